@@ -917,10 +917,11 @@ class BlockState:
 
 @final
 class BlockCovariances:
-    """Cofactors (a priori unit weight) of anything in an adjusted block, from one factor.
+    """Cofactors (a priori unit weight) of anything in an adjusted block or collection, from one factor.
 
-    What has cofactors is told by its kind and index: `photo` (position and angles), `step` (position and
-    rotation about the photo's axes), `point`, `camera`, `unknown`. Arguments as of :class:`BlockNetwork`.
+    What has cofactors is told by its kind and index: `photo` (its pose), `step` (position and rotation about
+    the photo's axes), `point`, `camera` (of a collection: that of the photo), `unknown`. Arguments as of
+    :class:`BlockNetwork`. Its methods raise BlockError or CollectionError.
     """
 
     def cofactors(

@@ -37,6 +37,7 @@ def test_the_example(run, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {"result.json", "o"}
     assert {path.name for path in Path("o").iterdir()} == {
         "points-transformed.csv",
+        "report.html",
         "report.txt",
         "residuals.png",
     }

@@ -109,3 +109,13 @@ def test_two_collections_without_a_common_point_have_none():
     result = adjust(both)
     with pytest.raises(RankError):
         result.covariances()
+
+
+def test_influences_on_chosen_unknowns_of_all_observations_make_up_their_cofactors(result):
+    """Q A^T A Q = Q: the squares of what one standard deviation in each observation does sum to q."""
+    reliability = result.reliability()
+    labels, effects = reliability.influence(("camera", 2))
+    assert [label[:2] for label in labels] == [("camera", "2")] * 3
+    by_sd = effects / (reliability.detectable / reliability.sd)
+    cofactors = np.diag(result.photo_cofactors[2])[6:]
+    np.testing.assert_allclose((by_sd**2).sum(axis=1), cofactors, rtol=1e-5)

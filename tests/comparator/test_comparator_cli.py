@@ -110,10 +110,15 @@ def test_without_matplotlib_there_are_no_pictures(run, tables, monkeypatch):
     real = importlib.util.find_spec
     without = lambda name, *rest: None if name == "matplotlib" else real(name, *rest)  # noqa: E731
     monkeypatch.setattr("photogram.cli.comparator.find_spec", without)
+    monkeypatch.setattr("photogram.cli.html.find_spec", without)
     result = run(*tables, "--out", "out")
     assert result.exit_code == 0
-    assert "pip install 'photogram[plots]'" in result.stderr
+    assert "pip install 'photogram[report]'" in result.stderr
     assert "report.html" not in names("out")
+    result = run(*tables, "--out", "out", "--pdf")
+    assert result.exit_code == 0
+    assert "pip install 'photogram[plots]'" in result.stderr
+    assert "report.pdf" not in names("out")
 
 
 def test_bad_input_writes_nothing(run, tables, tmp_path):

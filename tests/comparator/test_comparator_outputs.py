@@ -145,7 +145,7 @@ def test_feature_09_ellipses_of_operators_and_of_all_at_four_levels(full):
 
 def test_feature_18_pictures(full):
     pytest.importorskip("matplotlib")
-    from photogram.comparator.pictures import figures, html_report, pdf_report
+    from photogram.comparator.pictures import figures, pdf_report
 
     made = dict(figures(full))
     assert {
@@ -172,9 +172,10 @@ def test_feature_18_pictures(full):
     widths = np.array(ellipses.get_widths()) if hasattr(ellipses, "get_widths") else 2 * ellipses._widths
     expected = [readings.precision.ellipse.major_um for readings in full.cases[0].placed.readings]
     assert widths / widths[0] == pytest.approx(np.array(expected) / expected[0])
-    page = html_report(full).decode()
-    assert page.count("<img") == len(made)
-    assert "SYSTEMATIC COMPARATOR, LINEAR" in page
+    page = full.to_html().decode()
+    assert page.count("<figure") == len(made)
+    assert "Systematic comparator, linear" in page
+    assert "SYSTEMATIC COMPARATOR" not in page
     assert pdf_report(full).startswith(b"%PDF")
 
 

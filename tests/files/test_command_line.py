@@ -232,3 +232,28 @@ def test_every_exit_code_stands_in_the_table_of_the_docs():
     codes = {line.split("|")[1].strip() for line in table.splitlines() if line.startswith("| ")}
     assert {"0", "1", "2", "3", "129", "130", "143"} <= codes
     assert COMMANDS
+
+
+@pytest.mark.parametrize(
+    ("group", "others"),
+    [
+        ("giant", ["check"]),
+        ("comparator", ["correct"]),
+        ("absolute-orientation", ["transform"]),
+        ("stellar-camera", ["exposures"]),
+    ],
+)
+def test_the_help_of_a_group_names_its_other_commands(run, group, others):
+    shown = run(group, "--help").output
+    assert "Other commands:" in shown
+    assert all(f"photogram {group} {each}:" in shown for each in others)
+    assert "Other commands" not in run(group, others[0], "--help").output
+
+
+@pytest.mark.parametrize("command", ["giant", "adjust", "collection"])
+def test_an_example_names_its_report_last_and_no_path_of_the_package(run, command):
+    done = run(command, "--example", *(["--out", "out"] if command == "collection" else []))
+    assert done.exit_code == 0
+    assert done.stdout.splitlines()[-1].startswith("open in a browser: ")
+    assert done.stdout.splitlines()[-1].endswith("report.html")
+    assert str(Path(photogram.__file__).parent) not in done.output

@@ -230,6 +230,10 @@ def test_a_script_adjusts_to_what_its_program_reports(run, strasbourg, sxb, tmp_
     assert np.sqrt(found["variance_of_unit_weight"]) == pytest.approx(expected["sigma0"], abs=5e-5)
 
 
+def test_the_script_of_a_folder_is_read_and_not_its_tables_alone(sxb):
+    assert formats.read(sxb).title == "DBAT script"
+
+
 def test_a_script_says_what_is_unknown_and_held(roma, tmp_path):
     for source, target in (
         ("project.xml", "project.xml"),

@@ -10,6 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from . import programs, run
 from .case import Outcome
 from .page import lines, table, write_section
 from .run import fuzz, replay
@@ -36,9 +37,15 @@ def main() -> int:
         "--logs", type=Path, help="directory of logs: the same command goes on where it stopped"
     )
     parser.add_argument("--page", type=Path, help="page whose section on the fuzzer gets the figures")
+    parser.add_argument(
+        "--pages", type=float, default=0.0, help="part of them that have a report for the browser (0)"
+    )
     parser.add_argument("--replay", metavar="SEED:NUMBER", help="run one input again and say how it ends")
     parser.add_argument("--keep", type=Path, help="with --replay: directory for the files of the input")
     asked = parser.parse_args()
+    if asked.pages:
+        programs.PAGES = asked.pages
+        run.MEMORY *= 2  # matplotlib takes address space
     if asked.replay:
         outcome = replay(*map(int, asked.replay.split(":")), asked.keep)
         print(f"{outcome.format}: {outcome.ending}\n{outcome.fault or outcome.warned or ''}")

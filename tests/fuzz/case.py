@@ -161,7 +161,11 @@ class Fuzzer:
         }
         if written is None:
             # What a deck gave before the set that stopped it is kept.
-            kept = {"result.json", "out/listing.txt"} if (source / "grid.deck").exists() else set()
+            kept = (
+                {"result.json", "out/listing.txt", "out/report.html"}
+                if (source / "grid.deck").exists()
+                else set()
+            )
             return f"refused, but {sorted(left - kept)} was written" if left - kept else None
         if missing := set(written) - left:
             return f"{ending}, but {sorted(missing)} is missing"

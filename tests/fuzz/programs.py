@@ -30,6 +30,9 @@ from photogram.cli.options import OrderingName
 
 __all__ = ["PROGRAMS", "Watch"]
 
+PAGES = 0.0
+"""Part of the cases that have a report for the browser: it takes a hundred times as long as all else."""
+
 Run = Callable[[Path, Random, bool], list[str]]
 """Runs a command in a directory with the input; returns the names of the outputs that must be there."""
 
@@ -90,6 +93,11 @@ def _as_they_are() -> Iterator[None]:
     yield
 
 
+def _without_page(rng: Random) -> bool:
+    """Return whether no report for the browser is made."""
+    return rng.random() >= PAGES
+
+
 def _giant(place: Path, rng: Random, quiet: bool) -> list[str]:
     listing = place / "listing.txt" if rng.random() < 0.2 else None
     giant.giant(
@@ -100,6 +108,7 @@ def _giant(place: Path, rng: Random, quiet: bool) -> list[str]:
         as_published=rng.random() < 0.25,
         ordering=rng.choice(list(OrderingName)),
         threads=1,
+        no_html=_without_page(rng),
         quiet=quiet,
     )
     return ["out/report.txt", "result.json", *(["listing.txt"] if listing else [])]
@@ -120,6 +129,7 @@ def _collection(place: Path, rng: Random, quiet: bool) -> list[str]:
         max_iterations=60,
         covariance=rng.random() < 0.8,
         threads=1,
+        no_html=_without_page(rng),
         quiet=quiet,
     )
     # A damaged Bundle file may be taken for the other format.
@@ -137,6 +147,7 @@ def _orientation(place: Path, rng: Random, quiet: bool) -> list[str]:
         start=rng.choice((None, None, *absolute_orientation.Start)),
         unit_variance=rng.choice(list(absolute_orientation.UnitVariance)),
         zero_missing=rng.random() < 0.2,
+        no_html=_without_page(rng),
         quiet=quiet,
     )
     return ["result.json", "out/report.txt"]
@@ -161,6 +172,7 @@ def _perspective(place: Path, rng: Random, quiet: bool) -> list[str]:
         out=place / "out",
         as_published=rng.random() < 0.3,
         weights=rng.choice(list(perspective_center.Weights)),
+        no_html=_without_page(rng),
         quiet=quiet,
     )
     return ["result.json", "out/listing.txt"]
@@ -212,6 +224,7 @@ def _plate(name: str) -> Run:
             out=place / "out",
             json=place / "result.json",
             as_published=rng.random() < 0.3,
+            no_html=_without_page(rng),
             quiet=quiet,
         )
         return []
@@ -225,6 +238,7 @@ def _exposures(place: Path, rng: Random, quiet: bool) -> list[str]:
         out=place / "out",
         json=place / "result.json",
         threads=1,
+        no_html=_without_page(rng),
         quiet=quiet,
     )
     return ["out/report.txt", "out/camera.json", "result.json"]

@@ -17,7 +17,7 @@ from photogram.io.writing import write_whole
 PROJECTS = 840
 RUNS = 8
 ERROR_AT = re.compile(r"error: (?P<file>.+?)(, record (?P<record>\d+))?: ")
-WRITTEN = {"RESTART", "report.html", "report.txt"}
+WRITTEN = {"RESTART", "report.txt"}
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,8 @@ def test_damaged_projects_end_in_good_order(run, sound, tmp_path, monkeypatch):
         place = tmp_path / str(seed)
         (place / "in").mkdir(parents=True)
         write_whole({place / "in" / name: content for name, content in files.items() if content is not None})
-        options = ["--as-published"] if seed % 2 else []
+        # Pictures take longer than all else.
+        options = [*(["--as-published"] if seed % 2 else []), *(["--no-html"] if seed % 25 else [])]
         arguments = ["giant", str(place / "in"), "--out", str(place / "out"), "--threads", "1", *options]
         result = CliRunner().invoke(app, arguments)
         told = f"seed {seed}, {', '.join(kinds)}: {result.output}"
@@ -60,6 +61,8 @@ def test_damaged_projects_end_in_good_order(run, sound, tmp_path, monkeypatch):
 def outcome(result, place, told):
     """Check what a run left behind and said; return how it ended."""
     left = {path.name for path in (place / "out").iterdir()} if (place / "out").exists() else None
+    if left is not None:
+        left.discard("report.html")
     assert "Traceback" not in result.output, told
     assert {path.name for path in place.iterdir()} <= {"in", "out"}, told
     if "error: " not in result.stderr:

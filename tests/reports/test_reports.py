@@ -28,6 +28,10 @@ COMMANDS = {
         ["Verdict", "What was taken out", "Cameras", "Reproducibility"],
     ),
     "giant --example": ("galveston-adjusted", [*NETWORK, "Control points", "Observed photos", "Remarks"]),
+    "giant --example --components kind": (
+        "galveston-adjusted",
+        ["Variance components", "Plan of the network"],
+    ),
     "collection --example --out out": ("out", [*NETWORK, "Cameras"]),
     "plan --out out": (
         "out",
@@ -35,6 +39,26 @@ COMMANDS = {
     ),
     "check EXAMPLES/project --html report.html": (".", ["Verdict", "Plan of the network", "Reproducibility"]),
     "giant check EXAMPLES/galveston --html report.html": (".", ["Verdict", "Findings", "Key numbers"]),
+    "absolute-orientation --example --out out": (
+        "out",
+        ["Residuals in plan", "Parameters", "Control", "Tests", "Transformed points", "Iterations"],
+    ),
+    "comparator --example": (
+        "comparator-calibrated",
+        ["Where the errors come from", "Pictures", "Linear parameters", "Polynomials", "Cases", "Tests"],
+    ),
+    "stellar-camera --example": (
+        "plate-calibrated",
+        ["Stars and residuals", "How much, how good", "Parameters", "Worst observations", "Distortion"],
+    ),
+    "stellar-camera exposures --example": (
+        "night-calibrated",
+        ["Stars and residuals", "Camera", "Exposures", "Lens", "Worst observations", "Tests"],
+    ),
+    "perspective-center --example --out out": (
+        "out",
+        ["Residuals and distortion", "Perspective centre and attitude", "Points", "Iterations"],
+    ),
 }
 """Commands, where their report goes, and sections that it has."""
 

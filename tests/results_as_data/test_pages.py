@@ -41,8 +41,11 @@ def test_commands_write_results_as_data(run, command):
 
 
 def test_snooping_and_messages_come_along(run):
-    assert run("adjust", EXAMPLE, "--parquet", "data", "--quiet").exit_code == 0
-    assert run("adjust", EXAMPLE, "--parquet", "again", "--loss", "huber", "--quiet").exit_code == 0
+    assert run("adjust", EXAMPLE, "--out", "out", "--parquet", "data", "--quiet").exit_code == 0
+    assert (
+        run("adjust", EXAMPLE, "--out", "out", "--parquet", "again", "--loss", "huber", "--quiet").exit_code
+        == 0
+    )
     one, two = read_result("data"), read_result("again")
     assert two.loss is not None
     assert 0 < differences(one, two).values.size < 5
@@ -62,7 +65,10 @@ def test_a_folder_that_is_the_input_is_refused(run):
 
 
 def test_a_result_is_a_project_to_go_on_with(run):
-    assert run("adjust", EXAMPLE, "--parquet", "data", "--loss", "huber", "--quiet").exit_code == 0
+    assert (
+        run("adjust", EXAMPLE, "--out", "out", "--parquet", "data", "--loss", "huber", "--quiet").exit_code
+        == 0
+    )
     told = run("info", "data")
     assert told.exit_code == 0, told.output
     assert "result as data (Parquet)" in told.output

@@ -330,6 +330,7 @@ def test_command_line(tmp_path, monkeypatch):
     assert run.exit_code == 0, run.output
     written = {path.name for path in (tmp_path / "night-calibrated").iterdir()}
     assert written == {
+        "report.html",
         "report.txt",
         "camera.json",
         "camera.yaml",

@@ -205,6 +205,7 @@ def test_the_command_writes_tables_and_yaml(folder):
     )
     assert run.exit_code == 0, run.output
     assert {path.name for path in out.iterdir()} == {
+        "report.html",
         "report.txt",
         "camera.json",
         "camera.yaml",

@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use faer::{Mat, Side};
 use photocore::adjustment::{
     Datum, DatumError, Loss, Method, Model, Motions, NormalEquations, Options, Problem, Published, Status,
-    Stop, adjust, in_datum,
+    Stop, adjust,
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -173,21 +173,24 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
     // One point and the direction to another are held.
     let problem = network(vec![16, 17, 19]);
     let pool = pool();
-    let found = adjust(&problem, &options(), &pool, &mut go).unwrap();
+    let mut found = adjust(&problem, &options(), &pool, &mut go).unwrap();
     assert_eq!(found.status, Status::Converged);
+    let (redundancy, formed) = (found.redundancy.take().unwrap(), found.formations);
     let all = (0..problem.layout().unknowns()).map(|unknown| (unknown, 1.0)).collect();
     let datum = Datum { carriers: all, left: vec![], relative: false };
-    let free = in_datum(&problem, &options(), &found, &datum, &problem.initial, &pool, &mut go).unwrap();
+    found.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go).unwrap();
+    assert_eq!(found.formations, formed + 1);
+    let (free, cofactors) = (&found, found.cofactors.as_ref().unwrap());
     let a = design(&problem, &free.unknowns);
     let q = pseudo_inverse(&a);
     for kept in 0..12 {
-        assert!(kept_block(&problem, &free.cofactors.kept, kept, &q) < 1e-9);
+        assert!(kept_block(&problem, &cofactors.kept, kept, &q) < 1e-9);
     }
     for local in 0..8 {
         for k in 0..4 {
             let (i, j) = (2 * local + k / 2, 2 * local + k % 2);
             let scale = (q[(i, i)] * q[(j, j)]).sqrt();
-            assert!((free.cofactors.local[4 * local + k] - q[(i, j)]).abs() < 1e-9 * scale);
+            assert!((cofactors.local[4 * local + k] - q[(i, j)]).abs() < 1e-9 * scale);
         }
     }
     // The carriers move least: what they have moved has no part along the null vectors.
@@ -198,7 +201,6 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
         assert!((along / length).abs() < 1e-9);
     }
     // Distances do not know of a datum.
-    let redundancy = found.redundancy.unwrap();
     for (row, r) in redundancy.iter().enumerate() {
         let share: f64 = (0..a.ncols())
             .flat_map(|i| (0..a.ncols()).map(move |j| (i, j)))
@@ -206,8 +208,22 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
             .sum();
         assert!((1.0 - share - r).abs() < 1e-9);
     }
+    for (r, there) in redundancy.iter().zip(found.redundancy.as_ref().unwrap()) {
+        assert!((r - there).abs() < 1e-9);
+    }
     let sum: f64 = redundancy.iter().sum();
     assert!((sum - found.counts.degrees_of_freedom() as f64).abs() < 1e-8);
+    assert!(found.redundancy_excess.unwrap().abs() < 1e-8);
+
+    // Without cofactors it is moved all the same, and nothing is factored.
+    let bare = Options { covariance: false, ..options() };
+    let mut moved = adjust(&problem, &bare, &pool, &mut go).unwrap();
+    let formations = moved.formations;
+    moved.take_to(&problem, &bare, &datum, &problem.initial, &pool, &mut go).unwrap();
+    assert!(moved.cofactors.is_none() && moved.redundancy.is_none());
+    assert_eq!(moved.formations, formations);
+    let apart = moved.unknowns.iter().zip(&free.unknowns).map(|(x, other)| (x - other).abs());
+    assert!(apart.fold(0.0, f64::max) < 1e-9);
 }
 
 #[test]
@@ -215,33 +231,34 @@ fn a_datum_does_not_depend_on_where_the_network_comes_from() {
     let pool = pool();
     let in_datum_of = |held: Vec<usize>| {
         let problem = network(held);
-        let found = adjust(&problem, &options(), &pool, &mut go).unwrap();
+        let mut found = adjust(&problem, &options(), &pool, &mut go).unwrap();
         // Carried by three kept points only.
         let datum = Datum {
             carriers: (20..26).map(|unknown| (unknown, 1.0)).collect(),
             left: vec![],
             relative: false,
         };
-        in_datum(&problem, &options(), &found, &datum, &problem.initial, &pool, &mut go).unwrap()
+        found.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go).unwrap();
+        found.cofactors.unwrap()
     };
     let one = in_datum_of(vec![16, 17, 19]);
     let other = in_datum_of(vec![38, 39, 30]);
-    for (a, b) in one.cofactors.kept.iter().zip(&other.cofactors.kept) {
+    for (a, b) in one.kept.iter().zip(&other.kept) {
         assert!((a - b).abs() < 1e-7 * SD * SD, "{a} {b}");
     }
-    assert_eq!(one.cofactors.equations.len(), 32 + 36);
+    assert_eq!(one.equations.len(), 32 + 36);
 }
 
 #[test]
 fn too_few_carriers_are_refused() {
     let problem = network(vec![16, 17, 19]);
     let pool = pool();
-    let found = adjust(&problem, &options(), &pool, &mut go).unwrap();
+    let mut found = adjust(&problem, &options(), &pool, &mut go).unwrap();
     // One point carries shifts, but no rotation about itself; one coordinate of four points no shift along the other.
     for carriers in [vec![16, 17], vec![16, 18, 20, 22]] {
         let carriers = carriers.into_iter().map(|unknown| (unknown, 1.0)).collect();
         let datum = Datum { carriers, left: vec![], relative: false };
-        let refused = in_datum(&problem, &options(), &found, &datum, &problem.initial, &pool, &mut go);
+        let refused = found.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go);
         assert_eq!(refused.unwrap_err(), DatumError::NotCarried);
     }
 }
@@ -270,14 +287,14 @@ fn what_is_open_is_found_by_trying_and_held() {
         let (loose, _) = adjusted(&|problem| problem.sd[24] = 0.5, method);
         assert_eq!(loose.datum, [16, 17]);
         // Two give a datum.
-        let (placed, problem) = adjusted(&|problem| problem.sd[24..28].fill(0.5), method);
+        let (mut placed, problem) = adjusted(&|problem| problem.sd[24..28].fill(0.5), method);
         assert!(placed.datum.is_empty());
         let datum = Datum {
             carriers: (0..40).map(|unknown| (unknown, 1.0)).collect(),
             left: vec![],
             relative: false,
         };
-        let refused = in_datum(&problem, &options(), &placed, &datum, &problem.initial, &pool, &mut go);
+        let refused = placed.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go);
         assert_eq!(refused.unwrap_err(), DatumError::NotFree);
     }
 }

@@ -3,6 +3,7 @@
 from photogram.absolute_orientation import (  # noqa: F401  (the ways to show a result)
     document,
     findings,
+    html,
     plot,
     report,
     tables,

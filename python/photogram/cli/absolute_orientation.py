@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +13,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import output, print_sections
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
 from photogram.cli.options import (
     FormerPlot,
@@ -105,9 +107,13 @@ def absolute_orientation(
         ),
     ] = None,
     out: Annotated[
-        Path | None, Writes.DIRECTORY, out_option("Directory for report.txt. Default: no report.")
+        Path | None,
+        Writes.DIRECTORY,
+        out_option("Directory for report.html and report.txt. Default: no report."),
     ] = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
     listing: Annotated[
@@ -180,6 +186,7 @@ def absolute_orientation(
         from photogram.absolute_orientation.document import read_similarity
         from photogram.absolute_orientation.report import summary
         from photogram.messages import Message
+        from photogram.show.ways import page_of
 
         target = points_out
         if file is None:
@@ -192,7 +199,13 @@ def absolute_orientation(
             target = (out or points.parent) / f"{points.stem}-transformed.csv"
         reports = [path for path in (listing, out and out / "report.txt") if path]
         pictures = picture_places("residuals", plots, plot_format, out, plot)
-        job.writes(*reports, *pictures, *([target] if target and target is not points_out else []))
+        place = html_place(html, no_html, out)
+        job.writes(
+            *reports,
+            *pictures,
+            *([place] if place else []),
+            *([target] if target and target is not points_out else []),
+        )
         stations, former, messages = _read(file, format, zero_missing, ground_unit, model_unit)
         result = orient(
             stations,
@@ -208,6 +221,13 @@ def absolute_orientation(
             result.messages.append(Message("no points were transformed: the orientation is not to be used"))
             points = None
         made = _small_files(result, reports, pictures, trace, None if points else json)
+        made |= html_files(
+            job,
+            "absolute-orientation",
+            place,
+            html is not None,
+            lambda: replace(page_of(result), title=file.name),
+        )
         written = list(made)
         with job.outputs() as outputs:
             if points and target:

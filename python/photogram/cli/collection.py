@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.components import COMPONENTS, Components, cleaned, estimated, with_components, with_weights
+from photogram.cli.components import (
+    COMPONENTS,
+    Components,
+    cleaned,
+    estimated,
+    with_components,
+    with_components_page,
+    with_weights,
+)
 from photogram.cli.console import print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
@@ -37,6 +45,7 @@ from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
     from photogram.adjustment import robust
+    from photogram.show.page import Page
 
 __all__ = ["collection"]
 
@@ -183,13 +192,15 @@ def collection(
             written[out / COMPONENTS] = weights.report().encode()
         if report is not None:
             written[report] = told.report().encode()
-        written |= html_files(
-            job, "collection", place, html is not None, lambda: replace(page_of(told), title=problem.name)
-        )
+
+        def page() -> Page:
+            return with_components_page(replace(page_of(told), title=problem.name), estimates, made)
+
+        written |= html_files(job, "collection", place, html is not None, page)
         if json is not None:
             written[json] = told.to_json()
         sections = [
-            ("File", [f"{problem}: {found.title}"]),
+            ("File", [f"{job.shown(problem)}: {found.title}"]),
             *with_weights(log.sections() if log else [], made),
             *with_components(summary(result), estimates)[1 if log else 0 :],
         ]

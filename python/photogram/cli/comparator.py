@@ -7,6 +7,7 @@ import time
 from dataclasses import replace
 from datetime import UTC, datetime
 from enum import StrEnum
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,6 +16,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import errors, output, print_remark
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
 from photogram.cli.options import Quiet, default_out, out_option
 
@@ -81,10 +83,14 @@ def comparator(
             show_default=False,
         ),
     ] = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
     pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf instead of report.html.")] = False,
     plots: Annotated[
         bool,
-        typer.Option("--plots/--no-plots", help="Draw the pictures too, in a report (needs matplotlib)."),
+        typer.Option(
+            "--plots/--no-plots", help="Make the report, with its pictures (needs photogram[report])."
+        ),
     ] = True,
     pictures: Annotated[
         bool | None,
@@ -148,7 +154,9 @@ def comparator(
         folder = out or default_out((paths or [])[0], "-calibrated")
         job.reads(*(grid.source for one in sessions for grid in one.grids.values() if grid.source))
         drawn = plots if pictures is None else pictures
-        written = _results(calibrations, folder, _run_date(date), pdf=pdf, pictures=drawn, quiet=quiet)
+        written = _results(calibrations, folder, _run_date(date), pdf=pdf and drawn, quiet=quiet)
+        if html is not None or (drawn and not pdf):
+            written |= _pages(job, calibrations, folder, html, no_html)
         documents = {json: _documents(calibrations)} if json is not None else {}
         job.write(written, documents)
         _withheld(calibrations, folder)
@@ -208,14 +216,13 @@ def _results(
     run_date: str,
     *,
     pdf: bool,
-    pictures: bool,
     quiet: bool,
 ) -> dict[Path, bytes]:
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.comparator import listing
 
-    if pictures and find_spec("matplotlib") is None:
-        pictures = False
+    if pdf and find_spec("matplotlib") is None:
+        pdf = False
         if not quiet:
             print_remark("no pictures: pip install 'photogram[plots]'")
     written: dict[Path, bytes] = {}
@@ -224,11 +231,25 @@ def _results(
         written[place / "listing.txt"] = listing(calibration, run_date).encode()
         if calibration.usable:
             written |= _corrections(calibration, place)
-        if pictures:
-            from photogram.comparator.pictures import html_report, pdf_report
+        if pdf:
+            from photogram.comparator.pictures import pdf_report
 
-            name, make = ("report.pdf", pdf_report) if pdf else ("report.html", html_report)
-            written[place / name] = make(calibration, run_date)
+            written[place / "report.pdf"] = pdf_report(calibration, run_date)
+    return written
+
+
+def _pages(
+    job: Job, calibrations: list[Calibration], folder: Path, html: Path | None, no_html: bool
+) -> dict[Path, bytes]:
+    """Make the reports for the browser, one for each calibration."""
+    from photogram.show.ways import page_of
+
+    written: dict[Path, bytes] = {}
+    for number, calibration in enumerate(calibrations, 1):
+        place = html_place(html, no_html, _place(folder, number, len(calibrations)))
+        mark = f"-{number}" if html is not None and len(calibrations) > 1 else ""
+        make = partial(page_of, calibration)
+        written |= html_files(job, "comparator", place, html is not None, make, mark)
     return written
 
 

@@ -13,6 +13,7 @@ from photogram.cli.job import Job
 if TYPE_CHECKING:
     from photogram.adjustment.cleaning import Cleaned
     from photogram.results.components import VarianceComponents
+    from photogram.show.page import Page
     from photogram.show.sections import Section
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "cleaned",
     "estimated",
     "with_components",
+    "with_components_page",
     "with_weights",
 ]
 
@@ -78,6 +80,15 @@ def estimated(
                 status.update(f"variance components, adjustment {number + 1}")
 
         return variance_components(network, groups, threads=threads, progress=tell)
+
+
+def with_components_page(page: Page, found: VarianceComponents | None, made: Cleaned | None) -> Page:
+    """Return the report for the browser with what components say, if any were estimated."""
+    from photogram.results.page.weights import reweighed_page, weighed_page
+
+    if made is not None:
+        return reweighed_page(made.report().splitlines(), page)
+    return page if found is None else weighed_page(found, page)
 
 
 def cleaned(network: object, bases: list[Basis], threads: int | None, options: Mapping[str, Any]) -> Cleaned:

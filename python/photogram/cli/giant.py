@@ -16,6 +16,7 @@ from photogram.cli.components import (
     cleaned,
     estimated,
     with_components,
+    with_components_page,
     with_weights,
 )
 from photogram.cli.console import SHOWN, errors, print_sections
@@ -190,7 +191,8 @@ def giant(
         block = _refracted(
             project.to_block(allowed), project.common, air_refraction, water_refraction, water_index
         )
-        project = replace(project, messages=[*project.messages, *plane_remarks(block, directory)])
+        remarks = job.told([*project.messages, *plane_remarks(block, directory)])
+        project = replace(project, messages=remarks)
         if snoop and (as_published or project.common.intersection_only):
             refused = "not with --as-published or an intersection"
             raise typer.BadParameter(refused, param_hint="--snoop")
@@ -210,7 +212,13 @@ def giant(
         if weights is not None:
             written[out / COMPONENTS] = weights.report().encode()
         written |= pictures.of(result)
-        documents = html_files(job, "giant", place, html is not None, lambda: page_of(log or result))
+        documents = html_files(
+            job,
+            "giant",
+            place,
+            html is not None,
+            lambda: with_components_page(page_of(log or result), found, made),
+        )
         if json is not None:
             documents[json] = (log or result).to_json()
         if listing is not None:

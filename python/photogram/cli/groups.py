@@ -19,6 +19,17 @@ class GroupWithMain(TyperGroup):
         """Return the commands in the order in which they were added."""
         return list(self.commands)
 
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command; the help of the main one, which is that of the group, names the others."""
+        command = super().get_command(ctx, cmd_name)
+        if command is not None and cmd_name == self._main:
+            others = [self.commands[name] for name in self.list_commands(ctx) if name != self._main]
+            lines = [
+                f"{ctx.command_path} {each.name}: {each.get_short_help_str(limit=200)}" for each in others
+            ]
+            command.epilog = "\n\n".join(["Other commands:", *lines])
+        return command
+
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Put the main command before arguments that name no command.
 

@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import Enum
 from functools import wraps
@@ -21,7 +21,7 @@ import typer
 from typer.models import ArgumentInfo, OptionInfo
 
 from photogram.cli.console import errors, failures, print_remark, print_report, print_written
-from photogram.messages import printable
+from photogram.messages import Message, printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -94,6 +94,7 @@ class Job:
         self._outputs, self._directories = list(outputs), list(directories)
         self._failures = failures()
         self._resources = ExitStack()
+        self._examples: list[Path] = []
         self.quiet = quiet
 
     def __enter__(self) -> Job:
@@ -115,7 +116,20 @@ class Job:
 
     def packaged(self, *example: str) -> Path:
         """Return a packaged example, a file or a directory, for as long as the job lasts."""
-        return self._resources.enter_context(as_file(files("photogram").joinpath("examples", *example)))
+        found = self._resources.enter_context(as_file(files("photogram").joinpath("examples", *example)))
+        self._examples.append(found if found.is_dir() else found.parent)
+        return found
+
+    def shown(self, path: Path) -> Path:
+        """Return a path as people are told: one of a packaged example without where the package lies."""
+        for folder in self._examples:
+            if path == folder or folder in path.parents:
+                return path.relative_to(folder.parent)
+        return path
+
+    def told(self, messages: Iterable[Message]) -> list[Message]:
+        """Return messages with their paths as people are told; see :meth:`shown`."""
+        return [each if each.file is None else replace(each, file=self.shown(each.file)) for each in messages]
 
     def reads(self, *paths: Path) -> None:
         """Name further files, or directories of projects, that are read: no result goes over them.
@@ -185,7 +199,8 @@ class Job:
         """Return what the report says of the run of a command: options, inputs, times up to now."""
         from photogram.show.run import Run, input_files
 
-        inputs, others = input_files(self._inputs())
+        found, others = input_files(self._inputs())
+        inputs = [replace(each, path=self.shown(each.path)) for each in found]
         seconds = time.perf_counter() - self._clock
         return Run(f"photogram {command}", self._options, inputs, self._began, seconds, others)
 

@@ -10,6 +10,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import output, print_remark
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
 from photogram.cli.options import (
     FormerPlot,
@@ -54,9 +55,13 @@ def perspective_center(
     out: Annotated[
         Path | None,
         Writes.DIRECTORY,
-        out_option("Directory for listing.txt, what the 1969 program printed. Default: no files."),
+        out_option(
+            "Directory for report.html, and listing.txt, what the 1969 program printed. Default: no files."
+        ),
     ] = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
     listing: Annotated[
@@ -84,6 +89,7 @@ def perspective_center(
     """
     with job:
         from photogram.perspective_center import run_deck
+        from photogram.show.ways import page_of
         from photogram.statistics.verdict import worst
 
         if deck is None:
@@ -91,11 +97,13 @@ def perspective_center(
             job.reads(deck)
         listings = [path for path in (listing, out and out / "listing.txt") if path]
         pictures = picture_places("residuals", plots, plot_format, out, plot)
-        job.writes(*listings, *pictures)
+        place = html_place(html, no_html, out)
+        job.writes(*listings, *pictures, *([place] if place else []))
         run = run_deck(deck, as_published=as_published, weights=weights.value)
         stopped = run.stop is not None
         job.finish(
             _files(run, json, listings, pictures),
+            html_files(job, "perspective-center", place, html is not None, lambda: page_of(run)),
             summary=lambda: _summarize(run),
             code=0 if stopped else worst((each.verdict for each in run.results), strict=strict),
         )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from photogram.cli.console import print_sections
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import (
     JsonFile,
@@ -31,7 +33,7 @@ __all__ = ["exposures", "stellar_camera"]
 Out = Annotated[
     Path | None,
     Writes.DIRECTORY,
-    out_option("Directory for listing, camera and pictures. Default: INPUT-calibrated, here."),
+    out_option("Directory for report.html, listing, camera and pictures. Default: INPUT-calibrated, here."),
 ]
 
 
@@ -53,6 +55,8 @@ def stellar_camera(
     ] = False,
     out: Out = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
     as_published: Annotated[
         bool, typer.Option("--as-published", help="Iterate with the report's partials and stop rules.")
     ] = False,
@@ -66,6 +70,7 @@ def stellar_camera(
     `photogram stellar-camera exposures` does so by digital exposures of the sky.
     """
     with job:
+        from photogram.show.ways import page_of
         from photogram.statistics.verdict import worst
         from photogram.stellar import calibrate
         from photogram.stellar.document import to_json
@@ -76,6 +81,7 @@ def stellar_camera(
         job.reads(*inputs)
         pictures = plot_format.value if plots else ""
         target = out or Path(f"{deck.stem}-calibrated")
+        place = html_place(html, no_html, target)
         written: dict[Path, bytes] = {}
         documents: dict[Path, bytes] = {}
         results = []
@@ -86,6 +92,8 @@ def stellar_camera(
             results.append(result)
             mark = f"-{number}" if len(problems) > 1 else ""
             written |= _files(result, target, mark, pictures)
+            make = partial(page_of, result)
+            written |= html_files(job, "stellar-camera", place, html is not None, make, mark)
             if json is not None:
                 documents[json.with_stem(json.stem + mark)] = to_json(result)
         job.finish(
@@ -114,6 +122,8 @@ def exposures(
     ] = False,
     out: Out = None,
     json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
     threads: Threads = None,
@@ -122,6 +132,7 @@ def exposures(
 ) -> None:
     """Calibrate a digital camera, also one of the whole sky, by exposures of the stars (needs pyerfa)."""
     with job:
+        from photogram.show.ways import page_of
         from photogram.stellar.night import calibrate_night
         from photogram.stellar.night_document import to_json
         from photogram.stellar.night_file import inputs, read_night
@@ -132,7 +143,11 @@ def exposures(
         job.reads(*inputs(night))
         pictures = plot_format.value if plots else ""
         result = calibrate_night(read_night(night), threads)
-        written = _night_files(result, out or Path(f"{night.stem}-calibrated"), pictures)
+        target = out or Path(f"{night.stem}-calibrated")
+        place = html_place(html, no_html, target)
+        written = _night_files(result, target, pictures)
+        make = partial(page_of, result)
+        written |= html_files(job, "stellar-camera exposures", place, html is not None, make)
         documents = {json: to_json(result)} if json is not None else {}
         job.finish(
             written,

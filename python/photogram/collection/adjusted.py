@@ -108,6 +108,20 @@ class AdjustedCollection(AdjustedNetwork):
         residuals = self.collection.point_positions - self.point_positions
         return np.where(np.isfinite(self.point_given_sd), residuals, np.nan)
 
+    def covariances(self) -> Covariances:
+        """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`.
+
+        Kinds are `photo` (all parameters), `pose` and `camera` (its first six, the others) and `point`.
+        Photos and points are called by their numbers: `("photo", 3)`, `("point", [7, 8])`.
+        """
+        network = collection_network(self.collection, self.options)
+        return Covariances(
+            _selectable(self),
+            lambda: network.covariances(self.state, threads=0, progress=None),
+            lambda error: named(*error.args),
+            self.covariance_scale,
+        )
+
     def reliability(
         self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
     ) -> Reliability:
@@ -132,20 +146,6 @@ class AdjustedCollection(AdjustedNetwork):
         options = replace(self.options, covariance=True, loss=None)
         trial = collection_trial(self.collection, options, self.state)
         return reliability_of(trial, self.covariances, level=level, power=power, unit_weight=unit_weight)
-
-    def covariances(self) -> Covariances:
-        """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`.
-
-        Kinds are `photo` (all parameters), `pose` and `camera` (its first six, the others) and `point`.
-        Photos and points are called by their numbers: `("photo", 3)`, `("point", [7, 8])`.
-        """
-        network = collection_network(self.collection, self.options)
-        return Covariances(
-            _selectable(self),
-            lambda: network.covariances(self.state, threads=0, progress=None),
-            lambda error: named(*error.args),
-            self.covariance_scale,
-        )
 
     def adjusted(self) -> Collection:
         """Return the collection at its adjusted values; points that were left out stay as they were."""

@@ -8,10 +8,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.findings import names
+from photogram.collection.findings import names, tested_observations
 from photogram.collection.report import problems_of
 from photogram.results.page.frame import Frame
-from photogram.results.page.observed import Images, observed_table, worst_images
+from photogram.results.page.observed import Images, observed_table, worst_images, worst_of
 from photogram.results.page.parts import (
     images_facts,
     iterations_section,
@@ -38,6 +38,7 @@ from photogram.show.page import (
     Table,
     significant,
 )
+from photogram.statistics.findings import by_t
 
 __all__ = ["collection_page"]
 
@@ -48,7 +49,10 @@ def collection_page(result: AdjustedCollection) -> Page:
     given, (photos, points) = result.collection, names(result)
     images = Images(given.image_photos, photos, points, "px", 1.0, given.image_xy)
     pictures = drawings(result)
-    worst = worst_images(result)
+    omega, freedom = result.weighted_sum_of_squares, result.degrees_of_freedom
+    groups = [by_t(each, omega, freedom) for each in tested_observations(result)]
+    found = worst_of(groups)
+    worst = worst_images(found)
     sections = [
         Section("network", "Plan of the network", [pictures["network"]] if "network" in pictures else []),
         _size_section(result),
@@ -60,7 +64,7 @@ def collection_page(result: AdjustedCollection) -> Page:
             _REDUNDANCY,
         ),
         tests_section(result, pictures.get("tests")),
-        worst_section(result, images),
+        worst_section(result, images, groups, found),
         _weighted_section(result),
         _cameras_section(pictures),
         _photos_section(result, given.image_photos[worst].tolist()),

@@ -45,7 +45,7 @@ from photogram.comparator.variance import VarianceAnalysis, analyse_variance
 from photogram.errors import AdjustmentError
 from photogram.memory import require
 from photogram.messages import Message
-from photogram.show.ways import Judged
+from photogram.show.ways import Judged, html_of
 
 if TYPE_CHECKING:
     from photogram.comparator.readings import Session
@@ -168,6 +168,13 @@ class Calibration(Judged):
     screening: Screening
     far_pointings: tuple[FarPointing, ...]
     messages: list[Message]
+
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        return html_of(self)
 
     @property
     def usable(self) -> bool:

@@ -10,6 +10,7 @@ from photogram.messages import Message
 from photogram.perspective_center.deck import Deck
 from photogram.perspective_center.grid import Grid
 from photogram.perspective_center.solution import PerspectiveCenter, Weights, determine
+from photogram.show.ways import html_of
 
 __all__ = ["Run", "Stop", "run_deck"]
 
@@ -51,6 +52,13 @@ class Run:
     results: list[PerspectiveCenter] = field(default_factory=list)
     messages: list[Message] = field(default_factory=list)
     stop: Stop | None = None
+
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        return html_of(self)
 
     @property
     def converged(self) -> bool:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from photogram.results.components import VarianceComponents
 from photogram.results.result import Result
 from photogram.results.snooped import Snooped
 from photogram.show.page import Page
 from photogram.show.ways import page_of
 
-__all__ = ["block", "snooped"]
+__all__ = ["block", "components", "snooped"]
 
 
 @page_of.register(Result)
@@ -24,3 +25,11 @@ def snooped(found: Snooped) -> Page:
     from photogram.results.page.removed import snooped_page
 
     return snooped_page(found)
+
+
+@page_of.register(VarianceComponents)
+def components(found: VarianceComponents) -> Page:
+    """Return the page of the adjustment with the given weights, and what is wrong about these."""
+    from photogram.results.page.weights import weighed_page
+
+    return weighed_page(found, page_of(found.first))

@@ -319,28 +319,6 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         """(n, 3) standard deviations."""
         return standard_deviations(self.point_covariances)
 
-    @property
-    def plot(self) -> Plots:
-        """Pictures: `plot.network()`, `.residuals()`, `.redundancy()`, `.tests()` ... (docs/pictures.md)."""
-        from photogram.plots import Plots
-
-        return Plots(self)
-
-    def to_parquet(self, directory: str | PathLike[str]) -> None:
-        """Write the result as data: tables in Parquet, from which `photogram.read_result` makes it again.
-
-        `docs/results.md` lists files and columns. Either all files are there in the end or none has changed.
-
-        Raises
-        ------
-        ModuleNotFoundError
-            pyarrow is not installed.
-        OSError
-            A file cannot be written.
-        """
-        folder = Path(directory)
-        write_whole({folder / name: content for name, content in files_of(self).items()})
-
     @abstractmethod
     def covariances(self) -> Covariances:
         """Return an object that answers for covariances of anything with anything, from one factor.
@@ -371,6 +349,28 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
     ) -> Propagated:
         """Return a function of adjusted unknowns with its covariance; see `Covariances.propagate`."""
         return self.covariances().propagate(function, unknowns, bias=bias)
+
+    @property
+    def plot(self) -> Plots:
+        """Pictures: `plot.network()`, `.residuals()`, `.redundancy()`, `.tests()` ... (docs/pictures.md)."""
+        from photogram.plots import Plots
+
+        return Plots(self)
+
+    def to_parquet(self, directory: str | PathLike[str]) -> None:
+        """Write the result as data: tables in Parquet, from which `photogram.read_result` makes it again.
+
+        `docs/results.md` lists files and columns. Either all files are there in the end or none has changed.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            pyarrow is not installed.
+        OSError
+            A file cannot be written.
+        """
+        folder = Path(directory)
+        write_whole({folder / name: content for name, content in files_of(self).items()})
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""

@@ -245,8 +245,7 @@ class Reliability:
         InputError
             A selection that is not there.
         """
-        covariances = self._covariances()
-        labels, found = covariances.influences(self._trial.core, selection, None)
+        labels, found = self._covariances().influences(self._trial.core, selection, None)
         return labels, np.asarray(found * (self.detectable / self.sd))
 
     def influence_of(self, function: Callable[..., Any], unknowns: Selection) -> Floats:

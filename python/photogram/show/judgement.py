@@ -77,7 +77,7 @@ _NEXT = {
         " deviations, unless values were smoothed or used twice.",
     ),
     "accepted": (),
-    "not-tested": ("The tests of single observations and the check points have to do.",),
+    "not-tested": (),
 }
 """What follows from the condition that gave the headline, in the words of a program."""
 

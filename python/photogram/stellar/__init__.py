@@ -1,7 +1,7 @@
 """Stellar camera calibration (NOAA Technical Report NOS 55, 1972)."""
 
 from photogram.arguments.annotations import check_arguments
-from photogram.stellar import findings  # noqa: F401  (what a verdict rests on)
+from photogram.stellar import findings, html  # noqa: F401  (verdicts and pages)
 from photogram.stellar.adjustment import calibrate
 from photogram.stellar.cameras import BrownCamera, PlateCamera, SkyCamera
 from photogram.stellar.options import Options

@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import Message, listed
-from photogram.show.ways import Judged
+from photogram.show.ways import Judged, html_of
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.inertial import InertialAttitude, inertial_attitude
@@ -183,6 +183,13 @@ class CalibratedNight(Judged):
     scale_test: LensTest | None = None
     term_tests: tuple[LensTest, ...] = ()
     standstill: Standstill | None = None
+
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        return html_of(self)
 
     @property
     def converged(self) -> bool:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats
 from photogram.messages import Message
 from photogram.network.cameras import Camera
-from photogram.show.ways import Judged
+from photogram.show.ways import Judged, html_of
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.counts import Counts
 from photogram.stellar.moved import Movement
@@ -183,6 +183,13 @@ class Result(Judged):
     movement: tuple[Movement, ...] = ()
     combined: Result | None = None
     pairs: tuple[tuple[str, str], ...] = ()
+
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        return html_of(self)
 
     @property
     def converged(self) -> bool:

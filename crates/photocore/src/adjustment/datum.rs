@@ -13,19 +13,20 @@
 //! Q_ij - T_i W_j^T - W_i T_j^T + T_i (B^T W) T_j^T. Redundancy numbers and residuals are the same in every datum.
 
 use std::ops::ControlFlow;
+use std::time::Instant;
 
-use faer::{Mat, Side};
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use super::factored::{Factored, Inverted};
+use super::factored::Factored;
 use super::loss::Loss;
-use super::motions::Open;
-use super::options::Options;
 use super::problem::{Model, Motions, Problem};
-use super::result::{AdjustError, Adjustment};
+use super::result::{AdjustError, Seconds};
 use super::transformation::Transformation;
-use crate::normals::Cofactors;
+use crate::normals::{Cofactors, Inversion};
 
 /// A datum of a network whose observations leave one open.
 #[derive(Debug, Clone, Default)]
@@ -51,6 +52,8 @@ pub struct InDatum {
     pub prior_redundancy: Vec<f64>,
     /// About how large a part of a variance rounding may be: large numbers cancel where the old datum is far from the new one, or short.
     pub lost: f64,
+    /// What forming, factoring, solving and inverting have taken.
+    pub seconds: Seconds,
 }
 
 /// Why an adjusted network cannot be taken to a datum.
@@ -59,7 +62,7 @@ pub enum DatumError {
     /// Observations and weights leave nothing open: there is one datum only, that which they give.
     #[error("the network is not free: its observations and weights give its datum")]
     NotFree,
-    /// The adjustment ended without cofactors, or without a datum.
+    /// The adjustment ended where unknowns are not determined.
     #[error("the adjusted network has no cofactors")]
     NoCofactors,
     /// The carriers do not tell all motions apart: too few, on one line, in one place.
@@ -76,30 +79,6 @@ const SEPARABLE: f64 = 1e-10;
 const STALLS: usize = 3;
 /// Moves converge quadratically, near the end.
 const MOST_MOVES: usize = 100;
-
-/// Takes an adjusted network to another datum.
-///
-/// * `options`: those of the adjustment;
-/// * `adjustment`: with cofactors, in the datum of the unknowns it held;
-/// * `reference`: the values x_0 from which the carriers move least, usually the initial ones.
-///
-/// # Errors
-/// A network that is not free, carriers that do not carry all null vectors, an adjustment without cofactors; an interruption.
-pub fn in_datum<M: Model>(
-    problem: &Problem<M>,
-    options: &Options,
-    adjustment: &Adjustment,
-    datum: &Datum,
-    reference: &[f64],
-    pool: &ThreadPool,
-    between: &mut dyn FnMut(usize) -> ControlFlow<()>,
-) -> Result<InDatum, DatumError> {
-    if adjustment.cofactors.is_none() {
-        return Err(DatumError::NoCofactors);
-    }
-    let adjusted = Adjusted { unknowns: &adjustment.unknowns, held: &adjustment.datum, loss: options.loss };
-    Factored::in_datum(problem, adjusted, datum, reference, pool, between)?.into_datum(problem, pool, between)
-}
 
 /// Where an adjustment has ended.
 #[derive(Debug, Clone, Copy)]
@@ -125,97 +104,131 @@ impl Factored {
         pool: &ThreadPool,
         between: &mut dyn FnMut(usize) -> ControlFlow<()>,
     ) -> Result<Self, DatumError> {
-        let Adjusted { unknowns, held, loss } = adjusted;
-        let (unknowns, basis) = moved(problem, unknowns, datum, reference, pool)?;
-        let mut factored = Self::form(problem, loss, unknowns, held.to_vec(), pool, between)?;
-        // Held unknowns stand in the normal equations with unit weight: their columns of Q are zero.
-        let (count, d) = (factored.values.len(), basis.t.ncols());
-        let mut rights = vec![0.0; count * d];
+        let (unknowns, basis) = moved(problem, adjusted, datum, reference, pool)?;
+        let (mut factored, rights) = basis.form(problem, unknowns, adjusted, datum, pool, between)?;
+        let columns = factored.solve_further(problem, &rights, pool, between)?;
+        let (count, d) = (factored.values.len(), basis.d);
+        let row = |unknown: usize| (0..d).map(move |k| k * count + unknown);
+        let w = (0..count).flat_map(row).map(|at| columns[at]).collect();
+        factored.transformation = Some(basis.transformation(w, datum));
+        Ok(factored)
+    }
+}
+
+impl InDatum {
+    /// Moves an adjusted network to another datum, and computes all cofactors there.
+    ///
+    /// # Errors
+    /// Those of [`Factored::in_datum`].
+    pub fn new<M: Model>(
+        problem: &Problem<M>,
+        adjusted: Adjusted<'_>,
+        datum: &Datum,
+        reference: &[f64],
+        pool: &ThreadPool,
+        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Self, DatumError> {
+        let (unknowns, basis) = moved(problem, adjusted, datum, reference, pool)?;
+        let (factored, rights) = basis.form(problem, unknowns, adjusted, datum, pool, between)?;
+        let (start, mut seconds, unknowns) = (Instant::now(), factored.seconds, factored.values.clone());
+        let (found, prior_redundancy) = factored.invert(problem, &rights, pool, between)?;
+        drop(rights);
+        let Inversion { mut cofactors, further, inversion_share, .. } = found;
+        let transformation = basis.transformation(further, datum);
+        let lost = pool.install(|| transformation.apply(problem.layout(), &mut cofactors));
+        let took = start.elapsed().as_secs_f64();
+        (seconds.invert, seconds.cofactors) = (took * inversion_share, took * (1.0 - inversion_share));
+        Ok(Self { unknowns, cofactors, prior_redundancy, lost, seconds })
+    }
+}
+
+/// B in the rows of the carriers, and T = G (B^T G)^-1, in the columns for which B divided by the factors is orthonormal.
+pub(super) struct Basis {
+    b: Mat<f64>,
+    /// A row for each unknown, one after the other.
+    t: Vec<f64>,
+    /// How many columns there are.
+    d: usize,
+    /// Of B^T G, its columns scaled.
+    condition: f64,
+}
+
+impl Basis {
+    /// Forms and factors the normal equations at some values, on the way to Q B; also the right-hand sides B. Held unknowns stand in the
+    /// normal equations with unit weight: their columns of Q are zero.
+    fn form<M: Model>(
+        &self,
+        problem: &Problem<M>,
+        unknowns: Vec<f64>,
+        Adjusted { held, loss, .. }: Adjusted<'_>,
+        datum: &Datum,
+        pool: &ThreadPool,
+        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<(Factored, Vec<f64>), DatumError> {
+        let count = unknowns.len();
+        let mut rights = vec![0.0; count * self.d];
         let free = |unknown: usize| !held.contains(&unknown) && problem.sd[unknown] != 0.0;
         let carriers = datum.carriers.iter().enumerate();
         for (row, &(carrier, _)) in carriers.filter(|(_, carrier)| free(carrier.0)) {
-            (0..d).for_each(|k| rights[k * count + carrier] = basis.b[(row, k)]);
+            (0..self.d).for_each(|k| rights[k * count + carrier] = self.b[(row, k)]);
         }
-        let columns = factored.solve_for(problem, &rights, pool, between)?;
-        let w = Mat::from_fn(count, d, |i, k| columns[k * count + i]);
-        let of_carriers = Mat::from_fn(datum.carriers.len(), d, |row, k| w[(datum.carriers[row].0, k)]);
+        let formed = Factored::form_with(problem, loss, unknowns, held.to_vec(), &rights, pool, between)?;
+        Ok((formed, rights))
+    }
+
+    /// The transformation, with W = Q B.
+    fn transformation(self, w: Vec<f64>, datum: &Datum) -> Transformation {
+        let Self { b, t, d, condition } = self;
+        let of = |row: usize, k: usize| w[datum.carriers[row].0 * d + k];
+        let of_carriers = Mat::from_fn(datum.carriers.len(), d, of);
+        let common = product(b.transpose(), of_carriers.as_ref());
         let mut staying = vec![];
         if datum.carriers.len() == d {
             staying = datum.carriers.iter().map(|&(carrier, _)| carrier).collect();
             staying.sort_unstable();
         }
-        let common = basis.b.transpose() * of_carriers;
-        let Basis { t, condition, .. } = basis;
-        factored.transformation = Some(Transformation { t, w, common, condition, staying });
-        Ok(factored)
+        Transformation { t, w, common, condition, staying }
     }
-
-    /// The unknowns and their cofactors in its datum.
-    ///
-    /// # Errors
-    /// An interruption, no memory.
-    pub fn into_datum<M: Model>(
-        self,
-        problem: &Problem<M>,
-        pool: &ThreadPool,
-        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
-    ) -> Result<InDatum, DatumError> {
-        let unknowns = self.values.clone();
-        let Inverted { cofactors, prior_redundancy, lost } = self.inverted(problem, pool, between)?;
-        Ok(InDatum { unknowns, cofactors, prior_redundancy, lost: lost.unwrap_or(0.0) })
-    }
-}
-
-/// B in the rows of the carriers, and T = G (B^T G)^-1, in the columns for which B divided by the factors is orthonormal.
-struct Basis {
-    b: Mat<f64>,
-    t: Mat<f64>,
-    /// Of B^T G, its columns scaled.
-    condition: f64,
-}
-
-/// The basis, and how the carriers would come nearer to their references.
-struct Carried {
-    basis: Basis,
-    /// Of each open combination.
-    amounts: Vec<f64>,
-    /// By how much they would, in units of length, all taken together.
-    length: f64,
 }
 
 /// Moves a network as a whole to where its carriers are as near to their references as they come.
 ///
 /// Gauss and Newton's method for least squares of the distances, with exact motions.
-fn moved<M: Model>(
+pub(super) fn moved<M: Model>(
     problem: &Problem<M>,
-    adjusted: &[f64],
+    adjusted: Adjusted<'_>,
     datum: &Datum,
     reference: &[f64],
     pool: &ThreadPool,
 ) -> Result<(Vec<f64>, Basis), DatumError> {
-    let mut unknowns = adjusted.to_vec();
+    let mut unknowns = adjusted.unknowns.to_vec();
     let (mut before, mut stalls) = (f64::INFINITY, 0);
+    let square = |&(carrier, factor): &(usize, f64)| (factor * reference[carrier]).powi(2);
+    let rounding = f64::EPSILON * datum.carriers.iter().map(square).sum::<f64>().sqrt();
+    // What was found to leave all motions open leaves them open wherever it is moved to.
+    let mut all_open = datum.relative;
     for _ in 0..MOST_MOVES {
         let (motions, kept) = motions_of(problem, &unknowns, datum, pool).ok_or(DatumError::NotFree)?;
-        if motions.vectors.is_empty() {
+        let count = motions.vectors.len();
+        if count == 0 {
             return Err(DatumError::NotCarried);
         }
-        let open = if datum.relative {
-            Open::all(&motions)
-        } else {
-            problem.open(&unknowns, &motions, pool).ok_or(DatumError::NotFree)?
+        all_open |= adjusted.held.len() == kept.1;
+        let combinations = match all_open {
+            true => Mat::identity(count, count),
+            false => problem.open(&unknowns, &motions, pool).ok_or(DatumError::NotFree)?.combinations,
         };
         let apart = problem.model.step_between(&unknowns, reference);
-        let Carried { basis, amounts, length } =
-            carried(&open.vectors(&motions), datum, &apart).ok_or(DatumError::NotCarried)?;
-        stalls += usize::from(length >= 0.5 * before);
-        if length == 0.0 || stalls == STALLS {
+        let carried = Carried::new(&motions, combinations, datum, &apart).ok_or(DatumError::NotCarried)?;
+        stalls += usize::from(carried.length >= 0.5 * before);
+        if carried.length <= rounding || stalls == STALLS {
+            let basis = carried.basis(&motions, datum).ok_or(DatumError::NotCarried)?;
             return Ok((unknowns, basis));
         }
-        before = length;
+        before = carried.length;
         let mut along = vec![0.0; kept.1];
-        for (row, &motion) in kept.0.iter().enumerate() {
-            along[motion] = (0..amounts.len()).map(|k| open.combinations[(row, k)] * amounts[k]).sum();
+        for (&motion, amount) in kept.0.iter().zip(carried.along()) {
+            along[motion] = amount;
         }
         problem.model.move_along(&mut unknowns, &along);
     }
@@ -238,44 +251,89 @@ fn motions_of<M: Model>(
     Some((Motions { vectors, preferred }, (kept, all)))
 }
 
-/// The basis at some values for null vectors G, and by how much these still bring the carriers nearer to their references, which are the step
-/// `apart` away: with F G = Q R, F the factors, B^T G = R^T R, so that in the columns of G R^-1 it is I. None where the carriers do not carry all null vectors.
-fn carried(g: &Mat<f64>, datum: &Datum, apart: &[f64]) -> Option<Carried> {
-    let d = g.ncols();
-    let scaled_row = |row: usize, k: usize| datum.carriers[row].1 * g[(datum.carriers[row].0, k)];
-    let b = Mat::from_fn(datum.carriers.len(), d, scaled_row);
-    if b.nrows() < d {
-        return None;
-    }
-    let product = b.transpose() * &b;
-    let scale: Vec<f64> = (0..d).map(|k| product[(k, k)].sqrt().recip()).collect();
-    let scaled = Mat::from_fn(d, d, |i, k| product[(i, k)] * scale[i] * scale[k]);
-    let eigenvalues = scaled.self_adjoint_eigenvalues(Side::Lower).ok()?;
-    let (least, most) = (*eigenvalues.first()?, *eigenvalues.last()?);
-    if least.is_nan() || least <= SEPARABLE {
-        return None;
-    }
-    let decomposed = b.qr();
-    let (q, r) = (decomposed.compute_thin_Q(), decomposed.thin_R().to_owned());
-    // G R^-1, column by column from the left.
-    let mut t = g.clone();
-    for k in 0..d {
-        for i in 0..t.nrows() {
-            let before: f64 = (0..k).map(|m| t[(i, m)] * r[(m, k)]).sum();
-            t[(i, k)] = (t[(i, k)] - before) / r[(k, k)];
+/// How carriers would come nearer to their references.
+struct Carried {
+    /// Motions (rows) in each of the open ones (columns): G is that of the motions, times these.
+    combinations: Mat<f64>,
+    /// F G, the rows of the carriers, F being their factors.
+    rows: Mat<f64>,
+    /// The reciprocal lengths of its columns.
+    scale: Vec<f64>,
+    /// The Cholesky factor of its normal matrix, the columns being scaled.
+    factor: Mat<f64>,
+    condition: f64,
+    /// Of each open combination.
+    amounts: Mat<f64>,
+    /// By how much they would, in units of length, all taken together.
+    length: f64,
+}
+
+impl Carried {
+    /// The carriers are the step `apart` away from their references. None where they do not carry all open motions.
+    fn new(motions: &Motions, combinations: Mat<f64>, datum: &Datum, apart: &[f64]) -> Option<Self> {
+        let (d, carriers) = (combinations.ncols(), &datum.carriers);
+        if carriers.len() < d {
+            return None;
         }
+        let of = |row: usize, motion: usize| carriers[row].1 * motions.vectors[motion][carriers[row].0];
+        let rows = Mat::from_fn(carriers.len(), motions.vectors.len(), of);
+        let rows = product(rows.as_ref(), combinations.as_ref());
+        let normal = product(rows.transpose(), rows.as_ref());
+        let scale: Vec<f64> = (0..d).map(|k| normal[(k, k)].sqrt().recip()).collect();
+        let scaled = Mat::from_fn(d, d, |i, k| normal[(i, k)] * scale[i] * scale[k]);
+        let eigenvalues = scaled.self_adjoint_eigenvalues(Side::Lower).ok()?;
+        let (least, most) = (*eigenvalues.first()?, *eigenvalues.last()?);
+        if least.is_nan() || least <= SEPARABLE {
+            return None;
+        }
+        let factor = scaled.llt(Side::Lower).ok()?.L().to_owned();
+        let of = |&(carrier, factor): &(usize, f64)| factor * apart[carrier];
+        let distances = Mat::from_fn(carriers.len(), 1, |row, _| of(&carriers[row]));
+        let right = product(rows.transpose(), distances.as_ref());
+        let mut amounts = Mat::from_fn(d, 1, |k, _| scale[k] * right[(k, 0)]);
+        solve_lower_triangular_in_place(factor.as_ref(), amounts.as_mut(), Par::Seq);
+        let length = amounts.norm_l2();
+        solve_upper_triangular_in_place(factor.transpose(), amounts.as_mut(), Par::Seq);
+        (0..d).for_each(|k| amounts[(k, 0)] *= scale[k]);
+        Some(Self { combinations, rows, scale, factor, condition: most / least, amounts, length })
     }
-    let apart = |row: usize| {
-        let (carrier, factor) = datum.carriers[row];
-        factor * apart[carrier]
-    };
-    let mut amounts: Vec<f64> =
-        (0..d).map(|k| (0..q.nrows()).map(|row| q[(row, k)] * apart(row)).sum()).collect();
-    let length = amounts.iter().map(|amount| amount * amount).sum::<f64>().sqrt();
-    for k in (0..d).rev() {
-        let after: f64 = (k + 1..d).map(|m| r[(k, m)] * amounts[m]).sum();
-        amounts[k] = (amounts[k] - after) / r[(k, k)];
+
+    /// By how much to go along each motion.
+    fn along(&self) -> Vec<f64> {
+        let along = product(self.combinations.as_ref(), self.amounts.as_ref());
+        along.col(0).iter().copied().collect()
     }
-    let b = Mat::from_fn(q.nrows(), d, |row, k| datum.carriers[row].1 * q[(row, k)]);
-    Some(Carried { basis: Basis { b, t, condition: most / least }, amounts, length })
+
+    /// With F G C orthonormal, B^T G C = I for B = F F G C, and T = G C. C comes from two Cholesky factors, the second of what the first
+    /// has left.
+    fn basis(self, motions: &Motions, datum: &Datum) -> Option<Basis> {
+        let Self { combinations, rows, scale, factor, condition, .. } = self;
+        let d = scale.len();
+        let mut first = Mat::identity(d, d);
+        solve_upper_triangular_in_place(factor.transpose(), first.as_mut(), Par::Seq);
+        let first = Mat::from_fn(d, d, |i, k| scale[i] * first[(i, k)]);
+        let nearly = product(rows.as_ref(), first.as_ref());
+        let left = product(nearly.transpose(), nearly.as_ref()).llt(Side::Lower).ok()?.L().to_owned();
+        let mut second = Mat::identity(d, d);
+        solve_upper_triangular_in_place(left.transpose(), second.as_mut(), Par::Seq);
+        let orthonormal = product(nearly.as_ref(), second.as_ref());
+        let b = Mat::from_fn(rows.nrows(), d, |row, k| datum.carriers[row].1 * orthonormal[(row, k)]);
+        let by_motion = product(combinations.as_ref(), product(first.as_ref(), second.as_ref()).as_ref());
+        let count = motions.vectors.first().map_or(0, Vec::len);
+        let mut t = vec![0.0; count * d];
+        for (unknown, row) in t.chunks_exact_mut(d.max(1)).enumerate() {
+            for (motion, vector) in motions.vectors.iter().enumerate().filter(|(_, own)| own[unknown] != 0.0)
+            {
+                row.iter_mut().enumerate().for_each(|(k, t)| *t += vector[unknown] * by_motion[(motion, k)]);
+            }
+        }
+        Some(Basis { b, t, d, condition })
+    }
+}
+
+/// A product on one thread: the same bits for any number of threads.
+fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    let mut found = Mat::zeros(a.nrows(), b.ncols());
+    matmul(found.as_mut(), Accum::Replace, a, b, 1.0, Par::Seq);
+    found
 }

@@ -1,16 +1,17 @@
 //! The normal equations at adjusted values, factored once for any number of questions: covariances of anything with anything.
 
 use std::ops::ControlFlow;
+use std::time::Instant;
 
 use rayon::ThreadPool;
 use thiserror::Error;
 
 use super::loss::{Loss, Reweighting};
 use super::problem::{Linearized, Model, Problem};
-use super::result::{AdjustError, gib};
+use super::result::{AdjustError, Seconds, gib};
 use super::run::unless_stopped;
 use super::transformation::Transformation;
-use crate::normals::{Cofactors, Factor, Function, Inversion, Prior};
+use crate::normals::{Factor, Function, Inversion, Prior};
 
 /// The normal equations of a problem at adjusted values, factored, in the datum of the unknowns that are held or in any other.
 #[derive(Debug)]
@@ -21,6 +22,8 @@ pub struct Factored {
     prior: Prior,
     factor: Factor,
     pub(super) transformation: Option<Transformation>,
+    /// What forming and factoring have taken.
+    pub(super) seconds: Seconds,
 }
 
 /// Why there are no cofactors of what was asked for.
@@ -39,14 +42,6 @@ pub enum CofactorError {
     Adjust(#[from] AdjustError),
 }
 
-/// Cofactors of all unknowns and equations, and the redundancy numbers of the unknowns as observations of themselves.
-pub(super) struct Inverted {
-    pub cofactors: Cofactors,
-    pub prior_redundancy: Vec<f64>,
-    /// See [`Transformation::apply`].
-    pub lost: Option<f64>,
-}
-
 impl Factored {
     /// Forms and factors the normal equations at adjusted values, some unknowns held there; weights are those that the loss has left.
     ///
@@ -60,10 +55,24 @@ impl Factored {
         pool: &ThreadPool,
         between: &mut dyn FnMut(usize) -> ControlFlow<()>,
     ) -> Result<Self, AdjustError> {
+        Self::form_with(problem, loss, values, held, &[], pool, between)
+    }
+
+    /// The same with right-hand sides over all unknowns that are to be solved for, one after the other.
+    pub(super) fn form_with<M: Model>(
+        problem: &Problem<M>,
+        loss: Option<Loss>,
+        values: Vec<f64>,
+        held: Vec<usize>,
+        rights: &[f64],
+        pool: &ThreadPool,
+        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Self, AdjustError> {
+        let start = Instant::now();
         let prior = problem.prior_equations(&values, &held);
         let factor = {
             let equations = linearized(problem, loss, &values, &held, pool);
-            unless_stopped(problem.system.factor(pool, &equations, &prior, 0.0, between))?
+            unless_stopped(problem.system.factor_with(pool, &equations, &prior, rights, between))?
         };
         if !factor.deficient_locals.is_empty() {
             return Err(AdjustError::UndeterminedLocals(factor.deficient_locals.clone()));
@@ -71,7 +80,10 @@ impl Factored {
         if let Some(deficiency) = factor.deficiency() {
             return Err(AdjustError::Undetermined(deficiency.blocks()));
         }
-        Ok(Self { values, held, loss, prior, factor, transformation: None })
+        let took = start.elapsed().as_secs_f64();
+        let (form, factored) = (took * factor.formation_share, took * (1.0 - factor.formation_share));
+        let seconds = Seconds { form, factor: factored, ..Seconds::default() };
+        Ok(Self { values, held, loss, prior, factor, transformation: None, seconds })
     }
 
     /// The values that the equations are of.
@@ -136,19 +148,34 @@ impl Factored {
         unless_stopped(system.solve_for(pool, &self.factor, &equations, &self.prior, 0.0, rights, between))
     }
 
-    /// The selected inverse, in its datum.
-    pub(super) fn inverted<M: Model>(
-        self,
+    /// Solves for the right-hand sides that it was formed with: the solutions, one after the other.
+    pub(super) fn solve_further<M: Model>(
+        &self,
         problem: &Problem<M>,
+        rights: &[f64],
         pool: &ThreadPool,
         between: &mut dyn FnMut(usize) -> ControlFlow<()>,
-    ) -> Result<Inverted, AdjustError> {
+    ) -> Result<Vec<f64>, AdjustError> {
         let equations = linearized(problem, self.loss, &self.values, &self.held, pool);
-        let found = problem.system.invert(pool, self.factor, &equations, &self.prior, between);
-        let Inversion { mut cofactors, .. } = unless_stopped(found)?;
-        let prior_redundancy = problem.finish_cofactors(&mut cofactors, &self.held, &self.values);
-        let lost = self.transformation.map(|to| to.apply(problem.layout(), &mut cofactors));
-        Ok(Inverted { cofactors, prior_redundancy, lost })
+        let system = &problem.system;
+        unless_stopped(system.solve_further(pool, &self.factor, &equations, &self.prior, rights, between))
+    }
+
+    /// The selected inverse in the datum of what is held, the redundancy numbers of the unknowns as observations of themselves, and the
+    /// solutions for the right-hand sides that it was formed with.
+    pub(super) fn invert<M: Model>(
+        self,
+        problem: &Problem<M>,
+        rights: &[f64],
+        pool: &ThreadPool,
+        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<(Inversion, Vec<f64>), AdjustError> {
+        let equations = linearized(problem, self.loss, &self.values, &self.held, pool);
+        let system = &problem.system;
+        let found = system.invert_with(pool, self.factor, &equations, &self.prior, rights, between);
+        let mut found = unless_stopped(found)?;
+        let redundancy = problem.finish_cofactors(&mut found.cofactors, &self.held, &self.values);
+        Ok((found, redundancy))
     }
 }
 

@@ -79,7 +79,7 @@ mod tried;
 mod trust_region;
 mod walk;
 
-pub use datum::{Adjusted, Datum, DatumError, InDatum, in_datum};
+pub use datum::{Adjusted, Datum, DatumError, InDatum};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, student,
     student_limit,

@@ -20,22 +20,6 @@ pub(super) struct Open {
     pub hold: Vec<usize>,
 }
 
-impl Open {
-    /// All motions, each by itself.
-    pub fn all(motions: &Motions) -> Self {
-        let count = motions.vectors.len();
-        Self { combinations: Mat::identity(count, count), hold: vec![] }
-    }
-
-    /// The null vectors, in columns: how each combination moves the unknowns.
-    pub fn vectors(&self, motions: &Motions) -> Mat<f64> {
-        let unknowns = motions.vectors.first().map_or(0, Vec::len);
-        Mat::from_fn(unknowns, self.combinations.ncols(), |unknown, k| {
-            along(motions, &self.combinations, unknown, k)
-        })
-    }
-}
-
 /// What a combination may change of the observations, as the square of a share of what its parts change, and be rounding: the eigenvalues
 /// of a matrix of ones are good to 1e-15. Positions of photos that are observed to a hundred metres change 1e4 times as much.
 const NULL: f64 = 1e-14;

@@ -21,6 +21,16 @@ pub struct Seconds {
     pub cofactors: f64,
 }
 
+impl Seconds {
+    pub(super) fn add(&mut self, other: &Self) {
+        self.form += other.form;
+        self.factor += other.factor;
+        self.solve += other.solve;
+        self.invert += other.invert;
+        self.cofactors += other.cofactors;
+    }
+}
+
 /// The adjusted unknowns and how good they are.
 #[derive(Debug)]
 pub struct Adjustment {
@@ -93,10 +103,7 @@ impl Adjustment {
         self.history.splice(0..1, before.history);
         self.initial_sum_of_squares = before.initial_sum_of_squares;
         self.formations += before.formations;
-        let (own, earlier) = (&mut self.seconds, before.seconds);
-        own.form += earlier.form;
-        own.factor += earlier.factor;
-        own.solve += earlier.solve;
+        self.seconds.add(&before.seconds);
     }
 
     /// Residuals and test values of a group of observations with the given standard deviations a priori.

@@ -3,20 +3,36 @@
 use std::ops::Range;
 
 use faer::Mat;
+use rayon::prelude::*;
+use smallvec::{SmallVec, smallvec};
 
 use crate::normals::{Cofactors, Function, Layout};
+
+/// Unknowns whose cofactors are taken over one after the other.
+const AT_ONCE: usize = 256;
+
+/// Numbers of one unknown, or of one function, for the conditions of a datum: seven, but for networks in several parts.
+type Along = SmallVec<[f64; 8]>;
 
 /// T = G (B^T G)^-1, W = Q B and B^T W: with them any block of Q goes over to the other datum,
 /// Q_ij - T_i W_j^T - W_i T_j^T + T_i (B^T W) T_j^T.
 #[derive(Debug, Clone)]
 pub(super) struct Transformation {
-    pub t: Mat<f64>,
-    pub w: Mat<f64>,
+    /// A row for each unknown, one after the other; so has W.
+    pub t: Vec<f64>,
+    pub w: Vec<f64>,
     pub common: Mat<f64>,
     /// Of B^T G, scaled.
     pub condition: f64,
     /// The carriers, ascending, where there are no more than conditions: they do not move in the new datum.
     pub staying: Vec<usize>,
+}
+
+/// Cofactors of one block, and of which unknowns they are.
+struct Block<'a> {
+    rows: Range<usize>,
+    columns: Range<usize>,
+    values: &'a mut [f64],
 }
 
 impl Transformation {
@@ -28,57 +44,76 @@ impl Transformation {
     /// Takes cofactors over. Returns an estimate of the relative error that rounding leaves in the variances: where the old datum is far
     /// from the new one, or short, large numbers cancel.
     pub fn apply(&self, layout: &Layout, cofactors: &mut Cofactors) -> f64 {
-        let (l, mut cancelled) = (layout.local_dim(), 1.0);
-        for (local, block) in cofactors.local.chunks_exact_mut(l * l).enumerate() {
-            self.block(layout.local_range(local), layout.local_range(local), block, &mut cancelled);
-        }
+        let l = layout.local_dim();
+        let of_locals = |(chunk, values): (usize, &mut [f64])| {
+            let blocks = values.chunks_exact_mut(l * l).enumerate().map(|(k, values)| {
+                let range = layout.local_range(chunk * AT_ONCE + k);
+                Block { rows: range.clone(), columns: range, values }
+            });
+            self.blocks(blocks)
+        };
+        let chunks = cofactors.local.par_chunks_mut((AT_ONCE * l * l).max(1)).enumerate();
+        let mut cancelled = chunks.map(of_locals).reduce(|| 1.0, f64::max);
+        let mut others = Vec::new();
         for &pair in layout.pairs() {
             let [rows, columns] = pair.map(|block| layout.kept_range(block as usize));
             if let Some(range) = layout.pair(pair) {
-                self.block(rows, columns, &mut cofactors.pairs[range], &mut cancelled);
+                let values = &mut cofactors.pairs[range];
+                cancelled = cancelled.max(self.blocks(std::iter::once(Block { rows, columns, values })));
             }
         }
         let border = layout.border_range();
         let (mut own, mut tied) = (&mut cofactors.kept[..], &mut cofactors.kept_border[..]);
         for kept in 0..layout.kept() {
-            let range = layout.kept_range(kept);
-            let (block, rest) = std::mem::take(&mut own).split_at_mut(range.len().pow(2));
-            self.block(range.clone(), range.clone(), block, &mut cancelled);
+            let rows = layout.kept_range(kept);
+            let (values, rest) = std::mem::take(&mut own).split_at_mut(rows.len().pow(2));
             own = rest;
             if !border.is_empty() {
-                let (block, rest) = std::mem::take(&mut tied).split_at_mut(range.len() * border.len());
-                self.block(range, border.clone(), block, &mut cancelled);
+                let (values, rest) = std::mem::take(&mut tied).split_at_mut(rows.len() * border.len());
+                others.push(Block { rows: rows.clone(), columns: border.clone(), values });
                 tied = rest;
             }
+            others.push(Block { rows: rows.clone(), columns: rows, values });
         }
         if !border.is_empty() {
-            self.block(border.clone(), border, &mut cofactors.border, &mut cancelled);
+            others.push(Block { rows: border.clone(), columns: border, values: &mut cofactors.border });
         }
-        f64::EPSILON * self.condition * cancelled
+        let of_others = others.par_chunks_mut(AT_ONCE).map(|blocks| {
+            self.blocks(blocks.iter_mut().map(|Block { rows, columns, values }| Block {
+                rows: rows.clone(),
+                columns: columns.clone(),
+                values,
+            }))
+        });
+        f64::EPSILON * self.condition * of_others.reduce(|| cancelled, f64::max)
     }
 
-    /// Transforms one block of Q, row by row; notes how many times larger than a variance what has made it is.
-    fn block(&self, rows: Range<usize>, columns: Range<usize>, block: &mut [f64], cancelled: &mut f64) {
-        let (width, d) = (columns.len(), self.common.nrows());
-        for (i, row) in rows.enumerate() {
-            let left = self.left(self.of(&self.t, &[(row, 1.0)]), &self.of(&self.w, &[(row, 1.0)]));
-            for (j, column) in columns.clone().enumerate() {
-                let value = &mut block[i * width + j];
-                let product = |k: usize| left.by_t[k] * self.t[(column, k)] - left.t[k] * self.w[(column, k)];
-                let (before, change) = (*value, (0..d).map(product).sum::<f64>());
-                *value += change;
-                if self.stays(row) || self.stays(column) {
-                    *value = 0.0;
-                } else if row == column && *value > 0.0 {
-                    *cancelled = cancelled.max(before.max(change.abs()) / *value);
+    /// Transforms blocks of Q, row by row. Returns how many times larger than a variance what has made it is, at the most.
+    fn blocks<'a>(&self, blocks: impl Iterator<Item = Block<'a>>) -> f64 {
+        let mut cancelled = 1.0;
+        for Block { rows, columns, values } in blocks {
+            let width = columns.len();
+            for (i, row) in rows.enumerate() {
+                let left = self.left(self.row(&self.t, row).into(), self.row(&self.w, row));
+                for (j, column) in columns.clone().enumerate() {
+                    let value = &mut values[i * width + j];
+                    let change = left.times(self.row(&self.t, column), self.row(&self.w, column));
+                    let before = *value;
+                    *value += change;
+                    if self.stays(row) || self.stays(column) {
+                        *value = 0.0;
+                    } else if row == column && *value > 0.0 {
+                        cancelled = f64::max(cancelled, before.max(change.abs()) / *value);
+                    }
                 }
             }
         }
+        cancelled
     }
 
     /// Takes over cofactors of functions, those of every two of `rows` or of `rows` with `columns`.
     pub fn apply_to_functions(&self, rows: &[Function], columns: Option<&[Function]>, matrix: &mut [f64]) {
-        let along = |functions: &[Function]| -> Vec<[Vec<f64>; 2]> {
+        let along = |functions: &[Function]| -> Vec<[Along; 2]> {
             let of = |function: &Function| {
                 let moving: Function =
                     function.iter().filter(|&&(unknown, _)| !self.stays(unknown)).copied().collect();
@@ -95,23 +130,34 @@ impl Transformation {
         }
     }
 
-    /// The products of a function with the columns of a matrix over all unknowns.
-    fn of(&self, matrix: &Mat<f64>, function: &[(usize, f64)]) -> Vec<f64> {
-        let along = |k: usize| function.iter().map(|&(unknown, value)| value * matrix[(unknown, k)]).sum();
-        (0..matrix.ncols()).map(along).collect()
+    /// The numbers of an unknown in a matrix over all unknowns.
+    fn row<'a>(&self, matrix: &'a [f64], unknown: usize) -> &'a [f64] {
+        let d = self.common.nrows();
+        &matrix[unknown * d..][..d]
     }
 
-    fn left(&self, t: Vec<f64>, w: &[f64]) -> Left {
-        let d = t.len();
-        let by_t = |k: usize| (0..d).map(|m| t[m] * self.common[(m, k)]).sum::<f64>() - w[k];
-        Left { by_t: (0..d).map(by_t).collect(), t }
+    /// The products of a function with the columns of such a matrix.
+    fn of(&self, matrix: &[f64], function: &[(usize, f64)]) -> Along {
+        let mut along: Along = smallvec![0.0; self.common.nrows()];
+        for &(unknown, value) in function {
+            along.iter_mut().zip(self.row(matrix, unknown)).for_each(|(sum, of)| *sum += value * of);
+        }
+        along
+    }
+
+    fn left(&self, t: Along, w: &[f64]) -> Left {
+        let by_t = w
+            .iter()
+            .enumerate()
+            .map(|(k, w)| t.iter().enumerate().map(|(m, t)| t * self.common[(m, k)]).sum::<f64>() - w);
+        Left { by_t: by_t.collect(), t }
     }
 }
 
 /// What is added to Q_ij, of i.
 struct Left {
-    by_t: Vec<f64>,
-    t: Vec<f64>,
+    by_t: Along,
+    t: Along,
 }
 
 impl Left {

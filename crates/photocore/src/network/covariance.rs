@@ -8,7 +8,7 @@ use rayon::ThreadPool;
 use super::model::Owner;
 use super::problem::Assembled;
 use super::{InnerConstraints, Network, NetworkError, Options, Solution};
-use crate::adjustment::{Adjusted, Classes, CofactorError, Datum, Event, Factored, Phase};
+use crate::adjustment::{Adjusted, Classes, CofactorError, Datum, Event, Factored, InDatum, Phase};
 use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::normals::{Function, Ordering};
 
@@ -169,11 +169,7 @@ impl Network {
         let (problem, adjusted) = (&assembled.problem, state.adjusted(options));
         let found = {
             let mut between = forming(watch, &assembled);
-            Factored::in_datum(problem, adjusted, &carried, reference, pool, &mut between)?.into_datum(
-                problem,
-                pool,
-                &mut between,
-            )?
+            InDatum::new(problem, adjusted, &carried, reference, pool, &mut between)?
         };
         let lost = found.lost;
         let adjustment = found.into_adjustment(problem, state.held.clone(), adjusted.loss, pool);

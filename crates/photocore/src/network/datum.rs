@@ -86,8 +86,13 @@ impl Joined {
 }
 
 impl Bundle {
-    /// The parts of the network. A frame has the images of all photos on it.
-    pub(super) fn parts(&self) -> Parts {
+    /// The parts of the network, found when they are first asked for.
+    pub(super) fn parts(&self) -> &Parts {
+        self.parts.get_or_init(|| self.find_parts())
+    }
+
+    /// A frame has the images of all photos on it.
+    fn find_parts(&self) -> Parts {
         let (photos, points) = (self.images_on.len(), self.points.len());
         let of_point = |point: usize| photos + point;
         let of_common = |common: usize| photos + points + common;
@@ -175,7 +180,7 @@ impl Bundle {
             let scale = if k == SCALE { 2.0 } else { 1.0 };
             let displacement = |place: &Vector3| displacement(k, &(place - origins[part]));
             let motion = Motion { displacement: &displacement, turn, scale };
-            self.move_commons_of(&parts, part, vector, |vector| {
+            self.move_commons_of(parts, part, vector, |vector| {
                 self.move_commons(&placed, &motion, |common, state| common.change(state, &motion), vector);
             });
         }
@@ -216,7 +221,7 @@ impl Bundle {
     pub(super) fn move_rigidly(&self, unknowns: &mut [f64], amounts: &[f64]) {
         let (parts, placed) = (self.parts(), self.placed(&unknowns[self.of_stations()]));
         for (part, amounts) in amounts.chunks_exact(MOTIONS).take(parts.all.len()).enumerate() {
-            self.move_part(&parts, &placed, part, unknowns, amounts);
+            self.move_part(parts, &placed, part, unknowns, amounts);
         }
     }
 

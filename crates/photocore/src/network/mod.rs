@@ -351,6 +351,8 @@ impl Network {
             let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
             let mut own = options.adjustment;
             own.max_iterations = own.max_iterations.saturating_sub(done);
+            // Cofactors are those of the datum that is asked for.
+            own.covariance &= datum.is_none();
             let adjusted = adjustment::adjust(problem, &own, pool, watch);
             if let Ok(Adjustment { undetermined: Some(error), .. }) | Err(error) = &adjusted {
                 let (points, photos) = (assembled.few_points(error), assembled.few_photos(error));
@@ -438,10 +440,7 @@ impl Network {
         let total = assembled.points.len();
         let mut between = |done| watch(Event::Progress { phase: adjustment::Phase::Invert, done, total });
         let problem = &assembled.problem;
-        let found = adjustment::in_datum(problem, options, adjusted, &datum, &reference, pool, &mut between)?;
-        adjusted.unknowns = found.unknowns;
-        adjusted.cofactors = Some(found.cofactors);
-        Ok(found.lost)
+        Ok(adjusted.take_to(problem, options, &datum, &reference, pool, &mut between)?)
     }
 
     /// Refuses a network that contradicts itself.

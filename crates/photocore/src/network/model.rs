@@ -1,12 +1,14 @@
 //! The observation equations of a network.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use nalgebra::Matrix2x6;
 use rayon::prelude::*;
 
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
+use super::datum::Parts;
 use super::mounts::{Mount, Mounted, mounted};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::{Image, Minimum, Point};
@@ -73,6 +75,8 @@ pub struct Bundle {
     pub anchor: Option<usize>,
     /// What the user wants to be held where nothing else gives a datum.
     pub minimum: Option<Minimum>,
+    /// What hangs together, once it was asked for: it depends on all above.
+    pub parts: OnceLock<Parts>,
 }
 
 /// Photos and points at given values of the unknowns.

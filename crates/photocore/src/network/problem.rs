@@ -2,6 +2,7 @@
 //! that several photos share and common unknowns blocks of their own; points that observations touch are kept blocks of three.
 
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 use super::camera_priors::CameraPrior;
 use super::commons::PlacedCommon;
@@ -346,6 +347,7 @@ impl Network {
             placed,
             anchor,
             minimum: None,
+            parts: OnceLock::new(),
         };
         let prior = |(index, camera)| CameraPrior::of(camera, self.first_parameter(&bundle, index)?);
         bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 
 use super::equations::{Equations, Prior};
+use super::further::{Known, Side};
 use super::incidence::Stacks;
 use super::layout::Layout;
 use super::selected::SelectedInverse;
@@ -143,6 +144,8 @@ pub(super) struct AtHome {
     shares: Vec<f64>,
     by_local: Vec<f64>,
     alone: Vec<f64>,
+    /// Solutions for further right-hand sides, stack by stack.
+    pub further: Vec<Side>,
     /// Time that it took.
     pub seconds: f64,
 }
@@ -157,6 +160,7 @@ impl AtHome {
         index: usize,
         equations: &E,
         prior: &Prior,
+        known: &Known<'_>,
         control: &Control,
         front: &[f64],
         height: usize,
@@ -173,6 +177,7 @@ impl AtHome {
                 stack.eliminate(layout, prior, 0.0);
                 others.gather(stack, front, height);
                 others.cofactors(stack, layout, &mut part);
+                known.solve(system, stack, &mut part.further);
                 control.count(run.len());
             }
             part
@@ -187,6 +192,7 @@ impl AtHome {
                 all.shares.extend(part.shares);
                 all.by_local.extend(part.by_local);
                 all.alone.extend(part.alone);
+                all.further.extend(part.further);
                 all
             })
         };

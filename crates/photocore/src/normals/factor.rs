@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::dense::{Pivots, factor_front};
 use super::equations::{Equations, Prior};
 use super::front::Front;
+use super::further::{Reduced, of_others, reduce};
 use super::layout::Layout;
 use super::panels::{Handover, Panels, lock};
 use super::stack::Stack;
@@ -26,6 +27,8 @@ pub struct Factor {
     pub(super) panels: Panels,
     /// L^-1 n, in the order of elimination.
     pub(super) right: Vec<f64>,
+    /// Right-hand sides that it was formed with, the local blocks reduced out, in the order of elimination, one after the other.
+    pub(super) further: Vec<f64>,
     /// Diagonal of the normal equations before any elimination, in the order of elimination.
     pub(super) diagonal: Vec<f64>,
     /// Lost pivots, in the order of elimination.
@@ -55,6 +58,7 @@ struct Sums {
     sum_of_squares: f64,
     decrease: f64,
     deficient: Vec<usize>,
+    reduced: Vec<Reduced>,
 }
 
 /// What a visit to a supernode leaves to the result.
@@ -75,6 +79,8 @@ struct Formation<'a, E> {
     equations: &'a E,
     prior: &'a Prior,
     damping: f64,
+    /// Over all unknowns, one after the other.
+    rights: &'a [f64],
     control: &'a Control,
 }
 
@@ -101,8 +107,33 @@ impl System {
         damping: f64,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Factor> {
+        self.factored(pool, equations, prior, damping, &[], between)
+    }
+
+    /// The same with further right-hand sides over all unknowns, one after the other: they are reduced on the way, and wait to be solved for
+    /// ([`System::solve_further`], [`System::invert_with`]).
+    pub fn factor_with<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        equations: &E,
+        prior: &Prior,
+        rights: &[f64],
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, Factor> {
+        self.factored(pool, equations, prior, 0.0, rights, between)
+    }
+
+    fn factored<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        equations: &E,
+        prior: &Prior,
+        damping: f64,
+        rights: &[f64],
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, Factor> {
         watched(pool, between, |control| {
-            let formation = Formation { system: self, equations, prior, damping, control };
+            let formation = Formation { system: self, equations, prior, damping, rights, control };
             let mut given_up = Vec::new();
             loop {
                 let factor = formation.factor(&given_up)?;
@@ -142,6 +173,7 @@ impl<E: Equations> Formation<'_, E> {
         let mut factor = Factor {
             panels,
             right: Vec::with_capacity(symbolic.unknowns()),
+            further: self.control.allocated(of_others(self.system, self.rights))?,
             diagonal: Vec::with_capacity(symbolic.unknowns()),
             lost: Vec::new(),
             doubtful: Vec::new(),
@@ -223,6 +255,7 @@ impl<E: Equations> Formation<'_, E> {
                 if !control.stopped() {
                     self.fill(&mut stack, run);
                     stack.add_to(&mut front.columns(), &system.layout);
+                    reduce(system, &stack, self.rights, &mut sums.reduced);
                     sums.add(&mut stack);
                 }
             }
@@ -239,6 +272,15 @@ impl<E: Equations> Formation<'_, E> {
                     stack.add_to(&mut columns, &system.layout);
                 }
             });
+            if !self.rights.is_empty() {
+                let reduced = |stack: &Stack| {
+                    let mut found = Vec::new();
+                    reduce(system, stack, self.rights, &mut found);
+                    found
+                };
+                let found: Vec<Vec<Reduced>> = filled.par_iter().map(reduced).collect();
+                sums.reduced.extend(found.into_iter().flatten());
+            }
             filled.iter_mut().for_each(|stack| sums.add(stack));
         }
         sums
@@ -350,6 +392,8 @@ impl Factor {
         self.sum_of_squares += sums.sum_of_squares;
         self.decrease += sums.decrease;
         self.deficient_locals.extend(sums.deficient);
+        let count = self.panels.symbolic.unknowns();
+        sums.reduced.iter().for_each(|reduced| reduced.subtract_from(&mut self.further, count));
     }
 
     /// The unknowns that are not local and that a solution of the equations moves, ascending: those that take at least a tenth of

@@ -12,11 +12,13 @@ use super::cofactors::{AtHome, Cofactors, GroupCofactors};
 use super::dense::invert_front;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
+use super::further::Known;
 use super::panels::{Handover, Panels, lock};
 use super::selected::SelectedInverse;
 use super::symbolic::Symbolic;
 use super::system::System;
 use super::watch::{Between, Control, Stopped, watched};
+use super::workspace::zeros;
 
 /// Cofactors with the selected inverse that they come from.
 #[derive(Debug)]
@@ -25,6 +27,8 @@ pub struct Inversion {
     pub cofactors: Cofactors,
     /// Of every two kept blocks that share a local block.
     pub selected: SelectedInverse,
+    /// Solutions for the right-hand sides that the factor was formed with: a row for each unknown, one after the other.
+    pub further: Vec<f64>,
     /// Share of the time of all threads that went into the selected inverse; the rest went into the other cofactors.
     pub inversion_share: f64,
 }
@@ -41,7 +45,7 @@ impl System {
         prior: &Prior,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Inversion> {
-        self.inverted(pool, factor, equations, prior, between, false)
+        self.inverted(pool, factor, equations, prior, &[], between, false)
     }
 
     /// The same with what the equations of each group have to do with each other ([`Cofactors::groups`]).
@@ -55,7 +59,20 @@ impl System {
         prior: &Prior,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Inversion> {
-        self.inverted(pool, factor, equations, prior, between, true)
+        self.inverted(pool, factor, equations, prior, &[], between, true)
+    }
+
+    /// The same as [`System::invert`] with solutions for the right-hand sides that the factor was formed with.
+    pub fn invert_with<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        factor: Factor,
+        equations: &E,
+        prior: &Prior,
+        rights: &[f64],
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, Inversion> {
+        self.inverted(pool, factor, equations, prior, rights, between, false)
     }
 
     fn inverted<E: Equations>(
@@ -64,11 +81,15 @@ impl System {
         factor: Factor,
         equations: &E,
         prior: &Prior,
+        rights: &[f64],
         between: Between<'_>,
         by_group: bool,
     ) -> ControlFlow<Stopped, Inversion> {
         watched(pool, between, |control| {
-            let walk = Walk { system: self, equations, prior, control, by_group };
+            let mut others = factor.further.clone();
+            factor.solve_columns(&mut others);
+            let known = Known::new(self, rights, &others);
+            let walk = Walk { system: self, equations, prior, known, control, by_group };
             let information = factor.information(&self.layout);
             walk.invert(factor.panels, information)
         })
@@ -82,6 +103,7 @@ struct Walk<'a, E> {
     system: &'a System,
     equations: &'a E,
     prior: &'a Prior,
+    known: Known<'a>,
     control: &'a Control,
     by_group: bool,
 }
@@ -116,8 +138,9 @@ impl<E: Equations> Walk<'_, E> {
         if self.by_group {
             cofactors.groups = Some(GroupCofactors::collect(self.system, self.control, &found)?);
         }
+        let further = self.further(&found)?;
         let inversion_share = if inversion > 0.0 { inversion / (inversion + rest) } else { 0.0 };
-        Some(Inversion { cofactors, selected, inversion_share })
+        Some(Inversion { cofactors, selected, further, inversion_share })
     }
 
     /// Inverts one panel, given the front of its parent, and hands its own front to its children. Returns the cofactors of the local
@@ -154,8 +177,30 @@ impl<E: Equations> Walk<'_, E> {
     }
 
     fn at_home(&self, index: usize, front: &[f64], height: usize) -> AtHome {
-        let Self { system, equations, prior, control, by_group } = *self;
-        AtHome::new(system, index, equations, prior, control, front, height, by_group)
+        let Self { system, equations, prior, ref known, control, by_group } = *self;
+        AtHome::new(system, index, equations, prior, known, control, front, height, by_group)
+    }
+
+    /// The solutions for further right-hand sides, row by row; None without memory.
+    fn further(&self, found: &[AtHome]) -> Option<Vec<f64>> {
+        let (layout, symbolic, count) = (&self.system.layout, &*self.system.symbolic, self.known.count());
+        let mut rows = self.control.allocated(zeros(layout.unknowns() * count))?;
+        for (index, at_home) in found.iter().enumerate().filter(|_| count > 0) {
+            let stacks = self.system.incidence.stacks_at(index);
+            self.known.hand_out(layout, stacks, at_home.further.iter(), |local, first, own| {
+                for (row, own) in rows[local.start * count..].chunks_exact_mut(count).zip(own) {
+                    row[first..].iter_mut().zip(own).for_each(|(x, own)| *x = *own);
+                }
+            });
+        }
+        for column in 0..count {
+            let mut others = self.known.others(column);
+            for position in 0..symbolic.blocks() {
+                let range = symbolic.unknowns_at(layout, position);
+                range.zip(&mut others).for_each(|(unknown, x)| rows[unknown * count + column] = x);
+            }
+        }
+        Some(rows)
     }
 }
 

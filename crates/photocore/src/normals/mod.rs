@@ -46,6 +46,7 @@ mod equations;
 mod factor;
 mod front;
 mod functions;
+mod further;
 mod graph;
 mod incidence;
 mod invert;

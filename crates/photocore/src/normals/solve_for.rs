@@ -5,19 +5,19 @@ use std::ops::ControlFlow;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, MatMut, MatRef, Par};
-use pulp::Simd;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
+use super::further::{Known, Reduced, Side, of_others, reduce};
 use super::incidence::Stacks;
 use super::layout::Layout;
-use super::stack::{Stack, dot};
+use super::stack::Stack;
 use super::system::System;
-use super::vectorised::{Kernel, run};
+use super::vectorised::LANES;
 use super::watch::{Between, Control, Stopped, watched};
-use super::workspace::reserved;
+use super::workspace::zeros;
 
 /// Stacks that a thread takes at a time.
 const CHUNK: usize = 64;
@@ -42,33 +42,28 @@ impl System {
         rights: &[f64],
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Vec<f64>> {
-        let (layout, symbolic) = (&self.layout, &*self.symbolic);
         watched(pool, between, |control| {
             let work = Work { system: self, equations, prior, damping, control };
-            let count = rights.len() / layout.unknowns().max(1);
-            let mut solutions = control.allocated(reserved(rights.len()))?;
-            solutions.extend_from_slice(rights);
-            let mut others = control.allocated(reserved(symbolic.unknowns() * count))?;
-            for right in rights.chunks_exact(layout.unknowns().max(1)) {
-                for position in 0..symbolic.blocks() {
-                    others.extend_from_slice(&right[symbolic.unknowns_at(layout, position)]);
-                }
-            }
+            let mut others = control.allocated(of_others(self, rights))?;
             work.reduce(rights, &mut others);
-            others.par_chunks_mut((TOGETHER * symbolic.unknowns()).max(1)).for_each(|columns| {
-                if !control.stopped() {
-                    factor.solve_columns(columns);
-                }
-            });
-            work.solve_locals(&others, &mut solutions);
-            let columns = solutions.chunks_exact_mut(layout.unknowns().max(1));
-            for (column, others) in columns.zip(others.chunks_exact(symbolic.unknowns().max(1))) {
-                for position in 0..symbolic.blocks() {
-                    column[symbolic.unknowns_at(layout, position)]
-                        .copy_from_slice(&others[symbolic.range(position)]);
-                }
-            }
-            Some(solutions)
+            work.complete(factor, rights, others)
+        })
+    }
+
+    /// Solves N x = r for the right-hand sides that the factor was formed with (see [`System::factor_with`]): they are on their way
+    /// already.
+    pub fn solve_further<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        factor: &Factor,
+        equations: &E,
+        prior: &Prior,
+        rights: &[f64],
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, Vec<f64>> {
+        watched(pool, between, |control| {
+            let work = Work { system: self, equations, prior, damping: 0.0, control };
+            work.complete(factor, rights, factor.further.clone())
         })
     }
 }
@@ -82,11 +77,11 @@ struct Work<'a, E> {
 }
 
 impl<E: Equations> Work<'_, E> {
-    /// Takes N_ol N_ll^-1 r_l off the right-hand sides of the others: with N_ll = L L^T and V = L^-1 N_lo, that is V^T L^-1 r_l.
+    /// Takes what the local blocks say off the right-hand sides of the others.
     fn reduce(&self, rights: &[f64], others: &mut [f64]) {
         let layout = &self.system.layout;
         let (unknowns, count) = (layout.unknowns().max(1), self.system.symbolic.unknowns());
-        let reduce = |stacks: Stacks<'_>| {
+        let reduced = |stacks: Stacks<'_>| {
             let (mut stack, mut found) = (Stack::default(), Vec::new());
             for locals in stacks.iter().take_while(|_| !self.control.stopped()) {
                 let ranges = || locals.iter().map(|&local| layout.local_range(local as usize));
@@ -95,118 +90,60 @@ impl<E: Equations> Work<'_, E> {
                     columns.clone().all(|right| ranges().all(|range| right[range].iter().all(|r| *r == 0.0)));
                 if !idle {
                     self.eliminate(&mut stack, locals);
-                    run(
-                        layout,
-                        stack.kept_dim(),
-                        Reduce { work: self, stack: &stack, rights, found: &mut found },
-                    );
+                    reduce(self.system, &stack, rights, &mut found);
                 }
             }
             found
         };
         let parts = self.system.incidence.stacks().parts(CHUNK);
         // One after the other in a fixed order, whichever thread has found them.
-        for (column, first, values) in parts.into_par_iter().flat_map_iter(reduce).collect::<Vec<_>>() {
-            let target = &mut others[column * count + first..][..values.len()];
-            target.iter_mut().zip(values).for_each(|(right, value)| *right -= value);
-        }
+        let found: Vec<Reduced> = parts.into_par_iter().flat_map_iter(reduced).collect();
+        found.iter().for_each(|reduced| reduced.subtract_from(others, count));
     }
 
-    /// Solves the local blocks, the others being known: x_l = L^-T (L^-1 r_l - V x_o).
-    fn solve_locals(&self, others: &[f64], solutions: &mut [f64]) {
-        let layout = &self.system.layout;
-        let rights = &*solutions;
+    /// Solves for the other unknowns, whose right-hand sides are reduced, then for the local ones; None without memory.
+    fn complete(&self, factor: &Factor, rights: &[f64], mut others: Vec<f64>) -> Option<Vec<f64>> {
+        let (layout, symbolic) = (&self.system.layout, &*self.system.symbolic);
+        others.par_chunks_mut((TOGETHER * symbolic.unknowns()).max(1)).for_each(|columns| {
+            if !self.control.stopped() {
+                factor.solve_columns(columns);
+            }
+        });
+        let mut solutions = self.control.allocated(zeros(rights.len()))?;
+        let unknowns = layout.unknowns().max(1);
+        for (column, others) in
+            solutions.chunks_exact_mut(unknowns).zip(others.chunks_exact(symbolic.unknowns().max(1)))
+        {
+            for position in 0..symbolic.blocks() {
+                column[symbolic.unknowns_at(layout, position)]
+                    .copy_from_slice(&others[symbolic.range(position)]);
+            }
+        }
+        let known = Known::new(self.system, rights, &others);
+        drop(others);
         let solve = |stacks: Stacks<'_>| {
             let (mut stack, mut found) = (Stack::default(), Vec::new());
             for locals in stacks.iter().take_while(|_| !self.control.stopped()) {
                 self.eliminate(&mut stack, locals);
-                run(
-                    layout,
-                    stack.kept_dim(),
-                    Solve { work: self, stack: &stack, rights, others, found: &mut found },
-                );
+                known.solve(self.system, &stack, &mut found);
                 self.control.count(locals.len());
             }
             found
         };
-        let parts = self.system.incidence.stacks().parts(CHUNK);
-        let found: Vec<(usize, Vec<f64>)> = parts.into_par_iter().flat_map_iter(solve).collect();
-        for (first, values) in found {
-            solutions[first..][..values.len()].copy_from_slice(&values);
-        }
+        let stacks = self.system.incidence.stacks();
+        let found: Vec<Vec<Side>> = stacks.parts(CHUNK).into_par_iter().map(solve).collect();
+        known.hand_out(layout, stacks, found.iter().flatten(), |local, first, rows| {
+            let columns = solutions.chunks_exact_mut(unknowns).skip(first).take(LANES);
+            for (k, solution) in columns.enumerate() {
+                solution[local.clone()].iter_mut().zip(rows).for_each(|(x, row)| *x = row[k]);
+            }
+        });
+        Some(solutions)
     }
 
     fn eliminate(&self, stack: &mut Stack, locals: &[u32]) {
         stack.gather(self.system, self.equations, locals);
         stack.eliminate(&self.system.layout, self.prior, self.damping);
-    }
-}
-
-/// Computes V^T L^-1 r of a stack for every right-hand side: column, first of the coupled unknowns, values.
-struct Reduce<'a, E> {
-    work: &'a Work<'a, E>,
-    stack: &'a Stack,
-    rights: &'a [f64],
-    found: &'a mut Vec<(usize, usize, Vec<f64>)>,
-}
-
-impl<E: Equations> Kernel for Reduce<'_, E> {
-    #[inline(always)]
-    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
-        let layout = &self.work.system.layout;
-        for (column, right) in self.rights.chunks_exact(layout.unknowns()).enumerate() {
-            let mut reduced = Vec::with_capacity(self.stack.locals.len() * L);
-            for (t, &local) in self.stack.locals.iter().enumerate() {
-                let mut own = [0.0; L];
-                own.copy_from_slice(&right[layout.local_range(local as usize)]);
-                self.stack.triangles[t].forward::<L>(&mut own, 1);
-                reduced.extend_from_slice(&own);
-            }
-            if reduced.iter().all(|&value| value == 0.0) {
-                continue;
-            }
-            for (range, v) in self.stack.couplings::<L, D>(&self.work.system.symbolic) {
-                let mut sums = vec![0.0; range.len()];
-                for (row, factor) in v.values.chunks_exact(range.len().max(1)).zip(&reduced) {
-                    sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += factor * value);
-                }
-                self.found.push((column, range.start, sums));
-            }
-        }
-    }
-}
-
-/// Solves the local blocks of a stack for every right-hand side: where a block stands in the solutions, and its values.
-struct Solve<'a, E> {
-    work: &'a Work<'a, E>,
-    stack: &'a Stack,
-    rights: &'a [f64],
-    others: &'a [f64],
-    found: &'a mut Vec<(usize, Vec<f64>)>,
-}
-
-impl<E: Equations> Kernel for Solve<'_, E> {
-    #[inline(always)]
-    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
-        let layout = &self.work.system.layout;
-        let columns = self.rights.chunks_exact(layout.unknowns());
-        let count = self.work.system.symbolic.unknowns();
-        for (index, right) in columns.enumerate() {
-            let others = &self.others[index * count..][..count];
-            for (t, &local) in self.stack.locals.iter().enumerate() {
-                let range = layout.local_range(local as usize);
-                let mut own = [0.0; L];
-                own.copy_from_slice(&right[range.clone()]);
-                self.stack.triangles[t].forward::<L>(&mut own, 1);
-                for (coupled, v) in self.stack.couplings::<L, D>(&self.work.system.symbolic) {
-                    let x = &others[coupled];
-                    let rows = v.values[t * L * x.len()..].chunks_exact(x.len().max(1));
-                    own.iter_mut().zip(rows).for_each(|(value, row)| *value -= dot(row, x));
-                }
-                self.stack.triangles[t].backward::<L>(&mut own, 1);
-                self.found.push((index * layout.unknowns() + range.start, own.to_vec()));
-            }
-        }
     }
 }
 

@@ -4,7 +4,7 @@ use photocore::adjustment::DatumError;
 use photocore::network::{Network, NetworkDatum, NetworkError as Failure, Options};
 use pyo3::prelude::*;
 
-use super::covariances::{BlockCovariances, factored, refused};
+use super::covariances::{BlockCovariances, factored, refused, tried};
 use super::solution::BlockSolution;
 use super::state::{BlockState, DatumRow, datum_of};
 use super::trial::NetworkTrial;
@@ -72,8 +72,7 @@ impl BlockNetwork {
         threads: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<BlockCovariances> {
-        let found = factored(py, (&self.network, &self.options), state, threads, progress)?;
-        found.map_err(|error| refused(&error))
+        factored(py, (&self.network, &self.options), refused, state, threads, progress)
     }
 
     #[pyo3(signature = (state, *, threads))]
@@ -83,12 +82,7 @@ impl BlockNetwork {
         state: Option<PyRef<'_, BlockState>>,
         threads: usize,
     ) -> PyResult<NetworkTrial> {
-        let images = self.network.images.len();
-        let state = state.map(|state| state.state.clone());
-        let found = watched(py, Workers::of(threads, images), None, |pool, _| {
-            self.network.trial(&self.options, state.as_ref(), pool)
-        })?;
-        found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
+        tried(py, (&self.network, &self.options), refused, state, threads)
     }
 
     #[pyo3(signature = (state, *, threads))]

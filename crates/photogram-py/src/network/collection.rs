@@ -8,7 +8,7 @@ use photocore::network::{Camera, Network, NetworkError as Failure, Options, Phot
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::covariances::{BlockCovariances, factored};
+use super::covariances::{BlockCovariances, factored, tried};
 use super::solution::CollectionSolution;
 use super::state::BlockState;
 use super::trial::NetworkTrial;
@@ -62,8 +62,7 @@ impl CollectionNetwork {
         threads: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<BlockCovariances> {
-        let found = factored(py, (&self.network, &self.options), state, threads, progress)?;
-        found.map_err(|error| refused(&error))
+        factored(py, (&self.network, &self.options), refused, state, threads, progress)
     }
 
     #[pyo3(signature = (state, *, threads))]
@@ -73,12 +72,7 @@ impl CollectionNetwork {
         state: Option<PyRef<'_, BlockState>>,
         threads: usize,
     ) -> PyResult<NetworkTrial> {
-        let images = self.network.images.len();
-        let state = state.map(|state| state.state.clone());
-        let found = watched(py, Workers::of(threads, images), None, |pool, _| {
-            self.network.trial(&self.options, state.as_ref(), pool)
-        })?;
-        found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
+        tried(py, (&self.network, &self.options), refused, state, threads)
     }
 }
 

@@ -6,6 +6,7 @@ use photocore::network::{Covariances, Groups, Network, NetworkError as Failure, 
 use pyo3::prelude::*;
 
 use super::state::BlockState;
+use super::trial::NetworkTrial;
 use super::{BlockError, failure};
 use crate::arrays::group_rows;
 use crate::options::unknown;
@@ -16,7 +17,11 @@ use crate::work::{Workers, watched};
 pub struct BlockCovariances {
     pub(super) covariances: Covariances,
     images: usize,
+    refused: Refused,
 }
+
+/// A failure as Python sees it: of a block, or of a collection.
+pub(super) type Refused = fn(&Failure) -> PyErr;
 
 /// Something that has cofactors: its kind and its index.
 pub(super) type OfRow = (String, usize);
@@ -37,15 +42,34 @@ pub(super) fn of_rows(rows: Vec<OfRow>) -> PyResult<Vec<Of>> {
 pub fn factored(
     py: Python<'_>,
     (network, options): (&Network, &Options),
+    refused: Refused,
     state: &BlockState,
     threads: usize,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Result<BlockCovariances, Failure>> {
+) -> PyResult<BlockCovariances> {
     let images = network.images.len();
     let found = watched(py, Workers::of(threads, images), progress, |pool, watch| {
         network.covariances(options, &state.state, None, pool, watch)
     })?;
-    Ok(found.map(|covariances| BlockCovariances { covariances, images }))
+    found
+        .map(|covariances| BlockCovariances { covariances, images, refused })
+        .map_err(|error| refused(&error))
+}
+
+/// Prepares a network for trials without some of its observations, from where its adjustment has ended or from the start.
+pub fn tried(
+    py: Python<'_>,
+    (network, options): (&Network, &Options),
+    refused: Refused,
+    state: Option<PyRef<'_, BlockState>>,
+    threads: usize,
+) -> PyResult<NetworkTrial> {
+    let images = network.images.len();
+    let state = state.map(|state| state.state.clone());
+    let found = watched(py, Workers::of(threads, images), None, |pool, _| {
+        network.trial(options, state.as_ref(), pool)
+    })?;
+    found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
 }
 
 /// A failure of a block as Python sees it.
@@ -70,7 +94,7 @@ impl BlockCovariances {
         let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
             self.covariances.cofactors(&rows, columns.as_deref(), pool, watch)
         })?;
-        PyArray1::from_vec(py, found.map_err(|error| refused(&error))?).reshape([height, width])
+        PyArray1::from_vec(py, found.map_err(|error| (self.refused)(&error))?).reshape([height, width])
     }
 
     #[pyo3(signature = (partials, of, *, threads, progress))]
@@ -88,7 +112,7 @@ impl BlockCovariances {
         let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
             self.covariances.propagate(&partials, &of, pool, watch)
         })?;
-        PyArray1::from_vec(py, found.map_err(|error| refused(&error))?).reshape([count, count])
+        PyArray1::from_vec(py, found.map_err(|error| (self.refused)(&error))?).reshape([count, count])
     }
 
     #[pyo3(signature = (groups, *, classes, exact, vectors, seed, threads, progress))]
@@ -113,7 +137,7 @@ impl BlockCovariances {
                 Ok(GroupSquares { equations: vec![], squares, exact: vec![] })
             }
         })?;
-        let GroupSquares { equations, squares, exact } = found.map_err(|error| refused(&error))?;
+        let GroupSquares { equations, squares, exact } = found.map_err(|error| (self.refused)(&error))?;
         Ok((equations, PyArray1::from_vec(py, squares), exact))
     }
 
@@ -130,7 +154,7 @@ impl BlockCovariances {
         let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
             self.covariances.project_images(&columns, pool, watch)
         })?;
-        let found = found.map_err(|error| refused(&error))?;
+        let found = found.map_err(|error| (self.refused)(&error))?;
         PyArray1::from_vec(py, found).reshape([count, self.images, 2])
     }
 }
@@ -169,6 +193,6 @@ fn groups_of(
 impl BlockCovariances {
     fn width(&self, of: &[Of]) -> PyResult<usize> {
         let widths = of.iter().map(|&each| self.covariances.width(each));
-        widths.sum::<Result<usize, Failure>>().map_err(|error| refused(&error))
+        widths.sum::<Result<usize, Failure>>().map_err(|error| (self.refused)(&error))
     }
 }

@@ -2,11 +2,11 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use photocore::adjustment::Loss;
-use photocore::network::{Moved, NetworkError as Failure, Out, Standing, Subject, Trial, UnknownOf};
+use photocore::network::{Moved, Out, Standing, Subject, Trial, UnknownOf};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::covariances::{BlockCovariances, OfRow, of_rows};
+use super::covariances::{BlockCovariances, OfRow, Refused, of_rows};
 use crate::arrays::table;
 use crate::options::named_loss;
 use crate::solution::status_name;
@@ -23,7 +23,7 @@ pub struct NetworkTrial {
     trial: Trial,
     images: usize,
     threads: usize,
-    refused: fn(&Failure) -> PyErr,
+    refused: Refused,
 }
 
 /// Status, iterations, weighted sum of squares, degrees of freedom, points that ran into a station.
@@ -38,7 +38,7 @@ fn standing_row(standing: Standing) -> StandingRow {
 type PredictionRow = (f64, Vec<usize>, Vec<f64>, Vec<f64>);
 
 impl NetworkTrial {
-    pub fn new(trial: Trial, images: usize, threads: usize, refused: fn(&Failure) -> PyErr) -> Self {
+    pub fn new(trial: Trial, images: usize, threads: usize, refused: Refused) -> Self {
         Self { trial, images, threads, refused }
     }
 

@@ -1,9 +1,7 @@
-"""All pictures of a calibration, in one HTML page or one PDF."""
+"""All pictures of a calibration, by name or as one PDF."""
 
 from __future__ import annotations
 
-import base64
-import html
 import io
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -25,22 +23,14 @@ from photogram.comparator.pictures.vectors import (
     grid_vectors,
     joint_grid,
 )
-from photogram.show.pictures import drawn, new_figure
+from photogram.show.pictures import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from photogram.comparator.calibration import Calibration
 
-__all__ = ["figures", "html_report", "pdf_report"]
-
-STYLE = """
-body { font-family: system-ui, sans-serif; color: #1b2733; }
-body { max-width: 1150px; margin: 2em auto; padding: 0 1em; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.1em; margin-top: 2em; }
-figure { margin: 1.5em 0; } img { max-width: 100%; height: auto; }
-pre { background: #f4f6f8; padding: 1em; overflow-x: auto; font-size: 0.78em; line-height: 1.35; }
-"""
+__all__ = ["figures", "pdf_report"]
 
 
 def figures(calibration: Calibration) -> Iterator[tuple[str, Figure]]:
@@ -90,37 +80,9 @@ def _title(calibration: Calibration) -> str:
     return f"Calibration of comparator {session.comparator}, {len(calibration.cases)} cases{date}"
 
 
-def _problems(calibration: Calibration) -> list[str]:
-    return [line for message in calibration.messages for line in str(message).splitlines()] or ["none"]
-
-
 def _made(run_date: str) -> str:
     """Who made the report and, where it is said, when."""
     return f"photogram {_photocore.__version__}" + (f", run on {run_date}" if run_date else "")
-
-
-def html_report(calibration: Calibration, run_date: str = "") -> bytes:
-    """Return one page with the summary, the tests, the problems and all pictures inside (UTF-8).
-
-    Needs matplotlib (`pip install 'photogram[plots]'`).
-    """
-    parts = []
-    for name, figure in figures(calibration):
-        data = base64.b64encode(drawn(figure)).decode()
-        parts.append(f'<figure id="{name}"><img alt="{name}" src="data:image/png;base64,{data}"></figure>')
-    title = html.escape(_title(calibration))
-    pages = [
-        ("Problems", "\n".join(_problems(calibration))),
-        ("Summary", "\n".join(summary_page(calibration)[2:])),
-        ("Tests", "\n".join(tests_page(calibration)[2:])),
-    ]
-    texts = "".join(f"<h2>{head}</h2><pre>{html.escape(text)}</pre>" for head, text in pages)
-    document = (
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f"<style>{STYLE}</style></head><body><h1>{title}</h1><p>{html.escape(_made(run_date))}</p>"
-        f"{texts}<h2>Pictures</h2>{''.join(parts)}</body></html>\n"
-    )
-    return document.encode()
 
 
 def pdf_report(calibration: Calibration, run_date: str = "") -> bytes:

@@ -17,20 +17,23 @@ __all__ = ["FORMAT"]
 _EXPORTS = "*-pmexport.txt"
 
 
-def _the_export(path: Path) -> Path | None:
-    """Return the only export file of a folder."""
-    found = sorted(path.glob(_EXPORTS))
-    return found[0] if len(found) == 1 else None
-
-
 def _is_script(path: Path) -> bool:
     root, attributes = root_of(path)
     return root == "document" and "dbat_script_version" in attributes
 
 
+def _the_file(path: Path) -> Path | None:
+    """Return the only script of a folder, else the only export file."""
+    scripts = [each for each in sorted(path.glob("*.xml")) if _is_script(each)]
+    for found in (scripts, sorted(path.glob(_EXPORTS))):
+        if len(found) == 1:
+            return found[0]
+    return None
+
+
 def _recognises(path: Path) -> bool:
     if path.is_dir():
-        return is_folder(path) or _the_export(path) is not None
+        return is_folder(path) or _the_file(path) is not None
     return _is_script(path) or is_export(path) or is_measurements(path)
 
 
@@ -42,8 +45,8 @@ def read(path: Path, wishes: Wishes) -> Project:
     InputError
         Files at fault.
     """
-    if path.is_dir() and not is_folder(path):
-        path = _the_export(path) or path
+    if path.is_dir():
+        path = _the_file(path) or path
     if path.is_dir():
         content = read_folder(path, wishes)
     elif path.suffix.lower() == ".xml":

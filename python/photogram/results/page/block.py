@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.results.findings import axes
+from photogram.results.findings import axes, tested_observations
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.page.cameras import cameras_section
 from photogram.results.page.frame import block_frame, degrees
-from photogram.results.page.observed import Images, worst_images
+from photogram.results.page.observed import Images, worst_images, worst_of
 from photogram.results.page.parts import (
     images_facts,
     iterations_section,
@@ -36,6 +36,7 @@ from photogram.results.result import Result
 from photogram.results.unknowns import unknown_lines
 from photogram.show.judgement import advice, judged
 from photogram.show.page import Column, Drawing, Fact, Facts, Page, Part, Section, Table, significant
+from photogram.statistics.findings import by_w
 from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["block_images", "block_page"]
@@ -46,7 +47,9 @@ def block_page(result: Result) -> Page:
     """Return the report of an adjusted block for the browser."""
     block, images = result.block, block_images(result)
     pictures = drawings(result)
-    worst = worst_images(result)
+    groups = [by_w(each) for each in tested_observations(result)]
+    found = worst_of(groups)
+    worst = worst_images(found)
     photos, points = block.image_photos[worst].tolist(), block.image_points[worst].tolist()
     sections = [
         _network_section(result, pictures),
@@ -54,7 +57,7 @@ def block_page(result: Result) -> Page:
         _residuals_section(pictures),
         _redundancy_section(result, pictures),
         tests_section(result, pictures.get("tests")),
-        worst_section(result, images),
+        worst_section(result, images, groups, found),
         control_section(result),
         check_section(result),
         beside_section(result),

@@ -11,15 +11,18 @@ from photogram.arguments.types import Floats, Indices
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.results.page.frame import Frame
 from photogram.show.page import Cell, Column, Table
-from photogram.show.ways import findings_of
+from photogram.statistics.distributions import LEVEL, bonferroni, critical_normal, critical_student
 from photogram.statistics.findings import Tested
 
-__all__ = ["Images", "Links", "observed_table", "worst_images", "worst_of", "worst_table"]
+__all__ = ["Images", "Links", "Worst", "observed_table", "worst_images", "worst_of", "worst_table"]
 
 WORST = 25
 """Observations in the table of the worst."""
 LISTED = 120
 """Rows of observations of one kind."""
+
+Worst = tuple[float, Tested, tuple[int, ...]]
+"""The size of a test value, its kind, and its place there."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +64,10 @@ class Links:
         return Cell(name, goes_to=f"point-{number}")
 
 
-def worst_of(result: AdjustedNetwork, count: int = WORST) -> list[tuple[float, Tested, tuple[int, ...]]]:
+def worst_of(groups: Sequence[Tested], count: int = WORST) -> list[Worst]:
     """Return the observations of least probability, with |test value| as the measure of what is alike."""
-    found: list[tuple[float, Tested, tuple[int, ...]]] = []
-    for tested in findings_of(result).observations:
+    found: list[Worst] = []
+    for tested in groups:
         sizes = np.where(np.isnan(tested.values), -1.0, np.abs(tested.values))
         flat = sizes.ravel()
         if not flat.size:
@@ -77,18 +80,17 @@ def worst_of(result: AdjustedNetwork, count: int = WORST) -> list[tuple[float, T
     return found[:count]
 
 
-def worst_images(result: AdjustedNetwork, count: int = WORST) -> Indices:
+def worst_images(worst: Sequence[Worst]) -> Indices:
     """Return the images among the worst observations."""
-    return np.array(
-        [place[0] for _, tested, place in worst_of(result, count) if tested.kind == "image coordinates"],
-        dtype=np.int64,
-    )
+    own = [place[0] for _, tested, place in worst if tested.kind == "image coordinates"]
+    return np.array(own, dtype=np.int64)
 
 
-def worst_table(result: AdjustedNetwork, images: Images, limit: float | None) -> Table:
+def worst_table(
+    result: AdjustedNetwork, images: Images, limit: float | None, worst: Sequence[Worst]
+) -> Table:
     """Return the observations whose test values are the largest, of all kinds."""
     rows: list[list[Cell | str | float | None]] = []
-    worst = worst_of(result)
     for size, tested, place in worst:
         beyond = limit is not None and size > limit
         value = Cell(float(tested.values[place]), tone="look" if beyond else "")
@@ -200,9 +202,10 @@ def observed_table(
     return Table(caption, columns, rows, note)
 
 
-def limit_of(result: AdjustedNetwork) -> float | None:
-    """Return what a test value of a single observation may be at most."""
-    for test in result.verdict.tests:
-        if test.statistic in ("w", "t") and test.limits[1] is not None:
-            return float(test.limits[1])
-    return None
+def limit_of(groups: Sequence[Tested]) -> float | None:
+    """Return what a test value of a single observation may be at most, 5 percent for all together."""
+    number = sum(int(np.count_nonzero(~np.isnan(each.values))) for each in groups)
+    if not number:
+        return None
+    level, second = bonferroni(LEVEL, number), float(np.asarray(groups[0].second))
+    return critical_normal(level) if np.isinf(second) else critical_student(level, second)

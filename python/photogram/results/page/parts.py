@@ -9,9 +9,10 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.results.network import AdjustedNetwork
-from photogram.results.page.observed import Images, limit_of, worst_of, worst_table
+from photogram.results.page.observed import Images, Worst, limit_of, worst_table
 from photogram.show.judgement import verdict_table
 from photogram.show.page import Column, Drawing, Fact, Facts, Part, Remarks, Row, Section, Table, significant
+from photogram.statistics.findings import Tested
 
 __all__ = [
     "images_facts",
@@ -122,14 +123,16 @@ def tests_section(result: AdjustedNetwork, drawing: Drawing | None) -> Section:
     return Section("tests", "Tests", parts, intro)
 
 
-def worst_section(result: AdjustedNetwork, images: Images) -> Section:
+def worst_section(
+    result: AdjustedNetwork, images: Images, groups: Sequence[Tested], worst: Sequence[Worst]
+) -> Section:
     """Return the worst observations."""
     intro = (
         "A residual alone says little: an error shows in it only by the share of its redundancy number."
         " The test"
         " value takes both into account. Names of photos and points lead to their rows below."
     )
-    parts = [worst_table(result, images, limit_of(result))] if worst_of(result, 1) else []
+    parts = [worst_table(result, images, limit_of(groups), worst)] if worst else []
     return Section("worst", "Worst observations", parts, intro)
 
 

@@ -353,7 +353,7 @@ def _fit_of_photos(result: Result) -> Floats:
 
 def points_section(result: Result, named: Iterable[int]) -> Section:
     """Return points with their standard deviations."""
-    block, frame = result.block, block_frame(result)
+    block, frame, kinds = result.block, block_frame(result), result.point_kinds
     ranks = {name: row for row, name in enumerate(block.point_ids)}
     weak = {ranks[each.point]: each for each in weakest_points(result)}
     deviations = result.point_sd
@@ -369,7 +369,7 @@ def points_section(result: Result, named: Iterable[int]) -> Section:
     body: list[Row] = [
         [
             Cell(block.point_ids[row], id=f"point-{row}"),
-            str(result.point_kinds[row]),
+            str(kinds[row]),
             int(result.point_rays[row]),
             *frame.cells(result.point_positions[row], decimals),
             *frame.differences(deviations[row]),

@@ -1,0 +1,87 @@
+"""The page of an adjustment whose variance components were estimated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from photogram.results.components import VarianceComponents, statement
+from photogram.results.components_picture import figure_of_components
+from photogram.show.judgement import advice, judged
+from photogram.show.page import Column, Drawing, Lines, Page, Part, Remarks, Row, Section, Table
+from photogram.statistics.components import Component
+
+__all__ = ["reweighed_page", "weighed_page"]
+
+
+def weighed_page(found: VarianceComponents, page: Page) -> Page:
+    """Return the page of the adjustment with the given weights, judged by the components.
+
+    Parameters
+    ----------
+    found
+        The components.
+    page
+        That of the adjustment.
+    """
+    told = [f"{each[:1].upper()}{each[1:]}." for each in statement(found)]
+    parts: list[Part] = [Remarks(told), _drawing(found), Table("Components", _COLUMNS, _rows(found), _NOTE)]
+    if found.estimate.messages:
+        parts.append(Remarks(list(found.estimate.messages)))
+    section = Section("components", "Variance components", parts, _INTRO)
+    return replace(
+        page,
+        judgements=[judged(found.verdict)],
+        advice=advice(found.verdict, check="`photogram check` (`photogram.check`)", others=told[:1]),
+        sections=[section, *page.sections],
+    )
+
+
+def reweighed_page(lines: Sequence[str], page: Page) -> Page:
+    """Return the page of a network whose gross errors were taken out and weights estimated in turn.
+
+    Parameters
+    ----------
+    lines
+        What was done to the weights.
+    page
+        That of the network that is left.
+    """
+    section = Section("components", "Weights", [Lines(lines)], _CHANGED)
+    return replace(page, sections=[section, *page.sections])
+
+
+_CHANGED = "Weights were estimated from the observations that are left: the rest of this page has these."
+_INTRO = (
+    "By which factors the standard deviations of groups of observations are wrong, as their residuals say."
+    " Everything else on this page has the weights that were given."
+)
+_NOTE = "The interval holds the true factor of the standard deviation with 95 percent."
+_COLUMNS = (
+    Column("Group", text=True),
+    Column("Number"),
+    Column("Redundancy", decimals=2),
+    Column("Weighted sum of squares", decimals=2),
+    Column("Factor of sd", decimals=3),
+    Column("From", decimals=3),
+    Column("To", decimals=3),
+    Column("p", figures=2),
+    Column("Outcome", text=True),
+)
+
+
+def _rows(found: VarianceComponents) -> list[Row]:
+    return [_row(each) for each in found.components]
+
+
+def _row(each: Component) -> Row:
+    low, high = (math.sqrt(max(end, 0.0)) if math.isfinite(end) else end for end in each.interval)
+    outcome = "held" if each.held else "to be changed" if each.worth_changing else "stands"
+    p = None if each.held else each.probability
+    return [each.name, each.count, each.redundancy, each.squares, each.factor_of_sd, low, high, p, outcome]
+
+
+def _drawing(found: VarianceComponents) -> Drawing:
+    caption = "Factors of the standard deviations with their intervals (95 percent); 1 is what was given."
+    return Drawing("picture-components", "Variance components", caption, lambda: figure_of_components(found))

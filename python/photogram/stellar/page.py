@@ -1,0 +1,223 @@
+"""The page of a camera that was calibrated by a plate with stars."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from photogram.show.judgement import advice, judged, verdict_table
+from photogram.show.page import (
+    Cell,
+    Column,
+    Drawing,
+    Fact,
+    Facts,
+    Layers,
+    Lines,
+    Page,
+    Part,
+    Remarks,
+    Row,
+    Section,
+    Table,
+    decimals_of,
+    fixed,
+    significant,
+)
+from photogram.stellar import tables
+from photogram.stellar.outliers import studentized
+from photogram.stellar.parameters import GRAD, INDEX, NAMES, UNITS
+from photogram.stellar.plots import figures
+from photogram.stellar.result import Result
+
+__all__ = ["plate_page", "plate_pictures"]
+
+WORST = 25
+"""Plate coordinates in the table of the worst."""
+
+
+def plate_page(result: Result) -> Page:
+    """Return the report of a plate for the browser."""
+    sections = [
+        Section(
+            "pictures", "Stars and residuals", [Layers("picture-layers", plate_pictures(figures(result)))]
+        ),
+        Section(
+            "size", "How much, how good", [Facts("How much", _much(result)), Facts("How good", _good(result))]
+        ),
+        Section("parameters", "Parameters", [_parameters(result)], _PARAMETERS),
+        Section("worst", "Worst observations", [_worst(result)]),
+        Section("tests", "Tests", [verdict_table(result.verdict)] if result.verdict.tests else []),
+        Section("directions", "Unknown directions", _lines(tables.directions, result)),
+        Section("distortion", "Distortion", _lines(tables.distortion, result)),
+        Section("movement", "Movement of the camera", _lines(tables.movement, result)),
+        Section("remarks", "Remarks", _remarks(result)),
+    ]
+    return Page(
+        what="Calibration of a camera by a plate with stars",
+        title=result.problem.labels.get("title", ""),
+        judgements=[judged(result.verdict)],
+        advice=advice(result.verdict, others=_next(result)),
+        highlights=_highlights(result),
+        sections=sections,
+    )
+
+
+_PARAMETERS = (
+    "Lengths in metres, angles in grads (400 to the circle). A parameter that was weighted has a mean"
+    " error before; one"
+    " that is held has none after."
+)
+
+
+def plate_pictures(drawn: dict) -> list[Drawing]:  # type: ignore[type-arg]
+    """Return pictures by their names, as they stand on a page."""
+    return [
+        Drawing(f"picture-{name}", name[:1].upper() + name[1:], "", lambda figure=figure: figure)  # type: ignore[misc]
+        for name, figure in drawn.items()
+    ]
+
+
+def _next(result: Result) -> list[str]:
+    weak = [name for name, ratio in result.significance().items() if ratio < 1.96]
+    found = []
+    if weak:
+        found.append(
+            f"Distortion terms that are not significant: {', '.join(weak)}. A calibration without them is"
+            " simpler."
+        )
+    if result.verdict.usable:
+        found.append(
+            "camera.json holds the calibrated camera: blocks take it with its covariance"
+            " (`photogram.camera_from`)."
+        )
+    return found
+
+
+def _highlights(result: Result) -> list[Fact]:
+    rms = np.sqrt((result.solved.residuals**2).mean(axis=0)) * 1e6
+    known = int(result.problem.known.sum())
+    return [
+        Fact("Mean error of unit weight", significant(result.mean_error, 4)),
+        Fact(
+            "rms of plate residuals, x",
+            significant(float(rms[0]), 3),
+            "µm",
+            f"y {significant(float(rms[1]), 3)} µm",
+        ),
+        Fact(
+            "Stars",
+            f"{len(result.problem.star_ids)}",
+            note=f"{known} known, {len(result.problem.image_stars)} images",
+        ),
+        Fact("Degrees of freedom", f"{result.degrees_of_freedom}"),
+    ]
+
+
+def _much(result: Result) -> list[Fact]:
+    problem, counts = result.problem, result.counts
+    known = int(problem.known.sum())
+    return [
+        Fact("Stars", f"{known} known, {len(problem.star_ids) - known} unknown"),
+        Fact("Images on the plate", f"{len(problem.image_stars)}"),
+        Fact(
+            "Observations",
+            f"{counts.observations}",
+            note=f"{counts.plate_observations} of the plate, {counts.star_observations} of stars,"
+            f" {counts.parameter_observations} of parameters",
+        ),
+        Fact(
+            "Unknowns",
+            f"{counts.unknowns}",
+            note=f"{counts.parameter_unknowns} parameters, {counts.star_unknowns} of stars",
+        ),
+        Fact("Degrees of freedom", f"{counts.degrees_of_freedom}"),
+        Fact("Stop", result.solved.stop.capitalize()),
+    ]
+
+
+def _good(result: Result) -> list[Fact]:
+    plate, stars, parameters = (float(each) for each in result.solved.sums)
+    return [
+        Fact("Mean error of unit weight, computed", significant(result.computed_mean_error, 5)),
+        Fact("Mean error of unit weight, in use", significant(result.mean_error, 5)),
+        Fact("Weighted sum of squares, plate", significant(plate, 6)),
+        Fact("Weighted sum of squares, stars", significant(stars, 6)),
+        Fact("Weighted sum of squares, parameters", significant(parameters, 6)),
+    ]
+
+
+def _parameters(result: Result) -> Table:
+    problem, errors = result.problem, result.mean_errors
+    rows: list[Row] = []
+    for name in NAMES:
+        i = INDEX[name]
+        if name not in result.estimated and name in NAMES[22:]:
+            continue
+        unit = 1.0 / GRAD if UNITS[name] == "rad" else 1.0
+        weight = problem.parameter_weights[i, i]
+        after = errors[name] * unit if name in result.estimated else math.nan
+        decimals = min(decimals_of(np.array([after])) + 1, 12) if after > 0 else None
+        rows.append(
+            [
+                f"{name}, {'grads' if UNITS[name] == 'rad' else UNITS[name]}".rstrip(", "),
+                _written(problem.initial[i] * unit, decimals),
+                result.mean_error / math.sqrt(weight) * unit if weight else "free" if after > 0 else "held",
+                _written(result.parameters[name] * unit, decimals),
+                after if after > 0 else None,
+                result.significance().get(name),
+            ]
+        )
+    columns = (
+        Column("Parameter", text=True),
+        Column("Given"),
+        Column("Mean error before", figures=3),
+        Column("Computed"),
+        Column("Mean error after", figures=3),
+        Column("Over its mean error", decimals=1),
+    )
+    return Table("Parameters", columns, rows)
+
+
+def _written(value: float, decimals: int | None) -> Cell:
+    value = float(value)
+    return Cell(significant(value, 9) if decimals is None else fixed(value, decimals), sorts=value)
+
+
+def _worst(result: Result) -> Table:
+    problem, tests = result.problem, studentized(result)
+    sizes = np.nan_to_num(np.abs(tests.images))
+    rows: list[Row] = []
+    for flat in np.argsort(-sizes, axis=None, kind="stable")[:WORST].tolist():
+        image, axis = np.unravel_index(flat, sizes.shape)
+        rows.append(
+            [
+                str(problem.image_points[image]),
+                str(problem.star_ids[problem.image_stars[image]]),
+                "xy"[axis],
+                1e6 * float(result.solved.residuals[image, axis]),
+                float(tests.images[image, axis]),
+            ]
+        )
+    columns = (
+        Column("Point", text=True),
+        Column("Star", text=True),
+        Column("Coordinate", text=True),
+        Column("Residual", "µm", decimals=2),
+        Column(f"Test value {'w' if tests.known else 't'}", decimals=2),
+    )
+    return Table(
+        "Worst observations", columns, rows, f"The {len(rows)} plate coordinates of the largest test values."
+    )
+
+
+def _lines(table: Callable[[Result], list[str]], result: Result) -> list[Part]:
+    lines = table(result)
+    return [Lines(lines)] if lines else []
+
+
+def _remarks(result: Result) -> list[Part]:
+    told = [str(each) for each in result.messages]
+    return [Remarks(told)] if told else []
