@@ -45,6 +45,9 @@ SCALES = 5
 """Robust adjustments at the most until their scale stands."""
 LEAST_OF_PHOTO, MOST_OF_PHOTO = 4, 0.5
 """Images of a photo that are out, by number and share, from which on the whole photo goes."""
+EVEN = 0.25
+"""Share of the largest test value of a photo that the median of all of them has where all its images are
+bad: a few huge errors, such as exchanged names, lift the others, but far less."""
 BAD_PHOTOS = 5
 """Photos that are taken out before single images are tested, at the most."""
 RESCUES = 5
@@ -488,11 +491,22 @@ class _Snooping:
             if not len(middles) or np.isnan(middles).all():
                 return
             worst, usual = int(np.nanargmax(middles)), float(np.nanmedian(middles))
-            if not middles[worst] > FAR * max(usual, 1.0) or self._is_by_station(worst, middles[worst]):
+            single = middles[worst] < EVEN * self._largest(worst)
+            if (
+                single
+                or not middles[worst] > FAR * max(usual, 1.0)
+                or self._is_by_station(worst, middles[worst])
+            ):
                 return
             said = f"its test values have the median {middles[worst]:.3g}, those of other photos {usual:.3g}"
             if self._photo_out(worst, 0, said) is None:
                 return
+
+    def _largest(self, photo: int) -> float:
+        """Return the largest test value of the images of a photo, in standard deviations."""
+        own = self.suspects.on_photo(photo)
+        own = own[(self.suspects.kinds[own] == 0) & self._testable()[own]]
+        return float(np.sqrt(self.tests.statistic[own] / self.tests.rank[own]).max(initial=0.0))
 
     def _middles(self) -> Floats:
         """Return the median of the test values of the images of each photo, in standard deviations."""
