@@ -179,7 +179,7 @@ def adjust(
     truth_value("fix_photos", fix_photos)
     if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
         raise InputError(f"datum is InnerConstraints, MinimumConstraints or None, not {shown(datum)}")
-    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published, progress)
+    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published)
     processors = core_threads(threads)
     row = loss_row(loss, scale)
     if unit_variance == "redundancy" and not covariance:
@@ -324,7 +324,15 @@ def _result(
 def teller(
     progress: Callable[[Progress], None],
 ) -> Callable[[str, int, int, _photocore.IterationRow | None], None]:
-    """Return what the core calls: it tells `progress`."""
+    """Return what the core calls: it tells `progress`.
+
+    Raises
+    ------
+    InputError
+        It is no function.
+    """
+    if not callable(progress):
+        raise InputError(f"progress is no function: {shown(progress)}")
 
     def tell(phase: str, done: int, total: int, iteration: _photocore.IterationRow | None) -> None:
         progress(Progress(phase, done, total, Iteration(*iteration) if iteration else None))
@@ -338,7 +346,6 @@ def _check_options(
     max_iterations: int,
     tolerance: float,
     as_published: AsPublished | None,
-    progress: object,
 ) -> None:
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
     one_of("ordering", ordering, get_args(Ordering))
@@ -348,8 +355,6 @@ def _check_options(
         raise InputError("there must be one iteration at least")
     if not number("the criterion", as_published.percent if as_published else tolerance) > 0:
         raise InputError("the criterion of convergence must be positive")
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress is no function: {shown(progress)}")
 
 
 def core_threads(threads: int | None) -> int:

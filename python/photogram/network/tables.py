@@ -124,8 +124,8 @@ def _rows(table: Table, table_name: str) -> int:
     first = (RECTANGULAR_COLUMNS[0], GEOGRAPHIC_COLUMNS[0])
     known = next((each for each in (name, *first) if _has(table, table_name, each)), name)
     column = _column(table, table_name, known)
-    if not isinstance(column, Sized):
-        raise InputError(f"{table_name}, column {known} is not a list: {shown(column)}")
+    if not isinstance(column, Sized) or np.ndim(column) == 0:
+        raise InputError(f"{table_name}, column {known} is not a list of names or numbers: {shown(column)}")
     return len(column)
 
 

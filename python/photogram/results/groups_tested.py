@@ -46,7 +46,7 @@ def groups_tested(
         own = np.flatnonzero(suspects.kinds == kind)
         parts = [(PLURALS.get(name, name), own)]
         if kind == OBSERVATION:
-            named = np.array(labels, dtype=object)
+            named = np.array(labels, dtype=object)[suspects.subjects[own]]
             parts = [(f"observations of the kind {each}", own[named == each]) for each in sorted(set(labels))]
         for what, groups in parts:
             if not testable[groups].any():

@@ -296,6 +296,7 @@ class NamedSuspects:
             row_starts=self.starts,
             kinds=kinds.astype(np.int64),
             kind_names=KINDS,
+            subjects=subjects.astype(np.int64),
             points=points,
             photos=photos,
             loads=self.loads,

@@ -69,6 +69,7 @@ class LinearTrial:
             row_starts=starts,
             kinds=np.zeros(len(sizes), dtype=np.int64),
             kind_names=["observation"],
+            subjects=np.arange(len(sizes)),
             points=none,
             photos=none,
             loads=lambda group: np.empty(0, dtype=np.int64),

@@ -27,6 +27,8 @@ class Suspects:
         (G,) which of `kind_names` each is of.
     kind_names
         What the kinds are called: `image`, `control`, ...
+    subjects
+        (G,) the number, within its kind, of what a group is of: an image, a point, an observation ...
     points, photos
         (G,) the point and the photo that a group is of; -1 where there is none. Groups of one point cannot be
         judged one without the other.
@@ -46,6 +48,7 @@ class Suspects:
     row_starts: Indices
     kinds: Indices
     kind_names: Sequence[str]
+    subjects: Indices
     points: Indices
     photos: Indices
     loads: Callable[[int], Indices]
