@@ -7,6 +7,7 @@ use rayon::ThreadPool;
 
 use super::commons::Motion;
 use super::model::{Bundle, Placed};
+use super::parts::{Joined, MOST_PARTS, Part, Parts};
 use super::problem::Assembled;
 use crate::adjustment::{Datum, Motions};
 use crate::geometry::{
@@ -40,48 +41,6 @@ fn displacement(k: usize, from: &Vector3) -> Vector3 {
         0..3 => Vector3::ith(k, 1.0),
         3..6 => Vector3::ith(k - 3, 1.0).cross(from),
         _ => *from,
-    }
-}
-
-/// Photos that hang together by points and observations; a shared camera does not join them.
-#[derive(Debug)]
-struct Part {
-    photos: Vec<usize>,
-    /// The one to hold: what the user says or has placed, else that with most images.
-    central: usize,
-}
-
-/// The parts of a network that have photos with images, the largest first, and the part of each photo, point and common unknown.
-#[derive(Debug)]
-pub(super) struct Parts {
-    all: Vec<Part>,
-    of_photo: Vec<Option<usize>>,
-    of_point: Vec<Option<usize>>,
-    of_common: Vec<Option<usize>>,
-}
-
-/// Parts that are given a datum at the most: a network in more of them is a mistake.
-const MOST_PARTS: usize = 8;
-
-/// Joins what hangs together.
-struct Joined(Vec<usize>);
-
-impl Joined {
-    fn root(&mut self, mut node: usize) -> usize {
-        while self.0[node] != node {
-            self.0[node] = self.0[self.0[node]];
-            node = self.0[node];
-        }
-        node
-    }
-
-    fn join(&mut self, nodes: impl IntoIterator<Item = usize>) {
-        let mut nodes = nodes.into_iter();
-        let Some(first) = nodes.next() else { return };
-        for node in nodes {
-            let [a, b] = [first, node].map(|node| self.root(node));
-            self.0[a.max(b)] = a.min(b);
-        }
     }
 }
 

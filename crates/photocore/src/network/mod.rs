@@ -66,6 +66,7 @@ mod naming;
 mod neighbourhood;
 pub mod observations;
 mod on_frames;
+mod parts;
 mod precision;
 mod problem;
 mod responses;

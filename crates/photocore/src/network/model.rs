@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
-use super::datum::Parts;
 use super::mounts::{Mount, Mounted, mounted};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
+use super::parts::Parts;
 use super::{Image, Minimum, Point};
 use crate::adjustment::{Model, Motions, Weighted};
 use crate::geometry::angle_axis::rotation_angle_axis;

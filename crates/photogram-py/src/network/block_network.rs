@@ -4,10 +4,10 @@ use photocore::adjustment::DatumError;
 use photocore::network::{Network, NetworkDatum, NetworkError as Failure, Options};
 use pyo3::prelude::*;
 
-use super::covariances::{BlockCovariances, factored, refused, tried};
+use super::covariances::{BlockCovariances, factored, refused};
 use super::solution::BlockSolution;
 use super::state::{BlockState, DatumRow, datum_of};
-use super::trial::NetworkTrial;
+use super::trial::{NetworkTrial, tried};
 use crate::work::{Workers, watched};
 
 /// Adds the classes to the extension module.

@@ -8,10 +8,10 @@ use photocore::network::{Camera, Network, NetworkError as Failure, Options, Phot
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::covariances::{BlockCovariances, factored, tried};
+use super::covariances::{BlockCovariances, factored};
 use super::solution::CollectionSolution;
 use super::state::BlockState;
-use super::trial::NetworkTrial;
+use super::trial::{NetworkTrial, tried};
 use super::{CollectionError, failure, images, points, said};
 use crate::arrays::{check_lengths, rows, slices, table};
 use crate::options::{named_loss, named_ordering, unknown};

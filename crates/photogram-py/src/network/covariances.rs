@@ -6,7 +6,6 @@ use photocore::network::{Covariances, Groups, Network, NetworkError as Failure, 
 use pyo3::prelude::*;
 
 use super::state::BlockState;
-use super::trial::NetworkTrial;
 use super::{BlockError, failure};
 use crate::arrays::group_rows;
 use crate::options::unknown;
@@ -54,22 +53,6 @@ pub fn factored(
     found
         .map(|covariances| BlockCovariances { covariances, images, refused })
         .map_err(|error| refused(&error))
-}
-
-/// Prepares a network for trials without some of its observations, from where its adjustment has ended or from the start.
-pub fn tried(
-    py: Python<'_>,
-    (network, options): (&Network, &Options),
-    refused: Refused,
-    state: Option<PyRef<'_, BlockState>>,
-    threads: usize,
-) -> PyResult<NetworkTrial> {
-    let images = network.images.len();
-    let state = state.map(|state| state.state.clone());
-    let found = watched(py, Workers::of(threads, images), None, |pool, _| {
-        network.trial(options, state.as_ref(), pool)
-    })?;
-    found.map(|trial| NetworkTrial::new(trial, images, threads, refused)).map_err(|error| refused(&error))
 }
 
 /// A failure of a block as Python sees it.

@@ -2,11 +2,12 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use photocore::adjustment::Loss;
-use photocore::network::{Moved, Out, Standing, Subject, Trial, UnknownOf};
+use photocore::network::{Moved, Network, Options, Out, Standing, Subject, Trial, UnknownOf};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::covariances::{BlockCovariances, OfRow, Refused, of_rows};
+use super::state::BlockState;
 use crate::arrays::table;
 use crate::options::named_loss;
 use crate::solution::status_name;
@@ -38,10 +39,6 @@ fn standing_row(standing: Standing) -> StandingRow {
 type PredictionRow = (f64, Vec<usize>, Vec<f64>, Vec<f64>);
 
 impl NetworkTrial {
-    pub fn new(trial: Trial, images: usize, threads: usize, refused: Refused) -> Self {
-        Self { trial, images, threads, refused }
-    }
-
     fn workers(&self) -> Workers {
         Workers::of(self.threads, self.images)
     }
@@ -62,6 +59,22 @@ fn subject(subject: Subject) -> (u8, i64) {
 
 /// The unknown that is moved most: its kind, index and component, by how much, and that in its standard deviation.
 type MovedRow = (&'static str, usize, usize, f64, f64);
+
+/// Prepares a network for trials without some of its observations, from where its adjustment has ended or from the start.
+pub fn tried(
+    py: Python<'_>,
+    (network, options): (&Network, &Options),
+    refused: Refused,
+    state: Option<PyRef<'_, BlockState>>,
+    threads: usize,
+) -> PyResult<NetworkTrial> {
+    let images = network.images.len();
+    let state = state.map(|state| state.state.clone());
+    let found = watched(py, Workers::of(threads, images), None, |pool, _| {
+        network.trial(options, state.as_ref(), pool)
+    })?;
+    found.map(|trial| NetworkTrial { trial, images, threads, refused }).map_err(|error| refused(&error))
+}
 
 #[pymethods]
 impl NetworkTrial {
