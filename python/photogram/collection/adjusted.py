@@ -14,11 +14,11 @@ from photogram.collection.failures import named
 from photogram.collection.suspects import collection_trial
 from photogram.results.covariance import Covariances
 from photogram.results.network import AdjustedNetwork
-from photogram.results.reliability import Reliability, reliability_of
 from photogram.results.selection import Adjusted
 
 if TYPE_CHECKING:
     from photogram import _photocore
+    from photogram.results.network_trial import NetworkTrial
 
 __all__ = ["AdjustedCollection"]
 
@@ -122,30 +122,9 @@ class AdjustedCollection(AdjustedNetwork):
             self.covariance_scale,
         )
 
-    def reliability(
-        self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
-    ) -> Reliability:
-        """Return which gross errors of every observation are found, and what others do (docs/blunders.md).
-
-        It takes a factorisation and a selected inverse at the adjusted values.
-
-        Parameters
-        ----------
-        level, power
-            Of the test of an observation: alpha0, beta0.
-        unit_weight
-            `known`, or `unknown`: estimated by the adjustment, which makes errors harder to find.
-
-        Raises
-        ------
-        InputError
-            Options that cannot be.
-        KeyboardInterrupt
-            Ctrl-C.
-        """
+    def _trial(self) -> NetworkTrial:
         options = replace(self.options, covariance=True, loss=None)
-        trial = collection_trial(self.collection, options, self.state)
-        return reliability_of(trial, self.covariances, level=level, power=power, unit_weight=unit_weight)
+        return collection_trial(self.collection, options, self.state)
 
     def adjusted(self) -> Collection:
         """Return the collection at its adjusted values; points that were left out stay as they were."""

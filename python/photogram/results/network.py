@@ -22,7 +22,7 @@ from photogram.io.writing import write_whole
 from photogram.messages import Message
 from photogram.results.covariance import Covariances, Propagated
 from photogram.results.iteration import Iteration
-from photogram.results.reliability import Reliability
+from photogram.results.reliability import Reliability, reliability_of
 from photogram.results.reliability_summary import ReliabilitySummary, reliability_summary
 from photogram.results.selection import Selection
 from photogram.show.brief import Brief, Rows
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from photogram.plots import Plots
+    from photogram.results.network_trial import NetworkTrial
 
 __all__ = ["AdjustedNetwork", "Observed"]
 
@@ -201,10 +202,33 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         return False
 
     @abstractmethod
+    def _trial(self) -> NetworkTrial:
+        """Return the network as tests ask it, where the adjustment has ended."""
+
     def reliability(
         self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
     ) -> Reliability:
-        """Return which gross errors of every observation are found, and what others do."""
+        """Return which gross errors of every observation are found, and what others do (docs/blunders.md).
+
+        It takes a factorisation and a selected inverse at the adjusted values.
+
+        Parameters
+        ----------
+        level, power
+            Of the test of an observation: alpha0, beta0.
+        unit_weight
+            `known`, or `unknown`: estimated by the adjustment, which makes errors harder to find.
+
+        Raises
+        ------
+        InputError
+            Options that cannot be.
+        OutOfMemoryError, KeyboardInterrupt
+            As :meth:`covariances`.
+        """
+        return reliability_of(
+            self._trial(), self.covariances, level=level, power=power, unit_weight=unit_weight
+        )
 
     @cached_property
     def reliability_summary(self) -> ReliabilitySummary | None:

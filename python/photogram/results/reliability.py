@@ -310,9 +310,13 @@ class Reliability:
                     found.append(self._pair(group, other, rho))
         return sorted(found, key=lambda pair: -pair.correlation)
 
+    @cached_property
+    def _delta(self) -> float:
+        """Smallest error of a lone row that is found; kept, as networks have pairs by the thousand."""
+        return math.sqrt(self.lambda0(1))
+
     def _pair(self, first: int, second: int, rho: float) -> Inseparable:
-        delta = math.sqrt(self.lambda0(1))
-        factor = math.inf if rho > 1 - 1e-9 else SEPARATED / delta * math.sqrt(2 / (1 - rho))
+        factor = math.inf if rho > 1 - 1e-9 else SEPARATED / self._delta * math.sqrt(2 / (1 - rho))
         name = self.suspects.name
         return Inseparable(name(first), name(second), (first, second), rho, max(factor, 1.0))
 

@@ -28,7 +28,6 @@ from photogram.results.datum import (
 )
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
-from photogram.results.reliability import Reliability, reliability_of
 from photogram.results.selection import Adjusted, photo_components, point_components
 from photogram.results.suspects import network_trial
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
@@ -36,6 +35,8 @@ from photogram.statistics.limits import GlobalTest, global_test
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from photogram.results.network_trial import NetworkTrial
 
 __all__ = ["Redundancies", "Result", "SumsByKind", "SumsOfSquares"]
 
@@ -192,30 +193,9 @@ class Result(AdjustedNetwork):
             self.covariance_scale,
         )
 
-    def reliability(
-        self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
-    ) -> Reliability:
-        """Return which gross errors of every observation are found, and what others do (docs/blunders.md).
-
-        It takes a factorisation and a selected inverse at the adjusted values.
-
-        Parameters
-        ----------
-        level, power
-            Of the test of an observation: alpha0, beta0.
-        unit_weight
-            `known`, or `unknown`: estimated by the adjustment, which makes errors harder to find.
-
-        Raises
-        ------
-        InputError
-            Options that cannot be.
-        OutOfMemoryError, KeyboardInterrupt
-            As :meth:`covariances`.
-        """
+    def _trial(self) -> NetworkTrial:
         core = block_network(self.block, self.options).trial(self.state, threads=0)
-        trial = network_trial(self.block, core)
-        return reliability_of(trial, self.covariances, level=level, power=power, unit_weight=unit_weight)
+        return network_trial(self.block, core)
 
     def restarted(self) -> Block:
         """Return the block as it was given, but with free photos and cameras where the adjustment has ended.
