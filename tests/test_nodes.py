@@ -55,7 +55,7 @@ def above(parent, node):
     return found
 
 
-def cut(block, parent, photo_nodes, *, cameras=(), tied=()):
+def cut(block, parent, photo_nodes, *, cameras=(), tied=(), options=OPTIONS):
     """Return the nodes of a block.
 
     Blocks of unknowns are (`photo`, row), (`camera`, row) and (`point`, row) of tied points.
@@ -105,10 +105,10 @@ def cut(block, parent, photo_nodes, *, cameras=(), tied=()):
             outer[up] |= outer[node]
     # Every node has an order of its own.
     outer = [sorted(each, key=lambda name: (name[1] * 7919) % 1009) for each in outer]
-    return [piece(block, node, parent, homes, at, outer, set(tied)) for node in range(len(parent))]
+    return [piece(block, node, parent, homes, at, outer, set(tied), options) for node in range(len(parent))]
 
 
-def piece(block, node, parent, homes, at, outer, tied):
+def piece(block, node, parent, homes, at, outer, tied, options):
     """Return a node."""
     names = [name for name, home in homes.items() if home == node] + outer[node]
     photos = np.array(sorted(row for kind, row in names if kind == "photo"), dtype=np.int64)
@@ -147,7 +147,7 @@ def piece(block, node, parent, homes, at, outer, tied):
     children = [child for child, up in enumerate(parent) if up == node]
     part = replace(block, **changes)
     middle = tuple(np.median(block.photo_positions, axis=0))
-    core = block_network(part, OPTIONS)
+    core = block_network(part, options)
     made = core.node(
         local(outer[node]), [local(outer[child]) for child in children], middle=middle, threads=1
     )
@@ -235,9 +235,9 @@ def adjusted(pieces, *, threads=1, order=None):
     return downward(pieces, inverted), changes, states
 
 
-def compare(block, pieces, solutions, tolerance=1e-9):
+def compare(block, pieces, solutions, options=OPTIONS, tolerance=1e-9):
     """Compare the solutions of all nodes with the result of one piece, in standard deviations."""
-    core = block_network(block, OPTIONS).adjust(datum=None, threads=1, progress=None)
+    core = block_network(block, options).adjust(datum=None, threads=1, progress=None)
     seen = [np.zeros(len(names), dtype=int) for names in (block.photo_ids, block.point_ids, block.image_xy)]
     sums, kinds, redundancies = np.zeros(3), np.zeros(4), np.zeros(4)
     for own, found in zip(pieces, solutions, strict=True):
@@ -344,7 +344,8 @@ def test_weighted_poses_ties_and_control_cross_the_cuts():
         Position(block.photo_ids[row], stations[row] + random.normal(0, 0.05, 3), sd=0.05)
         for row in range(0, len(block.photo_ids), 3)
     ]
-    # Points of known place start from it: as outer ones they have images elsewhere only.
+    # All points start from given places: nodes see some of the images of those that lengths touch only.
+    given = replace(OPTIONS, points_given=True)
     places = np.where(np.isfinite(block.point_sd), block.point_positions, truth)
     fixed = block.photo_attitude_sd.copy()
     fixed[4] = 0.0
@@ -360,9 +361,15 @@ def test_weighted_poses_ties_and_control_cross_the_cuts():
         photo_attitudes=attitudes,
         photo_attitudes_observed=observed,
     )
-    pieces = cut(block, SEVEN, leaves_of(SEVEN)[across(block, 4)], tied=[int(row) for row in ends.ravel()])
+    pieces = cut(
+        block,
+        SEVEN,
+        leaves_of(SEVEN)[across(block, 4)],
+        tied=[int(row) for row in ends.ravel()],
+        options=given,
+    )
     solutions, _, _ = adjusted(pieces)
-    compare(block, pieces, solutions)
+    compare(block, pieces, solutions, given)
 
 
 def test_a_camera_of_all_photos_stays_outer_up_to_the_root():
