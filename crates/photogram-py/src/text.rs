@@ -1,7 +1,7 @@
 //! Numbers and tables as text; their documentation is in `_photocore.pyi`.
 
 use std::convert::Infallible;
-use std::io::Write;
+use std::io::{self, Write};
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
@@ -76,23 +76,17 @@ impl Column {
             Self::Floats(column) => write!(to, "{:?}", column[row]),
             Self::Integers(column) => write!(to, "{}", column[row]),
             Self::Truths(column) => write!(to, "{}", column[row]),
-            Self::Texts(column) => {
-                column[row].as_deref().map(|text| write_text(text, to));
-                Ok(())
-            }
+            Self::Texts(column) => column[row].as_deref().map_or(Ok(()), |text| write_text(text, to)),
         };
     }
 }
 
 /// In quotation marks where another program might take a part of it for something else.
-fn write_text(text: &str, to: &mut Vec<u8>) {
+fn write_text(text: &str, to: &mut Vec<u8>) -> io::Result<()> {
     if !text.contains([',', ';', '"', '|', '\t', '#', '\n']) && text == text.trim() {
-        return to.extend_from_slice(text.as_bytes());
+        return to.write_all(text.as_bytes());
     }
-    let quoted = text.replace('\n', " ").replace('"', "\"\"");
-    to.push(b'"');
-    to.extend_from_slice(quoted.as_bytes());
-    to.push(b'"');
+    write!(to, "\"{}\"", text.replace('\n', " ").replace('"', "\"\""))
 }
 
 #[pyfunction]
