@@ -53,6 +53,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod approaches;
 mod camera_priors;
 mod cameras;
 pub mod commons;
@@ -76,6 +77,7 @@ mod responses;
 mod screening;
 mod solution;
 mod start;
+mod stations;
 mod suspects;
 mod trial;
 mod weak_points;
