@@ -37,8 +37,8 @@ COMMANDS = {
         "out",
         ["Plan of the network", "Side by side", "How much", "New points", "Photos", "Control"],
     ),
-    "check EXAMPLES/project --html report.html": (".", ["Verdict", "Plan of the network", "Reproducibility"]),
-    "giant check EXAMPLES/galveston --html report.html": (".", ["Verdict", "Findings", "Key numbers"]),
+    "check --example": ("example-checked", ["Verdict", "Plan of the network", "Reproducibility"]),
+    "giant check EXAMPLES/galveston --out out": ("out", ["Verdict", "Findings", "Key numbers"]),
     "absolute-orientation --example --out out": (
         "out",
         ["Residuals in plan", "Parameters", "Control", "Tests", "Transformed points", "Iterations"],
