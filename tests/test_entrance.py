@@ -6,8 +6,8 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
-from files.test_guards import COMMANDS, RUNS
 
+from files.test_guards import COMMANDS, RUNS
 from photogram.cli.commands import app
 from photogram.cli.job import Writes, roles
 

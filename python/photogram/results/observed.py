@@ -84,7 +84,7 @@ def image_lines(
         image_photos[listed].tolist(),
         result.image_points[listed].tolist(),
         figures.tolist(),
-        np.isfinite(figures).all(axis=1).tolist(),
+        np.atleast_1d(np.isfinite(figures).all(axis=1)).tolist(),
         strict=True,
     )
     for photo, point, row, finite in rows:

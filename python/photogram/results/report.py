@@ -341,22 +341,24 @@ def _work(result: Result) -> list[str]:
         for name, count in result.predictions.items()
         if name != result.ordering
     ]
-    lines += bandwidths(result)
+    head, figures = bandwidths(result)
+    lines += [head, *(f"{f'  {name}':<36}{value}" for name, value in figures)]
     lines += [f"{f'multiply-adds of one {name}':<36}{count:.3e}" for name, count in result.operations.items()]
     return lines
 
 
-def bandwidths(result: Result) -> list[str]:
-    """Return what the 1987 program would have needed, for the order of the input and for the one chosen."""
+def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
+    """Return what the 1987 program would have needed, for the order of the input and for the one chosen.
+
+    A sentence, and names with values.
+    """
     images = result.block.image_photos, result.block.image_points
-    lines = ["bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)"]
+    figures = []
     for name, order in (("of the input", None), ("chosen", result.photo_order)):
-        structured = structure(*images, order)
-        lines.append(
-            f"{f'  in the order {name}':<36}{structured.effective_bandwidth} effective,"
-            f" {structured.naive_bandwidth} without sharing"
-        )
-    return lines
+        found = structure(*images, order)
+        value = f"{found.effective_bandwidth} effective, {found.naive_bandwidth} without sharing"
+        figures.append((f"in the order {name}", value))
+    return "bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)", figures
 
 
 def _rms(values: Floats) -> float:
