@@ -44,13 +44,11 @@ def damage(path, old, new):
 # Help
 
 
-def test_help_names_the_commands_and_is_quick(run):
+def test_help_names_the_commands(run):
     result = run("--help")
     assert result.exit_code == 0
     for word in ("giant", "simulate", "--version", "Exit codes"):
         assert word in result.output
-    heavy = "import sys, photogram.cli.commands; sys.exit(not {'numpy', 'pandas'}.isdisjoint(sys.modules))"
-    assert subprocess.run([sys.executable, "-c", heavy], check=False).returncode == 0
 
 
 def helps(command, name="photogram"):
