@@ -12,7 +12,7 @@ from photogram.statistics.snooping.log import Removal
 from photogram.statistics.snooping.suspects import LostSupportError
 from photogram.statistics.snooping.taking_out import TakingOut
 
-__all__ = ["agreeing", "note_return", "take_back", "with_prediction"]
+__all__ = ["agreeing", "log_probability", "note_return", "take_back", "with_prediction"]
 
 
 def note_return(work: TakingOut, places: list[int], number: int) -> None:
@@ -45,7 +45,7 @@ def agreeing(work: TakingOut) -> list[int]:
         return []
     predictions = work.trial.predictions([work.log[place].group for place in places])
     known = [(place, own) for place, own in zip(places, predictions, strict=True) if own is not None]
-    log_p = _log_probability(
+    log_p = log_probability(
         work,
         np.array([own.statistic for _, own in known]),
         np.array([len(own.rows) for _, own in known]),
@@ -89,7 +89,7 @@ def with_prediction(work: TakingOut, place: int) -> Removal:
     )
 
 
-def _log_probability(work: TakingOut, statistic: Floats, dimension: Indices, groups: Indices) -> Floats:
+def log_probability(work: TakingOut, statistic: Floats, dimension: Indices, groups: Indices) -> Floats:
     """Return log-probabilities of what is out as observations of the network without it."""
     if work.settings.known:
         return log_chi_square(statistic / work.scales[groups], dimension)

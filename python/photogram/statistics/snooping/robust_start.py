@@ -12,10 +12,10 @@ from photogram.statistics.snooping.choosing import Choice
 from photogram.statistics.snooping.factors import ENOUGH, OPTIMISTIC, robust_factor, scales, values
 from photogram.statistics.snooping.log import Round
 from photogram.statistics.snooping.returning import take_back
-from photogram.statistics.snooping.suspects import LostSupportError, Tests
+from photogram.statistics.snooping.suspects import LostSupportError, Standing, Tests
 from photogram.statistics.snooping.taking_out import TakingOut
 
-__all__ = ["needs_robust_start", "start_robustly"]
+__all__ = ["needs_robust_start", "start_robustly", "start_without"]
 
 MANY = 0.05
 """Share of the images beyond `FAR` robust standard deviations from which on a robust start is needed."""
@@ -60,9 +60,31 @@ def start_robustly(work: TakingOut) -> None:
         return
     sizes, scale = robust
     candidates = np.flatnonzero((sizes > CANDIDATE * scale) & suspects.removable & work.tests.active)
-    first, standing, start = work.tests, work.standing, work.out
+    start_without(
+        work,
+        candidates,
+        work.tests,
+        work.standing,
+        "many observations disagree: a robust adjustment (Huber, then Cauchy)",
+    )
+
+
+def start_without(work: TakingOut, candidates: Indices, first: Tests, standing: Standing, what: str) -> None:
+    """Put the points of some groups aside, and let tests against all others decide about them.
+
+    Parameters
+    ----------
+    candidates
+        The groups.
+    first, standing
+        Tests, and how the network stood, with everything in it.
+    what
+        Names them.
+    """
+    suspects, start = work.suspects, work.out
     points = np.unique(suspects.points[candidates])
-    choices, judged = _on_points_aside(work, points[points >= 0].tolist(), candidates, first)
+    points = points[points >= 0]
+    choices, judged = _on_points_aside(work, points.tolist(), candidates, first)
     others = candidates[~np.isin(suspects.points[candidates], sorted(judged))]
     entries = [work.as_it_was(group, first) for group in others.tolist()]
     entries += work.entries(choices, 0)
@@ -73,8 +95,8 @@ def start_robustly(work: TakingOut) -> None:
     if not work.factors:
         work.factors, work.scales = scales(work)
     work.remarks.append(
-        f"many observations disagree: a robust adjustment (Huber, then Cauchy) put {len(points)} points"
-        " aside; tests against the photos of the others decided which of their rays stay out"
+        f"{what} put {len(points)} points aside; tests against the photos of the others decided which of"
+        " their rays stay out"
     )
     returned = take_back(work, 0)
     work.rounds.append(

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.choosing import Choice
+from photogram.statistics.snooping.consensus import begun
 from photogram.statistics.snooping.factors import scales
 from photogram.statistics.snooping.log import Removal, Round
 from photogram.statistics.snooping.returning import agreeing, note_return, take_back, with_prediction
 from photogram.statistics.snooping.robust_start import needs_robust_start, start_robustly
 from photogram.statistics.snooping.settings import Settings
-from photogram.statistics.snooping.suspects import Out, Standing, Tests, Trial
+from photogram.statistics.snooping.suspects import Aside, Out, Standing, Tests, Trial
 from photogram.statistics.snooping.taking_out import TakingOut
 from photogram.statistics.snooping.whole_photos import take_bad_photos_out, take_photos_out
 
@@ -54,9 +56,20 @@ class Outcome:
     remarks: list[str]
 
 
-def snooped(trial: Trial, settings: Settings) -> Outcome:
-    """Take gross errors out of a network, and return what was done."""
-    work = TakingOut(trial, settings)
+def snooped(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None] | None = None) -> Outcome:
+    """Take gross errors out of a network, and return what was done.
+
+    Parameters
+    ----------
+    trial
+        The network.
+    settings
+        How.
+    afresh
+        Starts the trial anew from a consensus of its observations, for where its adjustment runs off; returns
+        what the consensus does without, None where there is none.
+    """
+    work = begun(trial, settings, afresh)
     take_bad_photos_out(work)
     if needs_robust_start(work):
         start_robustly(work)

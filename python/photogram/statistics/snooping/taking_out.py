@@ -22,13 +22,23 @@ _NOT_DETERMINED = "its point is no longer determined and has left the network"
 
 
 class TakingOut:
-    """A network that is being snooped."""
+    """A network that is being snooped.
 
-    def __init__(self, trial: Trial, settings: Settings) -> None:
+    Parameters
+    ----------
+    trial
+        The network.
+    settings
+        How.
+    out
+        What takes no part from the start; nothing by default.
+    """
+
+    def __init__(self, trial: Trial, settings: Settings, out: Out | None = None) -> None:
         self.trial, self.settings = trial, settings
         suspects = trial.suspects
         self.suspects: Suspects = suspects
-        self.out = Out(np.zeros(int(suspects.row_starts[-1]), dtype=bool))
+        self.out = Out(np.zeros(int(suspects.row_starts[-1]), dtype=bool)) if out is None else out
         self.log: list[Removal] = []
         self.rounds: list[Round] = []
         self.remarks: list[str] = []
@@ -74,7 +84,7 @@ class TakingOut:
         """Return the entry of a group that goes without a test of its own."""
         rows = self.suspects.rows(group)
         statistic, dimension = float(tests.statistic[group]), int(tests.rank[group])
-        return self._entry(
+        return self.entry(
             group,
             rows,
             0,
@@ -100,7 +110,7 @@ class TakingOut:
                 for group, statistic, dimension, odds in own.rivals
             )
             entries.append(
-                self._entry(
+                self.entry(
                     choice.group,
                     own.rows,
                     number,
@@ -117,7 +127,7 @@ class TakingOut:
             )
         return entries
 
-    def _entry(
+    def entry(
         self,
         group: int,
         rows: np.ndarray,
@@ -132,6 +142,7 @@ class TakingOut:
         limit: float,
         rivals: tuple[Rival, ...],
     ) -> Removal:
+        """Return the entry of a group, or of some of its rows; see :class:`Removal`."""
         suspects = self.suspects
         name = suspects.name(group)
         if len(rows) < len(suspects.rows(group)):

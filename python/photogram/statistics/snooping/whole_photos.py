@@ -9,10 +9,10 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.statistics.distributions import log_chi_square
 from photogram.statistics.snooping.log import Removal
-from photogram.statistics.snooping.suspects import LostSupportError
+from photogram.statistics.snooping.suspects import LostSupportError, Out, Standing
 from photogram.statistics.snooping.taking_out import TakingOut
 
-__all__ = ["take_bad_photos_out", "take_photos_out"]
+__all__ = ["log_photo", "take_bad_photos_out", "take_photo", "take_photos_out"]
 
 FAR = 5.0
 LEAST_OF_PHOTO, MOST_OF_PHOTO = 4, 0.5
@@ -67,28 +67,51 @@ def take_photos_out(work: TakingOut, number: int) -> list[int]:
 
 def _photo_out(work: TakingOut, photo: int, number: int, said: str) -> int | None:
     """Take a photo out with all that was observed of it; return the place of its entry in the log."""
-    suspects = work.suspects
-    own = suspects.on_photo(photo)
-    images = [group for group in own.tolist() if group in work.images]
-    out, before = work.out.copy(), work.standing
-    out.rows[np.concatenate([suspects.rows(group) for group in own.tolist()])] = True
-    out.photos.add(photo)
-    consequences: list[str] = []
-    for group in images:
-        for point in sorted(work.trial.consequences(out, group)[0] - out.points):
-            out.points.add(point)
-            consequences += work.left(out, point)
+    before = work.standing
+    out = work.out.copy()
+    consequences = take_photo(work, out, photo)
     try:
         work.adjust(out)
     except LostSupportError:
         work.adjust(work.out)
         return None
-    omega = before.weighted_sum_of_squares - work.standing.weighted_sum_of_squares
-    freedom = before.degrees_of_freedom - work.standing.degrees_of_freedom
+    return log_photo(work, photo, number, before, (said, *consequences))
+
+
+def take_photo(work: TakingOut, out: Out, photo: int) -> list[str]:
+    """Put a photo out with all that was observed of it; return what else leaves with it."""
+    suspects = work.suspects
+    own = suspects.on_photo(photo)
+    out.rows[np.concatenate([suspects.rows(group) for group in own.tolist()])] = True
+    out.photos.add(photo)
+    consequences: list[str] = []
+    for group in own.tolist():
+        if group not in work.images:
+            continue
+        for point in sorted(work.trial.consequences(out, group)[0] - out.points):
+            out.points.add(point)
+            consequences += work.left(out, point)
+    return consequences
+
+
+def log_photo(
+    work: TakingOut, photo: int, number: int, before: Standing | None, consequences: tuple[str, ...]
+) -> int:
+    """Enter a photo that is out, with what has fallen since then; return its place in the log.
+
+    `before` is None where the network has never been adjusted with it.
+    """
+    suspects = work.suspects
+    omega, log_p = math.nan, math.nan
+    freedom = sum(len(suspects.rows(group)) for group in suspects.on_photo(photo).tolist())
+    if before is not None:
+        omega = before.weighted_sum_of_squares - work.standing.weighted_sum_of_squares
+        freedom = before.degrees_of_freedom - work.standing.degrees_of_freedom
+        log_p = float(log_chi_square(max(omega, 0.0), max(freedom, 1)))
     work.log.append(
         Removal(
             round=number,
-            group=images[0],
+            group=next(group for group in suspects.on_photo(photo).tolist() if group in work.images),
             kind="photo",
             name=f"all of {suspects.photo_name(photo)}",
             rows=(),
@@ -98,12 +121,12 @@ def _photo_out(work: TakingOut, photo: int, number: int, said: str) -> int | Non
             first_statistic=omega,
             statistic=omega,
             fisher=math.nan,
-            log_probability=float(log_chi_square(max(omega, 0.0), max(freedom, 1))),
+            log_probability=log_p,
             limit=work.level.limit(0),
             error=(),
             error_sd=(),
             redundancy=math.nan,
-            consequences=(said, *consequences),
+            consequences=consequences,
         )
     )
     return len(work.log) - 1
