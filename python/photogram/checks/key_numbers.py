@@ -37,15 +37,22 @@ def key_numbers(edited: Edited, words: Words) -> Section:
             f" ({result.degrees_of_freedom} degrees of freedom)"
         )
     _variance(last, section)
-    section.lines.append(
-        f"{'weighted sum of squares, initial':<50}{last.initial_weighted_sum_of_squares:.4g}"
-    )
-    section.lines += [
-        f"{f'weighted sum of squares, iteration {each.number}':<50}{each.weighted_sum_of_squares:.4g}"
-        for each in last.iterations
-    ]
+    section.lines += _squares(last, words)
     _weights(last, words, section)
     return section
+
+
+def _squares(last: Result, words: Words) -> list[str]:
+    """Return what the iterations have made of the sum of squares."""
+    title = "weighted sum of squares"
+    initial = last.initial_weighted_sum_of_squares
+    after = [each.weighted_sum_of_squares for each in last.iterations]
+    if not words.iterations:
+        return [f"{f'{title}, initial and last':<50}{initial:.4g}, {[initial, *after][-1]:.4g}"]
+    lines = [f"{f'{title}, initial':<50}{initial:.4g}"]
+    return lines + [
+        f"{f'{title}, iteration {number}':<50}{value:.4g}" for number, value in enumerate(after, 1)
+    ]
 
 
 def _statuses(first: Result, last: Result, section: Section) -> None:
