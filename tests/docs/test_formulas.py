@@ -14,7 +14,7 @@ import pytest
 DOCS = Path(__file__).parents[2] / "docs"
 
 PAGES = [path.relative_to(DOCS).as_posix() for path in sorted(DOCS.rglob("*.md"))]
-CODE = re.compile(r"```(?!math)\w*\n.*?```|`[^`\n]+`", re.DOTALL)
+CODE = re.compile(r"<!--.*?-->|```(?!math)\w*\n.*?```|`[^`\n]+`", re.DOTALL)
 DISPLAYED = re.compile(r"^ *```math\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"(?<![\\$])\$(?! )([^$\n]+?)(?<! )\$(?!\d)")
 PAGE = SimpleNamespace(file=SimpleNamespace(src_uri="page.md"))
