@@ -1,0 +1,268 @@
+"""What a node of the tree has of a block: a block of its own on disk, as tables in Parquet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Indices
+from photogram.distributed.cut import Incidence, homes, joined
+from photogram.distributed.files import read_json, write_file, write_json
+from photogram.errors import InputError
+from photogram.io.parquet import Column, Repeated, parquet_content, read_sheet
+from photogram.io.structure import Decoder, Encoder
+from photogram.network.block import Block
+from photogram.network.cameras import Camera
+from photogram.network.frame import Frame
+from photogram.network.geometry import Spheroid
+from photogram.network.observations import Observation
+from photogram.network.refraction import Refraction
+from photogram.network.rigs import Mount
+from photogram.network.unknowns import Unknown
+
+__all__ = ["Homes", "Part", "homes_of", "incidence_of", "part_of", "read_part", "vertices_of", "write_part"]
+
+TABLES: dict[str, tuple[str, ...]] = {
+    "photos": (
+        "photo_positions",
+        "photo_attitudes",
+        "photo_position_sd",
+        "photo_attitude_sd",
+        "photo_positions_observed",
+        "photo_attitudes_observed",
+        "principal_distances",
+        "photo_cameras",
+    ),
+    "points": ("point_positions", "point_sd"),
+    "images": ("image_photos", "image_points", "image_xy", "image_sd"),
+}
+"""The arrays of a block that have a row for each photo, point or image."""
+SETTINGS = "part.json"
+_ROWS = ("photo_ids", "point_ids")
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """What a node has of a block.
+
+    Attributes
+    ----------
+    node
+        Its number in the tree.
+    block
+        Its photos, which are its own and those of nodes above that its observations touch, and the points,
+        images and other observations that are at home here. All its cameras are those of the whole block.
+    owners
+        (P,) the node that each photo belongs to: this one or one above it.
+    photos, points, images, observations
+        Which photo, point, image and observation of the whole block each one is.
+    unknowns
+        Which common unknown of the whole block each one is.
+    """
+
+    node: int
+    block: Block
+    owners: Indices
+    photos: Indices
+    points: Indices
+    images: Indices
+    observations: Indices
+    unknowns: Indices
+
+
+@dataclass(frozen=True, eq=False)
+class Homes:
+    """The nodes where points, images and other observations are at home.
+
+    Attributes
+    ----------
+    owners
+        (P,) of photos; one on a frame belongs to the node of its frame.
+    points, images, observations
+        (n,), (m,) and of each other observation.
+    """
+
+    owners: Indices
+    points: Indices
+    images: Indices
+    observations: Indices
+
+
+def vertices_of(block: Block) -> Indices:
+    """Return (P,) the photo whose pose each photo has: that of its frame, where it is on one."""
+    rows = {name: row for row, name in enumerate(block.photo_ids)} if block.mounts else {}
+    found = np.arange(len(block.photo_ids), dtype=np.int64)
+    for each in block.mounts:
+        found[rows[each.photo]] = rows[each.frame]
+    return found
+
+
+def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
+    """Return what each point and observation touches; the edge of each point, and of each observation.
+
+    Points that are observed together are one edge: they stay together in one node.
+    """
+    vertices = vertices_of(block)
+    points = {name: row for row, name in enumerate(block.point_ids)} if block.observations else {}
+    photos = {name: row for row, name in enumerate(block.photo_ids)} if block.observations else {}
+    tied = [tuple(points[name] for name in each.points) for each in block.observations]
+    edges = joined(len(block.point_ids), (each for each in tied if len(each) > 1))
+    own_edges, others, of_observations = [], [], []
+    count = len(block.point_ids)
+    for each, members in zip(block.observations, tied, strict=True):
+        edge = int(edges[members[0]]) if members else count
+        count += not members
+        of_observations.append(edge)
+        for name in each.photos:
+            own_edges.append(edge)
+            others.append(int(vertices[photos[name]]))
+    incidence = Incidence(
+        np.concatenate([vertices[block.image_photos], np.array(others, dtype=np.int64)]),
+        np.concatenate([edges[block.image_points], np.array(own_edges, dtype=np.int64)]),
+        count,
+    )
+    return incidence, edges, np.array(of_observations, dtype=np.int64)
+
+
+def homes_of(block: Block, owners: Indices, root: int) -> Homes:
+    """Return the nodes where everything is at home.
+
+    Parameters
+    ----------
+    block
+        The block.
+    owners
+        (P,) the nodes of photos; those on frames do not count.
+    root
+        The root of the tree, to which observations of common unknowns alone belong.
+    """
+    incidence, edges, of_observations = incidence_of(block)
+    found = homes(owners, incidence, root)
+    points = found[edges]
+    return Homes(owners[vertices_of(block)], points, points[block.image_points], found[of_observations])
+
+
+def part_of(block: Block, homes: Homes, node: int) -> Part:
+    """Return what a node has of a block."""
+    images = np.flatnonzero(homes.images == node)
+    points = np.flatnonzero(homes.points == node)
+    observations = np.flatnonzero(homes.observations == node)
+    own = [block.observations[row] for row in observations]
+    touched = homes.owners == node
+    touched[block.image_photos[images]] = True
+    _touch(block, touched, own)
+    photos = np.flatnonzero(touched)
+    names = [block.photo_ids[row] for row in photos]
+    new_photos, new_points = _renumbered(photos, len(touched)), _renumbered(points, len(homes.points))
+    rows = {"photos": photos, "points": points, "images": images}
+    changes: dict[str, Any] = {
+        name: None if getattr(block, name) is None else getattr(block, name)[rows[table]]
+        for table, fields in TABLES.items()
+        for name in fields
+    }
+    changes["image_photos"] = new_photos[changes["image_photos"]]
+    changes["image_points"] = new_points[changes["image_points"]]
+    present = set(names)
+    reduced = block.replace(
+        **changes,
+        photo_ids=names,
+        point_ids=[block.point_ids[row] for row in points],
+        observations=own,
+        mounts=[each for each in block.mounts if each.photo in present],
+    )
+    whole = {id(each): row for row, each in enumerate(block.unknowns)}
+    unknowns = np.array([whole[id(each)] for each in reduced.unknowns], dtype=np.int64)
+    return Part(node, reduced, homes.owners[photos], photos, points, images, observations, unknowns)
+
+
+def _touch(block: Block, touched: Bools, observations: list[Observation]) -> None:
+    """Add the photos of observations, and of the frames that photos are on."""
+    if not (observations or block.mounts):
+        return
+    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    for each in observations:
+        touched[[rows[name] for name in each.photos]] = True
+    vertices = vertices_of(block)
+    touched[vertices[np.flatnonzero(touched)]] = True
+
+
+def _renumbered(kept: Indices, count: int) -> Indices:
+    found = np.full(count, -1, dtype=np.int64)
+    found[kept] = np.arange(len(kept))
+    return found
+
+
+def write_part(folder: Path, part: Part) -> None:
+    """Write the tables of a node into a folder, its settings last: with these it is whole.
+
+    Raises
+    ------
+    AdjustmentError
+        The folder cannot be written to.
+    """
+    block = part.block
+    for table, fields in TABLES.items():
+        columns = []
+        if table != "images":
+            names = getattr(block, f"{table[:-1]}_ids")
+            columns.append(Column(table[:-1], Repeated(names, np.arange(len(names))), "", "its name"))
+        columns.append(Column("row", getattr(part, table), "", f"which of the {table} of the whole"))
+        if table == "photos":
+            columns.append(Column("owner", part.owners, "", "the node it belongs to"))
+        for name in fields:
+            values = getattr(block, name)
+            if values is not None:
+                columns.append(Column(name, np.asarray(values), "", f"as Block.{name}"))
+        write_file(folder / f"{table}.parquet", parquet_content(columns, {}))
+    document = {
+        "node": part.node,
+        "observations": part.observations.tolist(),
+        "unknowns": part.unknowns.tolist(),
+        "block": Encoder().fields(block, [*_ROWS, *(name for each in TABLES.values() for name in each)]),
+    }
+    write_json(folder / SETTINGS, document)
+
+
+def read_part(folder: Path) -> Part:
+    """Read what :func:`write_part` has written.
+
+    Raises
+    ------
+    InputError
+        A table is missing or damaged.
+    """
+    document = read_json(folder / SETTINGS)
+    if not isinstance(document, dict) or not {"node", "block", "unknowns", "observations"} <= document.keys():
+        raise InputError("is not what was written of a node", file=folder / SETTINGS)
+    sheets = {table: read_sheet(folder / f"{table}.parquet") for table in TABLES}
+    given: dict[str, Any] = Decoder(_classes(), folder / SETTINGS).fields(document["block"])
+    for table, fields in TABLES.items():
+        given |= {name: sheets[table].columns.get(name) for name in fields}
+    for table in ("photos", "points"):
+        names = sheets[table].column(table[:-1])
+        given[f"{table[:-1]}_ids"] = [names.names[row] for row in names.rows.tolist()]
+    return Part(
+        document["node"],
+        Block(**given),
+        sheets["photos"].column("owner"),
+        sheets["photos"].column("row"),
+        sheets["points"].column("row"),
+        sheets["images"].column("row"),
+        np.array(document["observations"], dtype=np.int64),
+        np.array(document["unknowns"], dtype=np.int64),
+    )
+
+
+def _classes() -> list[type]:
+    return [Camera, Frame, Mount, Refraction, Spheroid, *_below(Observation), *_below(Unknown)]
+
+
+def _below(base: type) -> Iterator[type]:
+    subclasses: list[type] = base.__subclasses__()
+    for each in subclasses:
+        yield each
+        yield from _below(each)
