@@ -244,7 +244,7 @@ def _adjusted(
     except _photocore.BlockError as error:
         if error.args[0] in ("not free", "datum"):
             raise refused(block, network, None, error) from None
-        raise hinted(_named(block, *error.args), block) from None
+        raise hinted(named(block, *error.args), block) from None
     with turned("the adjusted block"):
         freedom = _freedom(block, network, solution, options)
         return with_hints(_result(block, solution, options, freedom, inner, as_published))
@@ -268,7 +268,7 @@ def adjusted_again(
     try:
         solution = network.adjust(datum=None, threads=core_threads(threads), progress=None, start=start)
     except _photocore.BlockError as error:
-        raise _named(block, *error.args) from None
+        raise named(block, *error.args) from None
     return _result(block, solution, options, _freedom(block, network, solution, options))
 
 
@@ -379,7 +379,7 @@ def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]
     by_reason: dict[str, list[str]] = {}
     for point, reason in solution.dropped:
         by_reason.setdefault(reason, []).append(block.point_ids[point])
-    error = None if solution.undetermined is None else _named(block, *solution.undetermined)
+    error = None if solution.undetermined is None else named(block, *solution.undetermined)
     messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
     messages += harmful(block, solution) + behind(block, solution) + folded(block, solution)
     messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
@@ -404,7 +404,7 @@ def _rises(iterations: list[Iteration]) -> list[Message]:
     return messages
 
 
-def _named(
+def named(
     block: Block,
     kind: str,
     message: str,

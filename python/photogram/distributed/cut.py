@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 
 __all__ = ["Cut", "Incidence", "Tree", "cut", "homes", "joined", "tree_of"]
@@ -36,8 +37,8 @@ class Incidence:
     count: int
 
 
-@dataclass(frozen=True)
-class Tree:
+@dataclass(frozen=True, eq=False)
+class Tree(Valued):
     """A binary tree over parts; its nodes are numbered so that children come before their parent.
 
     Attributes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,19 @@ from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
 
-__all__ = ["Homes", "Part", "homes_of", "incidence_of", "part_of", "read_part", "vertices_of", "write_part"]
+__all__ = [
+    "Homes",
+    "Names",
+    "Part",
+    "homes_of",
+    "incidence_of",
+    "names_above",
+    "part_of",
+    "read_part",
+    "shared_cameras",
+    "vertices_of",
+    "write_part",
+]
 
 TABLES: dict[str, tuple[str, ...]] = {
     "photos": (
@@ -54,14 +66,17 @@ class Part:
     node
         Its number in the tree.
     block
-        Its photos, which are its own and those of nodes above that its observations touch, and the points,
-        images and other observations that are at home here. All its cameras are those of the whole block.
+        Its photos, which are its own and those of nodes above that its observations or those of nodes below
+        touch, and the points, images and other observations that are at home here. Its cameras are all of the
+        whole block.
     owners
         (P,) the node that each photo belongs to: this one or one above it.
     photos, points, images, observations
         Which photo, point, image and observation of the whole block each one is.
     unknowns
-        Which common unknown of the whole block each one is.
+        Which common unknowns of the whole block are known here.
+    common
+        These themselves.
     """
 
     node: int
@@ -72,6 +87,25 @@ class Part:
     images: Indices
     observations: Indices
     unknowns: Indices
+    common: tuple[Unknown, ...]
+
+
+@dataclass(frozen=True)
+class Names:
+    """Blocks of unknowns that belong to nodes above, as rows of the whole block, ascending."""
+
+    photos: list[int] = field(default_factory=list)
+    cameras: list[int] = field(default_factory=list)
+    unknowns: list[int] = field(default_factory=list)
+
+    def union(self, other: Names) -> Names:
+        """Return these and others."""
+        return Names(*(sorted({*one, *two}) for one, two in zip(self.rows, other.rows, strict=True)))
+
+    @property
+    def rows(self) -> tuple[list[int], list[int], list[int]]:
+        """Photos, cameras and unknowns."""
+        return self.photos, self.cameras, self.unknowns
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,14 +180,25 @@ def homes_of(block: Block, owners: Indices, root: int) -> Homes:
     return Homes(owners[vertices_of(block)], points, points[block.image_points], found[of_observations])
 
 
-def part_of(block: Block, homes: Homes, node: int) -> Part:
-    """Return what a node has of a block."""
+def part_of(block: Block, homes: Homes, node: int, below: Names) -> Part:
+    """Return what a node has of a block.
+
+    Parameters
+    ----------
+    block, homes
+        The block, and where everything is at home.
+    node
+        The node.
+    below
+        What nodes below hand up.
+    """
     images = np.flatnonzero(homes.images == node)
     points = np.flatnonzero(homes.points == node)
     observations = np.flatnonzero(homes.observations == node)
     own = [block.observations[row] for row in observations]
     touched = homes.owners == node
     touched[block.image_photos[images]] = True
+    touched[below.photos] = True
     _touch(block, touched, own)
     photos = np.flatnonzero(touched)
     names = [block.photo_ids[row] for row in photos]
@@ -175,8 +220,51 @@ def part_of(block: Block, homes: Homes, node: int) -> Part:
         mounts=[each for each in block.mounts if each.photo in present],
     )
     whole = {id(each): row for row, each in enumerate(block.unknowns)}
-    unknowns = np.array([whole[id(each)] for each in reduced.unknowns], dtype=np.int64)
-    return Part(node, reduced, homes.owners[photos], photos, points, images, observations, unknowns)
+    # Those of the block come first: in this order it knows them.
+    unknowns = [whole[id(each)] for each in reduced.unknowns]
+    unknowns += sorted(set(below.unknowns) - set(unknowns))
+    return Part(
+        node,
+        reduced,
+        homes.owners[photos],
+        photos,
+        points,
+        images,
+        observations,
+        np.array(unknowns, dtype=np.int64),
+        tuple(block.unknowns[row] for row in unknowns),
+    )
+
+
+def names_above(part: Part, below: Names, shared: Indices, *, root: bool) -> Names:
+    """Return what a part hands up: photos of nodes above, cameras and unknowns that belong to the root.
+
+    Parameters
+    ----------
+    part, below
+        The part, and what nodes below it hand up.
+    shared
+        The cameras that have unknown parameters and several photos in the whole block.
+    root
+        Whether it is the root, which hands nothing up.
+    """
+    if root:
+        return Names()
+    # A photo on a frame has no unknowns of its own.
+    free = vertices_of(part.block) == np.arange(len(part.photos))
+    photos = part.photos[(part.owners != part.node) & free]
+    cameras = part.block.photo_cameras
+    used = set() if cameras is None else set(cameras.tolist()) & set(shared.tolist())
+    return Names(photos.tolist(), sorted(used | set(below.cameras)), sorted(part.unknowns.tolist()))
+
+
+def shared_cameras(block: Block) -> Indices:
+    """Return which cameras have an unknown parameter and several photos: they belong to the root."""
+    if block.photo_cameras is None:
+        return np.zeros(0, dtype=np.int64)
+    photos = np.bincount(block.photo_cameras, minlength=len(block.cameras))
+    own = [row for row, each in enumerate(block.cameras) if photos[row] > 1 and not each.is_held]
+    return np.array(own, dtype=np.int64)
 
 
 def _touch(block: Block, touched: Bools, observations: list[Observation]) -> None:
@@ -218,11 +306,14 @@ def write_part(folder: Path, part: Part) -> None:
             if values is not None:
                 columns.append(Column(name, np.asarray(values), "", f"as Block.{name}"))
         write_file(folder / f"{table}.parquet", parquet_content(columns, {}))
+    encoder = Encoder()
     document = {
         "node": part.node,
         "observations": part.observations.tolist(),
         "unknowns": part.unknowns.tolist(),
-        "block": Encoder().fields(block, [*_ROWS, *(name for each in TABLES.values() for name in each)]),
+        "block": encoder.fields(block, [*_ROWS, *(name for each in TABLES.values() for name in each)]),
+        # After the block, whose unknowns are the same objects.
+        "common": encoder.value(list(part.common)),
     }
     write_json(folder / SETTINGS, document)
 
@@ -236,10 +327,12 @@ def read_part(folder: Path) -> Part:
         A table is missing or damaged.
     """
     document = read_json(folder / SETTINGS)
-    if not isinstance(document, dict) or not {"node", "block", "unknowns", "observations"} <= document.keys():
+    if not isinstance(document, dict) or not {"node", "block", "unknowns", "observations", "common"} <= document.keys():
         raise InputError("is not what was written of a node", file=folder / SETTINGS)
     sheets = {table: read_sheet(folder / f"{table}.parquet") for table in TABLES}
-    given: dict[str, Any] = Decoder(_classes(), folder / SETTINGS).fields(document["block"])
+    decoder = Decoder(_classes(), folder / SETTINGS)
+    given: dict[str, Any] = decoder.fields(document["block"])
+    common = tuple(decoder.value(document["common"]))
     for table, fields in TABLES.items():
         given |= {name: sheets[table].columns.get(name) for name in fields}
     for table in ("photos", "points"):
@@ -254,6 +347,7 @@ def read_part(folder: Path) -> Part:
         sheets["images"].column("row"),
         np.array(document["observations"], dtype=np.int64),
         np.array(document["unknowns"], dtype=np.int64),
+        common,
     )
 
 
