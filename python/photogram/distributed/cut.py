@@ -138,8 +138,6 @@ def cut(
     levels = tree.levels
     for level in range(int(levels.max(initial=0)) + 1):
         here = [node for node in np.flatnonzero(levels == level).tolist() if tree.children[node]]
-        if not here:
-            continue
         right = np.full(parts, -1, dtype=np.int64)
         node_of = np.full(parts, -1, dtype=np.int64)
         for node in here:
@@ -147,12 +145,12 @@ def cut(
             middle = tree.spans[tree.children[node][0]][1]
             node_of[first:last] = node
             right[first:middle], right[middle:last] = 0, 1
-        boundary = _boundary(owners, right[part], incidences())
-        for node in here:
-            near = boundary & (node_of[part] == node)
-            sides = [near & (right[part] == side) for side in (0, 1)]
-            smaller = min(sides, key=lambda side: int(np.count_nonzero(side)))
-            owners[smaller] = node
+        near = np.flatnonzero(_boundary(owners, right[part], incidences())) if here else part[:0]
+        nodes, sides = node_of[part[near]], right[part[near]]
+        counts = np.bincount(2 * nodes + sides, minlength=2 * len(tree)).reshape(-1, 2)
+        smaller = (counts[:, 1] < counts[:, 0]).astype(np.int64)
+        chosen = sides == smaller[nodes]
+        owners[near[chosen]] = nodes[chosen]
     leaves = np.flatnonzero(tree.spans[:, 1] - tree.spans[:, 0] == 1)
     of_part = np.empty(parts, dtype=np.int64)
     of_part[tree.spans[leaves, 0]] = leaves
