@@ -68,6 +68,7 @@ class Shuffled(Serial):
     random = np.random.default_rng(3)
 
     def first(self, handles):
+        """Return any task."""
         return self.random.choice(np.array(sorted(handles), dtype=object))
 
 

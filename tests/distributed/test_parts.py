@@ -13,7 +13,7 @@ from photogram.network.cameras import Camera
 from photogram.network.core import CoreOptions
 from photogram.network.geometry import rotation_matrix
 from photogram.network.observations import Distance, OnLevel, Position, Relative
-from photogram.network.unknowns import LeverArm, Level
+from photogram.network.unknowns import Level, LeverArm
 
 OPTIONS = CoreOptions("fraction", 1e-5, 50, True, None, "auto", "constrained", None)
 
@@ -26,7 +26,10 @@ def tied_block():
     )
     block, places = simulated.block, simulated.truth.point_positions
     names, photos = block.point_ids, block.photo_ids
-    level, arm = Level("lake", height=float(places[3, 2]), sd=10.0), LeverArm("antenna", [0.0, 0.0, 0.0], sd=0.1)
+    level, arm = (
+        Level("lake", height=float(places[3, 2]), sd=10.0),
+        LeverArm("antenna", [0.0, 0.0, 0.0], sd=0.1),
+    )
 
     def distance(one, other):
         apart = float(np.linalg.norm(places[one] - places[other]))
@@ -43,9 +46,7 @@ def tied_block():
         ),
         Relative(photos[0], photos[-1], *relative(simulated.truth, 0, -1), sd=[0.1] * 3 + [0.001] * 3),
     ]
-    return block.replace(
-        observations=observations, cameras=cameras, photo_cameras=np.arange(len(photos)) % 2
-    )
+    return block.replace(observations=observations, cameras=cameras, photo_cameras=np.arange(len(photos)) % 2)
 
 
 def relative(block, first, second):

@@ -1,7 +1,7 @@
-"""A network small enough to be solved densely, in parts behind the protocol of the engine, and as a whole.
+"""A network small enough to be solved densely: in parts behind the protocol of the engine, and whole.
 
-Stations and points stand in the plane; z = (1 + c) (q - p) + 0.05 sin(q - p) is measured from station p to point
-q, with a scale c that all stations share. Some stations are weighted.
+Stations and points stand in the plane; z = (1 + c) (q - p) + 0.05 sin(q - p) is measured from station p to
+point q, with a scale c that all stations share. Some stations are weighted.
 """
 
 import json
@@ -56,6 +56,7 @@ class Toy:
         self.weighted = np.arange(0, self.stations, 3)
 
     def initial(self):
+        """Return the unknowns to begin with."""
         return np.concatenate([self.places.ravel(), [0.0], self.targets.ravel()])
 
     def equations(self, x, images, stations):
@@ -128,21 +129,26 @@ class ToyNode:
         return [self.toy.c] if block == self.toy.stations else [2 * block, 2 * block + 1]
 
     def whole(self, state):
+        """Return all unknowns of the network."""
         x = self.toy.initial()
         x[self.local] = state
         return x
 
     def equations(self, state):
+        """Return rows (A, b) of unit weight over the unknowns of the node."""
         a, b = self.toy.equations(self.whole(state), self.images, self.weighted)
         return a[:, self.local], b
 
     def advance(self, state, step):
+        """Return the state after a step."""
         return state + step
 
     def relocate(self, state):
+        """Return the state: points stay."""
         return state.copy()
 
     def objective(self, state, *, threads):
+        """Return the sums of squares."""
         b = self.equations(state)[1]
         split = 2 * len(self.images)
         return float(b[split:] @ b[split:]), 0.0, float(b[:split] @ b[:split]), 0.0
@@ -151,10 +157,12 @@ class ToyNode:
         """Nothing, unless an engine wants to know."""
 
     def form(self, state, contributions, *, damping, threads):
+        """Form and eliminate."""
         self.reached("form")
         return FormedToy(self, state, contributions, damping)
 
     def solution(self, state, before, *, threads):
+        """Return the state."""
         return {"state": state}
 
 
@@ -184,9 +192,11 @@ class FormedToy:
 
     @property
     def contribution(self):
+        """What is left."""
         return packed(self.u_matrix), self.u, self.diagonal[self.node.outer]
 
     def solve(self, outer, *, threads):
+        """Return the step."""
         self.node.reached("solve")
         step = np.zeros(len(self.node.local))
         step[self.node.outer] = outer
@@ -194,6 +204,7 @@ class FormedToy:
         return step
 
     def invert(self, outer, state, *, threads):
+        """Return what is found, and cofactors for the children."""
         y = self.coupling @ self.inverse
         q_ss = unpacked(outer)
         q = np.zeros((len(state), len(state)))
@@ -210,34 +221,41 @@ class FormedToy:
 class ToyEngine:
     """Makes toy nodes, and keeps what is found of them as arrays.
 
-    The process that first comes to a certain phase of a certain node is killed there, where that is asked for.
+    The process that first comes to a certain phase of a certain node is killed there, if that is asked for.
     """
 
     def __init__(self, kill=None):
         self.kill = kill
 
     def node(self, run, number):
+        """Return a node."""
         node = ToyNode(run, number)
         if self.kill is not None:
             node.reached = lambda phase: self.reached(run, number, phase)
         return node
 
     def reached(self, run, number, phase):
+        """Die here, where that is asked for."""
         mark = run / f"killed-{phase}-{number}"
         if (phase, number) == self.kill and not mark.exists():
             mark.touch()
             os.kill(os.getpid(), signal.SIGKILL)
 
     def stations(self, run, number):
+        """Count weighted unknowns."""
         return 2 * len(ToyNode(run, number).weighted)
 
     def failure(self, run, number, undetermined):
+        """Return an error."""
         return RankError(f"node {number} is {undetermined}", [], [])
 
     def keep(self, run, number, solution, variance):
+        """Write what was found."""
         node = ToyNode(run, number)
         self.reached(run, number, "keep")
-        np.savez(run / f"kept{number}.npz", local=node.local, images=node.images, outer=node.outer, **solution)
+        np.savez(
+            run / f"kept{number}.npz", local=node.local, images=node.images, outer=node.outer, **solution
+        )
 
 
 def kept(folder: Path, nodes: int):

@@ -314,7 +314,7 @@ def _result(
     as_published: AsPublished | None = None,
 ) -> Result:
     datum = datum_of(block, solution, inner)
-    messages = datum_messages(block, datum, solution.point_rays) + _messages(block, solution)
+    messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
     messages += remark(options.loss, solution.image_weights)
     if as_published:
         messages += _rises([Iteration(*row) for row in solution.iterations])
@@ -374,7 +374,7 @@ def core_threads(threads: int | None) -> int:
     return threads_that_fit(min(threads, 4 * (os.cpu_count() or 1)))
 
 
-def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
+def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     """Collect remarks on the block that did not stop the adjustment, the gravest first."""
     by_reason: dict[str, list[str]] = {}
     for point, reason in solution.dropped:

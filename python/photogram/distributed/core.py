@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import shutil
-from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
-
-import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import named
 from photogram.distributed.files import write_file, write_json
 from photogram.distributed.parts import Names, Part, read_part
 from photogram.distributed.run import Manifest, part_folder, read_manifest, result_folder
-from photogram.errors import InputError
 from photogram.network.core import block_network
 from photogram.network.observations import observation_rows
 from photogram.results.datum import datum_of
@@ -85,15 +79,11 @@ class CoreEngine:
         write_json(folder / OUTCOME, _outcome(part, solution))
 
 
-def _result(
-    part: Part, manifest: Manifest, solution: BlockSolution, variance: float | None
-) -> Result:
+def _result(part: Part, manifest: Manifest, solution: BlockSolution, variance: float | None) -> Result:
     """Return the result of a node, scaled by the variance of unit weight of the whole."""
     scaled = cast("BlockSolution", _Scaled(solution, variance))
     datum = datum_of(part.block, solution)
-    return Result.from_solution(
-        part.block, scaled, manifest.options, datum, [], solution.degrees_of_freedom
-    )
+    return Result.from_solution(part.block, scaled, manifest.options, datum, [], solution.degrees_of_freedom)
 
 
 class _Scaled:
@@ -123,7 +113,7 @@ def _outcome(part: Part, solution: BlockSolution) -> dict[str, Any]:
         "weak_points": [(int(part.points[row]), *rest) for row, *rest in solution.weak_points],
         "dropped": [(int(part.points[row]), reason) for row, reason in solution.dropped],
         "cameras": solution.cameras,
-        "unknowns": solution.adjusted_unknowns,
+        "unknowns": list(zip(part.unknowns.tolist(), solution.adjusted_unknowns, strict=True)),
         "observed": list(observed),
         "operations": solution.operations,
         "seconds": solution.seconds,

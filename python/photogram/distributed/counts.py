@@ -1,4 +1,4 @@
-"""Counted work, memory and traffic of the nodes of a tree, from which photos points tie, before any is formed.
+"""Counted work, memory and traffic of the nodes of a tree, from which photos points tie, before forming any.
 
 A part is cut further until its pieces are as small as the fronts of the factorisation, whose multiply-adds,
 numbers and contributions are then those of dense panels: multifrontal elimination on the whole tree.
@@ -66,8 +66,7 @@ class Counts:
     @property
     def step_bytes(self) -> Floats:
         """(N,) bytes that come down in an iteration."""
-        found: Floats = WORD * self.outer
-        return found
+        return np.asarray(WORD * self.outer)
 
 
 def counted_work(
@@ -93,7 +92,7 @@ def counted_work(
     tree = tree_of(parts)
     node_of = _nodes_above(deep.tree, tree, pieces)
     outer = outer_vertices(deep.tree, deep.owners, list(incidences()))
-    inner = UNKNOWNS * np.bincount(deep.owners, minlength=len(deep.tree)).astype(float)
+    inner: Floats = UNKNOWNS * np.bincount(deep.owners, minlength=len(deep.tree)).astype(np.float64)
     above = UNKNOWNS * np.array([len(each) for each in outer], dtype=float)
     # Symmetric, dense: I^3 / 6 for the pivot, I^2 S / 2 for the panel, I S^2 / 2 for what is left.
     factor = inner**3 / 6 + inner**2 * above / 2 + inner * above**2 / 2
@@ -110,7 +109,7 @@ def counted_work(
         np.add.at(pairs, home, thinned * rays * (rays + 1) / 2)
 
     def summed(values: Floats) -> Floats:
-        return np.bincount(node_of, weights=values, minlength=len(tree)).astype(float)
+        return np.bincount(node_of, weights=values, minlength=len(tree)).astype(np.float64)
 
     tops = np.zeros(len(tree), dtype=np.int64)
     np.maximum.at(tops, node_of, np.arange(len(deep.tree)))

@@ -116,9 +116,7 @@ def tree_of(parts: int) -> Tree:
     return Tree(np.array(parents, dtype=np.int64), tuple(children), np.array(spans, dtype=np.int64))
 
 
-def cut(
-    positions: Floats, weights: Floats, incidences: Callable[[], Iterable[Incidence]], parts: int
-) -> Cut:
+def cut(positions: Floats, weights: Floats, incidences: Callable[[], Iterable[Incidence]], parts: int) -> Cut:
     """Cut photos into parts with separators.
 
     Parameters
@@ -177,7 +175,7 @@ def joined(count: int, together: Iterable[tuple[int, ...]]) -> Indices:
             one = int(found[one])
         return one
 
-    touched = []
+    touched: list[int] = []
     for members in together:
         first = min(least(each) for each in members)
         for each in members:
@@ -218,7 +216,9 @@ def _halved(positions: Floats, weights: Floats, tree: Tree) -> Indices:
         order = rows[np.argsort(places[:, axis], kind="stable")]
         reached = np.cumsum(weights[order])
         total = reached[-1] if len(order) else 0.0
-        middle = int(np.searchsorted(reached, share * total, side="left")) + 1 if total > 0 else len(order) // 2
+        middle = (
+            int(np.searchsorted(reached, share * total, side="left")) + 1 if total > 0 else len(order) // 2
+        )
         middle = min(middle, max(len(order) - 1, 0))
         split(left, order[:middle])
         split(right, order[middle:])

@@ -358,8 +358,7 @@ class Driver:
             return self._do(solved, node, up.at, after, wanted[node], near=up.places[node])
 
         def then(node: int, handle: Handle) -> None:
-            for child, step in zip(self.tree.children[node], self.executor.value(handle), strict=True):
-                wanted[child] = step
+            wanted.update(zip(self.tree.children[node], self.executor.value(handle), strict=True))
             self.executor.forget([handle])
 
         self._down(up, task, then, "solve")

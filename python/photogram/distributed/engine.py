@@ -15,40 +15,70 @@ ContributionRow = tuple[Floats, Floats, Floats]
 
 
 class FormedNode(Protocol):
-    """A node whose points and blocks are eliminated: `photogram._photocore.FormedNode` describes all of it."""
+    """A node whose points and blocks are eliminated; `photogram._photocore.FormedNode` tells more."""
 
     @property
-    def contribution(self) -> ContributionRow: ...
+    def contribution(self) -> ContributionRow:
+        """What it leaves to the node above."""
+
     @property
-    def sum_of_squares(self) -> float: ...
+    def sum_of_squares(self) -> float:
+        """Weighted, of what is at home here."""
+
     @property
-    def decrease(self) -> float: ...
+    def decrease(self) -> float:
+        """What a full step lowers it by, as far as known here."""
+
     @property
-    def undetermined(self) -> Any: ...
-    def solve(self, outer: Floats, *, threads: int) -> Floats: ...
-    def invert(self, outer: Floats, state: Floats, *, threads: int) -> tuple[Any, list[Floats]]: ...
+    def undetermined(self) -> Any:
+        """What the observations leave undetermined; or None."""
+
+    def solve(self, outer: Floats, *, threads: int) -> Floats:
+        """Return the step of all unknowns, given that of the outer ones."""
+
+    def invert(self, outer: Floats, state: Floats, *, threads: int) -> tuple[Any, list[Floats]]:
+        """Return what is adjusted, and the cofactors for each child."""
 
 
 class Node(Protocol):
-    """A node of the tree: `photogram._photocore.Node` describes all of it."""
+    """A node of the tree; `photogram._photocore.Node` tells more."""
 
     @property
-    def outer(self) -> Indices: ...
+    def outer(self) -> Indices:
+        """Where the outer unknowns stand in a state."""
+
     @property
-    def children(self) -> list[Indices]: ...
+    def children(self) -> list[Indices]:
+        """Where those of each child stand."""
+
     @property
-    def counts(self) -> tuple[int, int, int]: ...
+    def counts(self) -> tuple[int, int, int]:
+        """Observations, weighted unknowns, unknowns."""
+
     @property
-    def initial(self) -> Floats: ...
+    def initial(self) -> Floats:
+        """The state to begin with."""
+
     @property
-    def prediction(self) -> Mapping[str, float]: ...
-    def advance(self, state: Floats, step: Floats) -> Floats: ...
-    def relocate(self, state: Floats) -> Floats: ...
-    def objective(self, state: Floats, *, threads: int) -> Sequence[float]: ...
+    def prediction(self) -> Mapping[str, float]:
+        """Work and memory."""
+
+    def advance(self, state: Floats, step: Floats) -> Floats:
+        """Return the state after a step."""
+
+    def relocate(self, state: Floats) -> Floats:
+        """Return the state with points where their rays meet."""
+
+    def objective(self, state: Floats, *, threads: int) -> Sequence[float]:
+        """Return weighted sums of squares by kinds."""
+
     def form(
         self, state: Floats, contributions: list[ContributionRow], *, damping: float, threads: int
-    ) -> FormedNode: ...
-    def solution(self, state: Floats, before: Floats, *, threads: int) -> Any: ...
+    ) -> FormedNode:
+        """Form the normal equations at a state, and eliminate what is at home here."""
+
+    def solution(self, state: Floats, before: Floats, *, threads: int) -> Any:
+        """Return what is adjusted, without cofactors."""
 
 
 class Engine(Protocol):

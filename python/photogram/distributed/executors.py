@@ -9,7 +9,6 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any, Protocol
 
-
 from photogram.errors import AdjustmentError
 
 __all__ = ["Executor", "Handle", "Serial"]
@@ -63,9 +62,7 @@ class Serial:
         self._count = 0
         self._failed: dict[int, Exception] = {}
 
-    def submit(
-        self, function: Callable[..., Any], *arguments: Any, near: str = "", cost: float = 0.0
-    ) -> int:
+    def submit(self, function: Callable[..., Any], *arguments: Any, near: str = "", cost: float = 0.0) -> int:
         """Do a task."""
         del near, cost
         self._count += 1

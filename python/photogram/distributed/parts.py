@@ -54,6 +54,7 @@ TABLES: dict[str, tuple[str, ...]] = {
 }
 """The arrays of a block that have a row for each photo, point or image."""
 SETTINGS = "part.json"
+_MEMBERS = {"node", "block", "unknowns", "observations", "common"}
 _ROWS = ("photo_ids", "point_ids")
 
 
@@ -195,7 +196,7 @@ def part_of(block: Block, homes: Homes, node: int, below: Names) -> Part:
     images = np.flatnonzero(homes.images == node)
     points = np.flatnonzero(homes.points == node)
     observations = np.flatnonzero(homes.observations == node)
-    own = [block.observations[row] for row in observations]
+    own = [block.observations[row] for row in observations.tolist()]
     touched = homes.owners == node
     touched[block.image_photos[images]] = True
     touched[below.photos] = True
@@ -327,7 +328,10 @@ def read_part(folder: Path) -> Part:
         A table is missing or damaged.
     """
     document = read_json(folder / SETTINGS)
-    if not isinstance(document, dict) or not {"node", "block", "unknowns", "observations", "common"} <= document.keys():
+    if (
+        not isinstance(document, dict)
+        or not {"node", "block", "unknowns", "observations", "common"} <= document.keys()
+    ):
         raise InputError("is not what was written of a node", file=folder / SETTINGS)
     sheets = {table: read_sheet(folder / f"{table}.parquet") for table in TABLES}
     decoder = Decoder(_classes(), folder / SETTINGS)

@@ -66,8 +66,9 @@ def scheduled(
 ) -> Times:
     """Work a tree off.
 
-    A task that is ready goes to the worker that is free first; one with children to that of one of them, where
-    it can begin earlier. The way down goes where the factors are. A worker receives one message at a time.
+    A task that is ready goes to the worker that is free first; one with children to that of one of them,
+    where it can begin earlier. The way down goes where the factors are. A worker receives one message at a
+    time.
 
     Parameters
     ----------

@@ -1,17 +1,18 @@
-"""Tasks on the workers of a Dask cluster (`dask.distributed`): scheduling, transport and retries are Dask's."""
+"""Tasks on the workers of a Dask cluster: scheduling, transport and retries are those of `distributed`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from photogram import _photocore
 from photogram.errors import AdjustmentError, InputError
 
-if TYPE_CHECKING:
-    from distributed import Client, Future
+Client = Any
+Future = Any
+"""Of `distributed`, an extra that takes long to import."""
 
 __all__ = ["Workers", "check_workers", "connected"]
 
@@ -60,14 +61,13 @@ class Workers:
 
     def first(self, handles: Collection[Future]) -> Future:
         """Wait until one of some tasks is done."""
-        from distributed import wait
-
-        return next(iter(wait(list(handles), return_when="FIRST_COMPLETED").done))
+        return next(iter(_library().wait(list(handles), return_when="FIRST_COMPLETED").done))
 
     def value(self, handle: Future) -> Any:
         """Return what a task has given."""
-        from distributed import KilledWorker
         from distributed.client import FutureCancelledError
+
+        from distributed import KilledWorker
 
         try:
             return handle.result()
@@ -77,9 +77,7 @@ class Workers:
                 " be taken up again, with more parts or larger workers"
             ) from None
         except (FutureCancelledError, OSError) as error:
-            raise AdjustmentError(
-                f"the scheduler is lost ({error}); the run can be taken up again"
-            ) from None
+            raise AdjustmentError(f"the scheduler is lost ({error}); the run can be taken up again") from None
 
     def forget(self, handles: Collection[Future]) -> None:
         """Let go of what tasks have given."""
@@ -113,25 +111,26 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
         dask.distributed is not installed.
     """
     import dask
-    from distributed import Client, LocalCluster
 
-    if isinstance(cluster, Client):
+    library = _library()
+
+    if isinstance(cluster, library.Client):
         yield cluster
     elif cluster == "local":
         with (
             dask.config.set(SETTINGS),
-            LocalCluster(
+            library.LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 memory_limit=memory or "auto",
                 dashboard_address=None,
             ) as own,
-            Client(own) as client,
+            library.Client(own) as client,
         ):
             yield client
     elif isinstance(cluster, str):
         try:
-            client = Client(cluster, timeout="10s")
+            client = library.Client(cluster, timeout="10s")
         except (OSError, ValueError) as error:
             raise InputError(f"no scheduler answers at {cluster}: {error}") from None
         with client:
@@ -164,6 +163,12 @@ def check_workers(client: Client, folder: Path) -> int:
             " that all workers share"
         )
     return len(versions)
+
+
+def _library() -> Any:
+    import distributed
+
+    return distributed
 
 
 def _version() -> str:
