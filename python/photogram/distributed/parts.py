@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.distributed.cut import Incidence, homes, joined
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.errors import InputError
@@ -25,9 +25,11 @@ from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
 
 __all__ = [
+    "AtHome",
     "Homes",
     "Names",
     "Part",
+    "assembled_part",
     "homes_of",
     "incidence_of",
     "names_above",
@@ -127,6 +129,40 @@ class Homes:
     observations: Indices
 
 
+@dataclass(frozen=True, eq=False)
+class AtHome:
+    """The n points, m images and other observations that are at home in a node.
+
+    Attributes
+    ----------
+    points
+        (n,) which points of the whole block they are.
+    names, point_positions, point_sd
+        Of the points, as of a block.
+    images
+        (m,) which images of the whole block they are.
+    image_photos
+        (m,) photos of the whole block.
+    image_points
+        (m,) points of these.
+    image_xy, image_sd
+        (m, 2) as of a block.
+    observations
+        Which of the other observations.
+    """
+
+    points: Indices
+    names: list[str]
+    point_positions: Floats
+    point_sd: Floats
+    images: Indices
+    image_photos: Indices
+    image_points: Indices
+    image_xy: Floats
+    image_sd: Floats
+    observations: Indices
+
+
 def vertices_of(block: Block) -> Indices:
     """Return (P,) the photo whose pose each photo has: that of its frame, where it is on one."""
     rows = {name: row for row, name in enumerate(block.photo_ids)} if block.mounts else {}
@@ -195,28 +231,61 @@ def part_of(block: Block, homes: Homes, node: int, below: Names) -> Part:
     """
     images = np.flatnonzero(homes.images == node)
     points = np.flatnonzero(homes.points == node)
-    observations = np.flatnonzero(homes.observations == node)
-    own = [block.observations[row] for row in observations.tolist()]
-    touched = homes.owners == node
-    touched[block.image_photos[images]] = True
+    new_points = np.full(len(homes.points), -1, dtype=np.int64)
+    new_points[points] = np.arange(len(points))
+    at_home = AtHome(
+        points,
+        [block.point_ids[row] for row in points],
+        block.point_positions[points],
+        block.point_sd[points],
+        images,
+        block.image_photos[images],
+        new_points[block.image_points[images]],
+        block.image_xy[images],
+        block.image_sd[images],
+        np.flatnonzero(homes.observations == node),
+    )
+    return assembled_part(block, homes.owners, node, at_home, below)
+
+
+def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, below: Names) -> Part:
+    """Return what a node has, from what is at home there.
+
+    Parameters
+    ----------
+    block
+        The whole block, or all of it but points and images.
+    owners
+        (P,) the node of each photo of it.
+    node, at_home
+        The node, and what is at home there.
+    below
+        What nodes below hand up.
+    """
+    own = [block.observations[row] for row in at_home.observations.tolist()]
+    touched = owners == node
+    touched[at_home.image_photos] = True
     touched[below.photos] = True
     _touch(block, touched, own)
     photos = np.flatnonzero(touched)
     names = [block.photo_ids[row] for row in photos]
-    new_photos, new_points = _renumbered(photos, len(touched)), _renumbered(points, len(homes.points))
-    rows = {"photos": photos, "points": points, "images": images}
+    new_photos = np.full(len(touched), -1, dtype=np.int64)
+    new_photos[photos] = np.arange(len(photos))
     changes: dict[str, Any] = {
-        name: None if getattr(block, name) is None else getattr(block, name)[rows[table]]
-        for table, fields in TABLES.items()
-        for name in fields
+        name: None if getattr(block, name) is None else getattr(block, name)[photos]
+        for name in TABLES["photos"]
     }
-    changes["image_photos"] = new_photos[changes["image_photos"]]
-    changes["image_points"] = new_points[changes["image_points"]]
     present = set(names)
     reduced = block.replace(
         **changes,
         photo_ids=names,
-        point_ids=[block.point_ids[row] for row in points],
+        point_ids=at_home.names,
+        point_positions=at_home.point_positions,
+        point_sd=at_home.point_sd,
+        image_photos=new_photos[at_home.image_photos],
+        image_points=at_home.image_points,
+        image_xy=at_home.image_xy,
+        image_sd=at_home.image_sd,
         observations=own,
         mounts=[each for each in block.mounts if each.photo in present],
     )
@@ -227,11 +296,11 @@ def part_of(block: Block, homes: Homes, node: int, below: Names) -> Part:
     return Part(
         node,
         reduced,
-        homes.owners[photos],
+        owners[photos],
         photos,
-        points,
-        images,
-        observations,
+        at_home.points,
+        at_home.images,
+        at_home.observations,
         np.array(unknowns, dtype=np.int64),
         tuple(block.unknowns[row] for row in unknowns),
     )
@@ -277,12 +346,6 @@ def _touch(block: Block, touched: Bools, observations: list[Observation]) -> Non
         touched[[rows[name] for name in each.photos]] = True
     vertices = vertices_of(block)
     touched[vertices[np.flatnonzero(touched)]] = True
-
-
-def _renumbered(kept: Indices, count: int) -> Indices:
-    found = np.full(count, -1, dtype=np.int64)
-    found[kept] = np.arange(len(kept))
-    return found
 
 
 def write_part(folder: Path, part: Part) -> None:

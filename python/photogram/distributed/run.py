@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from photogram.distributed.cut import Tree, cut, tree_of
 from photogram.distributed.files import read_json, write_json
 from photogram.distributed.parts import (
     Names,
+    Part,
     homes_of,
     incidence_of,
     names_above,
@@ -26,7 +28,7 @@ from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions
 
-__all__ = ["Manifest", "part_folder", "partition", "places_of", "read_manifest", "result_folder"]
+__all__ = ["Manifest", "divided", "part_folder", "partition", "places_of", "read_manifest", "result_folder"]
 
 MANIFEST = "run.json"
 
@@ -109,15 +111,46 @@ def partition(block: Block, run: Path, parts: int, options: CoreOptions, source:
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
     found = cut(places_of(block), images.astype(float), lambda: [incidence], parts)
     homes = homes_of(block, found.owners, found.tree.root)
+    return divided(
+        block, run, found.tree, lambda node, below: part_of(block, homes, node, below), options, source
+    )
+
+
+def divided(
+    block: Block,
+    run: Path,
+    tree: Tree,
+    part_at: Callable[[int, Names], Part],
+    options: CoreOptions,
+    source: str,
+) -> Manifest:
+    """Write the parts of a block, one after the other.
+
+    Parameters
+    ----------
+    block
+        The block, or all of it but points and images.
+    run, options, source
+        As of :func:`partition`.
+    tree
+        The tree.
+    part_at
+        Gives the part of a node, told what nodes below hand up.
+
+    Raises
+    ------
+    AdjustmentError
+        The folder cannot be written to.
+    """
     shared = shared_cameras(block)
     outer: list[Names] = []
     counts: list[tuple[int, int, int, int]] = []
-    for node in range(len(found.tree)):
+    for node in range(len(tree)):
         below = Names()
-        for child in found.tree.children[node]:
+        for child in tree.children[node]:
             below = below.union(outer[child])
-        part = part_of(block, homes, node, below)
-        root = node == found.tree.root
+        part = part_at(node, below)
+        root = node == tree.root
         outer.append(names_above(part, below, shared, root=root))
         folder = part_folder(run, node)
         folder.mkdir(parents=True, exist_ok=True)
@@ -129,7 +162,7 @@ def partition(block: Block, run: Path, parts: int, options: CoreOptions, source:
     manifest = Manifest(
         _photocore.__version__,
         source,
-        found.tree,
+        tree,
         outer,
         (float(middle[0]), float(middle[1]), float(middle[2])),
         options,
