@@ -10,6 +10,7 @@ import hashlib
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -82,8 +83,8 @@ class Streamed:
     ----------
     project
         All of it but images, and points that are not control or tied.
-    images
-        (P,) image points of each photo.
+    block
+        Its block, common unknowns with values to start from.
 
     Raises
     ------
@@ -95,7 +96,8 @@ class Streamed:
         settings = read_settings(path / SETTINGS if path.is_dir() else path)
         settings = replace(settings, sd={**settings.sd, **wishes.sd})
         self._folder = folder / "buckets"
-        self._folder.mkdir(parents=True, exist_ok=True)
+        shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder.mkdir(parents=True)
         self._settings, self._wishes = settings, wishes
         held = self._without_images()
         self.project: Project = read_tables(Tables(held, []), wishes)
@@ -111,7 +113,20 @@ class Streamed:
             )
         named = {name for each in self.block.observations for name in each.points}
         self._tied = {name: row for row, name in enumerate(sorted(named))}
-        self._buckets, self.images = self._spread()
+
+    @cached_property
+    def _spread_out(self) -> tuple[int, Floats]:
+        """How many buckets there are, and (P,) the images of each photo."""
+        return self._spread()
+
+    @property
+    def images(self) -> Floats:
+        """(P,) image points of each photo."""
+        return self._spread_out[1]
+
+    def close(self) -> None:
+        """Remove the buckets."""
+        shutil.rmtree(self._folder, ignore_errors=True)
 
     def source(self, options: CoreOptions) -> str:
         """Return what tells the project and how it is adjusted from others: sizes and times of its files."""
@@ -145,7 +160,7 @@ class Streamed:
             return assembled_part(self.block, found.owners, node, at_home, below)
 
         manifest = divided(self.block, run, found.tree, part_at, options, source)
-        shutil.rmtree(self._folder)
+        self.close()
         return manifest
 
     def _without_images(self) -> Settings:
@@ -274,7 +289,7 @@ class Streamed:
 
     def _incidences(self) -> Iterator[Incidence]:
         rows = {name: row for row, name in enumerate(self.block.photo_ids)}
-        for number in range(self._buckets):
+        for number in range(self._spread_out[0]):
             bucket = read_arrays(self._folder / f"{number}.npz")
             edges, of_observations = self._edges(number, len(bucket["names"]))
             others = [
