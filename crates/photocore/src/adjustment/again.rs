@@ -86,6 +86,7 @@ impl InDatum {
             redundancy_excess: None,
             unknowns: self.unknowns,
             cofactors: Some(self.cofactors),
+            lost: None,
             selected: None,
             undetermined: None,
             counts: problem.counts(held.len()),

@@ -41,6 +41,7 @@ mod cofactors;
 mod deficiency;
 mod dense;
 mod dissection;
+mod eliminated;
 mod equation_block;
 mod equations;
 mod factor;
