@@ -241,7 +241,10 @@ def core_trial(
 
 
 def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
-    """Return a block without what is out, from where the last trial has ended."""
+    """Return a block without what is out, from where the last trial has ended.
+
+    Points start where their rays meet; what was given of them stays, for check points are compared with it.
+    """
     core = trial.core
     kinds, subjects = core.subjects
     starts, components = core.row_starts, core.components
@@ -251,7 +254,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     subject = subjects[group]
     images = np.ones(len(block.image_xy), dtype=bool)
     images[subject[gone[IMAGE]]] = False
-    point_sd, points = block.point_sd.copy(), core.points
+    point_sd = block.point_sd.copy()
     point_sd[subject[gone[CONTROL]], components[gone[CONTROL]]] = np.inf
     position_sd, attitude_sd = block.photo_position_sd.copy(), block.photo_attitude_sd.copy()
     position_sd[subject[gone[POSITION]], components[gone[POSITION]]] = np.inf
@@ -273,7 +276,6 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
         photo_attitudes_observed=_observed(block.photo_attitudes, attitudes, attitude_sd),
         photo_position_sd=position_sd,
         photo_attitude_sd=attitude_sd,
-        point_positions=np.where(np.isinf(point_sd) & ~np.isnan(points), points, block.point_positions),
         point_sd=point_sd,
         image_photos=block.image_photos[images],
         image_points=block.image_points[images],

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from itertools import groupby
+from typing import Any
 
 from photogram.checks.findings import Check, Finding, Section
+from photogram.checks.parts import Figure, Listing, Names
 from photogram.results.page.pictures import drawings
 from photogram.show.judgement import judged, verdict_table
-from photogram.show.page import Cell, Column, Fact, Lines, Page, Part, Remarks, Row, Table, Text
+from photogram.show.page import Cell, Column, Fact, Facts, Page, Part, Remarks, Row, Table, Text
 from photogram.show.page import Section as Chapter
 
 __all__ = ["check_page"]
@@ -85,7 +89,33 @@ def _named(each: Finding) -> str:
 
 
 def _chapter(number: int, section: Section) -> Chapter:
-    parts: list[Part] = [Lines(section.lines)] if section.lines else []
+    parts = [
+        part for kind, own in groupby(section.parts, type) for part in _shown(kind, list(own), section.title)
+    ]
     told = [f"{MARKS[each.level]}: {each.text}" for each in section.findings]
     parts.append(Remarks(told) if told else Text("Nothing found."))
     return Chapter(f"part-{number}", section.title, parts, section.why)
+
+
+def _shown(kind: type, parts: list[Any], title: str) -> list[Part]:
+    """Return parts of one kind that follow each other, as they stand on a page."""
+    if kind is str:
+        return [Text(f"{_begun(each)}{'' if each.endswith((':', '.')) else '.'}") for each in parts]
+    if kind is Listing:
+        return [_listing(each, title) for each in parts]
+    if kind is Names:
+        parts = [Figure(each.heading.capitalize(), ", ".join(each.names)) for each in parts]
+    return [Facts(title, [Fact(_begun(each.name.strip()), each.value) for each in parts])]
+
+
+def _listing(given: Listing, title: str) -> Table:
+    columns = []
+    for head, layout in given.columns:
+        decimals = re.search(r"\.(\d+)f", layout)
+        text = not layout.startswith(">")
+        columns.append(Column(_begun(head), decimals=int(decimals[1]) if decimals else None, text=text))
+    return Table(title, columns, [list(row) for row in given.rows])
+
+
+def _begun(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
