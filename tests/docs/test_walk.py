@@ -7,6 +7,7 @@ import walk
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = {
+    "gallery.md": 10,
     "tutorials/aerial-block.md": 6,
     "tutorials/drone.md": 7,
     "tutorials/metrology.md": 8,
@@ -31,7 +32,7 @@ def test_every_step_of_the_page(page, tmp_path):
         assert walk.alike(place.read_text(encoding="utf-8"), drawn), f"{made}: run python docs/walk.py {page}"
 
 
-@pytest.mark.parametrize("page", COMMANDS)
+@pytest.mark.parametrize("page", walk.TUTORIALS)
 def test_a_tutorial_has_pictures_and_ends_in_a_decision(page):
     text = (ROOT / "docs" / page).read_text(encoding="utf-8")
     assert len(walk.pictures(page)) >= 2
