@@ -95,7 +95,7 @@ def test_part_two_by_itself(run, tmp_path):
     source = str(EXAMPLE / "points.csv")
     assert run("transform", "result.json", source, "a.csv", "--decimals", 5).exit_code == 0
     bare = run("transform", "cards.txt", source, "b.csv", "--decimals", 5)
-    assert "12 points written" in bare.output
+    assert "12 points\nwritten: " in bare.output
     with_sd, without, inline = (
         Path(name).read_text().splitlines() for name in ("a.csv", "b.csv", "o/points-transformed.csv")
     )

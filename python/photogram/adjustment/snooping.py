@@ -11,6 +11,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, UnitVariance, adjust, adjusted_from, core_threads
+from photogram.adjustment.consensus import started_by_consensus
 from photogram.arguments.arrays import number, one_of, truth_value, whole_number
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError
@@ -32,7 +33,7 @@ from photogram.results.snooped import Snooped
 from photogram.results.suspects import network_trial
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
-from photogram.statistics.snooping.suspects import LostSupportError, Out
+from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 
 __all__ = ["block_trial", "of_network", "settings_of", "snoop"]
 
@@ -168,9 +169,17 @@ def _snoop_block(
     def adjusted(given: Block, **options: Any) -> Result:
         return adjust(given, unit_variance=unit_variance, threads=threads, progress=progress, **options)
 
+    def afresh() -> Aside | None:
+        found = started_by_consensus(block)
+        if found is None:
+            return None
+        start, aside = found
+        trial.restart(core_trial(start, None, options_of(unit_variance), threads))
+        return aside
+
     try:
         trial = block_trial(block, None, options_of(unit_variance), threads, parts=parts)
-        outcome = snooped(trial, settings)
+        outcome = snooped(trial, settings, afresh)
     except (LostSupportError, _photocore.BlockError):
         # It says by name what is not determined, or goes on where points have to leave.
         first = adjusted(block, covariance=False)
@@ -220,9 +229,15 @@ def block_trial(
     parts: bool = True,
 ) -> NetworkTrial:
     """Return a block as snooping asks it, from the start or from where an adjustment has ended."""
+    return network_trial(block, core_trial(block, state, options, threads), parts=parts)
+
+
+def core_trial(
+    block: Block, state: _photocore.BlockState | None, options: CoreOptions, threads: int | None
+) -> _photocore.NetworkTrial:
+    """Return the same in the core."""
     options = dataclasses.replace(options, covariance=True, loss=None)
-    core = block_network(block, options).trial(state, threads=core_threads(threads))
-    return network_trial(block, core, parts=parts)
+    return block_network(block, options).trial(state, threads=core_threads(threads))
 
 
 def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
