@@ -47,7 +47,8 @@ QUOTE = re.compile(r"(<!-- quote: (\S+)(?: \| (.*?))? -->\n).*?(<!-- end -->)", 
 PRINTED = re.compile(r"(<!-- printed: (.+?) -->\n```text\n)(.*?)(```\n<!-- end -->)", re.DOTALL)
 MEASURED = re.compile(r"<!-- measured: (.+?) -->\n(.*?)<!-- end -->", re.DOTALL)
 MARKED = re.compile(
-    r"<!-- (?:numbers|printed|measured|quote): .*?<!-- end -->|<!-- (\w+) -->.*?<!-- /\1 -->", re.DOTALL
+    r"<!-- (?:numbers|printed|measured|quote): .*?<!-- end -->|<!-- (\w+) -->.*?<!-- (?:/|end of )\1 -->",
+    re.DOTALL,
 )
 FIGURES = re.compile(r"```text\n.*?```|(?:^\|[^\n]*\n){3,}", re.DOTALL | re.MULTILINE)
 """What may hold figures: what was printed, and tables."""

@@ -21,7 +21,7 @@ from pathlib import Path
 
 DOCS = Path(__file__).parent
 TUTORIALS = tuple(f"tutorials/{path.name}" for path in sorted((DOCS / "tutorials").glob("*.md")))
-PAGES = ("first-ten-minutes.md", *TUTORIALS, "gallery.md")
+PAGES = ("index.md", "first-ten-minutes.md", *TUTORIALS, "gallery.md")
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 PICTURE = re.compile(r"<!-- picture: (\S+) -->\n!\[[^\]]*\]\(([^)]+)\)")
 MARKS = re.compile(r"<(path|use|text|image)\b")
