@@ -29,12 +29,14 @@ from pathlib import Path
 
 import calibration_numbers
 import comparator_numbers
+import redundancy_figure
 import stellar_numbers
 import tests_numbers
 
 DOCS = Path(__file__).parent
 BLOCKS: dict[str, Mapping[str, Callable[[], list[str] | None]]] = {
     "comparator.md": comparator_numbers.BLOCKS,
+    "redundancy.md": redundancy_figure.BLOCKS,
     "self-calibration.md": calibration_numbers.BLOCKS,
     "stellar-camera.md": stellar_numbers.BLOCKS,
     "tests.md": tests_numbers.BLOCKS,
