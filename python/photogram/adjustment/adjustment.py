@@ -244,7 +244,7 @@ def _adjusted(
     except _photocore.BlockError as error:
         if error.args[0] in ("not free", "datum"):
             raise refused(block, network, None, error) from None
-        raise hinted(_named(block, *error.args), block) from None
+        raise hinted(named(block, *error.args), block) from None
     with turned("the adjusted block"):
         freedom = _freedom(block, network, solution, options)
         return with_hints(_result(block, solution, options, freedom, inner, as_published))
@@ -268,7 +268,7 @@ def adjusted_again(
     try:
         solution = network.adjust(datum=None, threads=core_threads(threads), progress=None, start=start)
     except _photocore.BlockError as error:
-        raise _named(block, *error.args) from None
+        raise named(block, *error.args) from None
     return _result(block, solution, options, _freedom(block, network, solution, options))
 
 
@@ -314,7 +314,7 @@ def _result(
     as_published: AsPublished | None = None,
 ) -> Result:
     datum = datum_of(block, solution, inner)
-    messages = datum_messages(block, datum, solution.point_rays) + _messages(block, solution)
+    messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
     messages += remark(options.loss, solution.image_weights)
     if as_published:
         messages += _rises([Iteration(*row) for row in solution.iterations])
@@ -374,12 +374,12 @@ def core_threads(threads: int | None) -> int:
     return threads_that_fit(min(threads, 4 * (os.cpu_count() or 1)))
 
 
-def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
+def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     """Collect remarks on the block that did not stop the adjustment, the gravest first."""
     by_reason: dict[str, list[str]] = {}
     for point, reason in solution.dropped:
         by_reason.setdefault(reason, []).append(block.point_ids[point])
-    error = None if solution.undetermined is None else _named(block, *solution.undetermined)
+    error = None if solution.undetermined is None else named(block, *solution.undetermined)
     messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
     messages += harmful(block, solution) + behind(block, solution) + folded(block, solution)
     messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
@@ -404,7 +404,7 @@ def _rises(iterations: list[Iteration]) -> list[Message]:
     return messages
 
 
-def _named(
+def named(
     block: Block,
     kind: str,
     message: str,

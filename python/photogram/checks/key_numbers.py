@@ -36,13 +36,22 @@ def key_numbers(edited: Edited, words: Words) -> Section:
             f"variance of unit weight, {name}", f"{shown} ({result.degrees_of_freedom} degrees of freedom)"
         )
     _variance(last, section)
-    section.figure("weighted sum of squares, initial", f"{last.initial_weighted_sum_of_squares:.4g}")
-    for each in last.iterations:
-        section.figure(
-            f"weighted sum of squares, iteration {each.number}", f"{each.weighted_sum_of_squares:.4g}"
-        )
+    _squares(last, words, section)
     _weights(last, words, section)
     return section
+
+
+def _squares(last: Result, words: Words, section: Section) -> None:
+    """Say what the iterations have made of the sum of squares."""
+    title = "weighted sum of squares"
+    initial = last.initial_weighted_sum_of_squares
+    after = [each.weighted_sum_of_squares for each in last.iterations]
+    if not words.iterations:
+        section.figure(f"{title}, initial and last", f"{initial:.4g}, {[initial, *after][-1]:.4g}")
+        return
+    section.figure(f"{title}, initial", f"{initial:.4g}")
+    for number, value in enumerate(after, 1):
+        section.figure(f"{title}, iteration {number}", f"{value:.4g}")
 
 
 def _statuses(first: Result, last: Result, section: Section) -> None:

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
 from photogram.checks.findings import Check, Finding, Section
 from photogram.checks.parts import Figure, Listing, Names
 from photogram.results.page.pictures import drawings
-from photogram.show.page import Cell, Column, Fact, Facts, Judgement, Page, Part, Remarks, Row, Table, Text
+from photogram.show.judgement import judged, verdict_table
+from photogram.show.page import Cell, Column, Fact, Facts, Page, Part, Remarks, Row, Table, Text
 from photogram.show.page import Section as Chapter
 
 __all__ = ["check_page"]
 
+_TESTS = (
+    "Those of the adjustment, without what was found wrong: what the verdict rests on beside the findings."
+)
 MARKS = {"grave": "grave", "look": "to look at"}
 NAMED = 6
 """Photos and points that a row names."""
@@ -22,16 +27,18 @@ NAMED = 6
 def check_page(found: Check) -> Page:
     """Return the report of a check for the browser."""
     grave, look = len(found.grave), len(found.findings) - len(found.grave)
+    verdict = found.verdict
     pictures = drawings(found.result) if found.result is not None else {}
     chapters = [
         Chapter("findings", "Findings", [_table(found)] if found.findings else [], _INTRO),
         Chapter("network", "Plan of the network", [pictures["network"]] if pictures else []),
         *(_chapter(number, section) for number, section in enumerate(found.sections)),
+        Chapter("tests", "Tests", [verdict_table(verdict)] if verdict.tests else [], _TESTS),
     ]
     return Page(
         what="Check of a network before its adjustment",
         title=found.title,
-        judgements=[_judgement(grave, look)],
+        judgements=[replace(judged(verdict), lines=())],  # the table of findings has them
         advice=_advice(found),
         highlights=[
             Fact("Grave", f"{grave}", tone="bad" if grave else ""),
@@ -46,19 +53,6 @@ _INTRO = (
     " explains others is put"
     " right before the next step looks, so that each is named once. Nothing was changed in the files."
 )
-
-
-def _judgement(grave: int, look: int) -> Judgement:
-    if grave:
-        others = f", and {look} to look at" if look else ""
-        return Judgement(
-            "Mend it first", f"{grave} grave finding{'s' if grave > 1 else ''}{others}", (), "bad"
-        )
-    if look:
-        return Judgement(
-            "Look first", f"Nothing grave; {look} finding{'s' if look > 1 else ''} to look at", (), "look"
-        )
-    return Judgement("Ready", "Nothing was found that speaks against an adjustment", (), "good")
 
 
 def _advice(found: Check) -> list[str]:

@@ -89,7 +89,7 @@ def comparator(
     plots: Annotated[
         bool,
         typer.Option(
-            "--plots/--no-plots", help="Make the report, with its pictures (needs photogram[report])."
+            "--plots/--no-plots", help="Make the report, with its pictures (needs the extra `report`)."
         ),
     ] = True,
     pictures: Annotated[

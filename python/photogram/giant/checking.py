@@ -27,6 +27,7 @@ class _GuideWords(Words):
     order = "FRAMES"
     usual_um = (5.0, 15.0)
     bandwidth = True
+    iterations = True
 
     def unhold(self, kept: Bools) -> str:
         return f"lower the type (column 80: {_type_code(kept)})"

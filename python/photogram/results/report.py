@@ -106,8 +106,8 @@ def _adjustment(result: Result) -> list[str]:
     counts = zip(axes(result), held.sum(axis=0), strict=True)
     components = ", ".join(f"{axis} {count}" for axis, count in counts)
     basis = {
-        "free": "cameras free",
-        "constrained": "cameras constrained",
+        "free": "photos free",
+        "constrained": "photos weighted",
         "unity": "set to 1",
         "redundancy": "redundancy numbers",
     }[result.unit_variance]
@@ -120,9 +120,9 @@ def _adjustment(result: Result) -> list[str]:
             f"{math.sqrt(variance):.6f}" if variance is not None else "undefined",
         ),
         ("degrees of freedom", f"{result.degrees_of_freedom:.8g}"),
-        ("weighted sum of squares, camera", f"{sums.camera:.6f}"),
-        ("weighted sum of squares, ground", f"{sums.ground:.6f}"),
-        ("weighted sum of squares, plates", f"{sums.plates:.6f}"),
+        ("weighted sum of squares, photos", f"{sums.camera:.6f}"),
+        ("weighted sum of squares, control", f"{sums.ground:.6f}"),
+        ("weighted sum of squares, images", f"{sums.plates:.6f}"),
         *(
             (f"weighted sum of squares, {each.kind}", f"{each.sum_of_squares:.6f}")
             for each in result.kinds.values()
