@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
+use super::homes::Homes;
 use super::incidence::Incidence;
 use super::layout::Layout;
 use super::ordering::Ordering;
 use super::symbolic::Symbolic;
-use super::ties::Ties;
 use super::tree::Tree;
 use super::workspace::Workspace;
 
@@ -16,7 +16,8 @@ pub struct System {
     pub(super) layout: Layout,
     pub(super) symbolic: Arc<Symbolic>,
     pub(super) incidence: Incidence,
-    pub(super) ties: Ties,
+    pub(super) ties: Homes,
+    pub(super) contributions: Homes,
     pub(super) tree: Tree,
     pub(super) workspace: Workspace,
 }
@@ -26,14 +27,16 @@ impl System {
     pub fn new(layout: Layout, ordering: Ordering) -> Self {
         let symbolic = Arc::new(Symbolic::new(&layout, ordering));
         let incidence = Incidence::new(&layout, &symbolic);
-        let ties = Ties::new(&layout, &symbolic);
+        let ties = Homes::new(layout.ties().iter().map(|tie| &tie.kept), &symbolic);
+        let contributions = Homes::new(layout.contributions().iter(), &symbolic);
         let work = |(index, supernode): (usize, &super::symbolic::Supernode)| {
             let formation =
                 incidence.locals_at(index).iter().map(|&local| formation_work(&layout, local as usize));
-            supernode.operations() + formation.sum::<f64>()
+            let factored = if symbolic.open() == Some(index) { 0.0 } else { supernode.operations() };
+            factored + formation.sum::<f64>()
         };
         let tree = Tree::new(&symbolic, symbolic.supernodes().iter().enumerate().map(work).collect());
-        Self { layout, symbolic, incidence, ties, tree, workspace: Workspace::default() }
+        Self { layout, symbolic, incidence, ties, contributions, tree, workspace: Workspace::default() }
     }
 
     /// The unknowns and groups.
