@@ -5,11 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from photogram import _photocore
 from photogram.adjustment.adjustment import named
-from photogram.distributed.files import write_file, write_json
+from photogram.distributed.files import read_json, write_file, write_json
 from photogram.distributed.parts import Names, Part, read_part
 from photogram.distributed.run import Manifest, part_folder, read_manifest, result_folder
+from photogram.io.structure import Decoder, Encoder
 from photogram.network.core import block_network
 from photogram.network.observations import observation_rows
 from photogram.results.datum import datum_of
@@ -19,7 +22,7 @@ from photogram.results.saved_block import block_files
 if TYPE_CHECKING:
     from photogram._photocore import BlockSolution
 
-__all__ = ["OUTCOME", "CoreEngine"]
+__all__ = ["CoreEngine", "read_outcome"]
 
 OUTCOME = "outcome.json"
 
@@ -76,22 +79,40 @@ class CoreEngine:
             else:
                 write_file(folder / name, content)
         # The last of its files: with it the node is done.
-        write_json(folder / OUTCOME, _outcome(part, solution))
+        write_json(folder / OUTCOME, Encoder().value(_outcome(part, solution)))
+
+
+def read_outcome(folder: Path) -> dict[str, Any]:
+    """Return what the tables of a node have no place for.
+
+    Raises
+    ------
+    InputError
+        It is missing or damaged.
+    """
+    path = folder / OUTCOME
+    found: dict[str, Any] = Decoder([], path).value(read_json(path))
+    return found
 
 
 def _result(part: Part, manifest: Manifest, solution: BlockSolution, variance: float | None) -> Result:
     """Return the result of a node, scaled by the variance of unit weight of the whole."""
-    scaled = cast("BlockSolution", _Scaled(solution, variance))
+    scaled = cast("BlockSolution", _Scaled(part, solution, variance))
     datum = datum_of(part.block, solution)
     return Result.from_solution(part.block, scaled, manifest.options, datum, [], solution.degrees_of_freedom)
 
 
 class _Scaled:
-    """What the core found of a node, with the variance of unit weight of the whole."""
+    """What the core found of a node, with the variance of unit weight of the whole.
 
-    def __init__(self, solution: BlockSolution, variance: float | None) -> None:
+    The history of photos is not that of one node, and its block does not observe all unknowns that it has.
+    """
+
+    def __init__(self, part: Part, solution: BlockSolution, variance: float | None) -> None:
         self._solution = solution
         self.variance_of_unit_weight = variance
+        self.photo_corrections = np.zeros((0, len(part.photos), 6))
+        self.adjusted_unknowns = solution.adjusted_unknowns[: len(part.block.unknowns)]
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._solution, name)

@@ -13,10 +13,9 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import remarks_on
 from photogram.adjustment.hints import with_hints
-from photogram.arguments.types import Indices
-from photogram.distributed.core import OUTCOME
+from photogram.arguments.types import Floats, Indices
+from photogram.distributed.core import read_outcome
 from photogram.distributed.driver import Outcome
-from photogram.distributed.files import read_json
 from photogram.distributed.parts import read_part, shared_cameras
 from photogram.distributed.run import Manifest, part_folder, result_folder
 from photogram.errors import AdjustmentError
@@ -93,7 +92,7 @@ def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InP
     owners = np.zeros(counts[0], dtype=np.int64)
     for node in range(len(manifest.tree)):
         folder = result_folder(run, node)
-        details.append(read_json(folder / OUTCOME))
+        details.append(read_outcome(folder))
         result = read_block_result(folder, read_summary(folder))
         part = read_part(part_folder(run, node))
         own = np.flatnonzero(part.owners == node)
@@ -194,16 +193,17 @@ def _cameras(block: Block, owners: Indices, details: list[dict[str, Any]]) -> li
     """
     if block.photo_cameras is None:
         return []
-    shared = set(shared_cameras(block).tolist())
     photos = np.bincount(block.photo_cameras, minlength=len(block.cameras)).tolist()
-    last = len(details) - 1
-    homes = np.full(len(block.cameras), last, dtype=np.int64)
+    homes = np.full(len(block.cameras), len(details) - 1, dtype=np.int64)
     homes[block.photo_cameras] = owners
+    homes[shared_cameras(block)] = len(details) - 1
     rows = []
-    for camera in range(len(block.cameras)):
-        node = last if camera in shared else int(homes[camera])
-        values, cofactors, redundancy, *_ = details[node]["cameras"][camera]
+    for camera, given in enumerate(block.cameras):
         each = [own["cameras"][camera] for own in details]
+        covariance = given.prior_covariance
+        values, cofactors, redundancy = _of_home(
+            [row[:3] for row in each], int(homes[camera]), given.deviations, covariance
+        )
         normal = np.sum([row[3] for row in each], axis=0).tolist()
         rows.append((values, cofactors, redundancy, normal, photos[camera], sum(row[5] for row in each)))
     return rows
@@ -211,8 +211,33 @@ def _cameras(block: Block, owners: Indices, details: list[dict[str, Any]]) -> li
 
 def _unknowns(block: Block, details: list[dict[str, Any]]) -> list[Any]:
     """Return the adjusted common unknowns: those of the root, with the observations of all nodes."""
-    counts = [0] * len(block.unknowns)
-    for row, (*_, count) in _all(details, "unknowns"):
-        counts[row] += count
-    found = dict(details[-1]["unknowns"])
-    return [(*found[row][:-1], count) for row, count in enumerate(counts)]
+    found = []
+    for row, given in enumerate(block.unknowns):
+        each = [own for node in details for place, own in node["unknowns"] if place == row]
+        # The last node that has it is the root.
+        change, cofactors, redundancy = _of_home(
+            [(own[0], own[3], own[4]) for own in each], len(each) - 1, given.deviations, None
+        )
+        found.append((change, *each[-1][1:3], cofactors, redundancy, sum(own[5] for own in each)))
+    return found
+
+
+def _of_home(
+    rows: list[Any], home: int, deviations: Floats, covariance: Floats | None
+) -> tuple[list[float], list[float], list[float]]:
+    """Return values, cofactors and redundancy numbers of what several nodes know.
+
+    A node where nothing observes it has no cofactors of it to show, the home itself perhaps: then they are
+    those of another, and the redundancy numbers of its own weights those of R = I - Q P.
+    """
+    values, cofactors, redundancy = rows[home]
+    if np.isfinite(np.array(cofactors, dtype=float)).all():
+        return values, cofactors, redundancy
+    shown = next((row[1] for row in rows if np.isfinite(np.array(row[1], dtype=float)).all()), cofactors)
+    q = np.array(shown, dtype=float).reshape(len(deviations), len(deviations))
+    weighted = np.flatnonzero((deviations > 0) & np.isfinite(deviations))
+    prior = np.diag(deviations[weighted] ** 2) if covariance is None else covariance
+    of_weights = 1.0 - np.diagonal(q[np.ix_(weighted, weighted)] @ np.linalg.inv(prior))
+    found = np.zeros(len(deviations))
+    found[weighted] = of_weights
+    return values, shown, found.tolist()
