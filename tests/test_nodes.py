@@ -306,9 +306,12 @@ def across(block, parts):
     return np.searchsorted(ends, along, side="right")
 
 
-@pytest.mark.parametrize("parent", [TWO, FOUR, SEVEN], ids=["2", "4", "7"])
-def test_a_block_in_nodes_is_that_of_one_piece(parent):
-    block = photogram.simulate(strips=4, photos_per_strip=14, points_per_photo=40, seed=4).block
+@pytest.mark.parametrize(
+    ("parent", "shape"), [(TWO, (3, 9)), (FOUR, (4, 14)), (SEVEN, (10, 20))], ids=["2", "4", "7"]
+)
+def test_a_block_in_nodes_is_that_of_one_piece(parent, shape):
+    strips, length = shape
+    block = photogram.simulate(strips=strips, photos_per_strip=length, points_per_photo=40, seed=4).block
     nodes = leaves_of(parent) if len(parent) > 2 else np.arange(2)
     pieces = cut(block, parent, nodes[across(block, len(nodes))])
     solutions, changes, _ = adjusted(pieces)

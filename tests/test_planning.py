@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import math
+import re
 import shlex
 from pathlib import Path
 from typing import Any
@@ -414,9 +415,7 @@ def test_plan_takes_the_options_of_simulate(run):
 
 def documented() -> list[tuple[str, str]]:
     """Return the commands in the document that are said to print something, and what."""
-    parts = DOCUMENT.read_text().split("<!-- output -->\n")[1:]
-    blocks = [part.split("```")[1].removeprefix("text\n") for part in parts]
-    return [(block.partition("\n")[0].removeprefix("$ "), block.partition("\n")[2]) for block in blocks]
+    return re.findall(r"<!-- printed: (.*?) -->\n```text\n(.*?)```\n", DOCUMENT.read_text(), re.DOTALL)
 
 
 @pytest.mark.parametrize(("command", "printed"), documented(), ids=[command for command, _ in documented()])

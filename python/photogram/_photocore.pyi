@@ -4,7 +4,7 @@ Arrays are float64. Angles are radians, image coordinates millimetres, lengths t
 space. All functions release the GIL.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -2150,6 +2150,25 @@ def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     Returns
     -------
     (k,) numbers, and whether they are the whole text.
+    """
+
+def csv_rows(columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str | None]]) -> bytes:
+    """Return the rows of a table as text of commas (UTF-8), a line each.
+
+    Numbers have the shortest digits that read back to the last bit, NaN and None are empty cells, truth
+    values are `true` and `false`; texts stand in quotation marks where commas, semicolons, bars, tabs,
+    hashes, quotation marks, line ends or blanks about them would be taken for something else. Line ends
+    become blanks.
+
+    Parameters
+    ----------
+    columns
+        Of one length.
+
+    Raises
+    ------
+    ValueError
+        Columns that differ in length.
     """
 
 UNKNOWNS: list[tuple[str, list[tuple[str, str]]]]

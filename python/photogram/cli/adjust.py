@@ -147,7 +147,6 @@ def adjust(
         ):
             return
         project = read_project(job, path, added)
-        project = project.replace(path=job.shown(project.path), messages=tuple(job.told(project.messages)))
         check_maps(map)  # now that all inputs are known, which it must not be
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)

@@ -211,7 +211,7 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
         project = with_names(project, added.names)
     if added.control is not None:
         project = with_control(project, added.control, sd, added.control_crs)
-    return project
+    return project.replace(path=job.shown(project.path), messages=tuple(job.told(project.messages)))
 
 
 def described(project: Project) -> list[Section]:

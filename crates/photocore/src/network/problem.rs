@@ -6,10 +6,11 @@ use std::sync::OnceLock;
 
 use super::camera_priors::CameraPrior;
 use super::commons::PlacedCommon;
-use super::model::{Bundle, Station};
+use super::model::Bundle;
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::precision::median;
 use super::screening::{Dropped, Screened};
+use super::stations::Station;
 use super::surroundings::Surroundings;
 use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start, State};
 use crate::adjustment::{AdjustError, Method, Model, Problem};

@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::model::{Owner, Placed, Station};
+use super::model::Owner;
 use super::problem::Assembled;
+use super::stations::{Placed, Station};
 use super::{
     AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options,
     Point, State, UnitVariance, WeakPoint,
