@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NoReturn, cast
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, cast
 
 import numpy as np
 
@@ -50,6 +50,13 @@ class InParts(Result):
     It has what a :class:`Result` has. What asks for the normal equations of the whole block again is refused:
     covariances between any two quantities, another datum, reliability beyond single observations.
     """
+
+    WHOLE: ClassVar[bool] = False
+
+    @property
+    def reliability_summary(self) -> None:
+        """None: it would take a factor of all normal equations."""
+        return
 
     def covariances(self) -> Covariances:
         """Refuse; covariances of single photos, points and unknowns are there."""
