@@ -234,7 +234,7 @@ def relocated(job: Job, number: int, state: str, after: str) -> tuple[float, flo
     with shelf.lock:
         node = _node(job, number)
         before = _state(job, node, number, state)
-        moved = node.relocate(before)
+        moved = node.relocate(before, threads=job.threads)
         _write_state(job, number, after, moved)
         one, other = (sum(node.objective(each, threads=job.threads)) for each in (before, moved))
         return one, other
@@ -293,15 +293,18 @@ def finished(job: Job, number: int, before: str, after: str, variance: float | N
         job.engine.keep(job.folder, number, node.solution(*states, threads=job.threads), variance)
 
 
-def counted(job: Job, number: int) -> tuple[int, int, int, int]:
-    """Return how many observations, weighted unknowns (those of stations apart, too) and unknowns are there.
+def counted(job: Job, number: int) -> tuple[int, int, int, int, int]:
+    """Return how many observations and unknowns are at home in a node.
 
     Returns
     -------
-    Observations, weighted unknowns, unknowns; weighted unknowns of photos and cameras.
+    Observations, weighted unknowns, unknowns that are not fixed; weighted unknowns of photos and cameras;
+    unknowns, fixed ones too.
     """
     with shelf.lock:
-        return *_node(job, number).counts, job.engine.stations(job.folder, number)
+        node = _node(job, number)
+        size = len(node.initial) - len(node.outer)
+        return *node.counts, job.engine.stations(job.folder, number), size
 
 
 def predicted(job: Job, number: int) -> dict[str, float]:

@@ -307,7 +307,7 @@ fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(
 }
 
 /// The observations beside images.
-fn observations(
+pub(super) fn observations(
     network: &Network,
     problem: &Problem<Bundle>,
     adjustment: &Adjustment,
@@ -463,7 +463,7 @@ fn last_corrections(adjustment: &Adjustment) -> impl Fn(usize) -> f64 {
 }
 
 /// Sums of squares by group (GIANT guide, Appendix E).
-fn sums_of_squares(
+pub(super) fn sums_of_squares(
     problem: &Problem<Bundle>,
     adjustment: &Adjustment,
     unknowns: &[f64],
