@@ -5,6 +5,7 @@ import pytest
 from test_parts import tied_block
 
 import photogram
+from example_scripts import load
 from photogram import adjust
 from photogram.adjustment.elsewhere import Division
 from photogram.distributed import running
@@ -163,3 +164,13 @@ def test_what_parts_cannot_do_is_refused(block):
         adjust(block, memory="much")
     with pytest.raises(InputError, match="parts must be positive"):
         adjust(block, parts=0)
+
+
+def test_the_example_is_right(capsys):
+    script = load("in_parts")
+    script.main()
+    assert "4 parts and 3 separators for 1 workers" in capsys.readouterr().out
+    block = script.flown(seed=12)
+    values, redundancy = script.apart(adjust(block, parts=3), adjust(block))
+    assert values < 1e-9
+    assert redundancy < 1e-9
