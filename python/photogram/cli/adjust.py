@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from photogram.cli.components import UnitVarianceName
 from photogram.cli.console import NOT_CONVERGED, output, print_remark, print_sections
 from photogram.cli.division import WHOLE, Parts
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
@@ -107,6 +109,14 @@ def adjust(
         LossName | None,
         typer.Option(help="Robust loss of image coordinates. Default: what PATH says.", show_default=False),
     ] = None,
+    unit_variance: Annotated[
+        UnitVarianceName | None,
+        typer.Option(
+            help="What the variance of unit weight is based on; `redundancy`: on redundancy numbers, whatever"
+            " the weights of the stations. Default: what PATH says.",
+            show_default=False,
+        ),
+    ] = None,
     self_calibrate: Annotated[
         str | None,
         typer.Option(
@@ -150,6 +160,8 @@ def adjust(
         check_maps(map)  # now that all inputs are known, which it must not be
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
+        if unit_variance is not None:
+            project = project.replace(options=replace(project.options, unit_variance=unit_variance.value))
         sections = described(project)
         if not quiet:
             print_sections(sections, "`photogram info`")
@@ -263,8 +275,6 @@ def _adjusted(
     threads: int | None,
     division: Division,
 ) -> Result:
-    from dataclasses import replace
-
     from photogram import InnerConstraints, InputError, MinimumConstraints
     from photogram import adjust as adjust_block
 

@@ -14,9 +14,9 @@ from photogram.io import json
 from photogram.io.writing import write_whole
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
-from photogram.show.pictures import drawn, new_figure, open_frame
+from photogram.show.pictures import drawn, new_figure
 from photogram.show.sections import composed, headline
-from photogram.show.style import FAINT, INK, MARKED
+from photogram.show.style import FAINT, INK, MARKED, in_style
 from photogram.show.ways import Shown, columns_of, document_of, picture_of, report_of
 from photogram.statistics.variance_function import FunctionEstimate
 
@@ -188,6 +188,7 @@ def draw_variance_function(found: VarianceFunction, path: Path) -> None:
     write_whole({path: drawn(_figure(found), path)})
 
 
+@in_style
 def _figure(found: VarianceFunction) -> Figure:
     """Draw the bins with their intervals, and the function."""
     figure = new_figure(6.4, 4.0)
@@ -202,6 +203,5 @@ def _figure(found: VarianceFunction) -> Figure:
     axes.set_xlabel(found.name)
     axes.set_ylabel("factor of the given variance")
     axes.set_ylim(bottom=0.0)
-    axes.legend(frameon=False)
-    open_frame(axes)
+    axes.legend()
     return figure
