@@ -5,6 +5,7 @@ import pytest
 from test_parts import tied_block
 
 import photogram
+from example_scripts import load
 from photogram import adjust
 from photogram.adjustment.elsewhere import Division
 from photogram.distributed import running
@@ -96,6 +97,13 @@ def test_every_unit_variance_is_that_of_one_process(block, unit_variance):
     agrees(found, adjust(weighted, unit_variance=unit_variance))
 
 
+def test_weighted_cameras_and_unknowns_count_in_the_free_unit_variance():
+    block = tied_block()
+    whole, found = adjust(block, unit_variance="free"), adjust(block, parts=2, unit_variance="free")
+    assert found.degrees_of_freedom == whole.degrees_of_freedom
+    assert found.variance_of_unit_weight == pytest.approx(whole.variance_of_unit_weight, rel=1e-9)
+
+
 def test_without_covariances(block):
     whole, found = adjust(block, covariance=False), adjust(block, parts=4, covariance=False)
     np.testing.assert_allclose(found.photo_positions, whole.photo_positions, rtol=0, atol=1e-9)
@@ -163,3 +171,13 @@ def test_what_parts_cannot_do_is_refused(block):
         adjust(block, memory="much")
     with pytest.raises(InputError, match="parts must be positive"):
         adjust(block, parts=0)
+
+
+def test_the_example_is_right(capsys):
+    script = load("in_parts")
+    script.main()
+    assert "4 parts and 3 separators for 1 workers" in capsys.readouterr().out
+    block = script.flown(seed=12)
+    values, redundancy = script.apart(adjust(block, parts=3), adjust(block))
+    assert values < 1e-9
+    assert redundancy < 1e-9
