@@ -439,7 +439,7 @@ def test_check_points_are_compared_with_what_was_given_of_them():
     given = simulated.block.point_positions
     np.testing.assert_array_equal(cleaned.result.block.point_positions, given)
     table = cleaned.result.check_table()
-    assert len(table) == 20
+    assert len(table) == 8
     # What tells how good the block is has errors, in the size of its standard deviations.
     ratio = table[["d_X", "d_Y", "d_Z"]].to_numpy() / table[["sd_X", "sd_Y", "sd_Z"]].to_numpy()
     assert 0.5 < np.sqrt((ratio**2).mean()) < 2.0
