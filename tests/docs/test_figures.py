@@ -87,3 +87,12 @@ def test_redundancy_numbers_of_rays_are_those_of_theory():
     assert shares[2][0] < 0.01
     assert 0.1 < shares[3][0] < 0.25
     assert shares[2][1] < shares[3][1] < shares[4][1] < shares[5][1]
+
+
+def test_the_pictures_of_results_are_what_their_command_draws():
+    import pictures_figures
+    import walk
+
+    for name, drawn in pictures_figures.pictures().items():
+        shown = (ROOT / "docs" / "pictures" / f"{name}.svg").read_text(encoding="utf-8")
+        assert walk.alike(shown, drawn), f"{name}: run python docs/pictures_figures.py"

@@ -14,6 +14,7 @@ from photogram.io import json
 from photogram.io.writing import write_whole
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
+from photogram.show.brief import Brief
 from photogram.show.pictures import drawn, new_figure
 from photogram.show.sections import composed, headline
 from photogram.show.style import FAINT, INK, MARKED, in_style
@@ -66,8 +67,8 @@ class Bin:
         return cls(value, each.count, each.redundancy, found, interval)
 
 
-@dataclass(frozen=True, eq=False)
-class VarianceFunction(Shown):
+@dataclass(frozen=True, eq=False, repr=False)
+class VarianceFunction(Shown, Brief):
     """The variance of image coordinates as a function: sigma^2 = sd^2 (a^2 + b^2 (r / R)^2).
 
     Attributes
