@@ -156,7 +156,8 @@ def opened(
             workers, executor = 1, Serial(folder)
         else:
             client = stack.enter_context(connected(division.cluster, division.workers, memory))
-            workers, executor = check_workers(client, folder), Workers(client)
+            workers, limit = check_workers(client, folder)
+            executor, memory = Workers(client), memory or limit
             threads = threads or 1
         stack.callback(executor.stop)
         stack.callback(shelf.clear)

@@ -141,8 +141,10 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
         )
 
 
-def check_workers(client: Client, folder: Path) -> int:
-    """Return how many workers there are; refuse what cannot work together.
+def check_workers(client: Client, folder: Path) -> tuple[int, int | None]:
+    """Return how many workers there are, and the least memory of one; refuse what cannot work together.
+
+    The memory is None where nothing bounds it.
 
     Raises
     ------
@@ -162,7 +164,8 @@ def check_workers(client: Client, folder: Path) -> int:
             f"the workers at {', '.join(sorted(blind))} do not see {folder}: parts and results lie on a disk"
             " that all workers share"
         )
-    return len(versions)
+    limits = [each for each in client.run(_limit).values() if each]
+    return len(versions), min(limits, default=None)
 
 
 def _library() -> Any:
@@ -177,6 +180,12 @@ def _version() -> str:
     except ImportError:
         return ""
     return _photocore.__version__
+
+
+def _limit(dask_worker: Any = None) -> int | None:
+    """Return the bytes that Dask lets a worker take; Dask hands it over by this name."""
+    limit: int | None = dask_worker.memory_manager.memory_limit
+    return limit
 
 
 def _sees(folder: str) -> bool:
