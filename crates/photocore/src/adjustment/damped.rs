@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::method::Stop;
+use super::method::{NEGLIGIBLE, Stop};
 use super::options::{Iteration, Status};
 use super::problem::Model;
 use super::result::AdjustError;
@@ -10,10 +10,6 @@ use super::run::{End, Run, Solved, State};
 
 /// A step is accepted when the sum of squares does not rise by more than its own rounding error.
 const ROUNDING: f64 = 1e-12;
-/// A Gauss-Newton step that changes no unknown by more than this multiple of its standard deviation is accepted as it is:
-/// it lowers the sum of squares by less than the square of this, which may drown in the rounding errors of the computed
-/// observations (geocentric coordinates are good to a nanometre only).
-pub(super) const NEGLIGIBLE: f64 = 1e-3;
 /// The sum of squares stands still where three damped steps lower it by less than this multiple of the variance of unit weight: a
 /// hundredth of a standard deviation of the combination of unknowns that they follow.
 const STILL: f64 = 1e-4;

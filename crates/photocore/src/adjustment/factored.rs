@@ -8,8 +8,8 @@ use thiserror::Error;
 
 use super::loss::{Loss, Reweighting};
 use super::problem::{Linearized, Model, Problem};
-use super::result::{AdjustError, Seconds, gib};
-use super::run::unless_stopped;
+use super::result::{AdjustError, Seconds, gib, unless_stopped};
+
 use super::transformation::Transformation;
 use crate::normals::{Factor, Function, Inversion, Prior};
 

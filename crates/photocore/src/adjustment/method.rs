@@ -72,3 +72,8 @@ pub enum Published {
         limit: f64,
     },
 }
+
+/// A Gauss-Newton step that changes no unknown by more than this multiple of its standard deviation is accepted as it is:
+/// it lowers the sum of squares by less than the square of this, which may drown in the rounding errors of the computed
+/// observations (geocentric coordinates are good to a nanometre only).
+pub(super) const NEGLIGIBLE: f64 = 1e-3;

@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 
 use super::problem::{Linearized, Model, Problem};
-use super::result::AdjustError;
-use super::run::unless_stopped;
+use super::result::{AdjustError, unless_stopped};
+
 use crate::normals::{Factor, Prior};
 
 /// The normal equations of a problem at given values, factored.

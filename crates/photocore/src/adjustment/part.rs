@@ -12,8 +12,8 @@ use thiserror::Error;
 
 use super::options::Phase;
 use super::problem::{Linearized, Model, Problem};
-use super::result::{AdjustError, Adjustment, Seconds};
-use super::run::{Watch, between, unless_stopped};
+use super::result::{AdjustError, Adjustment, Seconds, unless_stopped};
+use super::run::{Watch, between};
 use crate::normals::{Contribution, Factor, Prior, packed};
 
 /// Why a part is not formed, solved or inverted.

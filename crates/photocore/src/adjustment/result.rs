@@ -1,5 +1,7 @@
 //! What an adjustment ends with.
 
+use std::ops::ControlFlow;
+
 use thiserror::Error;
 
 use super::options::{Iteration, Status};
@@ -179,4 +181,12 @@ impl From<Stopped> for AdjustError {
 pub(crate) fn gib(bytes: usize) -> String {
     let gib = bytes as f64 / f64::from(1 << 30);
     if gib < 0.1 { format!("{:.1} MiB", 1024.0 * gib) } else { format!("{gib:.1} GiB") }
+}
+
+/// What the work has ended with.
+pub(super) fn unless_stopped<T>(flow: ControlFlow<Stopped, T>) -> Result<T, AdjustError> {
+    match flow {
+        ControlFlow::Continue(found) => Ok(found),
+        ControlFlow::Break(stopped) => Err(stopped.into()),
+    }
 }

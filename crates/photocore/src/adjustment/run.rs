@@ -5,14 +5,13 @@ use std::time::Instant;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::damped::NEGLIGIBLE;
 use super::datum::{Adjusted, AtTarget, Datum, Target, moved};
 use super::loss::Reweighting;
-use super::method::{FIRST_DAMPING, Method};
+use super::method::{FIRST_DAMPING, Method, NEGLIGIBLE};
 use super::options::{Event, Iteration, Options, Phase, Status};
 use super::problem::{Linearized, Model, Problem};
-use super::result::{AdjustError, Adjustment, Seconds};
-use crate::normals::{Cofactors, Factor, Inversion, Prior, Stopped};
+use super::result::{AdjustError, Adjustment, Seconds, unless_stopped};
+use crate::normals::{Cofactors, Factor, Inversion, Prior};
 
 /// Whoever is told on the calling thread what is going on; breaking stops the work.
 pub type Watch<'a> = &'a mut dyn FnMut(Event) -> ControlFlow<()>;
@@ -284,7 +283,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a, M>, AdjustError> {
         let (unknowns, at_target) = match damping == 0.0 && self.foresees_end() {
-            true => self.to_target(unknowns),
+            true => self.moved_to_target(unknowns),
             false => (unknowns, None),
         };
         let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
@@ -305,7 +304,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     /// Moves the network to the datum that it is to end in; it stays where it cannot be moved there.
-    fn to_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<AtTarget>) {
+    fn moved_to_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<AtTarget>) {
         let Some(Target { datum, reference }) = self.target else { return (unknowns, None) };
         let adjusted = Adjusted { unknowns: &unknowns, held: &self.datum, loss: None };
         match moved(self.problem, adjusted, datum, reference, self.pool) {
@@ -503,14 +502,6 @@ impl<'a, M: Model> Run<'a, '_, M> {
         self.history.push(corrected);
         self.iterations.push(iteration);
         stopped((self.watch)(Event::Iteration(iteration)))
-    }
-}
-
-/// What the work has ended with.
-pub(super) fn unless_stopped<T>(flow: ControlFlow<Stopped, T>) -> Result<T, AdjustError> {
-    match flow {
-        ControlFlow::Continue(found) => Ok(found),
-        ControlFlow::Break(stopped) => Err(stopped.into()),
     }
 }
 

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use super::options::{Event, Options, Phase, Status};
 use super::problem::{Linearized, Model, Problem};
-use super::result::AdjustError;
-use super::run::{Watch, adjust_by_groups, unless_stopped};
+use super::result::{AdjustError, unless_stopped};
+use super::run::{Watch, adjust_by_groups};
 use crate::normals::{Cofactors, Equations, LocalCofactors, Prior, SelectedInverse, TieRows};
 
 /// A problem at adjusted values, with cofactors of everything inside the pattern of its normal equations.

@@ -251,7 +251,7 @@ impl Network {
         let of_images = model.images.iter().flat_map(|image| image.sd);
         let of_ties = model.observations.iter().flat_map(|tied| vec![1.0; tied.root.nrows()]);
         let held: Vec<bool> = sd.iter().map(|&sd| sd == 0.0).collect();
-        let (outer, below) = screened.surroundings.blocks(&model, &screened)?;
+        let (outer, below) = screened.surroundings.blocks(&model, &screened.points)?;
         let layout = layout(&model, places)?.with_held(&held).as_part(outer, below)?;
         let problem = Problem {
             observation_sd: of_images.chain(of_ties).collect(),

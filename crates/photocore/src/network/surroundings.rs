@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use super::model::Bundle;
-use super::screening::Screened;
 use super::{Network, NetworkError};
 
 /// What a block of unknowns that several nodes touch belongs to: indices into the network of the node.
@@ -56,16 +55,16 @@ impl Surroundings {
             .collect()
     }
 
-    /// The kept blocks of a model that outer ones are, and those that each node below leaves something for.
+    /// The kept blocks of a model of these points that outer ones are, and those that each node below leaves something for.
     ///
     /// # Errors
     /// One that has no unknowns of its own here.
     pub(super) fn blocks(
         &self,
         model: &Bundle,
-        screened: &Screened,
+        points: &[usize],
     ) -> Result<(Vec<u32>, Vec<Vec<u32>>), NetworkError> {
-        let (photos, tied) = (model.cameras.len(), &screened.points[model.locals..]);
+        let (photos, tied) = (model.cameras.len(), &points[model.locals..]);
         let block = |&block: &BlockOf| {
             let found = match block {
                 BlockOf::Photo(photo) => Some(photo),

@@ -7,13 +7,14 @@ use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 
 use super::equations::{Equations, Prior};
-use super::further::{Known, Side};
+use super::further::Known;
 use super::incidence::Stacks;
 use super::layout::Layout;
 use super::selected::SelectedInverse;
 use super::stack::{Part, Slot, Stack, dot};
 use super::system::System;
 use super::tie_equations::TieEquations;
+use super::vectorised::Side;
 use super::vectorised::{Kernel, LANES, Rows, copy_vectors, run, size};
 use super::watch::Control;
 use super::workspace::zeros;

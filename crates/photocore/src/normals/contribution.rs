@@ -6,7 +6,6 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::factor::Factor;
 use super::front::Front;
 use super::layout::Layout;
 use super::selected::SelectedInverse;
@@ -70,35 +69,6 @@ impl System {
             row..row + self.symbolic.dim(position)
         };
         blocks.iter().flat_map(rows).collect()
-    }
-}
-
-impl Factor {
-    /// Takes what is left for the outer unknowns, in the order of the layout, and the memory of its front; empty for a whole system,
-    /// and the second time.
-    pub fn take_contribution(&mut self) -> Contribution<'static> {
-        let symbolic = &*self.panels.symbolic;
-        let Some(open) = symbolic.open() else { return Contribution::default() };
-        let (s, first) = (&symbolic.supernodes()[open], symbolic.first_unknown(open));
-        if self.panels.values.len() < s.panel.end {
-            return Contribution::default();
-        }
-        let mut matrix = Vec::with_capacity(packed(s.width));
-        for (j, column) in self.panels.panel(open).chunks_exact(s.width.max(1)).enumerate() {
-            matrix.extend_from_slice(&column[j..]);
-        }
-        self.panels.values.truncate(s.panel.start);
-        self.panels.values.shrink_to_fit();
-        Contribution {
-            matrix: matrix.into(),
-            right: self.right[first..].to_vec().into(),
-            diagonal: self.diagonal[first..].to_vec().into(),
-        }
-    }
-
-    /// Makes room again for the front of the outer unknowns.
-    pub(super) fn reopen(&mut self) {
-        self.panels.values.resize(self.panels.symbolic.values(), 0.0);
     }
 }
 

@@ -5,31 +5,12 @@ use std::ops::Range;
 use pulp::Simd;
 use smallvec::SmallVec;
 
-use super::incidence::Incidence;
 use super::layout::Layout;
 use super::panels::skip_ref;
 use super::stack::{Stack, dot, parts_of, united};
 use super::system::System;
 use super::triangle::Triangle;
 use super::vectorised::{Kernel, run, size};
-
-/// For each supernode, and last for the local blocks without equations: V, v and L of every stack at home there (see [`Stack`]), one after
-/// the other; nothing where it is not kept.
-pub(super) type Eliminated = Vec<Vec<f64>>;
-
-/// Numbers that are kept of so many local blocks of one pattern, at the most.
-pub(super) fn numbers_of(layout: &Layout, first: usize, count: usize) -> usize {
-    let l = layout.local_dim();
-    let border = if layout.has_common() { layout.border_dim() } else { 0 };
-    count * (l * (layout.reduced_width(first) + border + 1) + Triangle::numbers(l))
-}
-
-/// The same of all local blocks at home in a supernode.
-pub(super) fn numbers_at(incidence: &Incidence, layout: &Layout, index: usize) -> usize {
-    let of_stack =
-        |run: &[u32]| run.first().map_or(0, |&first| numbers_of(layout, first as usize, run.len()));
-    incidence.stacks_at(index).iter().map(of_stack).sum()
-}
 
 impl Stack {
     /// Appends what the elimination has left.

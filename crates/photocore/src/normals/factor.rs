@@ -10,19 +10,20 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::dense::{Pivots, factor_front};
-use super::eliminated::{Eliminated, numbers_at};
 use super::equations::{Equations, Prior};
 use super::front::Front;
-use super::further::{Side, blocks_of, of_others, subtract_sides};
+use super::further::{blocks_of, of_others, subtract_sides};
 use super::layout::Layout;
 use super::panels::{Handover, Panels, lock};
+use super::room::numbers_at;
 use super::stack::Stack;
 use super::symbolic::Supernode;
 use super::system::System;
 use super::tie_equations::TieEquations;
+use super::vectorised::Side;
 use super::vectorised::dot_in_lanes;
 use super::watch::{Between, Control, Stopped, watched};
-use super::workspace::reserved;
+use super::workspace::{Eliminated, reserved};
 
 /// The Cholesky factor L of the reduced normal equations.
 #[derive(Debug)]

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use pulp::Simd;
 
-use super::further::Side;
 use super::panels::skip;
+use super::vectorised::Side;
 use super::vectorised::{LANES, Rows, add_difference, add_product, add_products, add_right, add_side};
 
 /// A front: the columns of a supernode, and what their elimination will leave for the parent. Rows and columns are those of the

@@ -8,11 +8,8 @@ use super::incidence::Stacks;
 use super::layout::Layout;
 use super::stack::Stack;
 use super::system::System;
-use super::vectorised::{Kernel, LANES, run};
+use super::vectorised::{Kernel, LANES, Side, run};
 use super::workspace::reserved;
-
-/// One row of so many right-hand sides: they go through the local blocks side by side.
-pub(super) type Side = [f64; LANES];
 
 /// Right-hand sides over all unknowns as blocks of [`LANES`].
 pub(super) fn blocks_of(layout: &Layout, rights: &[f64]) -> usize {

@@ -2,31 +2,14 @@
 
 use std::collections::HashMap;
 
-use super::layout::Layout;
+use super::room::vectors;
 use super::system::System;
 use super::workspace::capacity;
 
 /// Of a number.
 const BYTES: usize = size_of::<f64>();
-/// Numbers for each unknown: values, steps, priors and their copies, cofactors, what is made of them for the caller.
-const PER_UNKNOWN: usize = 40;
-/// Numbers for each equation beside its coefficients: observed value, standard deviation, residual, redundancy number and test value,
-/// as given, as ordered for the adjustment and as handed back.
-const PER_EQUATION: usize = 28;
-/// Of these, the part that is made of the results after the last solution: what is kept from the formation to the solution may take it.
-const LATER: f64 = 0.5;
 /// Bytes for what does not grow with the problem, threads among them.
 const BASE: usize = 8 << 20;
-
-/// Numbers in vectors, the problem itself and its results counted.
-fn vectors(layout: &Layout) -> usize {
-    PER_UNKNOWN * layout.unknowns() + PER_EQUATION * layout.equations()
-}
-
-/// Numbers in what is made of results only.
-pub(super) fn made_of_results(layout: &Layout) -> usize {
-    (LATER * vectors(layout) as f64) as usize
-}
 
 impl System {
     /// Bytes that forming, factoring, solving and inverting take at the most, the problem itself and its results counted: the

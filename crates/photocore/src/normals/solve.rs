@@ -5,14 +5,14 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::eliminated::{self, Coupled, Eliminated};
+use super::eliminated::{self, Coupled};
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::incidence::Stacks;
 use super::stack::Stack;
 use super::system::System;
 use super::watch::{Between, Control, Stopped, watched};
-use super::workspace::zeros;
+use super::workspace::{Eliminated, zeros};
 
 /// Stacks that a thread takes at a time.
 const CHUNK: usize = 64;

@@ -10,12 +10,13 @@ use rayon::prelude::*;
 
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
-use super::further::{Known, Reduced, Side, of_others, reduce};
+use super::further::{Known, Reduced, of_others, reduce};
 use super::incidence::Stacks;
 use super::layout::Layout;
 use super::stack::Stack;
 use super::system::System;
 use super::vectorised::LANES;
+use super::vectorised::Side;
 use super::watch::{Between, Control, Stopped, watched};
 use super::workspace::zeros;
 

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::eliminated::numbers_at;
 use super::homes::Homes;
 use super::incidence::Incidence;
 use super::layout::Layout;
-use super::memory::made_of_results;
 use super::ordering::Ordering;
+use super::room::made_of_results;
+use super::room::numbers_at;
 use super::symbolic::Symbolic;
 use super::tree::Tree;
 use super::workspace::Workspace;

@@ -70,6 +70,9 @@ const TOGETHER: usize = 6;
 /// Rows of a product whose sums are kept in registers together; matrices are followed by so many readable elements.
 pub(super) const LANES: usize = 8;
 
+/// One row of so many right-hand sides: they go through the local blocks side by side.
+pub(super) type Side = [f64; LANES];
+
 /// A matrix row by row, in a buffer that goes on for [`LANES`] elements at least.
 #[derive(Clone, Copy)]
 pub(super) struct Rows<'a> {

@@ -3,8 +3,11 @@
 use std::collections::HashMap;
 use std::sync::Mutex;
 
-use super::eliminated::Eliminated;
 use super::panels::lock;
+
+/// For each supernode, and last for the local blocks without equations: V, v and L of every stack at home there, one after
+/// the other; nothing where it is not kept.
+pub(super) type Eliminated = Vec<Vec<f64>>;
 
 /// Spare buffers, by their capacity (see [`capacity`]). Fronts come and go by the thousand; fresh pages for each of them, and
 /// giving them back, would cost more than the arithmetic.

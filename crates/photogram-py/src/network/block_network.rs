@@ -108,7 +108,7 @@ impl BlockNetwork {
         middle: Option<[f64; 3]>,
         threads: usize,
     ) -> PyResult<Node> {
-        Node::new(py, self, outer, children, middle, threads)
+        Node::new(py, (&self.network, &self.options), outer, children, middle, threads)
     }
 }
 

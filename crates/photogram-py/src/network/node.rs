@@ -5,14 +5,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyReadonlyArrayDyn};
 use photocore::network::{
-    BlockOf, FormedNode as Formed, NetworkError as Failure, Node as Core, NodePrediction, Surroundings,
+    BlockOf, FormedNode as Formed, Network, NetworkError as Failure, Node as Core, NodePrediction, Options,
+    Surroundings,
 };
 use photocore::normals::{Contribution, packed};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::block_network::BlockNetwork;
 use super::covariances::refused;
 use super::solution::BlockSolution;
 use super::{FailureRow, failure};
@@ -213,13 +213,12 @@ impl Node {
     /// A block as a node of a larger one, whose blocks are named for the nodes above and below.
     pub fn new(
         py: Python<'_>,
-        block: &BlockNetwork,
+        (network, options): (&Network, &Options),
         outer: Vec<BlockRow>,
         children: Vec<Vec<BlockRow>>,
         middle: Option<[f64; 3]>,
         threads: usize,
     ) -> PyResult<Self> {
-        let BlockNetwork { network, options } = block;
         let blocks = |rows: Vec<BlockRow>| rows.into_iter().map(block_of).collect::<PyResult<Vec<BlockOf>>>();
         let below = children.into_iter().map(blocks).collect::<PyResult<_>>()?;
         let surroundings = Surroundings { outer: blocks(outer)?, below, middle };

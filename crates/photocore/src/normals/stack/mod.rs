@@ -10,9 +10,9 @@ use std::ops::Range;
 use smallvec::SmallVec;
 
 use super::front::Strip;
-use super::further::Side;
 use super::symbolic::Symbolic;
 use super::triangle::Triangle;
+use super::vectorised::Side;
 use super::vectorised::{LANES, Rows, size};
 
 pub(super) use gather::{parts_of, united};
