@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram import Block, Result, adjust, simulate, snoop
+from photogram.errors import AdjustmentError
 from photogram.results.snooped import Snooped
 
 SMALLEST, LARGEST = 4.0, 100.0
@@ -97,6 +98,16 @@ def wrong_names(block: Block, random: np.random.Generator) -> Planted:
     return Planted(block.replace(image_xy=xy), frozenset({a, b}))
 
 
+def scrambled_names(block: Block, random: np.random.Generator) -> Planted:
+    """Give the images of a photo each other's names."""
+    photo = int(random.integers(len(block.photo_ids)))
+    own = np.flatnonzero(block.image_photos == photo)
+    other = random.permutation(own)
+    xy = block.image_xy.copy()
+    xy[own] = xy[other]
+    return Planted(block.replace(image_xy=xy), frozenset(own[own != other].tolist()))
+
+
 def wrong_control(block: Block, random: np.random.Generator) -> Planted:
     """Put an error of 4 to 100 standard deviations into a coordinate of a control point."""
     point = int(random.choice(np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))))
@@ -113,6 +124,7 @@ CASES: dict[str, Callable[[Block, np.random.Generator], Planted]] = {
     "1 %": share(0.01),
     "5 %": share(0.05),
     "names of two points exchanged": wrong_names,
+    "all names of a photo scrambled": scrambled_names,
     "a wrong coordinate of control": wrong_control,
 }
 
@@ -130,10 +142,18 @@ def outcome(plant: Callable[[Block, np.random.Generator], Planted], seed: int) -
     block, truth = simulated(seed)
     planted = plant(block, np.random.default_rng([seed, 7]))
     snooped = snoop(planted.block)
-    return judged(planted, block, truth, snooped, adjust(planted.block))
+    return judged(planted, block, truth, snooped, adjusted(planted.block))
 
 
-def judged(planted: Planted, block: Block, truth: Block, snooped: Snooped, before: Result) -> Outcome:
+def adjusted(block: Block) -> Result | None:
+    """Adjust a block with its errors; None where they leave nothing to adjust."""
+    try:
+        return adjust(block)
+    except AdjustmentError:
+        return None
+
+
+def judged(planted: Planted, block: Block, truth: Block, snooped: Snooped, before: Result | None) -> Outcome:
     """Compare what was taken out with what was planted."""
     image = {
         (int(point), int(photo)): row
@@ -147,10 +167,13 @@ def judged(planted: Planted, block: Block, truth: Block, snooped: Snooped, befor
     names |= {f"control point {block.point_ids[point]}" for point in planted.control}
 
     def is_bad(name: str) -> bool:
-        return any(name.endswith(own) for own in names)
+        photo = name.removeprefix("all of")
+        return any(name.endswith(own) or own.endswith(photo) for own in names)
 
     out = snooped.removed
+    whole = {entry.name.removeprefix("all of") for entry in out if entry.kind == "photo"}
     named = [entry.name for entry in out]
+    named += [name for name in bad if any(name.endswith(photo) for photo in whole)]
     rivals = {rival.name for entry in out for rival in entry.in_dispute}
     found = {own for own in names if any(name.endswith(own) for name in named) or own in rivals}
     false = [entry for entry in out if not is_bad(entry.name)]
@@ -166,7 +189,7 @@ def judged(planted: Planted, block: Block, truth: Block, snooped: Snooped, befor
         disputed=len(disputed),
         sigma0=math.sqrt(variance) if variance else math.nan,
         error=error(snooped.result, truth),
-        error_before=error(before, truth),
+        error_before=math.inf if before is None else error(before, truth),
     )
 
 

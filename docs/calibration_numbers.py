@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import io
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -38,20 +37,20 @@ def example() -> list[str]:
     return printed.getvalue().splitlines()
 
 
-def roma() -> list[str]:
-    """Return variance, redundancy and work of the Roma photos, and the camera of the first variant."""
+def roma() -> list[str] | None:
+    """Return what becomes of the Roma photos and the camera of the first variant; None without them."""
+    if not ROMA.is_dir():
+        return None
     block = test_roma.read(ROMA)
-    lines = [f"{'free':<26}{'sigma0':>10}{'report':>10}{'redundancy':>12}{'iterations':>12}{'cpu s':>8}"]
+    lines = [f"{'free':<26}{'sigma0':>10}{'report':>10}{'redundancy':>12}{'iterations':>12}"]
     results: list[Result] = []
     for name, (free, given, reported) in VARIANTS.items():
-        start = time.process_time()
         result = test_roma.adjusted(block, *free, **given)
-        seconds = time.process_time() - start
         results.append(result)
         assert result.variance_of_unit_weight is not None
         lines.append(
             f"{name:<26}{np.sqrt(result.variance_of_unit_weight):>10.6f}{reported:>10}"
-            f"{result.degrees_of_freedom:>12}{len(result.iterations):>12}{seconds:>8.2f}"
+            f"{result.degrees_of_freedom:>12}{len(result.iterations):>12}"
         )
     camera = results[0].cameras[0]
     lines += ["", f"{'parameter':<26}{'value':>14}{'sd':>12}"]
@@ -63,4 +62,4 @@ def roma() -> list[str]:
     return lines
 
 
-BLOCKS: dict[str, Callable[[], list[str]]] = {"example": example, "roma": roma}
+BLOCKS: dict[str, Callable[[], list[str] | None]] = {"example": example, "roma": roma}

@@ -13,6 +13,7 @@ FLOORS = (
     ("formats",),
     PROGRAMS,
     ("planning", "checks"),
+    ("distributed",),
     ("adjustment",),
     ("results",),
     ("network",),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import math
+import re
 import shlex
 from pathlib import Path
 from typing import Any
@@ -414,9 +415,7 @@ def test_plan_takes_the_options_of_simulate(run):
 
 def documented() -> list[tuple[str, str]]:
     """Return the commands in the document that are said to print something, and what."""
-    parts = DOCUMENT.read_text().split("<!-- output -->\n")[1:]
-    blocks = [part.split("```")[1].removeprefix("text\n") for part in parts]
-    return [(block.partition("\n")[0].removeprefix("$ "), block.partition("\n")[2]) for block in blocks]
+    return re.findall(r"<!-- printed: (.*?) -->\n```text\n(.*?)```\n", DOCUMENT.read_text(), re.DOTALL)
 
 
 @pytest.mark.parametrize(("command", "printed"), documented(), ids=[command for command, _ in documented()])
@@ -459,7 +458,7 @@ def test_the_picture_has_a_panel_for_each_pattern(two_patterns):
     pytest.importorskip("matplotlib")
     figure = two_patterns.plot()
     panels, bar = figure.axes[:2], figure.axes[2]
-    assert [axes.get_title().split("\n")[0] for axes in panels] == ["perimeter", "corners"]
+    assert [axes.get_title(loc="left").split("\n")[0] for axes in panels] == ["perimeter", "corners"]
     limits = {axes.collections[0].get_clim() for axes in panels}
     assert len(limits) == 1
     heights = [pattern.point_sd[pattern.new_points, 2] for pattern in two_patterns.patterns]

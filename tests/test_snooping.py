@@ -422,3 +422,24 @@ def test_commands(tmp_path):
     log = json.loads((tmp_path / "ring.json").read_text(encoding="utf-8"))["snooping"]
     assert log["false_discovery_rate"] == 0.1
     assert log["distribution"] == "F"
+
+
+def test_check_points_are_compared_with_what_was_given_of_them():
+    simulated = photogram.simulate(
+        strips=2,
+        photos_per_strip=5,
+        points_per_photo=30,
+        blunders=3,
+        blunder_size=0.3,
+        check_points=8,
+        seed=4,
+    )
+    cleaned = photogram.snoop(simulated.block)
+    assert len(cleaned.table()) > 0
+    given = simulated.block.point_positions
+    np.testing.assert_array_equal(cleaned.result.block.point_positions, given)
+    table = cleaned.result.check_table()
+    assert len(table) == 20
+    # What tells how good the block is has errors, in the size of its standard deviations.
+    ratio = table[["d_X", "d_Y", "d_Z"]].to_numpy() / table[["sd_X", "sd_Y", "sd_Z"]].to_numpy()
+    assert 0.5 < np.sqrt((ratio**2).mean()) < 2.0

@@ -4,7 +4,7 @@ Arrays are float64. Angles are radians, image coordinates millimetres, lengths t
 space. All functions release the GIL.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -30,6 +30,9 @@ FailureRow = tuple[str, str, list[CombinationRow], list[int]]
 CameraRow = tuple[list[float], list[float], list[float], list[float], int, int]
 """Of an adjusted camera: k parameters, k x k cofactors row by row, k redundancy numbers, the diagonal of the
 normal equations (k), photos, images."""
+
+ContributionRow = tuple[_Floats, _Floats, _Floats]
+"""What a node leaves to the one above: matrix, right-hand side, diagonal; see :class:`FormedNode`."""
 
 _DatumRow = tuple[str, list[int], list[int], bool, list[int], float | None]
 """What a datum is: its name, points, photos, whether scale counts, photos whose attitudes count, radius."""
@@ -717,6 +720,216 @@ class BlockNetwork:
         """Return what keeps the block from moving as a whole: kinds of observations.
 
         With each the greatest share of what a motion changes in them that remains when all unknowns move.
+        """
+
+    def node(
+        self,
+        outer: list[tuple[str, int]],
+        children: list[list[tuple[str, int]]],
+        *,
+        middle: tuple[float, float, float] | None,
+        threads: int,
+    ) -> Node:
+        """Take the block as a node of the elimination tree of a larger one (Helmert blocking).
+
+        Blocks of unknowns are named by what they belong to, (`photo`, `camera`, `unknown` or `point`, index
+        into the arrays of this block). A camera has one where several photos of the larger block share it and
+        a parameter of it is unknown, a point where an observation beside images touches it; cameras that are
+        known, and points that only images touch, are never named.
+
+        Parameters
+        ----------
+        outer
+            The blocks that are eliminated above this node, in an order that the node above knows: photos that
+            other parts see too, shared cameras. What was observed of their unknowns themselves belongs to the
+            node where they are eliminated, and is left out here; what is fixed stays fixed. Empty for the
+            root.
+        children
+            For each child, in a fixed order, the blocks that its contribution is over, in the order of its
+            `outer`; all are photos, cameras, unknowns or points of this block, outer ones or not.
+        middle
+            (3,) median of the positions of all photos of the larger block, component by component:
+            coordinates
+            are counted from it (rounded) in rectangular space, and it says what is up for shifts in
+            geographic
+            space. Every node must be given the same. None: of the photos of this block.
+        threads
+            As in :meth:`adjust`.
+
+        Raises
+        ------
+        InputError
+            A name that is not of the block, or is there twice; a loss.
+        BlockError
+            As :meth:`adjust`, before its first iteration.
+        """
+
+@final
+class Node:
+    """A node of the elimination tree of a block that is adjusted in parts (Helmert 1880; Wolf 1978).
+
+    It holds a part of the observations, the photos that they touch, and the order in which the blocks at home
+    here are eliminated, found once; no values. A *state* is a vector of all its unknowns: three of each point
+    that only images touch, then those of photos, shared cameras, common unknowns and other points, blocks
+    here and outer ones, positions counted from the middle; so is a *step*. All methods are functions of their
+    arguments, the same bits for any number of threads; `threads` and `progress` are as in
+    :class:`BlockNetwork`.
+    """
+
+    @property
+    def size(self) -> int:
+        """N, the number of unknowns in a state."""
+
+    @property
+    def outer(self) -> _Indices:
+        """(S,) where the unknowns of the outer blocks stand in a state, block by block in their order."""
+
+    @property
+    def children(self) -> list[_Indices]:
+        """For each child (S_c,) where the unknowns that it is over stand in a state, in its own order."""
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Observations, weighted unknowns, unknowns that are not fixed; outer ones are not counted."""
+
+    @property
+    def dropped(self) -> list[tuple[int, str]]:
+        """Points left out, each with the reason."""
+
+    @property
+    def initial(self) -> _Floats:
+        """(N,) the state to begin with: photos as given, points where the rays of their photos here meet.
+
+        The outer part of it must be set to what the node above has, where points are among the outer blocks.
+        """
+
+    @property
+    def prediction(self) -> dict[str, float]:
+        """What work and memory it takes, from the pattern alone.
+
+        `points`, `interior`, `outer`: unknowns of points, of blocks eliminated here, of outer ones (S);
+        `images`, `observations`: image points, equations in all; `reduction`, `factor`, `inverse`:
+        multiply-adds
+        of one formation, one factorisation, one inversion; `factor_bytes`: of the factor that a formed node
+        keeps; `memory_bytes`: at the most, while it is formed or inverted, contributions and the node itself
+        counted; `contribution_bytes`: of what it sends up, 8 (S (S + 1) / 2 + 2 S); `cofactor_bytes`: of what
+        it receives for the inversion, 8 S (S + 1) / 2; `step_bytes`: of what it receives in each iteration,
+        8 S.
+        """
+
+    def advance(self, state: _Floats, step: _Floats) -> _Floats:
+        """Return the state after a step: attitudes step by rotation vectors, all else is added."""
+
+    def relocate(self, state: _Floats, *, threads: int) -> _Floats:
+        """Return the state with the points that only images touch where the rays of their photos meet."""
+
+    def objective(self, state: _Floats, *, threads: int) -> tuple[float, float, float, float]:
+        """Return weighted sums of squares: camera, ground, plates, observations beside images.
+
+        Those at home here; they add up over all nodes to those of :attr:`BlockSolution.sums_of_squares`.
+        """
+
+    def form(
+        self,
+        state: _Floats,
+        contributions: list[ContributionRow],
+        *,
+        damping: float,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
+    ) -> FormedNode:
+        """Form the normal equations at a state, and eliminate the points and blocks at home here.
+
+        Parameters
+        ----------
+        state
+            (N,) values of all unknowns.
+        contributions
+            What the children leave, :attr:`FormedNode.contribution` of each in their order. They are added in
+            this order.
+        damping
+            Added to the diagonal of the normal equations as a fraction of it; 0 for a full step. The same in
+            all
+            nodes.
+        """
+
+    def solution(self, state: _Floats, before: _Floats, *, threads: int) -> BlockSolution:
+        """Return what is adjusted at a state, without cofactors.
+
+        `before` is the state before the last step. Arrays are those of the block of the node, outer photos
+        among them; sums, counts and degrees of freedom are of what is at home here, and add up.
+        """
+
+@final
+class FormedNode:
+    """A node at a state, its points and blocks eliminated.
+
+    It holds the factor, and copies of state and contributions no longer; it is not pickled, but formed again.
+    """
+
+    @property
+    def contribution(self) -> ContributionRow:
+        """What it leaves to the node above, over the S unknowns of the outer blocks; of the root it is empty.
+
+        `U = A_SS - A_SI A_II^-1 A_IS` (S (S + 1) / 2,), lower triangle, column by column: row i of column j
+        stands at `j S - j (j - 1) / 2 + i - j`; `u = b_S - A_SI A_II^-1 b_I` (S,); the diagonal of A_SS
+        before
+        any elimination, those of the children included (S,): what small pivots are compared with. It is
+        handed
+        out once.
+        """
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Weighted sum of squares of what is at home here at this state; they add up over all nodes."""
+
+    @property
+    def decrease(self) -> float:
+        """By how much a full step lowers it, as far as it is known here.
+
+        The sum over all nodes is that of the block; its root bounds what any unknown moves by, in standard
+        deviations (the largest change of an iteration).
+        """
+
+    @property
+    def undetermined(self) -> FailureRow | None:
+        """What the observations leave undetermined here, as in :class:`BlockError`; or None."""
+
+    def solve(
+        self,
+        outer: _Floats,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
+    ) -> _Floats:
+        """Return the step (N,) of all unknowns, given that of the outer ones (S,)."""
+
+    def invert(
+        self,
+        outer: _Floats,
+        state: _Floats,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
+    ) -> tuple[BlockSolution, list[_Floats]]:
+        """Return what is adjusted, with its cofactors, and what the children need for theirs.
+
+        The factor is used up.
+
+        Parameters
+        ----------
+        outer
+            (S (S + 1) / 2,) cofactors of the outer unknowns, a lower triangle packed like the contribution.
+        state
+            (N,) the state that is reached: after the step, where that was the last one, else the same.
+
+        Returns
+        -------
+        BlockSolution
+            As :meth:`Node.solution`, with cofactors, redundancy numbers and test values. Outer photos have
+            cofactors, but not the redundancy numbers of their own weights.
+        list
+            For each child its (S_c (S_c + 1) / 2,) cofactors.
         """
 
 @final
@@ -1937,6 +2150,25 @@ def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     Returns
     -------
     (k,) numbers, and whether they are the whole text.
+    """
+
+def csv_rows(columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str | None]]) -> bytes:
+    """Return the rows of a table as text of commas (UTF-8), a line each.
+
+    Numbers have the shortest digits that read back to the last bit, NaN and None are empty cells, truth
+    values are `true` and `false`; texts stand in quotation marks where commas, semicolons, bars, tabs,
+    hashes, quotation marks, line ends or blanks about them would be taken for something else. Line ends
+    become blanks.
+
+    Parameters
+    ----------
+    columns
+        Of one length.
+
+    Raises
+    ------
+    ValueError
+        Columns that differ in length.
     """
 
 UNKNOWNS: list[tuple[str, list[tuple[str, str]]]]

@@ -85,6 +85,24 @@ def test_ellipses_are_those_of_the_covariances_at_the_stated_scale(result, crs):
         np.testing.assert_allclose(forms, 5.9915, rtol=0.02)
 
 
+def test_of_many_ellipses_those_of_control_and_some_others_are_drawn(result, monkeypatch, tmp_path):
+    own = layers(result)
+    kinds = own["points"].table.set_index("point")["kind"]
+    named = set(kinds.index[kinds != "pass"])
+    most = len(named) + 8
+    found = layers(result, most=most)["point_ellipses"]
+    drawn = set(found.table["point"])
+    assert named < drawn
+    assert len(drawn) <= most
+    assert found.left_out == len(own["point_ellipses"].table) - len(drawn) > 0
+    assert f"of {len(drawn)} of {len(own['point_ellipses'].table)} points" in found.description
+    assert own["point_ellipses"].left_out == 0
+    assert len(layers(result, most=1)["point_ellipses"].table) == len(named) + 1
+    monkeypatch.setitem(map_layers.__kwdefaults__, "most", most)
+    remarks = map_files(result, tmp_path / "map.gpkg")[1]
+    assert any(f"of {len(drawn)} of" in each and "layer of the points" in each for each in remarks)
+
+
 def test_vectors_lead_from_given_to_adjusted_places(result):
     found = layers(result, crs="ENU:47.38,8.54,450", scale=100.0)
     lines = found["control_residuals"].table

@@ -35,10 +35,10 @@ COARSE = 1e-4
 NEAR, EXACT, ROUNDING = 1e-7, 1e-8, 1e-13
 """Unknowns in standard deviations; variances (relative) and redundancy numbers; the same by the condition
 squared, as the engine forms normal equations."""
-ON_ELLIPSOID = 1e-6
+ON_ELLIPSOID = 3e-6
 """Positions of 6400 km have their last digits at 1e-9 m, and so have partials by what is 15 m apart."""
-WRITTEN = 1e-5
-"""What these digits are of a standard deviation of a tenth of a millimetre."""
+CURVED = 1e-2
+"""By how much of a standard deviation of the last step cofactors, which are those before it, may differ."""
 NULL = 1e-9
 """Singular values of scaled equations that are none."""
 HOPELESS = 1e6
@@ -98,9 +98,10 @@ def compare(random: RandomNetwork) -> Comparison:
     moved = float((change[known] / sd[known]).max())
     apart = np.abs(found - q)[np.ix_(known, known)] / np.outer(sd[known], sd[known])
     redundancy = _redundancy(result, dense, design[:, free] @ root)
-    fine = max(EXACT, ROUNDING * condition**2, ON_ELLIPSOID if geographic else 0.0)
+    last = CURVED * result.iterations[-1].largest_change
+    fine = max(EXACT, ROUNDING * condition**2, max(ON_ELLIPSOID, last) if geographic else 0.0)
     variances, correlations = float(np.diag(apart).max()), float(apart.max())
-    near = max(NEAR, fine, WRITTEN if geographic else 0.0)
+    near = max(NEAR, fine, COARSE if geographic else 0.0)
     same = moved < near and max(correlations, redundancy) < fine
     ending = "agree" if same else "differ"
     return Comparison(ending, condition, moved, variances, correlations, redundancy, sums=_sums(result))

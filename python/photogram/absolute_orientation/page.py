@@ -9,7 +9,7 @@ import numpy as np
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.plot import figure
 from photogram.show.angles import ARCSEC
-from photogram.show.judgement import advice, judged, verdict_table
+from photogram.show.judgement import advice, judged, remarks_section, tests_section
 from photogram.show.page import (
     Cell,
     Column,
@@ -18,7 +18,6 @@ from photogram.show.page import (
     Facts,
     Page,
     Part,
-    Remarks,
     Row,
     Section,
     Table,
@@ -45,10 +44,10 @@ def orientation_page(result: Orientation) -> Page:
         Section(
             "size", "How much, how good", [Facts("How much", _much(result)), Facts("How good", _good(result))]
         ),
-        Section("tests", "Tests", [verdict_table(result.verdict)] if result.verdict.tests else []),
+        tests_section(result.verdict),
         Section("points", "Transformed points", _points(result)),
         Section("iterations", "Iterations", [_iterations(result)]),
-        Section("remarks", "Remarks", [Remarks(told)] if (told := result.problems) else []),
+        remarks_section(result.problems),
     ]
     return Page(
         what="Absolute orientation of a model",

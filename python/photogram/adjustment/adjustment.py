@@ -6,11 +6,13 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal, get_args
+from os import PathLike
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from photogram import _photocore
+from photogram.adjustment.elsewhere import IN_PARTS, Division
 from photogram.adjustment.ends import behind, folded, harmful, rounded, too_coarse, undetermined
 from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
@@ -101,6 +103,11 @@ def adjust(
     ordering: Ordering = "auto",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
+    cluster: Any = None,
+    workers: int | None = None,
+    parts: int | None = None,
+    memory: int | str | None = None,
+    folder: str | PathLike[str] | None = None,
 ) -> Result:
     """Adjust a block by least squares.
 
@@ -151,6 +158,21 @@ def adjust(
         processors. The result does not depend on it, to the last bit.
     progress
         Called now and then with what is going on; an exception it raises stops the adjustment.
+    cluster
+        Where to adjust in parts (docs/distributed.md): a `dask.distributed.Client`, the address of a
+        scheduler, or `local` for workers on this machine. The result is that of one process, to rounding;
+        covariances between photos or points, and other datums, are not asked of it.
+    workers
+        Of a local cluster: how many; one for each processor when None.
+    parts
+        How many parts; as many as `memory` and the workers ask for when None. Without a cluster they are
+        worked off one after the other in this process.
+    memory
+        Bytes that a worker, or this process, may take for them, or text such as `4GB`. A block that fits as a
+        whole, and is not for a cluster, is adjusted as a whole.
+    folder
+        Where parts and states are kept, on a disk that all workers see; a run that died is taken up there.
+        None: a temporary folder.
 
     Returns
     -------
@@ -206,6 +228,13 @@ def adjust(
         unit_variance=unit_variance,
         minimum=minimum_row(block, datum) if isinstance(datum, MinimumConstraints) else None,
     )
+    division = Division(cluster, workers, parts, memory, folder)
+    if division.is_asked_for:
+        if inner is not None or options.minimum is not None or row or as_published:
+            raise InputError("in parts there is no loss, no datum to choose and no published iteration")
+        found = IN_PARTS[0](block, options, division, threads, progress)
+        if found is not None:
+            return found
     return _adjusted(block, options, processors, progress, inner, as_published)
 
 
@@ -244,7 +273,7 @@ def _adjusted(
     except _photocore.BlockError as error:
         if error.args[0] in ("not free", "datum"):
             raise refused(block, network, None, error) from None
-        raise hinted(_named(block, *error.args), block) from None
+        raise hinted(named(block, *error.args), block) from None
     with turned("the adjusted block"):
         freedom = _freedom(block, network, solution, options)
         return with_hints(_result(block, solution, options, freedom, inner, as_published))
@@ -268,7 +297,7 @@ def adjusted_again(
     try:
         solution = network.adjust(datum=None, threads=core_threads(threads), progress=None, start=start)
     except _photocore.BlockError as error:
-        raise _named(block, *error.args) from None
+        raise named(block, *error.args) from None
     return _result(block, solution, options, _freedom(block, network, solution, options))
 
 
@@ -314,7 +343,7 @@ def _result(
     as_published: AsPublished | None = None,
 ) -> Result:
     datum = datum_of(block, solution, inner)
-    messages = datum_messages(block, datum, solution.point_rays) + _messages(block, solution)
+    messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
     messages += remark(options.loss, solution.image_weights)
     if as_published:
         messages += _rises([Iteration(*row) for row in solution.iterations])
@@ -374,12 +403,12 @@ def core_threads(threads: int | None) -> int:
     return threads_that_fit(min(threads, 4 * (os.cpu_count() or 1)))
 
 
-def _messages(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
+def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     """Collect remarks on the block that did not stop the adjustment, the gravest first."""
     by_reason: dict[str, list[str]] = {}
     for point, reason in solution.dropped:
         by_reason.setdefault(reason, []).append(block.point_ids[point])
-    error = None if solution.undetermined is None else _named(block, *solution.undetermined)
+    error = None if solution.undetermined is None else named(block, *solution.undetermined)
     messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
     messages += harmful(block, solution) + behind(block, solution) + folded(block, solution)
     messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
@@ -404,7 +433,7 @@ def _rises(iterations: list[Iteration]) -> list[Message]:
     return messages
 
 
-def _named(
+def named(
     block: Block,
     kind: str,
     message: str,

@@ -67,6 +67,20 @@ class Cleaned(Brief):
         """The adjusted network."""
         return self.snooped.result
 
+    @property
+    def changes(self) -> list[str]:
+        """What was done to weights and observations, in sentences."""
+        count = len(self.snooped.removed)
+        said = [f"{count} groups of observations are out after {self.rounds} rounds of variance components"]
+        if not self.settled:
+            said.append("weights and gross errors still change: look at both")
+        factors = zip(self.groups, self.factors.tolist(), strict=True)
+        return said + [
+            f"standard deviations of {name}: multiplied by {np.sqrt(factor):.3f}"
+            for name, factor in factors
+            if factor != 1.0
+        ]
+
     def report(self) -> str:
         """Return what was done to weights and observations as text."""
         return report_of(self)
@@ -74,13 +88,7 @@ class Cleaned(Brief):
 
 @report_of.register(Cleaned)
 def _report(found: Cleaned) -> str:
-    count = len(found.snooped.removed)
-    lines = [f"{count} groups of observations are out after {found.rounds} rounds of variance components"]
-    if not found.settled:
-        lines.append("weights and gross errors still change: look at both")
-    for name, factor in zip(found.groups, found.factors.tolist(), strict=True):
-        if factor != 1.0:
-            lines.append(f"standard deviations of {name}: multiplied by {np.sqrt(factor):.3f}")
+    lines = found.changes
     if found.components is not None:
         lines += ["", "components that are left", *statement(found.components)]
         lines += component_lines(found.components)

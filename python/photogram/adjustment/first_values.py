@@ -50,6 +50,9 @@ class FirstValues(Brief):
         Where the pose of each started photo comes from: `given`, `resected`, `observed` or `oriented`.
     missing
         The photos that could not be started, each with the reason.
+    contradicted
+        Those of them whose images agree with no pose at all: they are of something else, or stand under wrong
+        names.
     point_positions
         (n, 3) where the rays of points meet, as in the block; NaN where they do not.
     set_aside
@@ -66,6 +69,7 @@ class FirstValues(Brief):
     block: Block
     sources: dict[str, str]
     missing: dict[str, str]
+    contradicted: tuple[str, ...]
     point_positions: Floats
     set_aside: Bools
     misfit: float
@@ -168,6 +172,9 @@ def first_values(block: Block) -> FirstValues:
         block=_started(block, axes, positions, attitudes, how),
         sources=sources,
         missing=missing,
+        contradicted=tuple(
+            photo for photo, why in zip(names, how, strict=True) if photo in missing and why[0] == "misfit"
+        ),
         point_positions=axes.from_cartesian(points),
         set_aside=aside,
         misfit=np.nan if misfit is None else misfit,

@@ -11,6 +11,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, UnitVariance, adjust, adjusted_from, core_threads
+from photogram.adjustment.consensus import started_by_consensus
 from photogram.arguments.arrays import number, one_of, truth_value, whole_number
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError
@@ -32,7 +33,7 @@ from photogram.results.snooped import Snooped
 from photogram.results.suspects import network_trial
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
-from photogram.statistics.snooping.suspects import LostSupportError, Out
+from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 
 __all__ = ["block_trial", "of_network", "settings_of", "snoop"]
 
@@ -168,9 +169,17 @@ def _snoop_block(
     def adjusted(given: Block, **options: Any) -> Result:
         return adjust(given, unit_variance=unit_variance, threads=threads, progress=progress, **options)
 
+    def afresh() -> Aside | None:
+        found = started_by_consensus(block)
+        if found is None:
+            return None
+        start, aside = found
+        trial.restart(core_trial(start, None, options_of(unit_variance), threads))
+        return aside
+
     try:
         trial = block_trial(block, None, options_of(unit_variance), threads, parts=parts)
-        outcome = snooped(trial, settings)
+        outcome = snooped(trial, settings, afresh)
     except (LostSupportError, _photocore.BlockError):
         # It says by name what is not determined, or goes on where points have to leave.
         first = adjusted(block, covariance=False)
@@ -220,13 +229,22 @@ def block_trial(
     parts: bool = True,
 ) -> NetworkTrial:
     """Return a block as snooping asks it, from the start or from where an adjustment has ended."""
+    return network_trial(block, core_trial(block, state, options, threads), parts=parts)
+
+
+def core_trial(
+    block: Block, state: _photocore.BlockState | None, options: CoreOptions, threads: int | None
+) -> _photocore.NetworkTrial:
+    """Return the same in the core."""
     options = dataclasses.replace(options, covariance=True, loss=None)
-    core = block_network(block, options).trial(state, threads=core_threads(threads))
-    return network_trial(block, core, parts=parts)
+    return block_network(block, options).trial(state, threads=core_threads(threads))
 
 
 def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
-    """Return a block without what is out, from where the last trial has ended."""
+    """Return a block without what is out, from where the last trial has ended.
+
+    Points start where their rays meet; what was given of them stays, for check points are compared with it.
+    """
     core = trial.core
     kinds, subjects = core.subjects
     starts, components = core.row_starts, core.components
@@ -236,7 +254,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     subject = subjects[group]
     images = np.ones(len(block.image_xy), dtype=bool)
     images[subject[gone[IMAGE]]] = False
-    point_sd, points = block.point_sd.copy(), core.points
+    point_sd = block.point_sd.copy()
     point_sd[subject[gone[CONTROL]], components[gone[CONTROL]]] = np.inf
     position_sd, attitude_sd = block.photo_position_sd.copy(), block.photo_attitude_sd.copy()
     position_sd[subject[gone[POSITION]], components[gone[POSITION]]] = np.inf
@@ -258,7 +276,6 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
         photo_attitudes_observed=_observed(block.photo_attitudes, attitudes, attitude_sd),
         photo_position_sd=position_sd,
         photo_attitude_sd=attitude_sd,
-        point_positions=np.where(np.isinf(point_sd) & ~np.isnan(points), points, block.point_positions),
         point_sd=point_sd,
         image_photos=block.image_photos[images],
         image_points=block.image_points[images],

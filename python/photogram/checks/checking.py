@@ -142,7 +142,7 @@ def _started(block: Block) -> tuple[Block | None, Section]:
     except (AdjustmentError, InputError) as error:
         section.findings.append(Finding("no-first-values", "grave", f"nothing can be checked: {error}"))
         return None, section
-    section.lines.append(f"{len(found.sources)} of {len(block.photo_ids)} photos have first values")
+    section.parts.append(f"{len(found.sources)} of {len(block.photo_ids)} photos have first values")
     for photo, why in found.missing.items():
         text = f"photo {photo} could not be started: {why}"
         section.findings.append(Finding("no-first-values", "grave", text, [photo]))

@@ -45,7 +45,7 @@ def control(edited: Edited, words: Words) -> Section:
     held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
     names = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
     for axis, name in enumerate(names):
-        section.lines.append(f"{f'held components that fit, {name}':<50}{int(held[:, axis].sum())}")
+        section.figure(f"held components that fit, {name}", int(held[:, axis].sum()))
     return section
 
 

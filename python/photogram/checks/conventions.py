@@ -41,9 +41,9 @@ def conventions(view: View) -> tuple[Section, View, bool]:
         section.findings.append(Finding("convention", "grave", bars.text))
         view = view.changed(bars.change)
     if section.findings:
-        section.lines.append("the sections below hold with this put right")
+        section.parts.append("the sections below hold with this put right")
     if not exact:
-        section.lines.append(
+        section.parts.append(
             "the size of a pixel and the origin are known only about: nothing below is called grave"
         )
     return section, view, exact

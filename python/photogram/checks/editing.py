@@ -15,6 +15,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.checks.adjusting import Adjuster
 from photogram.checks.findings import Finding, Section
 from photogram.checks.gross import Suspects
+from photogram.checks.parts import Listing
 from photogram.checks.predictions import (
     exchange,
     exchanged_pair,
@@ -304,9 +305,9 @@ def _first(block: Block, bad: Bools, adjusted: Adjuster, section: Section) -> tu
         error = caught
     fewer = without_photos(block, bad)
     names = [name for name, of in zip(block.photo_ids, bad.tolist(), strict=True) if of]
-    section.lines.append(f"adjusted without the photos that do not fit: {', '.join(names)}")
+    section.parts.append(f"adjusted without the photos that do not fit: {', '.join(names)}")
     if error is not None:
-        section.lines.append(f"with them: {error}")
+        section.parts.append(f"with them: {error}")
     return adjusted(fewer), fewer
 
 
@@ -332,7 +333,7 @@ def _snoop(
         try:
             result = adjusted(block)
         except AdjustmentError as error:
-            section.lines.append(f"without these it cannot be adjusted: {error}")
+            section.parts.append(f"without these it cannot be adjusted: {error}")
             break
     return result, spread, control
 
@@ -565,27 +566,30 @@ def _list(result: Result, spread: float, section: Section) -> None:
     values = tests(result)["image"] / spread
     tested = int((values > 0).sum())
     images, axes = np.nonzero(values > BLUNDER)
-    section.lines.append(
-        f"{'robust spread of the test values':<50}{spread:.3f} (1 when the weights are right)"
-    )
-    section.lines.append(
-        f"{f'image coordinates beyond {BLUNDER:g} times the spread':<50}{len(images)} of {tested} tested"
-        f" ({0.0027 * tested:.0f} to be expected)"
+    section.figure("robust spread of the test values", f"{spread:.3f} (1 when the weights are right)")
+    section.figure(
+        f"image coordinates beyond {BLUNDER:g} times the spread",
+        f"{len(images)} of {tested} tested ({0.0027 * tested:.0f} to be expected)",
     )
     if not len(images):
         return
     block = result.block
     unit, factor = small_unit(block.image_unit)
-    heads = "".join(
-        f"{head:>12}" for head in (f"residual {unit}", "redundancy", "test value", f"error {unit}")
-    )
-    section.lines.append("the largest that are left, each with the error that would explain it:")
-    section.lines.append(f"{'photo':<10}{'point':<10}   {heads}")
+    section.parts.append("the largest that are left, each with the error that would explain it:")
+    listed: list[tuple[str | float, ...]] = []
     for row in np.argsort(-values[images, axes], kind="stable")[:SHOWN].tolist():
         i, axis = int(images[row]), int(axes[row])
         residual, redundancy = factor * result.residuals[i, axis], result.redundancy[i, axis]
-        section.lines.append(
-            f"{block.photo_ids[block.image_photos[i]]:<10}{block.point_ids[block.image_points[i]]:<10}"
-            f" {'xy'[axis]} {residual:>12.1f}{redundancy:>12.3f}{values[i, axis]:>12.2f}"
-            f"{residual / redundancy:>12.1f}"
-        )
+        names = block.photo_ids[block.image_photos[i]], block.point_ids[block.image_points[i]]
+        figures = residual, redundancy, values[i, axis], residual / redundancy
+        listed.append((*names, "xy"[axis], *map(float, figures)))
+    columns = (
+        ("photo", "<10"),
+        ("point", "<10"),
+        ("", "^3"),
+        (f"residual {unit}", ">12.1f"),
+        ("redundancy", ">12.3f"),
+        ("test value", ">12.2f"),
+        (f"error {unit}", ">12.1f"),
+    )
+    section.parts.append(Listing(columns, listed))

@@ -6,7 +6,9 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from photogram import _photocore
+from photogram.checks.parts import Figure, Part
 from photogram.io import json
+from photogram.show.brief import Brief, Rows
 from photogram.show.sections import composed, headline
 from photogram.show.ways import html_of
 from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Verdict
@@ -71,16 +73,25 @@ class Section:
         Its heading.
     why
         A sentence on why one looks.
-    lines
-        Figures and tables.
+    parts
+        Sentences, figures and small tables.
     findings
         What was found.
     """
 
     title: str
     why: str
-    lines: list[str] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
+
+    @property
+    def lines(self) -> list[str]:
+        """Figures and tables as text."""
+        return [line for part in self.parts for line in ([part] if isinstance(part, str) else part.lines())]
+
+    def figure(self, name: str, value: object) -> None:
+        """Add a figure with its unit."""
+        self.parts.append(Figure(name, str(value)))
 
     def text(self) -> list[str]:
         """Return the section as lines, the grave findings first."""
@@ -93,8 +104,8 @@ class Section:
         return [self.why, *self.lines, *(shown or ["nothing found"])]
 
 
-@dataclass
-class Check:
+@dataclass(repr=False)
+class Check(Brief):
     """The outcome of a check.
 
     Attributes
@@ -110,6 +121,15 @@ class Check:
     title: str
     sections: list[Section]
     result: Result | None
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return how many findings there are, and which, the grave ones first."""
+        grave = self.grave
+        found = [*grave, *(each for each in self.findings if each.level == "look")]
+        title = (
+            f"Check of {self.title or 'a network'}: {len(grave)} grave, {len(found) - len(grave)} to look at"
+        )
+        return title, [(each.level, each.text) for each in found]
 
     @property
     def findings(self) -> list[Finding]:
@@ -169,6 +189,14 @@ class Check:
             "title": self.title,
             "grave": len(self.grave),
             "verdict": self.verdict.document(),
-            "sections": [asdict(section) for section in self.sections],
+            "sections": [
+                {
+                    "title": section.title,
+                    "why": section.why,
+                    "lines": section.lines,
+                    "findings": [asdict(finding) for finding in section.findings],
+                }
+                for section in self.sections
+            ],
         }
         return json.to_json(document)

@@ -160,7 +160,7 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
         known = np.flatnonzero(medians > 0)
         if step == 0 and known.size:
             usual = float(np.median(medians[known]))
-            section.lines.append(f"{'median residual of a photo':<50}{usual:.4f} {rays.unit}")
+            section.figure("median residual of a photo", f"{usual:.4f} {rays.unit}")
         if len(known) < 4 or step == MOST_PHOTOS:
             break
         worst = _worst(rays, medians, known)
@@ -281,7 +281,9 @@ def _parted(
     for pair in combinations(rows.tolist(), 2):
         position = solver.changed(point, rows[~np.isin(rows, pair)].tolist(), [])
         residuals, in_front = solver.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
-        near = in_front & (np.linalg.norm(residuals, axis=1) < PARTED * before)
+        # Rays of two points may meet anywhere, even behind the cameras, and then miss by any number.
+        sizes = np.linalg.norm(residuals, axis=1)
+        near = in_front & (sizes < PARTED * min(before, float(np.nan_to_num(sizes, nan=0.0).max())))
         one, other = rows[near], rows[~near]
         if min(len(one), len(other)) < FEWEST_OF_TWO:
             continue
@@ -410,7 +412,7 @@ def _control(rays: Rays, section: Section) -> Bools:
     met = rays.intersect().positions
     control = np.flatnonzero(held.any(axis=1) & np.isfinite(met).all(axis=1))
     if not control.size:
-        section.lines.append("no control point is intersected")
+        section.parts.append("no control point is intersected")
         return np.zeros(len(block.point_ids), dtype=bool)
     given = np.where(held[control], block.point_positions[control], rays.axes.from_local(met[control]))
     differences = np.where(held[control], met[control] - rays.axes.positions(given), np.nan)
@@ -429,9 +431,9 @@ def _control_component(
         return
     unit, middle = block.linear_unit, float(np.median(differences[known]))
     spread = mad_sd(differences - middle)
-    section.lines.append(
-        f"{f'control, intersected minus given, {name}':<50}median {middle:.3f} {unit},"
-        f" spread {spread:.3f} {unit} ({len(known)} points)"
+    section.figure(
+        f"control, intersected minus given, {name}",
+        f"median {middle:.3f} {unit}, spread {spread:.3f} {unit} ({len(known)} points)",
     )
     if len(known) < FEWEST_CONTROL or spread == 0:
         return

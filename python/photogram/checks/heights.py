@@ -30,25 +30,23 @@ def two_ray_heights(result: Result) -> Section:
     )
     block = result.block
     if not flown(block):
-        section.lines.append("the photos do not look down: there is no ground that heights are above")
+        section.parts.append("the photos do not look down: there is no ground that heights are above")
         return section
     known = np.flatnonzero(result.used_points)
     positions = local_axes(block).positions(result.point_positions[known])
     heights = result.point_positions[known, 2]
     two = np.flatnonzero((result.point_rays[known] == 2) & ~np.isfinite(block.point_sd[known, 2]))
     if len(known) <= NEIGHBOURS + 1 or not two.size:
-        section.lines.append(f"{len(two)} two-ray points of {len(known)}: nothing to compare")
+        section.parts.append(f"{len(two)} two-ray points of {len(known)}: nothing to compare")
         return section
     near = neighbours(positions[:, :2], two, NEIGHBOURS)
     departures, extrapolation = _departures(positions[:, :2], heights, two, near)
     own_sd = np.sqrt(np.maximum(result.point_covariances[known[two], 2, 2], 0))
     spread = MAD_TO_SD * float(np.median(np.abs(departures) / extrapolation))
     unit = block.linear_unit
-    section.lines += [
-        f"{'two-ray points':<50}{len(two)} of {len(known)}",
-        f"{'spread about the planes of their neighbours':<50}{spread:.3f} {unit}",
-        f"{'median standard deviation of their heights':<50}{float(np.median(own_sd)):.3f} {unit}",
-    ]
+    section.figure("two-ray points", f"{len(two)} of {len(known)}")
+    section.figure("spread about the planes of their neighbours", f"{spread:.3f} {unit}")
+    section.figure("median standard deviation of their heights", f"{float(np.median(own_sd)):.3f} {unit}")
     scale = np.maximum(spread * extrapolation, own_sd)
     for row in np.flatnonzero(np.abs(departures) > DEPARTURE * scale).tolist():
         name = block.point_ids[known[two[row]]]

@@ -32,24 +32,30 @@ def key_numbers(edited: Edited, words: Words) -> Section:
     for name, result in rows:
         variance = result.variance_of_unit_weight
         shown = f"{variance:.4f}" if variance is not None else "undefined"
-        section.lines.append(
-            f"{f'variance of unit weight, {name}':<50}{shown}"
-            f" ({result.degrees_of_freedom} degrees of freedom)"
+        section.figure(
+            f"variance of unit weight, {name}", f"{shown} ({result.degrees_of_freedom} degrees of freedom)"
         )
     _variance(last, section)
-    section.lines.append(
-        f"{'weighted sum of squares, initial':<50}{last.initial_weighted_sum_of_squares:.4g}"
-    )
-    section.lines += [
-        f"{f'weighted sum of squares, iteration {each.number}':<50}{each.weighted_sum_of_squares:.4g}"
-        for each in last.iterations
-    ]
+    _squares(last, words, section)
     _weights(last, words, section)
     return section
 
 
+def _squares(last: Result, words: Words, section: Section) -> None:
+    """Say what the iterations have made of the sum of squares."""
+    title = "weighted sum of squares"
+    initial = last.initial_weighted_sum_of_squares
+    after = [each.weighted_sum_of_squares for each in last.iterations]
+    if not words.iterations:
+        section.figure(f"{title}, initial and last", f"{initial:.4g}, {[initial, *after][-1]:.4g}")
+        return
+    section.figure(f"{title}, initial", f"{initial:.4g}")
+    for number, value in enumerate(after, 1):
+        section.figure(f"{title}, iteration {number}", f"{value:.4g}")
+
+
 def _statuses(first: Result, last: Result, section: Section) -> None:
-    section.lines.append(f"{'status':<50}{last.status} after {len(last.iterations)} iterations")
+    section.figure("status", f"{last.status} after {len(last.iterations)} iterations")
     if not last.converged:
         text = f"the adjustment has {last.status}: the data are bad or the geometry is weak"
         section.findings.append(Finding("not-converged", "grave", text))
@@ -77,11 +83,9 @@ def _weights(result: Result, words: Words, section: Section) -> None:
     low, high = (
         factor * float(value) for value in (result.block.image_sd.min(), result.block.image_sd.max())
     )
-    section.lines.append(f"{'standard deviations of image coordinates':<50}{low:g} to {high:g} {unit}")
+    section.figure("standard deviations of image coordinates", f"{low:g} to {high:g} {unit}")
     spread = mad_sd(result.standardized)
-    section.lines.append(
-        f"{'the same as the residuals have them':<50}{low * spread:.3g} to {high * spread:.3g} {unit}"
-    )
+    section.figure("the same as the residuals have them", f"{low * spread:.3g} to {high * spread:.3g} {unit}")
     usual = words.usual_um
     if usual is not None and unit == "um" and (low < usual[0] or high > usual[1]):
         text = (

@@ -73,12 +73,12 @@ def orientation(block: Block, words: Words, unit: str = "mm") -> tuple[Section, 
     section.findings += _unexplained(above, explanations, whole, block) + explanations
     known = np.isfinite(met.sizes)
     behind = int((known & ~met.in_front).sum())
-    section.lines.append(f"{'rays that meet behind their camera':<50}{behind} of {int(known.sum())}")
-    section.lines.append(f"{'median residual of intersection':<50}{_median(met.sizes):.3f} {unit}")
+    section.figure("rays that meet behind their camera", f"{behind} of {int(known.sum())}")
+    section.figure("median residual of intersection", f"{_median(met.sizes):.3f} {unit}")
     if block is not rays.block:
-        section.lines.append(
-            f"{'median residual with these explanations':<50}{_median(met_after.sizes):.3f} {unit};"
-            " the sections below hold with them"
+        section.figure(
+            "median residual with these explanations",
+            f"{_median(met_after.sizes):.3f} {unit}; the sections below hold with them",
         )
     return section, block
 

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+from itertools import groupby
+from typing import Any
+
 from photogram.checks.findings import Check, Finding, Section
+from photogram.checks.parts import Figure, Listing, Names
 from photogram.results.page.pictures import drawings
-from photogram.show.page import Cell, Column, Fact, Judgement, Lines, Page, Part, Remarks, Row, Table, Text
+from photogram.show.judgement import judged, verdict_table
+from photogram.show.page import Cell, Column, Fact, Facts, Page, Part, Remarks, Row, Table, Text
 from photogram.show.page import Section as Chapter
 
 __all__ = ["check_page"]
 
+_TESTS = (
+    "Those of the adjustment, without what was found wrong: what the verdict rests on beside the findings."
+)
 MARKS = {"grave": "grave", "look": "to look at"}
 NAMED = 6
 """Photos and points that a row names."""
@@ -17,16 +27,18 @@ NAMED = 6
 def check_page(found: Check) -> Page:
     """Return the report of a check for the browser."""
     grave, look = len(found.grave), len(found.findings) - len(found.grave)
+    verdict = found.verdict
     pictures = drawings(found.result) if found.result is not None else {}
     chapters = [
         Chapter("findings", "Findings", [_table(found)] if found.findings else [], _INTRO),
         Chapter("network", "Plan of the network", [pictures["network"]] if pictures else []),
         *(_chapter(number, section) for number, section in enumerate(found.sections)),
+        Chapter("tests", "Tests", [verdict_table(verdict)] if verdict.tests else [], _TESTS),
     ]
     return Page(
         what="Check of a network before its adjustment",
         title=found.title,
-        judgements=[_judgement(grave, look)],
+        judgements=[replace(judged(verdict), lines=())],  # the table of findings has them
         advice=_advice(found),
         highlights=[
             Fact("Grave", f"{grave}", tone="bad" if grave else ""),
@@ -41,19 +53,6 @@ _INTRO = (
     " explains others is put"
     " right before the next step looks, so that each is named once. Nothing was changed in the files."
 )
-
-
-def _judgement(grave: int, look: int) -> Judgement:
-    if grave:
-        others = f", and {look} to look at" if look else ""
-        return Judgement(
-            "Mend it first", f"{grave} grave finding{'s' if grave > 1 else ''}{others}", (), "bad"
-        )
-    if look:
-        return Judgement(
-            "Look first", f"Nothing grave; {look} finding{'s' if look > 1 else ''} to look at", (), "look"
-        )
-    return Judgement("Ready", "Nothing was found that speaks against an adjustment", (), "good")
 
 
 def _advice(found: Check) -> list[str]:
@@ -90,7 +89,33 @@ def _named(each: Finding) -> str:
 
 
 def _chapter(number: int, section: Section) -> Chapter:
-    parts: list[Part] = [Lines(section.lines)] if section.lines else []
+    parts = [
+        part for kind, own in groupby(section.parts, type) for part in _shown(kind, list(own), section.title)
+    ]
     told = [f"{MARKS[each.level]}: {each.text}" for each in section.findings]
     parts.append(Remarks(told) if told else Text("Nothing found."))
     return Chapter(f"part-{number}", section.title, parts, section.why)
+
+
+def _shown(kind: type, parts: list[Any], title: str) -> list[Part]:
+    """Return parts of one kind that follow each other, as they stand on a page."""
+    if kind is str:
+        return [Text(f"{_begun(each)}{'' if each.endswith((':', '.')) else '.'}") for each in parts]
+    if kind is Listing:
+        return [_listing(each, title) for each in parts]
+    if kind is Names:
+        parts = [Figure(each.heading.capitalize(), ", ".join(each.names)) for each in parts]
+    return [Facts(title, [Fact(_begun(each.name.strip()), each.value) for each in parts])]
+
+
+def _listing(given: Listing, title: str) -> Table:
+    columns = []
+    for head, layout in given.columns:
+        decimals = re.search(r"\.(\d+)f", layout)
+        text = not layout.startswith(">")
+        columns.append(Column(_begun(head), decimals=int(decimals[1]) if decimals else None, text=text))
+    return Table(title, columns, [list(row) for row in given.rows])
+
+
+def _begun(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]

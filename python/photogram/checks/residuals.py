@@ -9,6 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.checks.findings import Finding, Section
+from photogram.checks.parts import Listing
 from photogram.checks.robust import critical, normal_of_chi_square
 from photogram.checks.words import small_unit
 from photogram.network.block import Block
@@ -47,7 +48,7 @@ def residuals(result: Result, spread: float) -> Section:
     _sums(result, section)
     plain = without_lenses(result.block)
     if len(plain.image_xy) < len(result.block.image_xy):
-        section.lines.append("images beyond what the lens sees: no patterns over the frame")
+        section.parts.append("images beyond what the lens sees: no patterns over the frame")
         return section
     _frame_pattern(result, plain, spread, section)
     _photo_patterns(result, plain, spread, section)
@@ -58,14 +59,20 @@ def _by_rays(result: Result, section: Section) -> None:
     used = result.used_images
     unit, factor = small_unit(result.block.image_unit)
     rays = result.point_rays[result.block.image_points]
-    section.lines.append(
-        f"{'rays':>6}{'images':>9}{f'rms x {unit}':>11}{f'rms y {unit}':>11}{'mean redundancy':>17}"
-    )
+    listed: list[tuple[float, ...]] = []
     for number in np.unique(rays[used]).tolist():
         rows = used & (rays == number)
         x, y = factor * np.sqrt((result.residuals[rows] ** 2).mean(axis=0))
         redundancy = result.redundancy[rows].mean()
-        section.lines.append(f"{number:>6}{int(rows.sum()):>9}{x:>11.2f}{y:>11.2f}{redundancy:>17.3f}")
+        listed.append((number, int(rows.sum()), float(x), float(y), float(redundancy)))
+    columns = (
+        ("rays", ">6"),
+        ("images", ">9"),
+        (f"rms x {unit}", ">11.2f"),
+        (f"rms y {unit}", ">11.2f"),
+        ("mean redundancy", ">17.3f"),
+    )
+    section.parts.append(Listing(columns, listed))
 
 
 def _sums(result: Result, section: Section) -> None:
@@ -89,9 +96,7 @@ def _sums(result: Result, section: Section) -> None:
     if not several.any():
         return
     rms = factor * np.sqrt((sums[several] ** 2).mean())
-    section.lines.append(
-        f"{'rms of the sums of the residuals of a point':<50}{rms:.2f} {unit} (3 and more rays)"
-    )
+    section.figure("rms of the sums of the residuals of a point", f"{rms:.2f} {unit} (3 and more rays)")
     # A point whose residuals nothing checks has sums of rounding errors.
     floor = (ROUNDING * float(block.image_sd.min())) ** 2
     sizes = np.abs(sums) / np.sqrt(np.maximum(variances, floor)) * several[:, np.newaxis]
@@ -138,9 +143,10 @@ def _frame_pattern(result: Result, plain: Block, spread: float, section: Section
             continue
         amplitude = float((design * (result.residuals[used] / sd)).sum()) / norm
         significance = abs(amplitude) * math.sqrt(norm) / spread
-        section.lines.append(
-            f"{f'pattern of all photos, {name}':<50}{factor * amplitude:.2f} {unit} at {size:.0f}"
-            f" {block.image_unit} from the centre ({significance:.1f} standard deviations)"
+        section.figure(
+            f"pattern of all photos, {name}",
+            f"{factor * amplitude:.2f} {unit} at {size:.0f} {block.image_unit} from the centre"
+            f" ({significance:.1f} standard deviations)",
         )
         if significance > limit and abs(amplitude) > WORTH * usual:
             text = (
@@ -179,9 +185,7 @@ def _photo_patterns(result: Result, plain: Block, spread: float, section: Sectio
                 "significance_sd": significance,
             }
             section.findings.append(Finding("photo-pattern", "look", text, [name], [], values))
-    section.lines.append(
-        f"{'photos tested for a pattern of their own':<50}{tested} of {len(block.photo_ids)}"
-    )
+    section.figure("photos tested for a pattern of their own", f"{tested} of {len(block.photo_ids)}")
 
 
 def _own_pattern(result: Result, plain: Block, rows: Indices, size: float, spread: float) -> float:

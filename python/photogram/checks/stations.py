@@ -66,14 +66,14 @@ def stations(block: Block, result: Result | None, misleading: Collection[str] = 
     axes = local_axes(block)
     positions, cameras = axes.positions(block.photo_positions), axes.cameras()
     if not flown(block):
-        section.lines.append("the photos do not look down, as those of an aircraft do: no paths")
+        section.parts.append("the photos do not look down, as those of an aircraft do: no paths")
         return section
     strips = strips_of(positions)
     heights = block.photo_positions[:, 2]
     paths = [
         _path(positions[strip], heights[strip], cameras[strip]) for strip in strips if len(strip) >= FEWEST
     ]
-    section.lines.append(
+    section.parts.append(
         f"{len(strips)} strips; {len(paths)} of them long enough ({FEWEST} photos) to judge the {which} path"
     )
     if paths:
@@ -134,7 +134,7 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
     units = [block.linear_unit] * 2 + ["deg"] * 3
     factors = np.array([1.0, 1.0, *[np.degrees(1.0)] * 3])
     for name, spread, unit in zip(QUANTITIES, usual * factors, units, strict=True):
-        section.lines.append(f"{f'spread about the path, {name}':<50}{spread:.4f} {unit}")
+        section.figure(f"spread about the path, {name}", f"{spread:.4f} {unit}")
     for strip, path in zip(strips, paths, strict=True):
         scale = np.maximum(np.maximum(usual, _spread(path.free)), floor)
         for row, k in np.argwhere(np.abs(path.departures) > LOOK * doubt * scale).tolist():
@@ -168,7 +168,7 @@ def _moved(result: Result, misleading: Collection[str], section: Section) -> Non
         spread = MAD_TO_SD * np.median(np.abs(changes[~mounted]), axis=0)
         sizes = np.abs(changes) / np.maximum(spread, TINY)
         listed = ", ".join(f"{each * factor:.4f}" for each in spread)
-        section.lines.append(f"{f'usual change of {what} by the adjustment':<50}{listed} {shown}")
+        section.figure(f"usual change of {what} by the adjustment", f"{listed} {shown}")
         small = np.abs(changes).max(axis=1) < (SMOOTH_ANGLE if what == "attitude" else SMOOTH_POSITION * base)
         for photo in np.flatnonzero((sizes.max(axis=1) > MOVED) & ~small & ~mounted).tolist():
             k = int(sizes[photo].argmax())

@@ -6,6 +6,7 @@ import numpy as np
 
 from photogram.arguments.types import Indices
 from photogram.checks.findings import Finding, Section
+from photogram.checks.parts import Figure
 from photogram.checks.words import Words
 from photogram.messages import listed
 from photogram.network.block import Block
@@ -41,10 +42,9 @@ def structure_section(block: Block, result: Result | None, words: Words) -> Sect
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     counts = np.bincount(block.image_photos, minlength=len(block.photo_ids))
     for number, points in zip(*np.unique(rays, return_counts=True), strict=True):
-        section.lines.append(f"{f'points on {number} photos':<50}{points}")
-    section.lines.append(
-        f"{'points on a photo, least, median, most':<50}"
-        f"{counts.min()}, {np.median(counts):.0f}, {counts.max()}"
+        section.figure(f"points on {number} photos", points)
+    section.figure(
+        "points on a photo, least, median, most", f"{counts.min()}, {np.median(counts):.0f}, {counts.max()}"
     )
     if words.bandwidth:
         _bandwidths(block, result, section)
@@ -59,17 +59,18 @@ def structure_section(block: Block, result: Result | None, words: Words) -> Sect
 
 def _bandwidths(block: Block, result: Result | None, section: Section) -> None:
     if result is not None:
-        section.lines += bandwidths(result)
+        head, figures = bandwidths(result)
+        section.parts += [head, *(Figure(f"  {name}", value) for name, value in figures)]
         bandwidth = structure(result.block.image_photos, result.block.image_points).effective_bandwidth
     else:
         structured = structure(block.image_photos, block.image_points)
         bandwidth = structured.effective_bandwidth
-        section.lines.append(
-            f"{'bandwidth in the order of the input':<50}{bandwidth} sets of three effective,"
-            f" {structured.naive_bandwidth} without sharing"
+        section.figure(
+            "bandwidth in the order of the input",
+            f"{bandwidth} sets of three effective, {structured.naive_bandwidth} without sharing",
         )
     photos = (bandwidth - 1) // 2
-    section.lines.append(
+    section.parts.append(
         f"{bandwidth} sets hold {photos} photos at a time: a photo may share points with {max(photos - 1, 0)}"
         " photos before it or after it in FRAMES"
     )
@@ -79,7 +80,7 @@ def _parts(block: Block, section: Section) -> None:
     """Name the parts of a block that share no point."""
     parts = parts_of(block)
     numbers, sizes = np.unique(parts, return_counts=True)
-    section.lines.append(f"{'parts without a common point':<50}{len(numbers)}")
+    section.figure("parts without a common point", len(numbers))
     if len(numbers) < 2:
         return
     largest = numbers[sizes.argmax()]

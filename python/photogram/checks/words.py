@@ -25,12 +25,15 @@ class Words:
         Between which standard deviations of image coordinates are usual, micrometres; None where nothing is.
     bandwidth
         Whether the bandwidths of the normal equations in that order are of interest.
+    iterations
+        Whether every iteration is one of the key numbers, as in Appendix H of the guide.
     """
 
     sense: str = "`photo_to_ground`"
     order: str = "the photos"
     usual_um: tuple[float, float] | None = None
     bandwidth: bool = False
+    iterations: bool = False
 
     def unhold(self, kept: Bools) -> str:
         """Return what is done about a control point of which only some components are to be held."""

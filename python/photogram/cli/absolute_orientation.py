@@ -277,8 +277,7 @@ def transform(
                 outputs=outputs,
                 progress=progress,
             )
-        if not quiet:
-            output.print(f"{count} points written: {escape(str(out))}")
+        job.conclude([out], summary=lambda: output.print(f"{count} points"))
 
 
 def _former(path: Path) -> Similarity:

@@ -9,11 +9,25 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import output
-from photogram.cli.html import HtmlFile, html_files
-from photogram.cli.job import Job, Reads, with_job
-from photogram.cli.options import JsonFile, Quiet, Threads
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
+from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.options import JsonFile, Quiet, Threads, default_out, out_option
 
-__all__ = ["check"]
+__all__ = ["CheckedOut", "check", "text_files"]
+
+TEXT = "report.txt"
+"""The report as text, in a directory of results."""
+
+CheckedOut = Annotated[
+    Path | None,
+    Writes.DIRECTORY,
+    out_option("Directory for report.html and report.txt. Default: the input with -checked, beside it."),
+]
+
+
+def text_files(out: Path, report: str) -> dict[Path, bytes]:
+    """Return the report as text as a file of a directory of results."""
+    return {out / TEXT: report.encode()}
 
 
 @with_job
@@ -24,8 +38,10 @@ def check(
         Reads.PROJECT,
         typer.Argument(metavar="DIR", help="Directory of the five files, as for adjusting."),
     ],
+    out: CheckedOut = None,
     json: JsonFile = None,
     html: HtmlFile = None,
+    no_html: NoHtml = False,
     limits: Annotated[
         str | None,
         typer.Option(metavar="N1=..,N6=..", help="Limits of the 1987 program.", show_default=False),
@@ -35,20 +51,24 @@ def check(
 ) -> None:
     """Look for errors in a GIANT project: blunders, wrong names, stations and control that do not fit.
 
-    Nothing is changed. The exit code is 3 when something grave is found.
+    The project is not changed. The exit code is 3 when something grave is found.
     """
     with job:
         from photogram.giant import Limits, read_project
         from photogram.giant import check as check_project
         from photogram.show.ways import page_of
 
+        out = out or default_out(directory, "-checked")
+        place = html_place(html, no_html, out)
+        job.writes(out / TEXT, *([place] if place else []))
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         with job.status("checking"):
             found = check_project(project, limits=allowed, threads=threads)
         job.finish(
+            text_files(out, found.report()),
             {} if json is None else {json: found.to_json()},
-            html_files(job, "giant check", html, True, lambda: page_of(found)),
+            html_files(job, "giant check", place, html is not None, lambda: page_of(found)),
             summary=lambda: output.print(escape(found.report()), end=""),
             code=found.verdict.exit,
         )

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from rich.markup import escape
 
+from photogram.cli.check import CheckedOut, text_files
 from photogram.cli.console import output, print_sections
-from photogram.cli.html import HtmlFile, html_files
+from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, with_job
-from photogram.cli.options import JsonFile, Quiet, Threads
+from photogram.cli.options import JsonFile, Quiet, Threads, default_out
 from photogram.cli.projects import (
     NOTHING,
     Additions,
@@ -28,28 +31,34 @@ def check_project(
     job: Job,
     path: ProjectPath = None,
     example: Example = False,
+    out: CheckedOut = None,
     json: JsonFile = None,
     html: HtmlFile = None,
+    no_html: NoHtml = False,
     added: Additions = NOTHING,
     threads: Threads = None,
     quiet: Quiet = False,
 ) -> None:
     """Look for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.
 
-    Nothing is changed. The exit code is 3 when something grave is found.
+    The project is not changed. The exit code is 3 when something grave is found.
     """
     with job:
         from photogram import check
         from photogram.show.ways import page_of
 
-        project = read_project(job, project_path(job, path), added)
+        path = project_path(job, path)
+        out = out or (Path("example-checked") if example else default_out(path, "-checked"))
+        place = html_place(html, no_html, out)
+        project = read_project(job, path, added)
         if not quiet:
             print_sections(described(project), "`photogram info`")
         with job.status("checking"):
             found = check(project.block, threads=threads)
         job.finish(
+            text_files(out, found.report()),
             {} if json is None else {json: found.to_json()},
-            html_files(job, "check", html, True, lambda: page_of(found)),
+            html_files(job, "check", place, html is not None, lambda: page_of(found)),
             summary=lambda: output.print(escape(found.report()), end=""),
             code=found.verdict.exit,
         )

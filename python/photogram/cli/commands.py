@@ -6,7 +6,6 @@ the commands that need them, so that `photogram --help` is quick.
 
 from __future__ import annotations
 
-from importlib.metadata import version as version_of
 from typing import Annotated
 
 import typer
@@ -77,6 +76,8 @@ app.command()(simulate.simulate)
 
 def _version(asked: bool) -> None:
     if asked:
+        from importlib.metadata import version as version_of  # takes long to import
+
         output.print(f"photogram {version_of('photogram')}")
         raise typer.Exit
 

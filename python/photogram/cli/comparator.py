@@ -89,7 +89,7 @@ def comparator(
     plots: Annotated[
         bool,
         typer.Option(
-            "--plots/--no-plots", help="Make the report, with its pictures (needs photogram[report])."
+            "--plots/--no-plots", help="Make the report, with its pictures (needs the extra `report`)."
         ),
     ] = True,
     pictures: Annotated[
@@ -310,6 +310,7 @@ def correct(
     invert: Annotated[
         bool, typer.Option("--invert", help="Turn corrected coordinates back into readings.")
     ] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Correct measurements by a calibration.
 
@@ -322,6 +323,6 @@ def correct(
 
         made = correct_table(Correction.read(correction), read_table(measurements), invert=invert)
         tables = [path for path in (corrected, out) if path]
-        job.write(dict.fromkeys(tables, made))
         if not tables:
             typer.echo(made.decode(), nl=False)
+        job.finish(dict.fromkeys(tables, made))

@@ -87,7 +87,7 @@ def with_components_page(page: Page, found: VarianceComponents | None, made: Cle
     from photogram.results.page.weights import reweighed_page, weighed_page
 
     if made is not None:
-        return reweighed_page(made.report().splitlines(), page)
+        return reweighed_page(made.changes, made.components, page)
     return page if found is None else weighed_page(found, page)
 
 

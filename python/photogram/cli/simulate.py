@@ -70,14 +70,14 @@ def simulate(
         block, common = _filed(simulation.block, position_error, attitude_error)
         project = Project.from_block(block, common)
         written = {**project_files(project, out, overwrite=overwrite), out / "truth.json": _truth(simulation)}
-        job.write(written)
-        for message in project.messages:
-            print_remark(message)
+        size = (
+            f"{out}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"
+            f" {len(block.image_xy)} image points"
+        )
         if not quiet:
-            output.print(
-                f"{escape(str(out))}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"
-                f" {len(block.image_xy)} image points"
-            )
+            for message in project.messages:
+                print_remark(message)
+        job.finish(written, summary=lambda: output.print(escape(size)))
 
 
 def _filed(block: Block, position_error: float, attitude_error: float) -> tuple[Block, Common]:

@@ -16,14 +16,13 @@ from photogram.results.page.parts import (
     images_facts,
     iterations_section,
     precision_table,
-    remarks_section,
     tests_section,
     unit_weight,
     worst_section,
 )
 from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import chosen_rows
-from photogram.show.judgement import advice, judged
+from photogram.show.judgement import advice, judged, remarks_section
 from photogram.show.page import (
     Cell,
     Column,

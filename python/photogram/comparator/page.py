@@ -10,7 +10,7 @@ from photogram.comparator.calibration import Calibration
 from photogram.comparator.polynomial import TERMS
 from photogram.comparator.variance import AxisSigma
 from photogram.show.angles import ARCSEC
-from photogram.show.judgement import advice, judged, verdict_table
+from photogram.show.judgement import advice, judged, remarks_section, tests_section
 from photogram.show.page import (
     Cell,
     Column,
@@ -20,7 +20,6 @@ from photogram.show.page import (
     Layers,
     Page,
     Part,
-    Remarks,
     Row,
     Section,
     Table,
@@ -50,8 +49,8 @@ def calibration_page(calibration: Calibration) -> Page:
         Section("cases", "Cases", _cases(calibration)),
         Section("outliers", "Readings that do not agree", _outliers(calibration)),
         Section("joint", "Joint adjustment", _joint(calibration.joint) if calibration.joint else [], _JOINT),
-        Section("tests", "Tests", [verdict_table(calibration.verdict)] if calibration.verdict.tests else []),
-        Section("remarks", "Remarks", _remarks(calibration)),
+        tests_section(calibration.verdict),
+        remarks_section(calibration.messages),
     ]
     return Page(
         what="Calibration of a comparator",
@@ -304,11 +303,6 @@ def _joint(joint: JointFit) -> list[Part]:
             joint.degrees_of_freedom,
         ),
     ]
-
-
-def _remarks(calibration: Calibration) -> list[Part]:
-    told = [str(each) for each in calibration.messages]
-    return [Remarks(told)] if told else []
 
 
 def _pictures(calibration: Calibration) -> list[Part]:

@@ -1,9 +1,15 @@
 """Projects in the files that people have: read, write, convert (docs/formats.md)."""
 
-from photogram.formats.format import Format, Wishes
-from photogram.formats.placing import Placed, placed
-from photogram.formats.project import Frame, Options, Project
-from photogram.formats.registry import FORMATS, cannot_hold, read, recognised, target, to_files
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from photogram.formats.format import Format, Wishes
+    from photogram.formats.placing import Placed, placed
+    from photogram.formats.project import Frame, Options, Project
+    from photogram.formats.registry import FORMATS, cannot_hold, read, recognised, target, to_files
 
 __all__ = [
     "FORMATS",
@@ -20,3 +26,29 @@ __all__ = [
     "target",
     "to_files",
 ]
+
+_HOMES = {
+    "Format": "format",
+    "Wishes": "format",
+    "Placed": "placing",
+    "placed": "placing",
+    "Frame": "project",
+    "Options": "project",
+    "Project": "project",
+}
+"""The module of each name, loaded when it is first asked for; the other names are those of the registry.
+
+Who needs one file of this folder, as the commands of GIANT do, does not wait for the readers of all formats.
+"""
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOMES.get(name, 'registry')}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

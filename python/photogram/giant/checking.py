@@ -7,6 +7,7 @@ import numpy as np
 from photogram.arguments.types import Bools
 from photogram.checks.checking import Manner, check_block, check_of
 from photogram.checks.findings import Check, Finding, Section
+from photogram.checks.parts import Names
 from photogram.checks.words import Words
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.limits import Limits
@@ -15,7 +16,6 @@ from photogram.network.block import Block
 
 __all__ = ["check"]
 
-NAMES_ON_A_LINE = 4
 """As the 1987 program printed them."""
 CODES = np.array([1, 2, 4])
 
@@ -27,6 +27,7 @@ class _GuideWords(Words):
     order = "FRAMES"
     usual_um = (5.0, 15.0)
     bandwidth = True
+    iterations = True
 
     def unhold(self, kept: Bools) -> str:
         return f"lower the type (column 80: {_type_code(kept)})"
@@ -78,19 +79,13 @@ def _(network: Project, threads: int | None) -> Check:
 
 def _input(project: Project, block: Block, limits: Limits | None) -> Section:
     section = Section("Input", "Remarks on the files, and the warnings of the 1987 program.")
-    section.lines.append(
+    section.parts.append(
         f"{len(block.photo_ids)} photos, {len(block.point_ids)} points, {len(block.image_xy)} images"
     )
     section.findings += [Finding("remark", "look", str(message)) for message in project.messages]
     for warning in error_warnings(project, block, limits):
-        if warning.general:
-            section.lines.append("ERROR WARNINGS")
-        section.lines.append(warning.heading)
-        names = [f"{name:<10}" for name in warning.names]
-        section.lines += [
-            "  " + "".join(names[first : first + NAMES_ON_A_LINE]).rstrip()
-            for first in range(0, len(names), NAMES_ON_A_LINE)
-        ]
+        above = "ERROR WARNINGS" if warning.general else ""
+        section.parts.append(Names(warning.heading, warning.names, above))
         text = f"{warning.heading.lower()}: {len(warning.names)}"
         section.findings.append(Finding("warning", "look", text, [], warning.names))
     return section

@@ -8,9 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from photogram import _photocore
+
 __all__ = ["csv_text"]
 
-_QUOTED = frozenset(',;"|\t#')
+_ARRAYS = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}
+"""What arrays of numbers and truth values are written from, by their kinds."""
 
 
 def csv_text(columns: Mapping[str, Sequence[Any] | Any], comments: Sequence[str] = ()) -> bytes:
@@ -23,28 +26,24 @@ def csv_text(columns: Mapping[str, Sequence[Any] | Any], comments: Sequence[str]
     comments
         Lines before the header, marked as comments.
     """
-    cells = [_cells(column) for column in columns.values()]
-    lines = [*(f"# {each}" for each in comments), ",".join(columns)]
-    lines += map(",".join, zip(*cells, strict=True))
-    return ("\n".join(lines) + "\n").encode()
+    head = [*(f"# {each}" for each in comments), ",".join(columns)]
+    rows = _photocore.csv_rows([_column(column) for column in columns.values()])
+    return ("\n".join(head) + "\n").encode() + rows
 
 
-def _cells(column: Any) -> list[str]:
-    if isinstance(column, np.ndarray) and column.dtype.kind == "f":
-        if np.isfinite(column).all():
-            return list(map(repr, column.tolist()))
-        return [_cell(each) for each in column.tolist()]
-    return [_cell(each) for each in (column.tolist() if isinstance(column, np.ndarray) else column)]
+def _column(column: Any) -> Any:
+    if isinstance(column, np.ndarray):
+        if kind := _ARRAYS.get(column.dtype.kind):
+            return np.ascontiguousarray(column, dtype=kind)
+        column = column.tolist()
+    return [each if isinstance(each, str) else _cell(each) for each in column]
 
 
-def _cell(value: Any) -> str:
+def _cell(value: Any) -> str | None:
     if value is None:
-        return ""
+        return None
     if isinstance(value, bool | np.bool_):
         return "true" if value else "false"
     if isinstance(value, float):
-        return "" if math.isnan(value) else repr(float(value))
-    text = str(value)
-    if _QUOTED.isdisjoint(text) and "\n" not in text and text == text.strip():
-        return text
-    return '"' + text.replace("\n", " ").replace('"', '""') + '"'
+        return None if math.isnan(value) else repr(float(value))
+    return str(value)

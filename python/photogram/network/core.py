@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from photogram import _photocore
@@ -9,6 +10,7 @@ from photogram.memory import available_memory
 from photogram.network.block import Block
 from photogram.network.observations import observation_rows
 from photogram.network.rigs import mount_rows
+from photogram.network.unknowns import Unknown
 
 __all__ = ["CoreOptions", "block_network"]
 
@@ -32,9 +34,15 @@ class CoreOptions:
     points_given: bool = False
 
 
-def block_network(block: Block, options: CoreOptions) -> _photocore.BlockNetwork:
-    """Return a block as the core adjusts it, and answers questions about it afterwards."""
-    unknowns = block.unknowns
+def block_network(
+    block: Block, options: CoreOptions, further: Sequence[Unknown] = ()
+) -> _photocore.BlockNetwork:
+    """Return a block as the core adjusts it, and answers questions about it afterwards.
+
+    `further` are common unknowns of a larger block, of which this one is a part that does not observe them;
+    they stand behind its own.
+    """
+    unknowns = [*block.unknowns, *further]
     groups = observation_rows(block.observations, block.point_ids, block.photo_ids, unknowns)
     cameras, photo_cameras = block.core_cameras()
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed

@@ -10,7 +10,7 @@ import numpy as np
 from photogram.perspective_center.batch import Run
 from photogram.perspective_center.plot import figure
 from photogram.perspective_center.solution import PerspectiveCenter
-from photogram.show.judgement import advice, judged
+from photogram.show.judgement import advice, judged, remarks_section
 from photogram.show.page import (
     Cell,
     Column,
@@ -20,7 +20,6 @@ from photogram.show.page import (
     Layers,
     Page,
     Part,
-    Remarks,
     Row,
     Section,
     Table,
@@ -38,9 +37,7 @@ def run_page(run: Run) -> Page:
         _layers("parameters", "Perspective centre and attitude", run, _parameters, _PARAMETERS),
         _layers("points", "Points", run, _points, _POINTS),
         _layers("iterations", "Iterations", run, _iterations, ""),
-        Section(
-            "remarks", "Remarks", [Remarks([str(each) for each in run.messages])] if run.messages else []
-        ),
+        remarks_section(run.messages),
     ]
     judgements = [judged(each.verdict, _name(each)) for each in run.results]
     if run.stop is not None:

@@ -10,6 +10,7 @@ from photogram.planning.plot import figure
 from photogram.planning.statistics import PointQuality
 from photogram.planning.text import remarks
 from photogram.show.angles import ARCSEC
+from photogram.show.judgement import remarks_section
 from photogram.show.page import (
     Column,
     Drawing,
@@ -18,7 +19,6 @@ from photogram.show.page import (
     Layers,
     Page,
     Part,
-    Remarks,
     Row,
     Section,
     Table,
@@ -40,7 +40,7 @@ def plan_page(patterns: Sequence[Pattern]) -> Page:
         _layers("points", "New points", patterns, _points, _POINTS),
         _layers("photos", "Photos", patterns, _photos, ""),
         _layers("control", "Control", patterns, _control, _CONTROL),
-        Section("remarks", "Remarks", [Remarks(told)] if (told := remarks(patterns)) else []),
+        remarks_section(remarks(patterns)),
     ]
     return Page(
         what="Prediction of a network before it is flown",

@@ -192,8 +192,8 @@ def labels(
 
     figure = _figure(axes)
     # Where legends and scales of equal axes go is known only when the layout was made twice.
-    figure.draw_without_rendering()
-    figure.draw_without_rendering()
+    for _ in range(2):
+        _lay_out(figure)
     room = axes.get_window_extent()
     point = figure.dpi / 72.0
     taken: list[Bbox] = [each.get_window_extent() for each in axes.texts if isinstance(each, Annotation)]
@@ -218,6 +218,17 @@ def labels(
         written.set_position(((corner[0] - x) / point, (corner[1] - y) / point))
         taken.append(box)
     return left_out
+
+
+def _lay_out(figure: Figure) -> None:
+    """Put axes and legends of a figure where they will be drawn."""
+    engine = figure.get_layout_engine()
+    if engine is None:
+        figure.draw_without_rendering()
+        return
+    engine.execute(figure)
+    for axes in figure.axes:
+        axes.apply_aspect()
 
 
 def _free_side(

@@ -81,6 +81,10 @@ class NetworkTrial:
         self._diagonal = np.repeat(self._block_starts[:-1], sizes) + row * (np.repeat(sizes, sizes) + 1)
         self._tests: dict[str, np.ndarray] = {}
 
+    def restart(self, core: _photocore.NetworkTrial) -> None:
+        """Go on with the same network from other initial values; its groups are the same."""
+        self.core, self._tests = core, {}
+
     @property
     def whole(self) -> bool:
         """Whether R of all rows together is small enough to be had."""

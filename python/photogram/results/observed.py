@@ -77,19 +77,26 @@ def image_lines(
     parts = (result.residuals * factor, result.redundancy, result.standardized)
     heads = (f"{axis} {head}" for axis in "xy" for head in (f"residual {unit}", "redundancy", "standardized"))
     lines = [f"{'photo':<10} {'point':<10}" + "".join(f"{head:>16}" for head in heads)]
-    for image in used[:LISTED].tolist():
-        name = f"{photos[image_photos[image]]:<10} {points[result.image_points[image]]:<10}"
-        figures = "".join(
-            "".join(
-                f"{f'{part[image, axis]:.{decimals}f}' if math.isfinite(part[image, axis]) else '-':>16}"
-                for part, decimals in zip(parts, (2, 3, 2), strict=True)
-            )
-            for axis in (0, 1)
-        )
-        lines.append(name + figures)
+    listed = used[:LISTED]
+    figures = np.stack([part[listed] for part in parts], axis=2).reshape(len(listed), -1)
+    whole = "{:>16.2f}{:>16.3f}{:>16.2f}" * 2
+    rows = zip(
+        image_photos[listed].tolist(),
+        result.image_points[listed].tolist(),
+        figures.tolist(),
+        np.atleast_1d(np.isfinite(figures).all(axis=1)).tolist(),
+        strict=True,
+    )
+    for photo, point, row, finite in rows:
+        cells = whole.format(*row) if finite else "".join(map(_image_cell, row, (2, 3, 2) * 2))
+        lines.append(f"{photos[photo]:<10} {points[point]:<10}{cells}")
     if len(used) > LISTED:
         lines.append(f"and {len(used) - LISTED} more; the JSON document and the table of images have all")
     return lines if len(used) else []
+
+
+def _image_cell(value: float, decimals: int) -> str:
+    return f"{f'{value:.{decimals}f}' if math.isfinite(value) else '-':>16}"
 
 
 def observed_lines(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,6 +38,7 @@ _ORDERINGS = {
     "amd": "by minimum degree",
     "dissection": "by nested dissection",
     "graph-dissection": "by dissection of the graph",
+    "parts": "in parts, and the separators between them",
 }
 
 
@@ -106,8 +107,8 @@ def _adjustment(result: Result) -> list[str]:
     counts = zip(axes(result), held.sum(axis=0), strict=True)
     components = ", ".join(f"{axis} {count}" for axis, count in counts)
     basis = {
-        "free": "cameras free",
-        "constrained": "cameras constrained",
+        "free": "photos free",
+        "constrained": "photos weighted",
         "unity": "set to 1",
         "redundancy": "redundancy numbers",
     }[result.unit_variance]
@@ -120,9 +121,9 @@ def _adjustment(result: Result) -> list[str]:
             f"{math.sqrt(variance):.6f}" if variance is not None else "undefined",
         ),
         ("degrees of freedom", f"{result.degrees_of_freedom:.8g}"),
-        ("weighted sum of squares, camera", f"{sums.camera:.6f}"),
-        ("weighted sum of squares, ground", f"{sums.ground:.6f}"),
-        ("weighted sum of squares, plates", f"{sums.plates:.6f}"),
+        ("weighted sum of squares, photos", f"{sums.camera:.6f}"),
+        ("weighted sum of squares, control", f"{sums.ground:.6f}"),
+        ("weighted sum of squares, images", f"{sums.plates:.6f}"),
         *(
             (f"weighted sum of squares, {each.kind}", f"{each.sum_of_squares:.6f}")
             for each in result.kinds.values()
@@ -291,9 +292,9 @@ def _photos(result: Result) -> list[str]:
     ]
     rows = zip(
         result.block.photo_ids,
-        result.photo_positions,
-        np.degrees(result.photo_attitudes),
-        result.photo_sd,
+        result.photo_positions.tolist(),
+        np.degrees(result.photo_attitudes).tolist(),
+        result.photo_sd.tolist(),
         strict=True,
     )
     for name, values, angles, sd in rows:
@@ -320,9 +321,9 @@ def _points(result: Result) -> list[str]:
     ]
     rows = zip(
         result.block.point_ids,
-        result.point_positions,
-        result.point_sd,
-        result.point_rays,
+        result.point_positions.tolist(),
+        result.point_sd.tolist(),
+        result.point_rays.tolist(),
         result.point_kinds,
         strict=True,
     )
@@ -341,22 +342,24 @@ def _work(result: Result) -> list[str]:
         for name, count in result.predictions.items()
         if name != result.ordering
     ]
-    lines += bandwidths(result)
+    head, figures = bandwidths(result)
+    lines += [head, *(f"{f'  {name}':<36}{value}" for name, value in figures)]
     lines += [f"{f'multiply-adds of one {name}':<36}{count:.3e}" for name, count in result.operations.items()]
     return lines
 
 
-def bandwidths(result: Result) -> list[str]:
-    """Return what the 1987 program would have needed, for the order of the input and for the one chosen."""
+def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
+    """Return what the 1987 program would have needed, for the order of the input and for the one chosen.
+
+    A sentence, and names with values.
+    """
     images = result.block.image_photos, result.block.image_points
-    lines = ["bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)"]
+    figures = []
     for name, order in (("of the input", None), ("chosen", result.photo_order)):
-        structured = structure(*images, order)
-        lines.append(
-            f"{f'  in the order {name}':<36}{structured.effective_bandwidth} effective,"
-            f" {structured.naive_bandwidth} without sharing"
-        )
-    return lines
+        found = structure(*images, order)
+        value = f"{found.effective_bandwidth} effective, {found.naive_bandwidth} without sharing"
+        figures.append((f"in the order {name}", value))
+    return "bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)", figures
 
 
 def _rms(values: Floats) -> float:
@@ -395,18 +398,23 @@ def _sd_head(result: Result) -> str:
     return "".join(f"{f'sd {unit}':>20}" for unit in _difference_units(result))
 
 
-def _position_formats(result: Result) -> tuple[Callable[[Floats], str], Callable[[Floats], str]]:
+def _position_formats(
+    result: Result,
+) -> tuple[Callable[[Sequence[float]], str], Callable[[Sequence[float]], str]]:
     """How positions and their standard deviations are written."""
+    geographic = result.block.geographic
 
-    def position(values: Floats) -> str:
-        if result.block.geographic:
-            return f"{_dms(values[0], 5):>20}{_dms(values[1], 5):>20}{values[2]:>20.4f}"
-        return "".join(f"{value:>20.4f}" for value in values)
+    def position(values: Sequence[float]) -> str:
+        x, y, z = values
+        if geographic:
+            return f"{_dms(x, 5):>20}{_dms(y, 5):>20}{z:>20.4f}"
+        return f"{x:>20.4f}{y:>20.4f}{z:>20.4f}"
 
-    outward = _outward(result)
+    by_x, by_y, by_z = _outward(result).tolist()
 
-    def deviations(values: Floats) -> str:
-        return "".join(f"{value:>20.5f}" for value in values * outward)
+    def deviations(values: Sequence[float]) -> str:
+        x, y, z = values
+        return f"{x * by_x:>20.5f}{y * by_y:>20.5f}{z * by_z:>20.5f}"
 
     return position, deviations
 

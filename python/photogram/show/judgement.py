@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from photogram.show.page import Cell, Column, Judgement, Table, Tone
+from photogram.show.page import Cell, Column, Judgement, Remarks, Section, Table, Tone
 
 if TYPE_CHECKING:
     from photogram.statistics.evidence import Test
     from photogram.statistics.verdict import Verdict
 
-__all__ = ["advice", "judged", "verdict_table"]
+__all__ = ["advice", "judged", "remarks_section", "tests_section", "verdict_table"]
 
 MARKS: dict[Tone, str] = {
     "good": "Usable",
@@ -130,6 +130,17 @@ def verdict_table(verdict: Verdict, of: str = "") -> Table:
         " level. Of every kind of observation the least probable one stands here."
     )
     return Table(caption, columns, [_row(each) for each in verdict.tests], note)
+
+
+def tests_section(verdict: Verdict) -> Section:
+    """Return the section of all tests of a verdict; empty, and so not shown, where there are none."""
+    return Section("tests", "Tests", [verdict_table(verdict)] if verdict.tests else [])
+
+
+def remarks_section(sentences: Iterable[object]) -> Section:
+    """Return the section of what was remarked on; empty, and so not shown, where that is nothing."""
+    told = [said for each in sentences if (said := str(each)) != "none"]
+    return Section("remarks", "Remarks", [Remarks(told)] if told else [])
 
 
 def _row(test: Test) -> list[Cell | str | float | None]:

@@ -25,7 +25,6 @@ __all__ = [
     "Facts",
     "Judgement",
     "Layers",
-    "Lines",
     "Page",
     "Part",
     "Picture",
@@ -199,14 +198,6 @@ class Layers:
 
 
 @dataclass(frozen=True)
-class Lines:
-    """Lines of text whose columns stand below each other."""
-
-    lines: Sequence[str]
-    kind: str = field(default="lines", init=False)
-
-
-@dataclass(frozen=True)
 class Text:
     """A paragraph."""
 
@@ -223,7 +214,7 @@ class Remarks:
     kind: str = field(default="remarks", init=False)
 
 
-Part = Table | Facts | Drawing | Picture | Layers | Lines | Text | Remarks
+Part = Table | Facts | Drawing | Picture | Layers | Text | Remarks
 
 
 @dataclass(frozen=True)

@@ -244,7 +244,8 @@ def _combined(result: Result, threads: int | None) -> Result:
     pairs = pairs_to_combine(test, result.problem.options.movement_factor)
     result = replace(result, movement=test)
     if not pairs:
-        return replace(result, messages=(*result.messages, Message("NO COMBINED SOLUTION")))
+        text = "no combined solution: the camera has moved between any two of its attitudes"
+        return replace(result, messages=(*result.messages, Message(text)))
     combined = combine(result, pairs, threads=threads)
     if not combined.converged:
         text = f"the combined solution has not converged: {combined.solved.stop}"

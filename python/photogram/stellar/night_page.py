@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.show.angles import ARCSEC
-from photogram.show.judgement import advice, judged, verdict_table
+from photogram.show.judgement import advice, judged, remarks_section, tests_section
 from photogram.show.page import (
     Cell,
     Column,
@@ -16,7 +16,6 @@ from photogram.show.page import (
     Layers,
     Page,
     Part,
-    Remarks,
     Row,
     Section,
     Table,
@@ -55,10 +54,8 @@ def night_page(result: CalibratedNight) -> Page:
             "Which lens the data speak for, and which of its terms are worth having.",
         ),
         Section("worst", "Worst observations", [_worst(result)]),
-        Section("tests", "Tests", [verdict_table(result.verdict)] if result.verdict.tests else []),
-        Section(
-            "remarks", "Remarks", [Remarks(told)] if (told := [str(each) for each in result.messages]) else []
-        ),
+        tests_section(result.verdict),
+        remarks_section(result.messages),
     ]
     ready = (
         "camera.json holds the calibrated camera; so do camera.yaml and camera-ros.yaml of lenses they know."

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
-from photogram.show.judgement import advice, judged, verdict_table
+from photogram.show.angles import ARCSEC
+from photogram.show.judgement import advice, judged, remarks_section, tests_section
 from photogram.show.page import (
     Cell,
     Column,
@@ -15,10 +15,8 @@ from photogram.show.page import (
     Fact,
     Facts,
     Layers,
-    Lines,
     Page,
     Part,
-    Remarks,
     Row,
     Section,
     Table,
@@ -27,10 +25,11 @@ from photogram.show.page import (
     significant,
 )
 from photogram.stellar import tables
+from photogram.stellar.curves import distortion_curves
 from photogram.stellar.outliers import studentized
 from photogram.stellar.parameters import GRAD, INDEX, NAMES, UNITS
 from photogram.stellar.plots import figures
-from photogram.stellar.result import Result
+from photogram.stellar.result import Ellipse, Result
 
 __all__ = ["plate_page", "plate_pictures"]
 
@@ -49,11 +48,11 @@ def plate_page(result: Result) -> Page:
         ),
         Section("parameters", "Parameters", [_parameters(result)], _PARAMETERS),
         Section("worst", "Worst observations", [_worst(result)]),
-        Section("tests", "Tests", [verdict_table(result.verdict)] if result.verdict.tests else []),
-        Section("directions", "Unknown directions", _lines(tables.directions, result)),
-        Section("distortion", "Distortion", _lines(tables.distortion, result)),
-        Section("movement", "Movement of the camera", _lines(tables.movement, result)),
-        Section("remarks", "Remarks", _remarks(result)),
+        tests_section(result.verdict),
+        Section("directions", "Unknown directions", _directions(result), _DIRECTIONS),
+        Section("distortion", "Distortion", _distortion(result), _DISTORTION),
+        Section("movement", "Movement of the camera", _movement(result), _MOVEMENT),
+        remarks_section(result.messages),
     ]
     return Page(
         what="Calibration of a camera by a plate with stars",
@@ -213,11 +212,113 @@ def _worst(result: Result) -> Table:
     )
 
 
-def _lines(table: Callable[[Result], list[str]], result: Result) -> list[Part]:
-    lines = table(result)
-    return [Lines(lines)] if lines else []
+_DIRECTIONS = (
+    "Stars whose places were to be found, with mean errors, and the semi-axes and directions of their"
+    " ellipses: from the orientation alone, and in total."
+)
 
 
-def _remarks(result: Result) -> list[Part]:
-    told = [str(each) for each in result.messages]
-    return [Remarks(told)] if told else []
+def _directions(result: Result) -> list[Part]:
+    rows: list[Row] = [
+        [
+            str(each.star),
+            Cell(tables.hours(each.place[0] % math.tau), sorts=each.place[0] % math.tau),
+            Cell(tables.degrees(each.place[1]), sorts=each.place[1]),
+            math.degrees(each.azimuth),
+            math.degrees(each.elevation),
+            *(float(error) / ARCSEC for error in each.mean_errors),
+            1e6 * each.image_mean_error,
+            *_axes(each.orientation),
+            *_axes(each.total),
+        ]
+        for each in result.directions()
+    ]
+    columns = (
+        Column("Star", text=True),
+        Column("Right ascension"),
+        Column("Declination"),
+        Column("Azimuth", "°", decimals=5),
+        Column("Elevation", "°", decimals=5),
+        Column("Mean error, right ascension", "″", decimals=4),
+        Column("declination", "″", decimals=4),
+        Column("image", "µm", decimals=3),
+        *(
+            Column(f"{name}{of}", unit, decimals=decimals)
+            for of in (", orientation", ", total")
+            for name, unit, decimals in (("a", "″", 4), ("b", "″", 4), ("Direction", "°", 2))
+        ),
+    )
+    return [Table("Unknown directions", columns, rows)] if rows else []
+
+
+def _axes(found: Ellipse) -> tuple[float, float, float]:
+    return found.major / ARCSEC, found.minor / ARCSEC, math.degrees(found.direction)
+
+
+_DISTORTION = (
+    "Over the distance from its centre, with mean errors. Transformed: for the calibrated principal distance,"
+    " with which it is zero at the crossover."
+)
+
+
+def _distortion(result: Result) -> list[Part]:
+    options = result.problem.options
+    if not options.curves:
+        return []
+    curves = distortion_curves(result)
+    facts = [
+        Fact(
+            "Calibrated principal distance",
+            f"{curves.calibrated:.9f}",
+            "m",
+            f"mean error {significant(1e6 * curves.calibrated_error, 4)} µm",
+        ),
+        Fact("Crossover", f"{1e3 * options.crossover:g}", "mm"),
+    ]
+    parts = [
+        each
+        for curve, error in (
+            (curves.radial, curves.radial_error),
+            (curves.transformed, curves.transformed_error),
+            (curves.decentering, curves.decentering_error),
+        )
+        for each in (curve, error)
+    ]
+    table = np.column_stack([1e3 * curves.distance, *(1e6 * each for each in parts)])
+    columns = (
+        Column("Distance", "mm", decimals=1),
+        *(
+            Column(head, "µm", decimals=3)
+            for name in ("Radial", "Transformed", "Decentering")
+            for head in (name, "Mean error")
+        ),
+    )
+    rows: list[Row] = [list(row) for row in table.tolist()]
+    return [Facts("Principal distance", facts), Table("Distortion", columns, rows)]
+
+
+_MOVEMENT = "Angles between the directions of a point of the plate under two attitudes."
+
+
+def _movement(result: Result) -> list[Part]:
+    rows: list[Row] = [
+        [
+            f"{each.second} - {each.first}",
+            1e3 * each.xy,
+            each.angle / ARCSEC,
+            each.mean_error / ARCSEC,
+            *(float(value) / ARCSEC for value in each.differences),
+        ]
+        for each in result.movement
+    ]
+    columns = (
+        Column("Pair", text=True),
+        Column("x = y", "mm", decimals=0),
+        Column("Angle", "″", decimals=3),
+        Column("Mean error", "″", decimals=3),
+        *(
+            Column(name, "″", decimals=3)
+            for name in ("ra cos dec", "Declination", "Azimuth sin z", "Elevation")
+        ),
+    )
+    return [Table("Movement of the camera", columns, rows)] if rows else []

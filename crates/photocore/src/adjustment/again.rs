@@ -8,7 +8,7 @@ use super::datum::{Adjusted, Datum, DatumError, InDatum, moved};
 use super::loss::Loss;
 use super::options::{Options, Status};
 use super::problem::{Model, Problem};
-use super::result::Adjustment;
+use super::result::{Adjustment, Seconds};
 
 impl Adjustment {
     /// Takes an adjusted network to another datum: unknowns and, where so asked, all cofactors and redundancy numbers. It need not have any
@@ -68,34 +68,53 @@ impl InDatum {
         loss: Option<Loss>,
         pool: &ThreadPool,
     ) -> Adjustment {
-        let residuals = problem.residuals(pool, &self.unknowns);
-        let weights =
-            |loss: Loss| problem.group_squares(&residuals).map(|square| loss.weight(square)).collect();
+        let redundancy = Some(self.redundancy());
+        let reached = Adjustment::reached(problem, self.unknowns, pool);
+        let weights = |loss: Loss| {
+            problem.group_squares(&reached.residuals).map(|square| loss.weight(square)).collect()
+        };
+        Adjustment {
+            weights: loss.map(weights),
+            redundancy,
+            prior_redundancy: Some(self.prior_redundancy),
+            cofactors: Some(self.cofactors),
+            counts: problem.counts(held.len()),
+            datum: held,
+            formations: 1,
+            seconds: self.seconds,
+            ..reached
+        }
+    }
+}
+
+impl Adjustment {
+    /// An adjustment that is told where it has ended, without iterations and cofactors.
+    pub(super) fn reached<M: Model>(problem: &Problem<M>, unknowns: Vec<f64>, pool: &ThreadPool) -> Self {
         let locals = problem.layout().all_locals();
         let symbolic = problem.system.symbolic();
-        Adjustment {
+        Self {
             status: Status::Converged,
             initial_sum_of_squares: f64::NAN,
             iterations: vec![],
-            history: vec![self.unknowns[locals.end..].to_vec()],
+            history: vec![unknowns[locals.end..].to_vec()],
             last_local_corrections: vec![0.0; locals.len()],
-            weights: loss.map(weights),
-            residuals,
-            redundancy: Some(self.redundancy()),
-            prior_redundancy: Some(self.prior_redundancy),
+            weights: None,
+            residuals: problem.residuals(pool, &unknowns),
+            redundancy: None,
+            prior_redundancy: None,
             redundancy_excess: None,
-            unknowns: self.unknowns,
-            cofactors: Some(self.cofactors),
+            unknowns,
+            cofactors: None,
             lost: None,
             selected: None,
             undetermined: None,
-            counts: problem.counts(held.len()),
-            datum: held,
+            counts: problem.counts(0),
+            datum: vec![],
             weak: vec![],
             collapsed: vec![],
             operations: symbolic.operations(problem.layout()),
-            formations: 1,
-            seconds: self.seconds,
+            formations: 0,
+            seconds: Seconds::default(),
             ordering: symbolic.ordering(),
             predictions: symbolic.predictions().to_vec(),
             order: symbolic.order().to_vec(),

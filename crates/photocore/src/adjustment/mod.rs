@@ -67,6 +67,7 @@ mod noncentral;
 mod normal_equations;
 mod observation_rows;
 mod options;
+mod part;
 mod problem;
 mod projection;
 mod published;
@@ -95,6 +96,7 @@ pub use noncentral::{
 pub use normal_equations::NormalEquations;
 pub use observation_rows::ObservationRows;
 pub use options::{Event, Iteration, Options, Phase, Status};
+pub use part::{Part, PartError};
 pub use problem::{Model, Motions, Problem, Weighted};
 pub use resistance::Classes;
 pub(crate) use result::gib;

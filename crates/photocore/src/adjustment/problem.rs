@@ -6,7 +6,7 @@ use rayon::ThreadPool;
 use smallvec::SmallVec;
 
 use super::loss::Reweighting;
-use crate::normals::{Equations, GroupRows, Layout, Prior, System, TieRows};
+use crate::normals::{Contribution, Equations, GroupRows, Layout, Prior, System, TieRows};
 
 /// How observations follow from unknowns.
 pub trait Model: Sync {
@@ -175,7 +175,7 @@ impl<M: Model> Problem<M> {
     }
 
     /// The equations of the unknowns themselves at the given values. A fixed or held unknown has an equation of its own,
-    /// x = 0 with unit weight, and no other (see [`Linearized`]).
+    /// x = 0 with unit weight, and no other (see [`Linearized`]); an outer one has none here.
     pub(super) fn prior_equations(&self, values: &[f64], held: &[usize]) -> Prior {
         let mut weight: Vec<f64> =
             self.sd.iter().map(|&sd| if sd == 0.0 { 1.0 } else { (sd * sd).recip() }).collect();
@@ -187,6 +187,8 @@ impl<M: Model> Problem<M> {
         let mut prior = Prior { weight, right, between: vec![] };
         let is_held = |unknown: usize| self.sd[unknown] == 0.0 || held.contains(&unknown);
         self.weighted(values).iter().for_each(|own| add_weighted(&mut prior, own, &is_held));
+        let layout = self.layout();
+        layout.unknowns_of(layout.outer()).for_each(|unknown| prior.weight[unknown] = 0.0);
         prior
     }
 
@@ -207,6 +209,8 @@ pub(super) struct Linearized<'a, M: Model> {
     /// Which unknowns are fixed or held; None where none is.
     fixed: Option<Vec<bool>>,
     reweighting: Option<Reweighting>,
+    /// What systems below have left (see [`super::Part`]).
+    contributions: &'a [Contribution<'a>],
 }
 
 impl<'a, M: Model> Linearized<'a, M> {
@@ -229,7 +233,13 @@ impl<'a, M: Model> Linearized<'a, M> {
         let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
         held.iter().for_each(|&unknown| fixed[unknown] = true);
         let fixed = fixed.contains(&true).then_some(fixed);
-        Self { problem, prepared, observation_sd: &problem.observation_sd, fixed, reweighting }
+        let observation_sd = &problem.observation_sd;
+        Self { problem, prepared, observation_sd, fixed, reweighting, contributions: &[] }
+    }
+
+    /// The same with what systems below have left.
+    pub fn with_contributions(self, contributions: &'a [Contribution<'a>]) -> Self {
+        Self { contributions, ..self }
     }
 
     /// The same equations with other standard deviations of the observations.
@@ -248,7 +258,8 @@ impl<'a, M: Model> Linearized<'a, M> {
     /// With the columns of fixed unknowns, and without a loss.
     pub fn of_all(problem: &'a Problem<M>, values: &[f64]) -> Self {
         let prepared = problem.model.prepare(values);
-        Self { problem, prepared, observation_sd: &problem.observation_sd, fixed: None, reweighting: None }
+        let observation_sd = &problem.observation_sd;
+        Self { problem, prepared, observation_sd, fixed: None, reweighting: None, contributions: &[] }
     }
 
     /// The problem that they are of.
@@ -329,6 +340,10 @@ impl<M: Model> Equations for Linearized<'_, M> {
         if let Some(fixed) = &self.fixed {
             leave_out(rows.coefficients, sd.len(), layout.tie_columns(tie).map(|unknown| fixed[unknown]));
         }
+    }
+
+    fn contribution(&self, below: usize) -> Option<&Contribution<'_>> {
+        self.contributions.get(below)
     }
 }
 

@@ -539,7 +539,8 @@ fn stopped(flow: ControlFlow<()>) -> Result<(), AdjustError> {
     }
 }
 
-fn between(
+/// Tells of local blocks done.
+pub(super) fn between(
     watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     phase: Phase,
     total: usize,

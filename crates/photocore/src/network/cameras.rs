@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::model::Bundle;
 use super::precision::median;
 use super::problem::Assembled;
+use super::surroundings::Surroundings;
 use super::{AdjustedPhoto, Network};
 use crate::adjustment::{Adjustment, Problem};
 
@@ -27,12 +28,13 @@ pub struct AdjustedCamera {
 }
 
 impl Network {
-    /// The cameras with unknown parameters that several photos share, or one on a frame has, ascending.
-    pub(super) fn shared_cameras(&self) -> Vec<usize> {
+    /// The cameras with unknown parameters that several photos share, here or in other nodes, or one on a frame has, ascending.
+    pub(super) fn shared_cameras(&self, surroundings: &Surroundings) -> Vec<usize> {
         let mut photos = vec![0; self.cameras.len()];
         self.photos.iter().for_each(|photo| photos[photo.camera] += 1);
         // A photo on a frame has no unknowns of its own.
         self.mounts.iter().for_each(|mount| photos[self.photos[mount.photo].camera] += 1);
+        surroundings.cameras().into_iter().for_each(|camera| photos[camera] += 2);
         (0..photos.len()).filter(|&camera| photos[camera] > 1 && !self.cameras[camera].is_held()).collect()
     }
 

@@ -6,9 +6,10 @@ use nalgebra::Vector6;
 use rayon::ThreadPool;
 
 use super::commons::Motion;
-use super::model::{Bundle, Placed};
+use super::model::Bundle;
 use super::parts::{Joined, MOST_PARTS, Part, Parts};
 use super::problem::Assembled;
+use super::stations::Placed;
 use crate::adjustment::{Datum, Motions};
 use crate::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Point, PoseNumbers, Vector3, angle_axis::rotation_angle_axis,

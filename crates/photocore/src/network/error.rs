@@ -6,6 +6,7 @@ use super::model::Owner;
 use super::observations::Fault;
 use super::precision::Coarse;
 use super::problem::Assembled;
+use super::surroundings::BlockOf;
 use crate::adjustment::{AdjustError, CofactorError, DatumError, gib};
 use crate::normals::LayoutError;
 
@@ -124,6 +125,12 @@ pub enum NetworkError {
     /// It cannot be taken to a datum.
     #[error(transparent)]
     Datum(#[from] DatumError),
+    /// A block of unknowns that other nodes touch is not there, or has no unknowns of its own.
+    #[error("{0:?}, named for other nodes, is not there or has no unknowns of its own")]
+    NoBlock(BlockOf),
+    /// A node of a larger network cannot go on with what it is given.
+    #[error("{0}")]
+    Node(&'static str),
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),

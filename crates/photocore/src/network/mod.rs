@@ -53,26 +53,33 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod approaches;
 mod camera_priors;
 mod cameras;
 pub mod commons;
 mod covariance;
 mod datum;
+mod effects;
 mod error;
+mod group_tests;
 mod groups;
 mod model;
 mod mounts;
 mod naming;
 mod neighbourhood;
+mod node;
 pub mod observations;
 mod on_frames;
 mod parts;
 mod precision;
+mod predictions;
 mod problem;
 mod responses;
 mod screening;
 mod solution;
 mod start;
+mod stations;
+mod surroundings;
 mod suspects;
 mod trial;
 mod weak_points;
@@ -92,17 +99,21 @@ pub use commons::{AdjustedCommon, Common, CommonKind};
 pub use covariance::{Covariances, NetworkDatum, Of, State};
 pub use datum::InnerConstraints;
 pub use error::{Combination, NetworkError, PosePart};
+pub use group_tests::Tests;
 pub use groups::Groups;
 pub use mounts::Mount;
+pub use node::{FormedNode, Node, NodePrediction};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use precision::Coarse;
 pub(crate) use precision::median;
+pub use predictions::{OnPoint, Prediction};
 pub use responses::{Moved, UnknownOf};
 pub use screening::{Dropped, Reason};
 pub use solution::{AdjustedPhoto, AdjustedPoint, Redundancies, Solution, SumsOfSquares};
 pub(crate) use start::meet;
+pub use surroundings::{BlockOf, Surroundings};
 pub use suspects::Subject;
-pub use trial::{OnPoint, Out, Prediction, Standing, Tests, Trial};
+pub use trial::{Out, Standing, Trial};
 pub use weak_points::WeakPoint;
 
 /// A photo as it is known beforehand.

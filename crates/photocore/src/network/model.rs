@@ -3,21 +3,21 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use nalgebra::Matrix2x6;
 use rayon::prelude::*;
 
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
-use super::mounts::{Mount, Mounted, mounted};
+use super::mounts::{Mount, mounted};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::parts::Parts;
+use super::stations::{Bent, Placed, Refracted, Station, Stations, write_in_its_place};
 use super::{Image, Minimum, Point};
 use crate::adjustment::{Model, Motions, Weighted};
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::camera::each_camera;
 use crate::geometry::{
-    self, AttitudeNumbers, Camera, CameraModel, ObjectSpace, Orientation, PoseNumbers, Ray, Refraction,
-    RotationSense, Vector3, Vertical,
+    self, AttitudeNumbers, Camera, ObjectSpace, Orientation, PoseNumbers, Refraction, RotationSense, Vector3,
+    Vertical,
 };
 use crate::normals::{Cofactors, GroupRows, Tie, TieRows};
 
@@ -79,204 +79,12 @@ pub struct Bundle {
     pub parts: OnceLock<Parts>,
 }
 
-/// Photos and points at given values of the unknowns.
-#[derive(Debug)]
-pub struct Stations {
-    pub photos: Vec<Station>,
-    pub points: Vec<geometry::Point>,
-    /// The coordinates of the points that are not local.
-    tied: Vec<[f64; 3]>,
-    pub commons: Vec<CommonState>,
-    bent: Option<Bent>,
-}
-
-/// What images need besides where they are not plain.
-#[derive(Debug)]
-struct Bent {
-    refracted: Option<Refracted>,
-    /// By photo; none at all where there are no rigs.
-    mounted: Vec<Option<Mounted>>,
-}
-
-/// Photos and common unknowns at given values.
-pub struct Placed {
-    pub photos: Vec<Station>,
-    pub commons: Vec<CommonState>,
-    /// By photo; none at all where there are no rigs.
-    pub mounted: Vec<Option<Mounted>>,
-}
-
 /// What a kept block belongs to: indices into the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Owner {
     Photo(usize),
     Camera(usize),
     Common(usize),
-}
-
-/// A photo at given values of its unknowns.
-#[derive(Debug, Clone, Copy)]
-pub struct Station {
-    pub orientation: Orientation,
-    pub camera: Camera,
-}
-
-impl Station {
-    /// The ray of an image position; None where no direction has it.
-    pub fn ray(&self, xy: [f64; 2]) -> Option<Ray> {
-        self.camera.direction(xy).map(|direction| self.orientation.ray(&direction))
-    }
-}
-
-/// What refraction needs besides.
-#[derive(Debug)]
-struct Refracted {
-    refraction: Refraction,
-    at_photos: Vec<Vertical>,
-    at_points: Vec<Vertical>,
-}
-
-impl Refracted {
-    /// The orientation and the place of a point as its image has them.
-    fn lifted(&self, stations: &Stations, image: &Image, local: usize) -> (Orientation, geometry::Point) {
-        let Station { orientation, .. } = &stations.photos[image.photo];
-        let (from, to) = (&self.at_photos[image.photo], &self.at_points[local]);
-        let point = &stations.points[local];
-        let lift = self.refraction.lift(orientation, from, point, to);
-        (orientation.under(&lift), point.lifted(&lift))
-    }
-}
-
-impl Bent {
-    /// Out of line, so that plain images do not pay for it.
-    #[inline(never)]
-    fn write(&self, stations: &Stations, image: &Image, local: usize, rows: &mut GroupRows<'_>) {
-        let Station { orientation, camera } = &stations.photos[image.photo];
-        let (orientation, point) = match &self.refracted {
-            None => (*orientation, stations.points[local]),
-            Some(refracted) => refracted.lifted(stations, image, local),
-        };
-        let write = |rows: &mut GroupRows<'_>| {
-            each_camera!(camera, camera => write_in_its_place(&orientation, camera, &point, image, rows));
-        };
-        match self.mounted.get(image.photo).and_then(Option::as_ref) {
-            None => write(rows),
-            Some(mounted) => mounted.write(rows, write),
-        }
-    }
-}
-
-impl Mounted {
-    /// Writes an image of its photo: `write` does so as if the photo had six unknowns of its own. They are those of the frame, the main
-    /// block, and of the sensor, the first of what is common with others where it is as wide as there is room besides the camera.
-    fn write(&self, rows: &mut GroupRows<'_>, write: impl FnOnce(&mut GroupRows<'_>)) {
-        let (width, common) = (rows.kept.len() / 2, rows.common.len() / 2);
-        let sensor = if self.sensor_is_unknown { 6 } else { 0 };
-        let (mut pose, mut camera) = ([0.0; 12], vec![0.0; 2 * (common - sensor)]);
-        let (constant, local) = (&mut *rows.constant, &mut *rows.local);
-        write(&mut GroupRows { constant, local, kept: &mut pose, common: &mut camera });
-        let pose = Matrix2x6::from_row_slice(&pose);
-        let (by_frame, by_sensor) = (pose * self.by_frame, pose * self.by_sensor);
-        rows.kept.fill(0.0);
-        for row in 0..2 {
-            (0..6).for_each(|k| rows.kept[width * row + k] = by_frame[(row, k)]);
-            let own = &mut rows.common[common * row..][..common];
-            (0..sensor).for_each(|k| own[k] = by_sensor[(row, k)]);
-            own[sensor..].copy_from_slice(&camera[(common - sensor) * row..][..common - sensor]);
-        }
-    }
-}
-
-/// [`write`], in line or called: what is compiled at every place should be small.
-#[inline(always)]
-fn write_in_its_place<C: CameraModel>(
-    orientation: &Orientation,
-    camera: &C,
-    point: &geometry::Point,
-    image: &Image,
-    rows: &mut GroupRows<'_>,
-) {
-    if C::IN_LINE {
-        write(orientation, camera, point, image, rows);
-    } else {
-        write_apart(orientation, camera, point, image, rows);
-    }
-}
-
-#[inline(never)]
-fn write_apart<C: CameraModel>(
-    orientation: &Orientation,
-    camera: &C,
-    point: &geometry::Point,
-    image: &Image,
-    rows: &mut GroupRows<'_>,
-) {
-    write(orientation, camera, point, image, rows);
-}
-
-/// The two equations of an image: observed minus computed, and the partials of the computed.
-#[inline(always)]
-fn write<C: CameraModel>(
-    orientation: &Orientation,
-    camera: &C,
-    point: &geometry::Point,
-    image: &Image,
-    rows: &mut GroupRows<'_>,
-) {
-    let u = orientation.sight(point);
-    let (residual, computed) = camera.compare(&u, image.xy);
-    let projection = orientation.projection(&u, &computed, point);
-    let (width, shared) = (rows.kept.len() / 2, rows.common.len() / 2);
-    for row in 0..2 {
-        rows.constant[row] = residual[row];
-        rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
-        rows.kept[width * row..][..6].copy_from_slice(&projection.photo[row]);
-        if width > 6 {
-            rows.kept[width * row + 6..][..width - 6].copy_from_slice(projection.camera[row].as_ref());
-        }
-    }
-    if shared > 0 {
-        (0..2).for_each(|row| {
-            rows.common[shared * row..][..shared].copy_from_slice(projection.camera[row].as_ref());
-        });
-    }
-}
-
-/// A point has run into a station when its share in what the station learns is so many times that of the others in the mean: it is
-/// ten thousand times nearer than they are, and rounding leaves eight digits of what they say.
-const NEAR: f64 = 1e8;
-/// A point a hundred times nearer than the others is on its way there,
-const ON_ITS_WAY: f64 = 1e4;
-/// when no other photo tells it from the station: their images there, before and after a step, are closer than so many standard
-/// deviations.
-const SAME_PLACE: f64 = 3.0;
-
-/// A point much nearer to a station than the others.
-struct Approach {
-    point: usize,
-    photo: usize,
-    /// Its share in what the station learns, in those of the others in the mean.
-    share: f64,
-}
-
-/// What the points that a photo sees have as shares in what its station learns.
-#[derive(Debug, Clone, Copy, Default)]
-struct Shares {
-    sum: f64,
-    largest: f64,
-}
-
-impl Shares {
-    fn add(&mut self, share: f64) {
-        self.sum += share;
-        self.largest = self.largest.max(share);
-    }
-
-    /// A share in those of the others in the mean, of so many images; None unless it is much larger.
-    fn ratio(&self, own: f64, images: usize) -> Option<f64> {
-        let others = (self.sum - own).max(0.0) / (images as f64 - 1.0).max(1.0);
-        (others > 0.0 && own > ON_ITS_WAY * others).then(|| own / others)
-    }
 }
 
 impl Bundle {
@@ -478,52 +286,6 @@ impl Bundle {
     pub fn images_of(&self, point: usize) -> &[Image] {
         &self.images[self.start[point]..self.start[point + 1]]
     }
-
-    /// Points much nearer to a station than the others that it sees.
-    ///
-    /// The image of a point turns by 1 / distance when point or station move; what its station learns from it, and loses again when
-    /// the point is eliminated, is the square of that.
-    fn approaches(&self, stations: &Stations) -> Vec<Approach> {
-        let share = |point: usize, image: &Image| {
-            let centre = stations.photos[image.photo].orientation.centre();
-            (stations.points[point].position() - centre).norm_squared().recip()
-        };
-        let mut shares = vec![Shares::default(); stations.photos.len()];
-        for point in 0..self.points.len() {
-            self.images_of(point).iter().for_each(|image| shares[image.photo].add(share(point, image)));
-        }
-        let has_near = |(shares, &images): (&Shares, &usize)| shares.ratio(shares.largest, images).is_some();
-        if !shares.iter().zip(&self.images_on).any(has_near) {
-            return vec![];
-        }
-        let approach = |point: usize, image: &Image| {
-            let photo = image.photo;
-            let share = shares[photo].ratio(share(point, image), self.images_on[photo])?;
-            Some(Approach { point, photo, share })
-        };
-        let of_point = |point| self.images_of(point).iter().filter_map(move |image| approach(point, image));
-        (0..self.points.len()).flat_map(of_point).collect()
-    }
-
-    /// Whether nothing but its image on that photo tells a point from the station it is near to, a step having changed nothing in that.
-    fn is_same_place(&self, near: &Approach, before: &Stations, after: &Stations) -> bool {
-        let is_same = |image: &Image| {
-            let images = [before, after].map(|stations| {
-                let station = stations.photos[near.photo].orientation.centre();
-                let Station { orientation, camera } = &stations.photos[image.photo];
-                [stations.points[near.point].position(), station]
-                    .map(|place| camera.image(&orientation.pose().sight(&place)))
-            });
-            let [.., station] = images[1];
-            let is_close =
-                |xy: &[f64; 2]| (0..2).all(|k| (xy[k] - station[k]).abs() < SAME_PLACE * image.sd[k]);
-            images.as_flattened().iter().all(is_close)
-        };
-        let mut elsewhere =
-            self.images_of(near.point).iter().filter(|image| image.photo != near.photo).peekable();
-        let free = self.points[near.point].held() == [false; 3];
-        free && elsewhere.peek().is_some() && elsewhere.all(is_same)
-    }
 }
 
 impl Model for Bundle {
@@ -645,15 +407,8 @@ impl Model for Bundle {
         self.observations[observation].write(&model, rows.constant, rows.coefficients);
     }
 
-    /// Points that have run into a station, or are on their way there: two rays that meet there ask for it.
     fn collapsed(&self, before: &[f64], after: &Stations) -> Vec<usize> {
-        let mut near = self.approaches(after);
-        if !near.is_empty() {
-            let before = self.prepare(before);
-            near.retain(|near| near.share > NEAR || self.is_same_place(near, &before, after));
-        }
-        near.dedup_by_key(|near| near.point);
-        near.iter().map(|near| near.point).collect()
+        self.run_into_stations(before, after)
     }
 
     /// Straight rays turn and stretch with everything else; what a frame carries may have known lengths.

@@ -2,8 +2,9 @@
 
 use thiserror::Error;
 
-use super::model::{Bundle, Station};
+use super::model::Bundle;
 use super::screening::Screened;
+use super::stations::Station;
 use super::{Network, Start};
 use crate::geometry::PoseNumbers;
 

@@ -6,10 +6,12 @@ use std::sync::OnceLock;
 
 use super::camera_priors::CameraPrior;
 use super::commons::PlacedCommon;
-use super::model::{Bundle, Station};
+use super::model::Bundle;
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::precision::median;
 use super::screening::{Dropped, Screened};
+use super::stations::Station;
+use super::surroundings::Surroundings;
 use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start, State};
 use crate::adjustment::{AdjustError, Method, Model, Problem};
 use crate::geometry::{
@@ -105,15 +107,17 @@ impl Network {
     /// A point near the photos: coordinates are counted from it while the network is adjusted, so that no digits are lost in
     /// large ones. Medians, so that a single photo with a wrong position does not move it. Geographic coordinates stay as they
     /// are, differences being formed in geocentric space; so do poses in vectors, whose translations turn with the rotation.
-    fn origin(&self) -> [f64; 3] {
-        let middle = |k: usize| {
-            let values = self.photos.iter().map(|photo| photo.pose[k]).collect();
-            median(values).map_or(0.0, f64::round)
-        };
+    fn origin(&self, middle: [f64; 3]) -> [f64; 3] {
         match (self.space, self.poses) {
-            (ObjectSpace::Rectangular, PoseNumbers::Angles(_)) => std::array::from_fn(middle),
+            (ObjectSpace::Rectangular, PoseNumbers::Angles(_)) => middle.map(f64::round),
             _ => [0.0; 3],
         }
+    }
+
+    /// The medians of the coordinates of the photos.
+    fn middle(&self) -> [f64; 3] {
+        let middle = |k: usize| median(self.photos.iter().map(|photo| photo.pose[k]).collect());
+        std::array::from_fn(|k| middle(k).unwrap_or_default())
     }
 
     fn camera(&self, photo: &Photo) -> &Camera {
@@ -122,9 +126,16 @@ impl Network {
 
     /// Standard deviations of the unknowns of photos, shared cameras and common unknowns; those of `unused` and of mounted photos, of
     /// cameras that have no others, and of common unknowns that nothing which takes part is of, are held.
-    fn station_sd(&self, model: &Bundle, unused: impl Fn(usize) -> bool) -> Vec<f64> {
+    fn station_sd(
+        &self,
+        model: &Bundle,
+        surroundings: &Surroundings,
+        unused: impl Fn(usize) -> bool,
+    ) -> Vec<f64> {
         let mut all = Vec::new();
         let mut used = vec![false; self.cameras.len()];
+        surroundings.cameras().into_iter().for_each(|camera| used[camera] = true);
+        let elsewhere = surroundings.commons();
         for (index, photo) in self.photos.iter().enumerate() {
             let own = if model.has_own_camera(index) { &self.camera(photo).sd[..] } else { &[] };
             used[photo.camera] |= !unused(index);
@@ -136,7 +147,7 @@ impl Network {
         }
         for (common, own) in self.commons.iter().enumerate().filter(|&(i, _)| model.common_block[i].is_some())
         {
-            let is_used = model.uses_of_commons[common] > 0;
+            let is_used = model.uses_of_commons[common] > 0 || elsewhere.contains(&common);
             all.extend(own.sd.iter().map(|&sd| if is_used { sd } else { 0.0 }));
         }
         all
@@ -194,8 +205,9 @@ impl Network {
         if reached.is_none() {
             self.check_rounding(&screened, |photo| !unused(photo))?;
         }
-        let origin = self.origin();
-        let mut model = self.bundle(&screened, images_on.clone(), origin)?;
+        let middle = screened.surroundings.middle.unwrap_or_else(|| self.middle());
+        let origin = self.origin(middle);
+        let mut model = self.bundle(&screened, images_on.clone(), middle)?;
         model.minimum = options.minimum;
         // The programs of their time stepped in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
@@ -221,7 +233,7 @@ impl Network {
         let own: Vec<[f64; 3]> = model.points.iter().map(|point| point.coordinates).collect();
         let own_sd: Vec<[f64; 3]> = model.points.iter().map(|point| point.sd).collect();
         let observed = self.station_values(&model, |photo| local(self.observed_pose(photo)));
-        let station_sd = self.station_sd(&model, unused);
+        let station_sd = self.station_sd(&model, &screened.surroundings, unused);
         // Local points, photos and shared cameras, points that observations touch.
         let unknowns = |points: &[[f64; 3]], stations: &[f64]| {
             let (local, tied) = points.split_at(model.locals);
@@ -239,9 +251,11 @@ impl Network {
         let of_images = model.images.iter().flat_map(|image| image.sd);
         let of_ties = model.observations.iter().flat_map(|tied| vec![1.0; tied.root.nrows()]);
         let held: Vec<bool> = sd.iter().map(|&sd| sd == 0.0).collect();
+        let (outer, below) = screened.surroundings.blocks(&model, &screened)?;
+        let layout = layout(&model, places)?.with_held(&held).as_part(outer, below)?;
         let problem = Problem {
             observation_sd: of_images.chain(of_ties).collect(),
-            system: System::new(layout(&model, places)?.with_held(&held), options.ordering),
+            system: System::new(layout, options.ordering),
             initial,
             prior,
             sd,
@@ -276,13 +290,14 @@ impl Network {
         &self,
         screened: &Screened,
         images_on: Vec<usize>,
-        origin: [f64; 3],
+        middle: [f64; 3],
     ) -> Result<Bundle, NetworkError> {
+        let origin = self.origin(middle);
         let local_point = |&point: &usize| {
             let Point { coordinates, sd } = self.points[point];
             Point { coordinates: std::array::from_fn(|k| coordinates[k] - origin[k]), sd }
         };
-        let (shared, mut first) = (self.shared_cameras(), vec![0]);
+        let (shared, mut first) = (self.shared_cameras(&screened.surroundings), vec![0]);
         for photo in &self.photos {
             let camera = self.camera(photo);
             let own = if camera.is_held() || shared.binary_search(&photo.camera).is_ok() {
@@ -304,7 +319,7 @@ impl Network {
         first
             .windows(2)
             .for_each(|ends| squares.push(squares[squares.len() - 1] + (ends[1] - ends[0]).pow(2)));
-        let vertical = self.vertical();
+        let vertical = self.vertical(middle);
         let place = |common| PlacedCommon::new(common, self.space, origin, &vertical);
         let block = |photo: &Photo| Some(self.photos.len() + shared.binary_search(&photo.camera).ok()?);
         let mounts = self.mounts_by_photo();
@@ -356,12 +371,10 @@ impl Network {
     }
 
     /// The axes amid the photos, as rows, that shifts and drifts are told in: X, Y, Z or, in geographic space, east, north and up.
-    fn vertical(&self) -> Matrix3 {
-        let middle =
-            |k: usize| median(self.photos.iter().map(|photo| photo.pose[k]).collect()).unwrap_or_default();
+    fn vertical(&self, middle: [f64; 3]) -> Matrix3 {
         match self.space {
             ObjectSpace::Rectangular => Matrix3::identity(),
-            ObjectSpace::Geographic(_) => local_vertical(middle(0), middle(1)),
+            ObjectSpace::Geographic(_) => local_vertical(middle[0], middle[1]),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Which points take part in the adjustment.
 
 use super::Network;
+use super::surroundings::Surroundings;
 
 /// A point that was left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,10 +48,21 @@ impl Network {
     ///
     /// Points that observations touch stand behind all others. Images on `loose` photos do not take part.
     pub(super) fn screen(&self, left_out: &[bool], loose: &[bool]) -> Screened {
+        self.screen_within(left_out, loose, Surroundings::default())
+    }
+
+    /// The same of a node of a larger network: points that other nodes have unknowns of stay whatever is seen of them here.
+    pub(super) fn screen_within(
+        &self,
+        left_out: &[bool],
+        loose: &[bool],
+        surroundings: Surroundings,
+    ) -> Screened {
+        let named = surroundings.points();
         let all = self.point_images(loose);
         let (mut points, mut dropped) = (Vec::new(), Vec::new());
         for point in self.along_curve(&all).into_iter().filter(|&point| !left_out[point]) {
-            match self.reason(point, all.of(point)) {
+            match self.reason(point, all.of(point)).filter(|_| !named.contains(&point)) {
                 Some(reason) => dropped.push(Dropped { point, reason }),
                 None => points.push(point),
             }
@@ -58,10 +70,10 @@ impl Network {
         dropped.sort_unstable_by_key(|dropped| dropped.point);
         let observations = self.observations_of(&points);
         let mut tied = Vec::new();
-        if !observations.is_empty() {
+        if !(observations.is_empty() && named.is_empty()) {
             let mut touched = vec![false; self.points.len()];
             let touches = observations.iter().flat_map(|&i| self.observations[i].touches().points);
-            touches.for_each(|point| touched[point] = true);
+            touches.chain(named).for_each(|point| touched[point] = true);
             (tied, points) = points.into_iter().partition(|&point| touched[point]);
         }
         let locals = points.len();
@@ -72,7 +84,7 @@ impl Network {
             images.start.push(images.order.len());
         }
         let loose = (0..loose.len()).filter(|&photo| loose[photo]).collect();
-        Screened { points, locals, images, observations, dropped, loose }
+        Screened { points, locals, images, observations, dropped, loose, surroundings }
     }
 
     /// Why a point with the given images does not take part; None where it does.
@@ -134,6 +146,8 @@ pub(super) struct Screened {
     pub dropped: Vec<Dropped>,
     /// The photos whose images do not take part, ascending: they stay where they are.
     pub loose: Vec<usize>,
+    /// Where the network stands in a larger one.
+    pub surroundings: Surroundings,
 }
 
 /// The images of the points that take part, point by point: those of the i-th are `order[start[i]..start[i + 1]]`.

@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::model::{Owner, Placed, Station};
+use super::model::Owner;
 use super::problem::Assembled;
+use super::stations::{Placed, Station};
 use super::{
     AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options,
     Point, State, UnitVariance, WeakPoint,
@@ -306,7 +307,7 @@ fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(
 }
 
 /// The observations beside images.
-fn observations(
+pub(super) fn observations(
     network: &Network,
     problem: &Problem<Bundle>,
     adjustment: &Adjustment,
@@ -462,7 +463,7 @@ fn last_corrections(adjustment: &Adjustment) -> impl Fn(usize) -> f64 {
 }
 
 /// Sums of squares by group (GIANT guide, Appendix E).
-fn sums_of_squares(
+pub(super) fn sums_of_squares(
     problem: &Problem<Bundle>,
     adjustment: &Adjustment,
     unknowns: &[f64],

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::model::{Bundle, Station};
+use super::model::Bundle;
+use super::stations::Station;
 use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Point, Ray, Vector3};
 

@@ -1,5 +1,6 @@
 //! Where the equations of a system come from.
 
+use super::contribution::Contribution;
 use super::layout::Layout;
 
 /// Where the equations of a system come from.
@@ -11,6 +12,11 @@ pub trait Equations: Sync {
 
     /// Writes the equations of one tie, every element of `rows`. Not called where the layout has no ties.
     fn write_tie(&self, _tie: usize, _rows: &mut TieRows<'_>) {}
+
+    /// What a system below has left, in the order of the layout. Not called where there is none.
+    fn contribution(&self, _below: usize) -> Option<&Contribution<'_>> {
+        None
+    }
 }
 
 /// The rows of one tie, to be filled in.

@@ -28,7 +28,7 @@ use super::workspace::reserved;
 #[derive(Debug)]
 pub struct Factor {
     pub(super) panels: Panels,
-    /// L^-1 n, in the order of elimination.
+    /// L^-1 n, in the order of elimination; of outer unknowns n as the others leave it.
     pub(super) right: Vec<f64>,
     /// Right-hand sides that it was formed with, the local blocks reduced out, in the order of elimination, one after the other.
     pub(super) further: Vec<f64>,
@@ -203,10 +203,12 @@ impl<E: Equations> Formation<'_, E> {
         let (mut formation, mut factorisation) = (0.0, 0.0);
         let none = Front::new(0, 0, &mut [], Vec::new(), 0);
         let homeless = self.assemble(&mut { none }, symbolic.supernode_count(), &kept)?;
-        for visited in visited.into_values().flatten() {
+        for (index, visited) in visited.into_values().flatten().enumerate() {
             factor.add(visited.sums, self.keeps);
             subtract_sides(&mut factor.further, factor.right.len(), symbolic.unknowns(), &visited.sides);
-            factor.decrease += visited.right.iter().map(|v| v * v).sum::<f64>();
+            if symbolic.open() != Some(index) {
+                factor.decrease += visited.right.iter().map(|v| v * v).sum::<f64>();
+            }
             factor.lost.extend(visited.lost);
             factor.doubtful.extend(visited.doubtful);
             factor.right.extend(visited.right);
@@ -245,11 +247,18 @@ impl<E: Equations> Formation<'_, E> {
         }
         let mut sums = self.assemble(&mut front, index, kept)?;
         sums.sum_of_squares += self.add_ties(&mut front, index);
-        self.add_prior(&mut front, index);
+        self.add_contributions(&mut front, index);
+        let open = symbolic.open() == Some(index);
+        if !open {
+            self.add_prior(&mut front, index);
+        }
         let formation = start.elapsed().as_secs_f64();
         let first = symbolic.first_unknown(index);
-        let own = given_up.iter().filter_map(|&pivot| pivot.checked_sub(first));
-        let pivots = front.factor(&own.filter(|&column| column < s.width).collect::<Vec<_>>(), self.control);
+        let mut pivots = Pivots::default();
+        if !open {
+            let own = given_up.iter().filter_map(|&pivot| pivot.checked_sub(first));
+            pivots = front.factor(&own.filter(|&column| column < s.width).collect::<Vec<_>>(), self.control);
+        }
         let Front { width, update, mut right, mut diagonal, mut sides, .. } = front;
         if s.parent.is_some() {
             let (right, diagonal) = (right.split_off(width), diagonal.split_off(width));
@@ -357,6 +366,16 @@ impl<E: Equations> Formation<'_, E> {
             }
         }
         sum_of_squares
+    }
+
+    /// Adds what systems below have left, in the order of the layout.
+    fn add_contributions(&self, front: &mut Front<'_>, index: usize) {
+        for &below in self.system.contributions.at(index) {
+            let blocks = &self.system.layout.contributions()[below as usize];
+            if let Some(given) = self.equations.contribution(below as usize) {
+                front.add_contribution(given, &self.system.rows_of(index, blocks));
+            }
+        }
     }
 
     /// Adds the priors and the damping of the own blocks of a supernode.
@@ -492,7 +511,7 @@ impl Factor {
         information
     }
 
-    /// The corrections of the unknowns that are not local, in the order of the layout.
+    /// The corrections of the unknowns that are not local, in the order of the layout; of a whole system.
     pub fn reduced_corrections(&self, layout: &Layout) -> Vec<f64> {
         let (first, mut x) = (layout.all_locals().end, self.right.clone());
         self.solve_backward(&mut x);
@@ -507,7 +526,7 @@ impl Factor {
             let columns = self.panels.panel(index).chunks_exact(s.height().max(1)).enumerate();
             columns.map(|(j, column)| 2.0 * column[j].ln()).sum::<f64>()
         };
-        let supernodes = self.panels.symbolic.supernodes().iter().enumerate();
+        let supernodes = self.panels.symbolic.closed().iter().enumerate();
         self.lost.is_empty().then(|| supernodes.map(logarithm).sum())
     }
 
@@ -546,11 +565,11 @@ impl Factor {
         x
     }
 
-    /// x := L^-T x.
+    /// x := L^-T x; outer unknowns stay as they are.
     pub(super) fn solve_backward(&self, x: &mut [f64]) {
         let symbolic = &*self.panels.symbolic;
         let mut own = Vec::new();
-        for (index, s) in symbolic.supernodes().iter().enumerate().rev() {
+        for (index, s) in symbolic.closed().iter().enumerate().rev() {
             let first = symbolic.first_unknown(index);
             own.clear();
             own.extend_from_slice(&x[first..first + s.width]);

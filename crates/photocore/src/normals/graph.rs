@@ -1,10 +1,10 @@
-//! Which kept blocks share a local block or a tie.
+//! Which kept blocks share a local block, a tie or what a system below leaves.
 
 use std::collections::{HashMap, VecDeque};
 
 use super::layout::Layout;
 
-/// Which kept blocks share a local block or a tie: an undirected graph in compressed form, neighbours ascending.
+/// Which kept blocks share a local block, a tie or what a system below leaves: an undirected graph in compressed form, neighbours ascending.
 #[derive(Debug, Clone)]
 pub struct Graph {
     ptr: Vec<usize>,
@@ -12,12 +12,14 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Joins every two kept blocks that share a local block or a tie.
+    /// Joins every two kept blocks that share one.
     pub fn new(layout: &Layout) -> Self {
         let kept = layout.kept();
+        let ties = layout.ties().iter().map(|tie| &tie.kept);
+        let ties: Vec<&Vec<u32>> = ties.chain(layout.contributions()).collect();
         let mut ties_of = vec![Vec::new(); kept];
-        for (index, tie) in layout.ties().iter().enumerate() {
-            tie.kept.iter().for_each(|&block| ties_of[block as usize].push(index));
+        for (index, tie) in ties.iter().enumerate() {
+            tie.iter().for_each(|&block| ties_of[block as usize].push(index));
         }
         let mut locals_of = vec![Vec::new(); kept];
         for local in 0..layout.locals() {
@@ -44,7 +46,7 @@ impl Graph {
                 layout.groups_of(local).flat_map(|group| layout.blocks_of(group)).for_each(&mut join);
             }
             for &tie in &ties_of[block] {
-                layout.ties()[tie].kept.iter().for_each(|&other| join(other as usize));
+                ties[tie].iter().for_each(|&other| join(other as usize));
             }
             neighbours[start..].sort_unstable();
             ptr.push(neighbours.len());

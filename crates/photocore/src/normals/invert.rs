@@ -9,6 +9,7 @@ use faer::{MatMut, MatRef};
 use rayon::ThreadPool;
 
 use super::cofactors::{AtHome, Cofactors, GroupCofactors};
+use super::contribution::unpack;
 use super::dense::invert_front;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
@@ -45,7 +46,21 @@ impl System {
         prior: &Prior,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Inversion> {
-        self.inverted(pool, factor, equations, prior, &[], between, false)
+        self.inverted(pool, factor, equations, prior, Given::default(), between, false)
+    }
+
+    /// The same of a part of a larger system, with the inverse over the outer unknowns: a lower triangle, block by block, column by column.
+    pub fn invert_below<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        mut factor: Factor,
+        equations: &E,
+        prior: &Prior,
+        outer: &[f64],
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, Inversion> {
+        factor.reopen();
+        self.inverted(pool, factor, equations, prior, Given { outer, rights: &[] }, between, false)
     }
 
     /// The same with what the equations of each group have to do with each other ([`Cofactors::groups`]).
@@ -59,7 +74,7 @@ impl System {
         prior: &Prior,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Inversion> {
-        self.inverted(pool, factor, equations, prior, &[], between, true)
+        self.inverted(pool, factor, equations, prior, Given::default(), between, true)
     }
 
     /// The same as [`System::invert`] with solutions for the right-hand sides that the factor was formed with.
@@ -72,7 +87,7 @@ impl System {
         rights: &[f64],
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Inversion> {
-        self.inverted(pool, factor, equations, prior, rights, between, false)
+        self.inverted(pool, factor, equations, prior, Given { outer: &[], rights }, between, false)
     }
 
     fn inverted<E: Equations>(
@@ -81,7 +96,7 @@ impl System {
         factor: Factor,
         equations: &E,
         prior: &Prior,
-        rights: &[f64],
+        Given { rights, outer }: Given<'_>,
         between: Between<'_>,
         by_group: bool,
     ) -> ControlFlow<Stopped, Inversion> {
@@ -91,11 +106,20 @@ impl System {
             let mut others = std::mem::take(&mut factor.further);
             factor.solve_columns(&mut others);
             let known = Known::new(self, rights, &others);
-            let walk = Walk { system: self, equations, prior, known, control, by_group };
+            let walk = Walk { system: self, equations, prior, known, outer, control, by_group };
             let information = factor.information(&self.layout);
             walk.invert(factor.panels, information)
         })
     }
+}
+
+/// What an inversion is given besides the factor.
+#[derive(Default)]
+struct Given<'a> {
+    /// The inverse over the outer unknowns.
+    outer: &'a [f64],
+    /// Right-hand sides.
+    rights: &'a [f64],
 }
 
 /// The inverse over the rows of one front (own blocks, then coupled blocks), full square, column by column.
@@ -106,6 +130,7 @@ struct Walk<'a, E> {
     equations: &'a E,
     prior: &'a Prior,
     known: Known<'a>,
+    outer: &'a [f64],
     control: &'a Control,
     by_group: bool,
 }
@@ -158,14 +183,14 @@ impl<E: Equations> Walk<'_, E> {
             take_coupled_rows(symbolic, index, &parent, &mut front);
             Arc::into_inner(parent).into_iter().for_each(|last| workspace.put_back(last));
         }
-        let z = MatRef::from_column_major_slice(&front, height, height);
-        let below = z.submatrix(width, width, height - width, height - width);
-        invert_front(
-            MatMut::from_column_major_slice_mut(panel, height, width),
-            below,
-            workspace,
-            self.control,
-        )?;
+        if symbolic.open() == Some(index) {
+            unpack(width, self.outer, panel);
+        } else {
+            let z = MatRef::from_column_major_slice(&front, height, height);
+            let below = z.submatrix(width, width, height - width, height - width);
+            let panel = MatMut::from_column_major_slice_mut(panel, height, width);
+            invert_front(panel, below, workspace, self.control)?;
+        }
         for (j, column) in panel.chunks_exact(height.max(1)).enumerate() {
             front[j * height + j..(j + 1) * height].copy_from_slice(&column[j..]);
             (j..height).for_each(|i| front[i * height + j] = column[i]);
@@ -179,7 +204,7 @@ impl<E: Equations> Walk<'_, E> {
     }
 
     fn at_home(&self, index: usize, front: &[f64], height: usize) -> AtHome {
-        let Self { system, equations, prior, ref known, control, by_group } = *self;
+        let Self { system, equations, prior, ref known, control, by_group, .. } = *self;
         AtHome::new(system, index, equations, prior, known, control, front, height, by_group)
     }
 

@@ -38,6 +38,9 @@ pub struct Layout {
     /// Pairs of kept blocks, ascending, and where the block of each starts among those of all; one more at the end.
     pairs: Vec<[u32; 2]>,
     pair_ptr: Vec<usize>,
+    /// Kept blocks that a system above eliminates, and those that each system below leaves something for.
+    outer: Vec<u32>,
+    contributions: Vec<Vec<u32>>,
 }
 
 /// Equations among kept blocks and common unknowns: a distance between two points that are kept, a relative pose of two
@@ -107,6 +110,9 @@ pub enum LayoutError {
     /// A pair names a kept block that does not exist.
     #[error("a pair of kept blocks names one that does not exist: {0:?}")]
     Pair([usize; 2]),
+    /// Outer blocks beside a border, or a list of outer or contributed blocks with one that does not exist or is there twice.
+    #[error("outer or contributed blocks do not exist, are named twice or stand beside a border")]
+    Outer,
     /// A tie without equations or unknowns, or one that names a block twice or unknowns that do not exist.
     #[error("tie {tie} has no equations or unknowns, or names a block twice or one that does not exist")]
     Tie {
@@ -168,6 +174,8 @@ impl Layout {
             free: Vec::new(),
             pairs: Vec::new(),
             pair_ptr: vec![0],
+            outer: Vec::new(),
+            contributions: Vec::new(),
         })
     }
 
@@ -285,6 +293,41 @@ impl Layout {
     pub fn pair(&self, pair: [u32; 2]) -> Option<Range<usize>> {
         let index = self.pairs.binary_search(&pair).ok()?;
         Some(self.pair_ptr[index]..self.pair_ptr[index + 1])
+    }
+
+    /// Makes the system a part of a larger one: a node of its elimination tree.
+    ///
+    /// * `outer`: kept blocks that stay, in an order of their own: a system above eliminates them;
+    /// * `contributions`: for each system below the kept blocks that it leaves something for, in its order.
+    pub fn as_part(mut self, outer: Vec<u32>, contributions: Vec<Vec<u32>>) -> Result<Self, LayoutError> {
+        let sound = |blocks: &[u32]| {
+            let mut seen = vec![false; self.kept()];
+            let fresh = |&block: &u32| {
+                seen.get_mut(block as usize).is_some_and(|seen| !std::mem::replace(seen, true))
+            };
+            blocks.iter().all(fresh)
+        };
+        let all_sound = std::iter::once(&outer).chain(&contributions).all(|blocks| sound(blocks));
+        if !all_sound || self.border_dim > 0 && !outer.is_empty() {
+            return Err(LayoutError::Outer);
+        }
+        (self.outer, self.contributions) = (outer, contributions);
+        Ok(self)
+    }
+
+    /// The kept blocks that a system above eliminates.
+    pub fn outer(&self) -> &[u32] {
+        &self.outer
+    }
+
+    /// The kept blocks that each system below leaves something for.
+    pub fn contributions(&self) -> &[Vec<u32>] {
+        &self.contributions
+    }
+
+    /// The unknowns of some kept blocks, block by block.
+    pub fn unknowns_of<'a>(&'a self, blocks: &'a [u32]) -> impl Iterator<Item = usize> + 'a {
+        blocks.iter().flat_map(|&block| self.kept_range(block as usize))
     }
 
     /// Equations in each group.

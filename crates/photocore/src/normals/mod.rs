@@ -11,6 +11,12 @@
 //! 4. [`System::solve`], and [`System::solve_for`] for any other right-hand sides;
 //! 5. [`System::invert`]: the selected inverse, and cofactors of everything; [`System::reduce`] those of any linear functions.
 //!
+//! A system may be a part of a larger one ([`Layout::as_part`]): some kept blocks, the outer ones, stay when all others are eliminated. Their
+//! front, ordered last, is assembled and left open, and is what the part leaves for the system above ([`Factor::take_contribution`]), into
+//! whose fronts it goes like what a child leaves for its parent ([`Equations::contribution`]). [`System::solve_below`] and
+//! [`System::invert_below`] begin with the step and the inverse that the system above has found for these blocks. Cut near the top of its
+//! elimination tree, a system is solved in pieces so, to the same result (Helmert 1880; Wolf 1978).
+//!
 //! ```
 //! use std::ops::ControlFlow;
 //!
@@ -38,6 +44,7 @@
 //! ```
 
 mod cofactors;
+mod contribution;
 mod deficiency;
 mod dense;
 mod dissection;
@@ -49,6 +56,7 @@ mod front;
 mod functions;
 mod further;
 mod graph;
+mod homes;
 mod incidence;
 mod invert;
 mod layout;
@@ -64,7 +72,6 @@ mod stack;
 mod symbolic;
 mod system;
 mod tie_equations;
-mod ties;
 mod tree;
 mod triangle;
 mod vectorised;
@@ -72,6 +79,7 @@ mod watch;
 mod workspace;
 
 pub use cofactors::{Cofactors, GroupCofactors};
+pub use contribution::{Contribution, packed};
 pub use deficiency::Deficiency;
 pub use equation_block::LocalCofactors;
 pub use equations::{Equations, GroupRows, Prior, TieRows};

@@ -64,17 +64,21 @@ impl Ordering {
     ///
     /// What nearly all others are joined to (the camera of a whole block) goes last, and is taken out of the graph before: a search
     /// through it reaches everything in two steps, and there is no shape left to follow.
+    /// Outer blocks come after all others, in their own order.
     pub(crate) fn order(self, graph: &Graph, layout: &Layout) -> Vec<usize> {
-        let dense = if self == Ordering::Input { Vec::new() } else { dense_blocks(graph, layout) };
-        if dense.is_empty() {
+        let mut last = if self == Ordering::Input { Vec::new() } else { dense_blocks(graph, layout) };
+        last.retain(|&block| !layout.outer().contains(&(block as u32)));
+        last.extend(layout.outer().iter().map(|&block| block as usize));
+        if last.is_empty() {
             return self.order_all(graph, layout.places());
         }
-        let mut others: Vec<usize> = (0..graph.len()).collect();
-        others.retain(|block| !dense.contains(block));
+        let mut is_last = vec![false; graph.len()];
+        last.iter().for_each(|&block| is_last[block] = true);
+        let others: Vec<usize> = (0..graph.len()).filter(|&block| !is_last[block]).collect();
         let places: Option<Vec<[f64; 3]>> =
             layout.places().map(|places| others.iter().map(|&block| places[block]).collect());
         let order = self.order_all(&graph.subgraph(&others), places.as_deref());
-        order.into_iter().map(|block| others[block]).chain(dense).collect()
+        order.into_iter().map(|block| others[block]).chain(last).collect()
     }
 
     fn order_all(self, graph: &Graph, places: Option<&[[f64; 3]]>) -> Vec<usize> {

@@ -33,8 +33,25 @@ impl System {
         damping: f64,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Vec<f64>> {
+        self.solve_below(pool, factor, equations, prior, damping, &[], between)
+    }
+
+    /// The same of a part of a larger system, with the outer unknowns, block by block, as they are given.
+    pub fn solve_below<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        factor: &Factor,
+        equations: &E,
+        prior: &Prior,
+        damping: f64,
+        outer: &[f64],
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, Vec<f64>> {
+        let symbolic = &*self.symbolic;
         watched(pool, between, |control| {
             let mut others = factor.right.clone();
+            let first = others.len() - symbolic.outer_unknowns();
+            others[first..].iter_mut().zip(outer).for_each(|(x, given)| *x = *given);
             factor.solve_backward(&mut others);
             let found = match factor.eliminated.is_empty() {
                 false => self.kept_locals(&factor.eliminated, None, &others, control),

@@ -165,13 +165,14 @@ impl Factor {
         solutions
     }
 
-    /// Replaces columns, in the order of elimination, by (L L^T)^-1 times them.
+    /// Replaces columns, in the order of elimination, by (L L^T)^-1 times them. Outer unknowns must be zero: they stay so only where the
+    /// others leave nothing for them, so that this is for whole systems.
     pub(super) fn solve_columns(&self, columns: &mut [f64]) {
         let symbolic = &*self.panels.symbolic;
         let count = columns.len() / symbolic.unknowns().max(1);
         let mut x = MatMut::from_column_major_slice_mut(columns, symbolic.unknowns(), count);
         let mut below = Vec::new();
-        for index in 0..symbolic.supernode_count() {
+        for index in 0..symbolic.closed().len() {
             let (s, first) = (&symbolic.supernodes()[index], symbolic.first_unknown(index));
             let (top, rest) = self.panel(index);
             let mut own = x.as_mut().subrows_mut(first, s.width);
@@ -185,7 +186,7 @@ impl Factor {
                 target -= product.as_ref().subrows(offset - s.width, range.len());
             }
         }
-        for index in (0..symbolic.supernode_count()).rev() {
+        for index in (0..symbolic.closed().len()).rev() {
             let (s, first) = (&symbolic.supernodes()[index], symbolic.first_unknown(index));
             let (top, rest) = self.panel(index);
             below.resize(s.below() * count, 0.0);

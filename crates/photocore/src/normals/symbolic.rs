@@ -12,7 +12,8 @@ use super::ordering::Ordering;
 ///
 /// Blocks are counted by *position*, their place in the order of elimination. The border, when there is one, is a block
 /// like the others that is eliminated last and coupled to all. Blocks of nearly the same pattern are eliminated together,
-/// as one supernode whose columns form one dense panel.
+/// as one supernode whose columns form one dense panel. Outer blocks are the last supernode, which stays *open*: its front is
+/// assembled and not factored.
 #[derive(Debug, Clone)]
 pub struct Symbolic {
     ordering: Ordering,
@@ -23,6 +24,8 @@ pub struct Symbolic {
     supernode_of: Vec<usize>,
     supernodes: Vec<Supernode>,
     values: usize,
+    /// The supernode of the outer blocks.
+    open: Option<usize>,
 }
 
 /// Adjacent blocks that are eliminated together, with the blocks below that they are coupled to.
@@ -97,7 +100,8 @@ impl Symbolic {
     }
 
     fn with_order(layout: &Layout, graph: &Graph, ordering: Ordering, order: &[usize]) -> Self {
-        let order = postorder(graph, order);
+        let inner = order.len() - layout.outer().len();
+        let order = postorder(graph, order, inner);
         let border = layout.border_dim() > 0;
         let mut block_at = order;
         let mut dims: Vec<usize> = block_at.iter().map(|&block| layout.kept_dim(block)).collect();
@@ -120,15 +124,23 @@ impl Symbolic {
             supernode_of: Vec::new(),
             supernodes: Vec::new(),
             values: 0,
+            open: None,
         };
-        symbolic.gather_supernodes(columns, border);
+        symbolic.gather_supernodes(columns, inner, border);
         symbolic
     }
 
-    /// Turns column patterns into supernodes with their panels.
-    fn gather_supernodes(&mut self, columns: Vec<Vec<usize>>, border: bool) {
-        self.supernode_of = vec![0; columns.len()];
-        for (blocks, rows) in merge_columns(columns, &self.offset, border) {
+    /// Turns column patterns into supernodes with their panels. Blocks from position `inner` on are outer ones, or the border.
+    fn gather_supernodes(&mut self, mut columns: Vec<Vec<usize>>, inner: usize, border: bool) {
+        let count = columns.len();
+        self.supernode_of = vec![0; count];
+        let outer = (inner < count && !border).then_some((inner..count, Vec::new()));
+        if outer.is_some() {
+            columns.truncate(inner);
+        }
+        let merged = merge_columns(columns, &self.offset, border);
+        self.open = outer.is_some().then_some(merged.len());
+        for (blocks, rows) in merged.into_iter().chain(outer) {
             let width = self.offset[blocks.end] - self.offset[blocks.start];
             let mut row_offset = vec![width];
             for &row in &rows {
@@ -195,7 +207,7 @@ impl Symbolic {
                 (width * (width + 6) / 2 * layout.local_dim()) as f64
             })
             .sum();
-        let inverse = self.supernodes.iter().map(|s| {
+        let inverse = self.closed().iter().map(|s| {
             let (w, r) = (s.width as f64, s.below() as f64);
             r * r * w + 1.5 * r * w * w + w * w * w / 2.0
         });
@@ -203,7 +215,22 @@ impl Symbolic {
     }
 
     fn factor_operations(&self) -> f64 {
-        self.supernodes.iter().map(Supernode::operations).sum()
+        self.closed().iter().map(Supernode::operations).sum()
+    }
+
+    /// The supernode of the outer blocks, the last one, whose front is not factored.
+    pub(crate) fn open(&self) -> Option<usize> {
+        self.open
+    }
+
+    /// How many unknowns the outer blocks have.
+    pub fn outer_unknowns(&self) -> usize {
+        self.open.map_or(0, |open| self.supernodes[open].width)
+    }
+
+    /// The supernodes that are factored: all but the open one.
+    pub(crate) fn closed(&self) -> &[Supernode] {
+        &self.supernodes[..self.open.unwrap_or(self.supernodes.len())]
     }
 
     pub(crate) fn supernodes(&self) -> &[Supernode] {
@@ -318,7 +345,8 @@ fn predicted_operations(layout: &Layout, graph: &Graph, order: &[usize]) -> f64 
             }
         }
     }
-    let columns = order.iter().zip(below).map(|(&block, below)| multiply_adds(layout.kept_dim(block), below));
+    let inner = &order[..order.len() - layout.outer().len()];
+    let columns = inner.iter().zip(below).map(|(&block, below)| multiply_adds(layout.kept_dim(block), below));
     columns.sum::<f64>() + multiply_adds(layout.border_dim(), 0)
 }
 
@@ -337,17 +365,19 @@ fn places(order: &[usize]) -> Vec<usize> {
     place
 }
 
-/// Reorders so that every subtree of the elimination tree is contiguous; the fill stays the same.
-fn postorder(graph: &Graph, order: &[usize]) -> Vec<usize> {
-    let parent = elimination_tree(graph, order, &places(order));
-    let mut children = vec![Vec::new(); order.len()];
+/// Reorders so that every subtree of the elimination tree of the first `inner` blocks is contiguous; the fill stays the same.
+fn postorder(graph: &Graph, order: &[usize], inner: usize) -> Vec<usize> {
+    let mut parent = elimination_tree(graph, order, &places(order));
+    parent.truncate(inner);
+    parent.iter_mut().for_each(|above| *above = above.filter(|&above| above < inner));
+    let mut children = vec![Vec::new(); inner];
     for (k, above) in parent.iter().enumerate() {
         if let Some(above) = above {
             children[*above].push(k);
         }
     }
     let mut result = Vec::with_capacity(order.len());
-    for root in (0..order.len()).filter(|&k| parent[k].is_none()) {
+    for root in (0..inner).filter(|&k| parent[k].is_none()) {
         // Depth first with an explicit stack, parents before children; the subtree is then reversed.
         let start = result.len();
         let mut stack = vec![root];
@@ -357,6 +387,7 @@ fn postorder(graph: &Graph, order: &[usize]) -> Vec<usize> {
         }
         result[start..].reverse();
     }
+    result.extend_from_slice(&order[inner..]);
     result
 }
 

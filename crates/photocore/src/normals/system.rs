@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use super::eliminated::numbers_at;
+use super::homes::Homes;
 use super::incidence::Incidence;
 use super::layout::Layout;
 use super::memory::made_of_results;
 use super::ordering::Ordering;
 use super::symbolic::Symbolic;
-use super::ties::Ties;
 use super::tree::Tree;
 use super::workspace::Workspace;
 
@@ -18,7 +18,8 @@ pub struct System {
     pub(super) layout: Layout,
     pub(super) symbolic: Arc<Symbolic>,
     pub(super) incidence: Incidence,
-    pub(super) ties: Ties,
+    pub(super) ties: Homes,
+    pub(super) contributions: Homes,
     pub(super) tree: Tree,
     pub(super) workspace: Workspace,
     /// Whether what the elimination of local blocks leaves is kept for the solution.
@@ -30,15 +31,26 @@ impl System {
     pub fn new(layout: Layout, ordering: Ordering) -> Self {
         let symbolic = Arc::new(Symbolic::new(&layout, ordering));
         let incidence = Incidence::new(&layout, &symbolic);
-        let ties = Ties::new(&layout, &symbolic);
+        let ties = Homes::new(layout.ties().iter().map(|tie| &tie.kept), &symbolic);
+        let contributions = Homes::new(layout.contributions().iter(), &symbolic);
         let work = |(index, supernode): (usize, &super::symbolic::Supernode)| {
-            supernode.operations() + formation_work(&incidence, &layout, index)
+            let factored = if symbolic.open() == Some(index) { 0.0 } else { supernode.operations() };
+            factored + formation_work(&incidence, &layout, index)
         };
         let tree = Tree::new(&symbolic, symbolic.supernodes().iter().enumerate().map(work).collect());
         let kept: usize =
             (0..=symbolic.supernode_count()).map(|index| numbers_at(&incidence, &layout, index)).sum();
         let keeps = kept <= made_of_results(&layout);
-        Self { layout, symbolic, incidence, ties, tree, workspace: Workspace::default(), keeps }
+        Self {
+            layout,
+            symbolic,
+            incidence,
+            ties,
+            contributions,
+            tree,
+            workspace: Workspace::default(),
+            keeps,
+        }
     }
 
     /// The unknowns and groups.

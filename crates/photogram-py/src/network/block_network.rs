@@ -5,6 +5,7 @@ use photocore::network::{Network, NetworkDatum, NetworkError as Failure, Options
 use pyo3::prelude::*;
 
 use super::covariances::{BlockCovariances, factored, refused};
+use super::node::{BlockRow, Node};
 use super::solution::BlockSolution;
 use super::state::{BlockState, DatumRow, datum_of};
 use super::trial::{NetworkTrial, tried};
@@ -96,6 +97,18 @@ impl BlockNetwork {
         let found =
             watched(py, workers, None, |pool, _| self.network.resistance(&self.options, &state.state, pool))?;
         found.map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (outer, children, *, middle, threads))]
+    fn node(
+        &self,
+        py: Python<'_>,
+        outer: Vec<BlockRow>,
+        children: Vec<Vec<BlockRow>>,
+        middle: Option<[f64; 3]>,
+        threads: usize,
+    ) -> PyResult<Node> {
+        Node::new(py, self, outer, children, middle, threads)
     }
 }
 

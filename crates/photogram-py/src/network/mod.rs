@@ -5,6 +5,7 @@ mod block_network;
 mod collection;
 mod covariances;
 mod first_values;
+mod node;
 mod solution;
 mod state;
 mod trial;
@@ -38,6 +39,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     block_network::register(module)?;
     collection::register(module)?;
     first_values::register(module)?;
+    node::register(module)?;
     trial::register(module)?;
     solution::register(module)
 }
@@ -111,6 +113,8 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::Observation { .. }
         | Failure::Vectors
         | Failure::Attitude(_)
+        | Failure::NoBlock(_)
+        | Failure::Node(_)
         | Failure::Layout(_)
         | Failure::Interrupted => ("input", vec![], vec![]),
     };

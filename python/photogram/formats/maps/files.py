@@ -80,6 +80,11 @@ def map_files(
             f"the map {path.name} has no coordinate reference system: nothing says where on the earth the"
             " coordinates are"
         )
+    remarks += [
+        f"the map {path.name} has {each.description}; all standard deviations are in the layer of the points"
+        for each in layers
+        if each.left_out
+    ]
     return (_geopackage(path, layers) if suffix == GEOPACKAGE else _geojson(path, layers)), remarks
 
 

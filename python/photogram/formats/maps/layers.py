@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Layer", "chosen_crs", "map_layers"]
 
+MOST_ELLIPSES = 20_000
+"""Error ellipses of points at most, unless more are asked for: where there are more they cover each other."""
 SUSPICIOUS = 3.0
 """Test values beyond are on the map."""
 _ANGLES = ("omega", "phi", "kappa")
@@ -44,12 +46,15 @@ class Layer:
         In a sentence.
     table
         Geometries and attributes; its `crs` is that of the map, None where the place is not known.
+    left_out
+        How many it might have beside these.
     """
 
     name: str
     title: str
     description: str
     table: geopandas.GeoDataFrame
+    left_out: int = 0
 
 
 def chosen_crs(result: Result) -> str:
@@ -82,6 +87,7 @@ def map_layers(
     scale: float | None = None,
     confidence: float = CONFIDENCE,
     sizes: Sequence[tuple[float, float] | None] = (),
+    most: int = MOST_ELLIPSES,
 ) -> list[Layer]:
     """Return the layers of a map.
 
@@ -100,6 +106,9 @@ def map_layers(
     sizes
         Width and height of the pictures of each camera in the unit of image coordinates; without them
         footprints reach as far as measurements do.
+    most
+        Error ellipses at most: those of control and check points, and of every second, third ... of the
+        others. The description of the layer says of how many points they are.
 
     Raises
     ------
@@ -112,6 +121,8 @@ def map_layers(
 
     found = placed(result, chosen_crs(result) if crs is None else crs)
     own = ellipses(found.point_covariances, confidence)
+    drawn, known = _with_ellipses(found, most)
+    few = f" {len(drawn):,} of {known:,}" if len(drawn) < known else ""
     if scale is None:
         # Sizes in metres beside places in degrees: the spacing is that of the block's own stations.
         scale = fitting_scale(own, _metric_places(found))
@@ -125,8 +136,8 @@ def map_layers(
         ("points", "adjusted points with standard deviations, metres", *_points(found)),
         (
             "point_ellipses",
-            f"error ellipses ({100 * confidence:g} %) of points, magnified {scale:g} times",
-            *_ellipses(found, confidence, scale),
+            f"error ellipses ({100 * confidence:g} %) of{few} points, magnified {scale:g} times",
+            *_ellipses(found, drawn, confidence, scale),
         ),
         ("control", "control as it was given, residuals observed minus adjusted, metres", *_control(found)),
         (
@@ -150,7 +161,8 @@ def map_layers(
     for name, description, geometries, columns in parts:
         scaled = name in ("point_ellipses", "control_residuals", "check_residuals")
         table = geopandas.GeoDataFrame(dict(columns), geometry=list(geometries), crs=system)
-        layers.append(Layer(name, f"{name}_x{scale:g}" if scaled else name, description, table))
+        left_out = known - len(drawn) if name == "point_ellipses" else 0
+        layers.append(Layer(name, f"{name}_x{scale:g}" if scaled else name, description, table, left_out))
     return layers
 
 
@@ -213,10 +225,20 @@ def _points(found: Placed) -> _Part:
     }
 
 
-def _ellipses(found: Placed, confidence: float, scale: float) -> _Part:
+def _with_ellipses(found: Placed, most: int) -> tuple[Indices, int]:
+    """Return which points get an ellipse, and how many might."""
+    known = np.flatnonzero(np.isfinite(found.point_covariances).all(axis=(1, 2)))
+    if len(known) <= most:
+        return known, len(known)
+    passes = found.result.point_kinds[found.rows[known]] == "pass"
+    named, others = known[~passes], known[passes]
+    step = -(-len(others) // max(most - len(named), 1))
+    return np.sort(np.concatenate([named, others[::step]])), len(known)
+
+
+def _ellipses(found: Placed, known: Indices, confidence: float, scale: float) -> _Part:
     import shapely
 
-    known = np.flatnonzero(np.isfinite(found.point_covariances).all(axis=(1, 2)))
     own = ellipses(found.point_covariances[known], confidence)
     steps = own.outlines(np.zeros((len(known), 2)), scale)
     count = steps.shape[1]

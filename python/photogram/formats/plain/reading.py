@@ -27,7 +27,17 @@ from photogram.messages import Message, listed, quoted
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Attitude, Control, Observation
 
-__all__ = ["SETTINGS", "read", "read_control"]
+__all__ = [
+    "SETTINGS",
+    "Images",
+    "Photos",
+    "image_coordinates",
+    "read",
+    "read_control",
+    "read_images",
+    "read_photos",
+    "read_tables",
+]
 
 SETTINGS = "project.toml"
 DIFFER = 1e-6
@@ -46,7 +56,18 @@ def read(path: Path, wishes: Wishes) -> Project:
     """
     settings = read_settings(path / SETTINGS if path.is_dir() else path)
     settings = replace(settings, sd={**settings.sd, **wishes.sd})
-    tables = Tables(settings, unread_tables(settings))
+    return read_tables(Tables(settings, unread_tables(settings)), wishes)
+
+
+def read_tables(tables: Tables, wishes: Wishes) -> Project:
+    """Read the tables of a project.
+
+    Raises
+    ------
+    InputError
+        As :func:`read`.
+    """
+    settings = tables.settings
     if "images" not in settings.tables:
         raise InputError("has no table of images (images.csv)", file=settings.path)
     transform = Transform(settings, tables.messages)
@@ -54,12 +75,12 @@ def read(path: Path, wishes: Wishes) -> Project:
     control = _control_table(tables)
     # The frame is settled by control where it has no origin: it is the first that is carried over.
     given = None if control is None else read_control(tables, control, transform)
-    photos = _photos(tables, transform, cameras)
-    images = _images(tables, photos)
+    photos = read_photos(tables, transform, cameras)
+    images = read_images(tables, photos)
     points = _points(tables, transform, images, given)
     rigs = read_rigs(tables, [each.name for each in cameras.cameras])
     cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
-    xy, sd = _coordinates(settings, images, cameras, np.asarray(photo_cameras))
+    xy, sd = image_coordinates(settings, images, cameras, np.asarray(photo_cameras))
     mounts, stands = mounted(
         read_frames(tables, rigs, photos.names, photos.taken), photos.names, photos.centres, photos.matrices
     )
@@ -120,7 +141,9 @@ def _with_cameras(tables: Tables, path: Path) -> Tables:
 
 
 @dataclass(frozen=True)
-class _Photos:
+class Photos:
+    """The table of photos, in the frame of the project; those that are not used are named apart."""
+
     names: list[str]
     cameras: list[int]
     taken: list[str]
@@ -134,7 +157,8 @@ class _Photos:
     observed: list[Observation]
 
 
-def _photos(tables: Tables, transform: Transform, cameras: Cameras) -> _Photos:
+def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photos:
+    """Read the table of photos; errors as of :func:`read`."""
     table = tables.read("photos")
     if table is None:
         raise InputError("has no table of photos (photos.csv)", file=tables.settings.path)
@@ -161,7 +185,7 @@ def _photos(tables: Tables, transform: Transform, cameras: Cameras) -> _Photos:
     if len(kept) < table.count:
         tables.messages.append(Message(f"{table.count - len(kept)} photos are not used", table.path))
     which = _camera_of(table, cameras)
-    return _Photos(
+    return Photos(
         [texts[row] for row in kept],
         [which[row] for row in kept],
         [cameras.cameras[which[row]].name for row in kept],
@@ -239,7 +263,9 @@ def _attitude_weights(
 
 
 @dataclass(frozen=True)
-class _Images:
+class Images:
+    """The table of images, as it is written."""
+
     table: ColumnTable
     photos: Indices
     points: Indices
@@ -248,7 +274,8 @@ class _Images:
     sd: Floats | None
 
 
-def _images(tables: Tables, photos: _Photos) -> _Images:
+def read_images(tables: Tables, photos: Photos) -> Images:
+    """Read the table of images; errors as of :func:`read`."""
     table = tables.read("images")
     assert table is not None
     xs, ys = ("column", "row") if "column" in table else ("x", "y")
@@ -265,13 +292,13 @@ def _images(tables: Tables, photos: _Photos) -> _Images:
     keep = table.flags("use") & (rows < len(places)) if "use" in table or photos.unused else None
     sd = _image_sd(tables, table)
     if keep is None:
-        return _Images(table, rows, names.rows, names.names, xy, sd)
+        return Images(table, rows, names.rows, names.names, xy, sd)
     left = int(np.count_nonzero(~keep))
     if left:
         tables.messages.append(Message(f"{left} images are not used", table.path))
     seen, points = np.unique(names.rows[keep], return_inverse=True)
     kept_sd = sd if sd is None or np.ndim(sd) == 0 else sd[keep]
-    return _Images(
+    return Images(
         table, rows[keep], points.reshape(-1), [names.names[row] for row in seen], xy[keep], kept_sd
     )
 
@@ -309,8 +336,8 @@ def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
     return found
 
 
-def _coordinates(
-    settings: Settings, images: _Images, cameras: Cameras, photo_cameras: Indices
+def image_coordinates(
+    settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices
 ) -> tuple[Floats, Floats | None]:
     """Return image coordinates and standard deviations in the unit and along the axes of the cameras."""
     xy, sd = images.xy, images.sd
@@ -413,7 +440,7 @@ class _Points:
     observed: list[Observation]
 
 
-def _points(tables: Tables, transform: Transform, images: _Images, control: _Given | None) -> _Points:
+def _points(tables: Tables, transform: Transform, images: Images, control: _Given | None) -> _Points:
     table = tables.read("points")
     own = table.texts("point") if table is not None else []
     names = list(dict.fromkeys([*images.point_names, *(control.names if control else []), *own]))

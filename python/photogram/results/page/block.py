@@ -17,7 +17,6 @@ from photogram.results.page.parts import (
     images_facts,
     iterations_section,
     precision_table,
-    remarks_section,
     tests_section,
     unit_weight,
     worst_section,
@@ -34,7 +33,7 @@ from photogram.results.page.tables import (
 from photogram.results.report import image_unit, problems_of
 from photogram.results.result import Result
 from photogram.results.unknowns import unknown_lines
-from photogram.show.judgement import advice, judged
+from photogram.show.judgement import advice, judged, remarks_section
 from photogram.show.page import Column, Drawing, Fact, Facts, Page, Part, Section, Table, significant
 from photogram.statistics.findings import by_w
 from photogram.statistics.reliability import TESTABLE

@@ -11,14 +11,13 @@ from photogram.arguments.types import Floats
 from photogram.results.network import AdjustedNetwork
 from photogram.results.page.observed import Images, Worst, limit_of, worst_table
 from photogram.show.judgement import verdict_table
-from photogram.show.page import Column, Drawing, Fact, Facts, Part, Remarks, Row, Section, Table, significant
+from photogram.show.page import Column, Drawing, Fact, Facts, Part, Row, Section, Table, significant
 from photogram.statistics.findings import Tested
 
 __all__ = [
     "images_facts",
     "iterations_section",
     "precision_table",
-    "remarks_section",
     "tests_section",
     "unit_weight",
     "worst_section",
@@ -167,10 +166,5 @@ _ORDERINGS = {
     "amd": "by minimum degree",
     "dissection": "by nested dissection",
     "graph-dissection": "by dissection of the graph",
+    "parts": "in parts, and the separators between them",
 }
-
-
-def remarks_section(sentences: Sequence[str]) -> Section:
-    """Return what was remarked on."""
-    told = [each for each in sentences if each != "none"]
-    return Section("remarks", "Remarks", [Remarks(told)] if told else [])

@@ -75,12 +75,14 @@ def check_section(result: Result) -> Section:
 
 def _check_summary(result: Result, check: np.ndarray) -> Table:
     frame = block_frame(result)
+    points = np.flatnonzero(check.any(axis=1))
+    check, all_differences, sd = check[points], result.point_differences[points], result.point_sd[points]
     rows: list[Row] = []
     for k, (name, unit, factor) in enumerate(zip(frame.names, frame.units, frame.factors, strict=True)):
         own = check[:, k]
         if not own.any():
             continue
-        differences, deviations = result.point_differences[own, k] * factor, result.point_sd[own, k] * factor
+        differences, deviations = all_differences[own, k] * factor, sd[own, k] * factor
         with np.errstate(all="ignore"):
             tests = differences / deviations
             rows.append(
@@ -113,10 +115,11 @@ def _compared(result: Result, which: np.ndarray, caption: str) -> Table | None:
     if not len(places):
         return None
     block, frame = result.block, block_frame(result)
+    differences, sd = result.point_differences, result.point_sd
     with np.errstate(all="ignore"):
-        tests = (result.point_differences / result.point_sd)[tuple(places.T)]
+        tests = (differences / sd)[tuple(places.T)]
     chosen = np.sort(np.argsort(-np.nan_to_num(np.abs(tests), nan=-1.0), kind="stable")[:LISTED])
-    own = np.where(which, result.point_sd, np.nan)
+    own = np.where(which, sd, np.nan)
     values, few = frame.value_decimals(own), [count + 1 for count in frame.decimals(own)]
     rows: list[Row] = []
     mixed = len(set(frame.units)) > 1
@@ -128,8 +131,8 @@ def _compared(result: Result, which: np.ndarray, caption: str) -> Table | None:
                 f"{frame.names[k]}, {frame.units[k]}" if mixed else frame.names[k],
                 frame.cell(k, float(block.point_positions[point, k]), values[k]),
                 frame.cell(k, float(result.point_positions[point, k]), values[k]),
-                frame.difference(k, float(result.point_differences[point, k]), few[k]),
-                float(result.point_sd[point, k]) * factor,
+                frame.difference(k, float(differences[point, k]), few[k]),
+                float(sd[point, k]) * factor,
                 test,
             ]
         )

@@ -9,7 +9,7 @@ from dataclasses import replace
 from photogram.results.components import VarianceComponents, statement
 from photogram.results.components_picture import figure_of_components
 from photogram.show.judgement import advice, judged
-from photogram.show.page import Column, Drawing, Lines, Page, Part, Remarks, Row, Section, Table
+from photogram.show.page import Column, Drawing, Page, Part, Remarks, Row, Section, Table
 from photogram.statistics.components import Component
 
 __all__ = ["reweighed_page", "weighed_page"]
@@ -25,11 +25,8 @@ def weighed_page(found: VarianceComponents, page: Page) -> Page:
     page
         That of the adjustment.
     """
-    told = [f"{each[:1].upper()}{each[1:]}." for each in statement(found)]
-    parts: list[Part] = [Remarks(told), _drawing(found), Table("Components", _COLUMNS, _rows(found), _NOTE)]
-    if found.estimate.messages:
-        parts.append(Remarks(list(found.estimate.messages)))
-    section = Section("components", "Variance components", parts, _INTRO)
+    told = _sentences(statement(found))
+    section = Section("components", "Variance components", _parts(found), _INTRO)
     return replace(
         page,
         judgements=[judged(found.verdict)],
@@ -38,18 +35,36 @@ def weighed_page(found: VarianceComponents, page: Page) -> Page:
     )
 
 
-def reweighed_page(lines: Sequence[str], page: Page) -> Page:
+def reweighed_page(changes: Sequence[str], left: VarianceComponents | None, page: Page) -> Page:
     """Return the page of a network whose gross errors were taken out and weights estimated in turn.
 
     Parameters
     ----------
-    lines
+    changes
         What was done to the weights.
+    left
+        The components of the weights that they have now, where they were estimated.
     page
         That of the network that is left.
     """
-    section = Section("components", "Weights", [Lines(lines)], _CHANGED)
+    parts: list[Part] = [Remarks(_sentences(changes)), *(_parts(left) if left is not None else [])]
+    section = Section("components", "Weights", parts, _CHANGED)
     return replace(page, sections=[section, *page.sections])
+
+
+def _parts(found: VarianceComponents) -> list[Part]:
+    parts: list[Part] = [
+        Remarks(_sentences(statement(found))),
+        _drawing(found),
+        Table("Components", _COLUMNS, _rows(found), _NOTE),
+    ]
+    if found.estimate.messages:
+        parts.append(Remarks(list(found.estimate.messages)))
+    return parts
+
+
+def _sentences(said: Sequence[str]) -> list[str]:
+    return [f"{each[:1].upper()}{each[1:]}." for each in said]
 
 
 _CHANGED = "Weights were estimated from the observations that are left: the rest of this page has these."

@@ -12,7 +12,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["LostSupportError", "Out", "Prediction", "Standing", "Suspects", "Tests", "Trial"]
+__all__ = ["Aside", "LostSupportError", "Out", "Prediction", "Standing", "Suspects", "Tests", "Trial"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,6 +191,22 @@ class Prediction:
     rows: tuple[int, ...]
     error: tuple[float, ...]
     error_sd: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Aside:
+    """What a consensus of resections and intersections does without, from which a network was started anew.
+
+    Attributes
+    ----------
+    images
+        The groups, by their numbers, that do not meet where most of their point and photo do.
+    photos
+        Photos whose images agree with no pose, and why that is said.
+    """
+
+    images: tuple[int, ...]
+    photos: dict[int, str]
 
 
 class LostSupportError(Exception):

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use super::{CommonState, Moves, PlacedCommon, turned};
 use crate::geometry::{Matrix3, Vector3};
-use crate::network::model::{Bundle, Placed};
+use crate::network::model::Bundle;
 use crate::network::observations::Observation;
+use crate::network::stations::Placed;
 
 /// A motion of the whole: how it displaces a place, the rotation vector by which it turns, the factor of its scale.
 pub struct Motion<'a> {

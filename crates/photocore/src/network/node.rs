@@ -1,0 +1,281 @@
+//! A node of the elimination tree of a network that is adjusted in parts: Helmert blocking (Helmert 1880; Wolf 1978).
+//!
+//! A node is a network of its own: the photos at home in it and those that other nodes eliminate after it, the points whose first photo in
+//! the order of elimination is at home here, all their images, and the observations at home likewise. See [`crate::adjustment::Part`] for
+//! what is done with it.
+
+use rayon::ThreadPool;
+
+use super::problem::Assembled;
+use super::solution::{observations, sums_of_squares};
+use super::surroundings::Surroundings;
+use super::{Dropped, Network, NetworkError, Options, Solution, SumsOfSquares};
+use crate::adjustment::{Adjustment, Counts, Model, Part, PartError, Watch};
+use crate::normals::{Contribution, Operations, packed};
+
+/// A node, its blocks ordered; it has no values.
+#[derive(Debug)]
+pub struct Node {
+    network: Network,
+    options: Options,
+    assembled: Assembled,
+    outer: Vec<usize>,
+    below: Vec<Vec<usize>>,
+}
+
+/// A node at given values, what is at home in it eliminated.
+#[derive(Debug)]
+pub struct FormedNode {
+    part: Part,
+}
+
+/// What a node takes, from its pattern alone.
+#[derive(Debug, Clone, Copy)]
+pub struct NodePrediction {
+    /// Unknowns of points that only images touch.
+    pub points: usize,
+    /// Unknowns of blocks that are eliminated here, and of outer ones.
+    pub interior: usize,
+    /// Unknowns of outer blocks.
+    pub outer: usize,
+    /// Image points, and equations in all.
+    pub images: usize,
+    /// Equations in all, weighted unknowns not counted.
+    pub observations: usize,
+    /// Multiply-adds of each phase.
+    pub operations: Operations,
+    /// Numbers in the factor of a formed node.
+    pub factor: usize,
+    /// Bytes that forming or inverting takes at the most, what it is given and the node itself counted.
+    pub memory: usize,
+}
+
+impl Network {
+    /// Takes the network as a node of a larger one.
+    ///
+    /// # Errors
+    /// A network that contradicts itself, blocks that are not there or have no unknowns, more memory than the options give; a loss.
+    pub fn node(
+        &self,
+        options: &Options,
+        surroundings: Surroundings,
+        pool: &ThreadPool,
+    ) -> Result<Node, NetworkError> {
+        self.check()?;
+        self.check_blocks(&surroundings)?;
+        if options.adjustment.loss.is_some() {
+            return Err(NetworkError::Node("a network in parts is adjusted without a loss"));
+        }
+        let mut network = self.clone();
+        network.release(&surroundings.outer);
+        let none = (vec![false; self.points.len()], vec![false; self.photos.len()]);
+        let screened = network.screen_within(&none.0, &none.1, surroundings);
+        let assembled = pool.install(|| network.assemble(options, screened, None))?;
+        assembled.check_memory(options)?;
+        let layout = assembled.problem.layout();
+        let outer = layout.unknowns_of(layout.outer()).collect();
+        let below =
+            layout.contributions().iter().map(|blocks| layout.unknowns_of(blocks).collect()).collect();
+        Ok(Node { network, options: *options, assembled, outer, below })
+    }
+}
+
+impl Node {
+    /// Unknowns of a state: of points that only images touch, then of photos, shared cameras, common unknowns and other points.
+    pub fn size(&self) -> usize {
+        self.assembled.problem.initial.len()
+    }
+
+    /// Image points.
+    pub fn images(&self) -> usize {
+        self.network.images.len()
+    }
+
+    /// Where the outer unknowns stand in a state.
+    pub fn outer(&self) -> &[usize] {
+        &self.outer
+    }
+
+    /// Where the unknowns stand that each node below leaves something for.
+    pub fn below(&self) -> &[Vec<usize>] {
+        &self.below
+    }
+
+    /// Observations and unknowns at home here.
+    pub fn counts(&self) -> Counts {
+        self.assembled.problem.counts(0)
+    }
+
+    /// Points that do not take part.
+    pub fn dropped(&self) -> &[Dropped] {
+        &self.assembled.dropped
+    }
+
+    /// The state to begin with: photos as they are given, points where their rays meet.
+    pub fn initial(&self) -> &[f64] {
+        &self.assembled.problem.initial
+    }
+
+    /// What it takes, from its pattern alone.
+    pub fn prediction(&self) -> NodePrediction {
+        let system = &self.assembled.problem.system;
+        let (layout, symbolic) = (system.layout(), system.symbolic());
+        let outer = symbolic.outer_unknowns();
+        let handed = packed(outer) + self.below.iter().map(|own| packed(own.len())).sum::<usize>();
+        NodePrediction {
+            points: layout.all_locals().len(),
+            interior: layout.all_kept().len() - outer,
+            outer,
+            images: self.assembled.problem.model.images.len(),
+            observations: layout.equations(),
+            operations: symbolic.operations(layout),
+            factor: symbolic.values() - outer * outer,
+            memory: system.memory() + size_of::<f64>() * handed,
+        }
+    }
+
+    /// The state after a step: attitudes step by rotation vectors.
+    ///
+    /// # Errors
+    /// A state or step of another length.
+    pub fn advance(&self, state: &[f64], step: &[f64]) -> Result<Vec<f64>, NetworkError> {
+        self.check(&[state, step])?;
+        let mut state = state.to_vec();
+        self.assembled.problem.model.advance(&mut state, step);
+        Ok(state)
+    }
+
+    /// The state with points that only images touch where their rays meet; as it is where some do not.
+    ///
+    /// # Errors
+    /// A state of another length.
+    pub fn relocate(&self, state: &[f64], pool: &ThreadPool) -> Result<Vec<f64>, NetworkError> {
+        self.check(&[state])?;
+        let (model, mut moved) = (&self.assembled.problem.model, state.to_vec());
+        if pool.install(|| model.relocate(&mut moved)) {
+            let kept = 3 * model.locals;
+            moved[kept..].copy_from_slice(&state[kept..]);
+        }
+        Ok(moved)
+    }
+
+    /// Weighted sums of squares of what is at home here.
+    ///
+    /// # Errors
+    /// A state of another length.
+    pub fn objective(&self, state: &[f64], pool: &ThreadPool) -> Result<SumsOfSquares, NetworkError> {
+        self.check(&[state])?;
+        let problem = &self.assembled.problem;
+        let reached = Adjustment::between(problem, state, state.to_vec(), pool);
+        let observed = observations(&self.network, problem, &reached);
+        Ok(sums_of_squares(problem, &reached, state, &observed))
+    }
+
+    /// Forms the normal equations at a state, with what the nodes below leave, and eliminates what is at home here.
+    ///
+    /// # Errors
+    /// A state of another length, contributions over other unknowns, an interruption, no memory.
+    pub fn form(
+        &self,
+        state: &[f64],
+        contributions: &[Contribution<'_>],
+        damping: f64,
+        pool: &ThreadPool,
+        watch: Watch<'_>,
+    ) -> Result<FormedNode, NetworkError> {
+        self.check(&[state])?;
+        let problem = &self.assembled.problem;
+        let part = Part::form(problem, state.to_vec(), contributions, damping, pool, watch);
+        Ok(FormedNode { part: part.map_err(|error| self.named(error))? })
+    }
+
+    /// What the observations leave undetermined of what is at home here.
+    pub fn undetermined(&self, formed: &FormedNode) -> Option<NetworkError> {
+        formed.part.undetermined().map(|error| NetworkError::new(error, &self.assembled))
+    }
+
+    /// The step of all unknowns, given that of the outer ones.
+    ///
+    /// # Errors
+    /// Another number of outer unknowns, an interruption, no memory.
+    pub fn solve(
+        &self,
+        formed: &FormedNode,
+        outer: &[f64],
+        pool: &ThreadPool,
+        watch: Watch<'_>,
+    ) -> Result<Vec<f64>, NetworkError> {
+        formed.part.solve(&self.assembled.problem, outer, pool, watch).map_err(|error| self.named(error))
+    }
+
+    /// What is adjusted here, with its cofactors, and the cofactors that each node below needs for its own: lower triangles, column by column.
+    ///
+    /// * `outer`: those of the outer unknowns;
+    /// * `state`: where the adjustment has ended.
+    ///
+    /// # Errors
+    /// Other numbers of unknowns, what is not determined, an interruption, no memory.
+    pub fn invert(
+        &self,
+        formed: FormedNode,
+        outer: &[f64],
+        state: &[f64],
+        pool: &ThreadPool,
+        watch: Watch<'_>,
+    ) -> Result<(Solution, Vec<Vec<f64>>), NetworkError> {
+        self.check(&[state])?;
+        let problem = &self.assembled.problem;
+        let found = formed.part.invert(problem, outer, state.to_vec(), pool, watch);
+        let (adjustment, below) = found.map_err(|error| self.named(error))?;
+        Ok((self.told(adjustment), below))
+    }
+
+    /// What is adjusted here, without cofactors; `before` is the state before the last step.
+    ///
+    /// # Errors
+    /// States of another length.
+    pub fn solution(
+        &self,
+        state: &[f64],
+        before: &[f64],
+        pool: &ThreadPool,
+    ) -> Result<Solution, NetworkError> {
+        self.check(&[state, before])?;
+        Ok(self.told(Adjustment::between(&self.assembled.problem, before, state.to_vec(), pool)))
+    }
+
+    fn told(&self, adjustment: Adjustment) -> Solution {
+        Solution::new(&self.network, &self.options, &self.assembled, adjustment, vec![])
+    }
+
+    fn check(&self, states: &[&[f64]]) -> Result<(), NetworkError> {
+        let fit = states.iter().all(|state| state.len() == self.size());
+        if fit { Ok(()) } else { Err(NetworkError::State) }
+    }
+
+    fn named(&self, error: PartError) -> NetworkError {
+        match error {
+            PartError::Foreign => {
+                NetworkError::Node("what a node is given is over other unknowns, or damped")
+            }
+            PartError::Adjust(error) => NetworkError::new(error, &self.assembled),
+        }
+    }
+}
+
+impl FormedNode {
+    /// What it leaves for the outer unknowns; empty the second time.
+    pub fn take_contribution(&mut self) -> Contribution<'static> {
+        self.part.take_contribution()
+    }
+
+    /// Weighted sum of squares of what is at home in the node.
+    pub fn sum_of_squares(&self) -> f64 {
+        self.part.sum_of_squares()
+    }
+
+    /// The share of the node in the decrease of the sum of squares that a full step predicts.
+    pub fn decrease(&self) -> f64 {
+        self.part.decrease()
+    }
+}

@@ -1,0 +1,249 @@
+//! What is out of a network that is tried against what the rest predicts of it, and R of all observations of a point.
+
+use std::collections::HashMap;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::ThreadPool;
+
+use super::NetworkError;
+use super::group_tests::{in_units, sub};
+use super::suspects::{Home, Row, Suspect};
+use super::trial::Trial;
+use crate::adjustment::{TieCofactors, Tried, Weighted};
+use crate::normals::LocalCofactors;
+
+/// What is out against what the rest predicts of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// d^T C^-1 d: chi-square with as many degrees of freedom as there are rows out.
+    pub statistic: f64,
+    /// Rows that are out.
+    pub rows: Vec<usize>,
+    /// Observed minus predicted of each, and its standard deviation (a priori unit weight), in the unit of the observation.
+    pub error: Vec<f64>,
+    /// See [`Prediction::error`].
+    pub error_sd: Vec<f64>,
+}
+
+/// The observations of one point, that of its coordinates and all its images.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OnPoint {
+    /// The suspects, each with its number of rows.
+    pub suspects: Vec<usize>,
+    /// Residuals of unit weight.
+    pub residual: Vec<f64>,
+    /// R: their cofactors, square, row by row.
+    pub cofactors: Vec<f64>,
+}
+
+/// Cofactors about some suspects: of the observations of local points, of ties.
+pub(super) struct Around {
+    pub(super) points: HashMap<usize, LocalCofactors>,
+    pub(super) ties: HashMap<usize, TieCofactors>,
+}
+
+impl Trial {
+    /// Tests what is out of some suspects against what the rest predicts (Cook and Weisberg 1982): with d observed minus predicted and
+    /// C = S + a Q a^T its cofactors, d^T C^-1 d. None where nothing is out, or its unknowns are.
+    ///
+    /// # Errors
+    /// Nothing was adjusted before.
+    pub fn predictions(
+        &self,
+        suspects: &[usize],
+        pool: &ThreadPool,
+    ) -> Result<Vec<Option<Prediction>>, NetworkError> {
+        let found = self.found()?;
+        let problem = &self.assembled.problem;
+        let around = self.around(suspects, &self.observation_sd, found, pool);
+        let weighted = self.weighted(&self.sd, &found.values);
+        let predict = |&index: &usize| {
+            let suspect = &self.suspects[index];
+            let out: Vec<usize> =
+                (0..suspect.rows.len()).filter(|&k| !self.is_in(suspect.rows[k].0)).collect();
+            if out.is_empty() || self.is_gone(suspect) {
+                return None;
+            }
+            let shares = match suspect.home {
+                Home::Group { group, point } => {
+                    let own = around.points.get(&point)?;
+                    let first = 2 * (group - problem.layout().groups_of(point).start);
+                    let rows: Vec<usize> = out.iter().map(|&k| first + k).collect();
+                    sub(&own.equations, own.rows(), &rows)
+                }
+                Home::Tie(tie) => sub(&around.ties.get(&tie)?.equations, suspect.rows.len(), &out),
+                Home::Point(_) | Home::Block(_) => {
+                    let rows = self.prior_rows(suspect, &out, &self.sd, &found.values, &weighted);
+                    let shares = &rows * self.cofactors_at(found, suspect.home) * rows.transpose();
+                    shares.transpose().as_slice().to_vec()
+                }
+            };
+            self.prediction(suspect, &out, &shares, found, &weighted)
+        };
+        Ok(suspects.iter().map(predict).collect())
+    }
+
+    /// Cofactors of all that some suspects touch.
+    pub(super) fn around(
+        &self,
+        suspects: &[usize],
+        observation_sd: &[f64],
+        found: &Tried,
+        pool: &ThreadPool,
+    ) -> Around {
+        let problem = &self.assembled.problem;
+        let (mut places, mut ties) = (vec![], vec![]);
+        for &index in suspects {
+            match self.suspects[index].home {
+                Home::Group { point, .. } => places.push(point),
+                Home::Tie(tie) => ties.push(tie),
+                Home::Point(_) | Home::Block(_) => {}
+            }
+        }
+        places.sort_unstable();
+        places.dedup();
+        let of_points = found.of_locals(problem, observation_sd, &places, |_| vec![], pool);
+        let of_ties = found.of_ties(problem, observation_sd, &ties, pool);
+        Around {
+            points: places.into_iter().zip(of_points).collect(),
+            ties: ties.into_iter().zip(of_ties).collect(),
+        }
+    }
+
+    fn prediction(
+        &self,
+        suspect: &Suspect,
+        out: &[usize],
+        shares: &[f64],
+        found: &Tried,
+        weighted: &[Weighted],
+    ) -> Option<Prediction> {
+        let count = out.len();
+        let c = DMatrix::identity(count, count) + DMatrix::from_row_slice(count, count, shares);
+        let residual = |&k: &usize| match suspect.rows[k].0 {
+            Row::Equation(equation) => found.residuals[equation] / self.observation_sd[equation],
+            Row::Unknown(unknown) => {
+                self.assembled.problem.prior_row(&self.sd, &found.values, weighted, unknown).1
+            }
+        };
+        let d = DVector::from_iterator(count, out.iter().map(residual));
+        let statistic = d.dot(&c.clone().cholesky()?.solve(&d));
+        let rows: Vec<(Row, usize)> = out.iter().map(|&k| suspect.rows[k]).collect();
+        let units = self.units(suspect, &rows);
+        let (error, error_sd) = in_units(&units, d.as_slice(), c.as_slice());
+        Some(Prediction { statistic, rows: out.to_vec(), error, error_sd })
+    }
+
+    /// Whether the unknowns of a suspect are out with it: held where they were not given so.
+    fn is_gone(&self, suspect: &Suspect) -> bool {
+        let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
+        let gone = |unknowns: std::ops::Range<usize>| {
+            unknowns.into_iter().any(|unknown| problem.sd[unknown] == 0.0 && self.sd[unknown] != 0.0)
+        };
+        match (suspect.home, suspect.subject) {
+            (Home::Group { group, point }, _) => {
+                gone(model.of_point(point)) || gone(model.of_block(model.carrier(model.images[group].photo)))
+            }
+            (Home::Tie(tie), _) => {
+                problem.layout().tie_columns(tie).any(|unknown| gone(unknown..unknown + 1))
+            }
+            (home, _) => gone(self.unknowns_at(home)),
+        }
+    }
+
+    /// R of all observations of some points together; empty for points that observations beside images touch.
+    ///
+    /// # Errors
+    /// Nothing was adjusted before.
+    pub fn on_points(&self, points: &[usize], pool: &ThreadPool) -> Result<Vec<OnPoint>, NetworkError> {
+        let (found, problem) = (self.found()?, &self.assembled.problem);
+        let (observation_sd, sd) = (&problem.observation_sd[..], &problem.sd[..]);
+        let weighted = self.weighted(sd, &found.values);
+        let further = |place: usize| self.further(place, sd, &found.values, &weighted);
+        let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
+        let cofactors = found.of_locals(problem, observation_sd, &places, further, pool);
+        let mut found_at = places.iter().zip(cofactors);
+        let of = |&point: &usize| {
+            let known = self.local(point).and_then(|_| found_at.next());
+            known.map_or_else(OnPoint::default, |(&place, own)| {
+                let (rows, residual) = self.rows_at(place, (observation_sd, sd), found, &weighted);
+                let (count, shares) = (rows.len(), sub(&own.equations, own.rows(), &rows));
+                let identity = |k: usize| f64::from(u8::from(k / count == k % count));
+                let cofactors = shares.iter().enumerate().map(|(k, share)| identity(k) - share).collect();
+                OnPoint { suspects: self.on_place[place].clone(), residual, cofactors }
+            })
+        };
+        Ok(points.iter().map(of).collect())
+    }
+
+    /// The same of points that are out with all that was observed of them, as if they took part: each by itself against the photos as
+    /// the others determine them. Empty also for points that their rays do not determine.
+    ///
+    /// # Errors
+    /// Nothing was adjusted before.
+    pub fn on_gone_points(&self, points: &[usize], pool: &ThreadPool) -> Result<Vec<OnPoint>, NetworkError> {
+        let (found, problem) = (self.found()?, &self.assembled.problem);
+        let given = (&self.observation_sd[..], &self.sd[..]);
+        let weighted = self.weighted(&self.sd, &found.values);
+        let further = |place: usize| self.further(place, &self.sd, &found.values, &weighted);
+        let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
+        let cofactors = found.of_gone(problem, given, &places, further, pool);
+        let mut found_at = places.iter().zip(cofactors);
+        let of = |&point: &usize| {
+            let known = self.local(point).and_then(|_| found_at.next()).filter(|(_, own)| !own.is_empty());
+            known.map_or_else(OnPoint::default, |(&place, own)| {
+                let (rows, observed) = self.rows_at(place, given, found, &weighted);
+                let cofactors = sub(&own, own.len().isqrt(), &rows);
+                let residual = cofactors.chunks_exact(rows.len()).map(|row| dot(row, &observed)).collect();
+                OnPoint { suspects: self.on_place[place].clone(), residual, cofactors }
+            })
+        };
+        Ok(points.iter().map(of).collect())
+    }
+
+    /// The place of a point in the model, where no observation beside images touches it.
+    fn local(&self, point: usize) -> Option<usize> {
+        self.place.get(point).copied().flatten().filter(|&place| place < self.assembled.problem.model.locals)
+    }
+
+    /// The equations of the coordinates of a local point that are observations themselves.
+    fn further(&self, place: usize, sd: &[f64], values: &[f64], weighted: &[Weighted]) -> Vec<f64> {
+        let mut own = self.on_place[place].iter().map(|&index| &self.suspects[index]);
+        let Some(suspect) = own.find(|suspect| matches!(suspect.home, Home::Point(_))) else { return vec![] };
+        let all: Vec<usize> = (0..suspect.rows.len()).collect();
+        self.prior_rows(suspect, &all, sd, values, weighted).transpose().as_slice().to_vec()
+    }
+
+    /// The place of each row of the suspects at a local point among its equations, and how much each is off, of unit weight.
+    fn rows_at(
+        &self,
+        place: usize,
+        (observation_sd, sd): (&[f64], &[f64]),
+        found: &Tried,
+        weighted: &[Weighted],
+    ) -> (Vec<usize>, Vec<f64>) {
+        let problem = &self.assembled.problem;
+        let groups = problem.layout().groups_of(place);
+        let (mut rows, mut off) = (vec![], vec![]);
+        for &index in &self.on_place[place] {
+            let suspect = &self.suspects[index];
+            let first = match suspect.home {
+                Home::Group { group, .. } => 2 * (group - groups.start),
+                _ => 2 * groups.len(),
+            };
+            for (k, &(row, _)) in suspect.rows.iter().enumerate() {
+                rows.push(first + k);
+                off.push(match row {
+                    Row::Equation(equation) => found.residuals[equation] / observation_sd[equation],
+                    Row::Unknown(unknown) => problem.prior_row(sd, &found.values, weighted, unknown).1,
+                });
+            }
+        }
+        (rows, off)
+    }
+}
+
+/// The product of two vectors.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}

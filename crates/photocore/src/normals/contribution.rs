@@ -1,0 +1,139 @@
+//! What a part of a larger system leaves for the unknowns that it shares with others (Helmert blocking).
+//!
+//! With i what a part eliminates and s its outer unknowns, U = A_ss - A_si A_ii^-1 A_is and u = b_s - A_si A_ii^-1 b_i: the front of the
+//! outer blocks, assembled and left open.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use super::factor::Factor;
+use super::front::Front;
+use super::layout::Layout;
+use super::selected::SelectedInverse;
+use super::system::System;
+
+/// What the elimination of a part leaves for its outer unknowns, block by block.
+#[derive(Debug, Clone, Default)]
+pub struct Contribution<'a> {
+    /// U, lower triangle, column by column.
+    pub matrix: Cow<'a, [f64]>,
+    /// u.
+    pub right: Cow<'a, [f64]>,
+    /// Diagonal of the normal equations before any elimination.
+    pub diagonal: Cow<'a, [f64]>,
+}
+
+/// Numbers in the lower triangle of a symmetric matrix.
+pub const fn packed(order: usize) -> usize {
+    order * (order + 1) / 2
+}
+
+/// Where column `j` of a packed lower triangle stands, from its diagonal on.
+pub(super) fn column(order: usize, j: usize) -> Range<usize> {
+    let start = j * order - j * j.saturating_sub(1) / 2;
+    start..start + order - j
+}
+
+impl Contribution<'_> {
+    /// Whether it is over so many unknowns.
+    pub fn is_over(&self, unknowns: usize) -> bool {
+        let Self { matrix, right, diagonal } = self;
+        [matrix.len(), right.len(), diagonal.len()] == [packed(unknowns), unknowns, unknowns]
+    }
+}
+
+impl Front<'_> {
+    /// Adds a contribution whose rows and columns are the given ones of the front, lower triangle only.
+    pub fn add_contribution(&mut self, given: &Contribution<'_>, rows: &[usize]) {
+        let (width, height) = (self.width, self.height);
+        for (j, &at) in rows.iter().enumerate() {
+            self.right[at] += given.right[j];
+            self.diagonal[at] += given.diagonal[j];
+            for (&value, &other) in given.matrix[column(rows.len(), j)].iter().zip(&rows[j..]) {
+                let (row, column) = (at.max(other), at.min(other));
+                if column < width {
+                    self.panel[column * height + row] += value;
+                } else {
+                    self.update[(column - width) * (height - width) + row - width] += value;
+                }
+            }
+        }
+    }
+}
+
+impl System {
+    /// The rows of some kept blocks in the front of a supernode; all are in its pattern.
+    pub(super) fn rows_of(&self, supernode: usize, blocks: &[u32]) -> Vec<usize> {
+        let rows = |&block: &u32| {
+            let position = self.symbolic.position(block as usize);
+            let row = self.symbolic.panel_row(supernode, position).unwrap_or_default();
+            row..row + self.symbolic.dim(position)
+        };
+        blocks.iter().flat_map(rows).collect()
+    }
+}
+
+impl Factor {
+    /// Takes what is left for the outer unknowns, in the order of the layout, and the memory of its front; empty for a whole system,
+    /// and the second time.
+    pub fn take_contribution(&mut self) -> Contribution<'static> {
+        let symbolic = &*self.panels.symbolic;
+        let Some(open) = symbolic.open() else { return Contribution::default() };
+        let (s, first) = (&symbolic.supernodes()[open], symbolic.first_unknown(open));
+        if self.panels.values.len() < s.panel.end {
+            return Contribution::default();
+        }
+        let mut matrix = Vec::with_capacity(packed(s.width));
+        for (j, column) in self.panels.panel(open).chunks_exact(s.width.max(1)).enumerate() {
+            matrix.extend_from_slice(&column[j..]);
+        }
+        self.panels.values.truncate(s.panel.start);
+        self.panels.values.shrink_to_fit();
+        Contribution {
+            matrix: matrix.into(),
+            right: self.right[first..].to_vec().into(),
+            diagonal: self.diagonal[first..].to_vec().into(),
+        }
+    }
+
+    /// Makes room again for the front of the outer unknowns.
+    pub(super) fn reopen(&mut self) {
+        self.panels.values.resize(self.panels.symbolic.values(), 0.0);
+    }
+}
+
+/// Writes both triangles of a symmetric matrix whose lower one is packed.
+pub(super) fn unpack(order: usize, triangle: &[f64], square: &mut [f64]) {
+    for j in 0..order {
+        for (i, &value) in (j..order).zip(&triangle[column(order, j)]) {
+            (square[j * order + i], square[i * order + j]) = (value, value);
+        }
+    }
+}
+
+impl SelectedInverse {
+    /// The inverse over some kept blocks that stand together in its pattern, in their order: a lower triangle, column by column. What is
+    /// not in the pattern is NaN.
+    pub fn triangle(&self, layout: &Layout, blocks: &[u32]) -> Vec<f64> {
+        let starts = blocks.iter().scan(0, |next, &block| {
+            let start = *next;
+            *next += layout.kept_dim(block as usize);
+            Some(start)
+        });
+        let starts: Vec<usize> = starts.collect();
+        let order = layout.unknowns_of(blocks).count();
+        let mut triangle = vec![f64::NAN; packed(order)];
+        for (a, (&block, &left)) in blocks.iter().zip(&starts).enumerate() {
+            let width = layout.kept_dim(block as usize);
+            for (&other, &top) in blocks[a..].iter().zip(&starts[a..]) {
+                let values = self.block(other as usize, block as usize).unwrap_or_default();
+                for (i, row) in values.chunks_exact(width.max(1)).enumerate() {
+                    for (j, &value) in row.iter().enumerate().filter(|(j, _)| left + j <= top + i) {
+                        triangle[column(order, left + j).start + top + i - left - j] = value;
+                    }
+                }
+            }
+        }
+        triangle
+    }
+}

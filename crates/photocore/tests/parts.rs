@@ -1,0 +1,377 @@
+//! Systems cut into the nodes of a tree (Helmert blocking) against the same in one piece.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod cut;
+
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+
+use cut::{Cut, TREES};
+use photocore::normals::{
+    Contribution, Equations, Factor, GroupRows, Layout, LayoutError, Ordering, Prior, Stopped, System, Tie,
+    TieRows,
+};
+use proptest::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// Numbers between -1 and 1 that a seed and two places give.
+fn number(seed: u64, i: usize, j: usize) -> f64 {
+    let mut state = seed
+        ^ (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        ^ (j as u64).wrapping_mul(0xD1B5_4A32_D192_ED03);
+    for _ in 0..2 {
+        state = (state ^ (state >> 31)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    }
+    (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// The equations of a system, or of a node of it: local blocks, groups, ties and kept blocks as the whole system numbers them.
+struct Piece<'a> {
+    seed: u64,
+    layout: Layout,
+    locals: Vec<usize>,
+    groups: Vec<usize>,
+    ties: Vec<usize>,
+    kept: Vec<usize>,
+    prior: Prior,
+    below: Vec<Contribution<'a>>,
+}
+
+impl Piece<'_> {
+    /// The coefficients of blocks of unknowns, each with its number in the whole system.
+    fn fill(&self, row: usize, target: &mut [f64], blocks: impl Iterator<Item = (usize, usize)>) {
+        let columns = blocks.flat_map(|(block, dim)| (0..dim).map(move |k| 16 * block + k));
+        target.iter_mut().zip(columns).for_each(|(value, column)| *value = number(self.seed, row, column));
+    }
+
+    fn own(&self, block: usize) -> (usize, usize) {
+        (1 + self.kept[block], self.layout.kept_dim(block))
+    }
+}
+
+impl Equations for Piece<'_> {
+    fn write(&self, _: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let (layout, whole) = (&self.layout, self.groups[group]);
+        for k in 0..layout.rows() {
+            let row = 8 * whole + k;
+            rows.constant[k] = number(self.seed, row, 7);
+            let l = layout.local_dim();
+            self.fill(row, &mut rows.local[l * k..][..l], [(1000, l)].into_iter());
+            let main = layout.kept_of(group);
+            let width = layout.kept_dim(main);
+            self.fill(row, &mut rows.kept[width * k..][..width], [self.own(main)].into_iter());
+            let width = layout.common_width(group);
+            let further = layout.further_of(group).iter().map(|&block| self.own(block as usize));
+            self.fill(row, &mut rows.common[width * k..][..width], further);
+        }
+    }
+
+    fn write_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+        let (layout, whole) = (&self.layout, self.ties[tie]);
+        let width = layout.tie_columns(tie).count();
+        for (k, constant) in rows.constant.iter_mut().enumerate() {
+            let row = 100_000 + 8 * whole + k;
+            *constant = number(self.seed, row, 7);
+            let kept = layout.ties()[tie].kept.iter().map(|&block| self.own(block as usize));
+            self.fill(row, &mut rows.coefficients[width * k..][..width], kept);
+        }
+    }
+
+    fn contribution(&self, below: usize) -> Option<&Contribution<'_>> {
+        self.below.get(below)
+    }
+}
+
+/// A system in one piece.
+fn whole(layout: Layout, seed: u64) -> Piece<'static> {
+    let unknowns = layout.unknowns();
+    let weight: Vec<f64> = (0..unknowns).map(|i| 0.5 + 0.4 * number(seed, i, 11)).collect();
+    let right = (0..unknowns).map(|i| number(seed, i, 13)).collect();
+    Piece {
+        seed,
+        locals: (0..layout.locals()).collect(),
+        groups: (0..layout.groups()).collect(),
+        ties: (0..layout.ties().len()).collect(),
+        kept: (0..layout.kept()).collect(),
+        prior: Prior { weight, right, between: vec![] },
+        below: vec![],
+        layout,
+    }
+}
+
+/// The kept blocks that each local block, then each tie, touches.
+fn touched(layout: &Layout) -> Vec<Vec<usize>> {
+    let of_local = |local| {
+        let blocks: BTreeSet<usize> =
+            layout.groups_of(local).flat_map(|group| layout.blocks_of(group)).collect();
+        blocks.into_iter().collect()
+    };
+    let ties = layout.ties().iter().map(|tie| tie.kept.iter().map(|&block| block as usize).collect());
+    (0..layout.locals()).map(of_local).chain(ties).collect()
+}
+
+/// Node `p` of a system that is cut.
+fn piece<'a>(all: &Piece<'_>, cut: &Cut, p: usize) -> Piece<'a> {
+    let layout = &all.layout;
+    let kept = cut.blocks(p);
+    let place = |block: usize| kept.iter().position(|&own| own == block).unwrap() as u32;
+    let homes = &cut.homes;
+    let locals: Vec<usize> = (0..layout.locals()).filter(|&local| homes[local] == p).collect();
+    let ties: Vec<usize> =
+        (0..layout.ties().len()).filter(|&tie| homes[layout.locals() + tie] == p).collect();
+    let groups: Vec<usize> = locals.iter().flat_map(|&local| layout.groups_of(local)).collect();
+    let (mut ptr, mut further_ptr, mut further) = (vec![0], vec![0], vec![]);
+    locals.iter().for_each(|&local| ptr.push(ptr[ptr.len() - 1] + layout.groups_of(local).len()));
+    for &group in &groups {
+        further.extend(layout.further_of(group).iter().map(|&block| place(block as usize)));
+        further_ptr.push(further.len());
+    }
+    let dims: Vec<usize> = kept.iter().map(|&block| layout.kept_dim(block)).collect();
+    let main = groups.iter().map(|&group| place(layout.kept_of(group))).collect();
+    let tie = |&tie: &usize| {
+        let Tie { rows, kept, border } = layout.ties()[tie].clone();
+        Tie { rows, kept: kept.iter().map(|&block| place(block as usize)).collect(), border }
+    };
+    let children = cut.children(p);
+    let below = children.iter().map(|&child| cut.outer[child].iter().map(|&block| place(block)).collect());
+    let own = Layout::new(layout.rows(), layout.local_dim(), &dims, ptr, main).unwrap();
+    let own =
+        own.with_further(further_ptr, further).unwrap().with_ties(ties.iter().map(tie).collect()).unwrap();
+    let outer = cut.outer[p].iter().map(|&block| place(block)).collect();
+    let own = own.as_part(outer, below.collect()).unwrap();
+    let unknowns = locals.iter().flat_map(|&local| layout.local_range(local));
+    let unknowns: Vec<usize> =
+        unknowns.chain(kept.iter().flat_map(|&block| layout.kept_range(block))).collect();
+    let mut prior = Prior {
+        weight: unknowns.iter().map(|&unknown| all.prior.weight[unknown]).collect(),
+        right: unknowns.iter().map(|&unknown| all.prior.right[unknown]).collect(),
+        between: vec![],
+    };
+    let outer: Vec<usize> = own.unknowns_of(own.outer()).collect();
+    outer.iter().for_each(|&unknown| (prior.weight[unknown], prior.right[unknown]) = (0.0, 0.0));
+    Piece { seed: all.seed, layout: own, locals, groups, ties, kept, prior, below: vec![] }
+}
+
+fn pool(threads: usize) -> ThreadPool {
+    ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
+}
+
+fn go(_: usize) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+fn done<T>(flow: ControlFlow<Stopped, T>) -> T {
+    match flow {
+        ControlFlow::Continue(value) => value,
+        ControlFlow::Break(stopped) => panic!("{stopped:?}"),
+    }
+}
+
+/// Every node of a tree, formed and eliminated from the leaves up.
+fn upward<'a>(
+    all: &Piece<'_>,
+    cut: &Cut,
+    ordering: Ordering,
+    pool: &ThreadPool,
+) -> Vec<(Piece<'a>, System, Factor)> {
+    let mut left: Vec<Option<Contribution<'static>>> = vec![];
+    let mut nodes = vec![];
+    for p in 0..cut.parent.len() {
+        let mut piece = piece(all, cut, p);
+        piece.below = cut.children(p).iter().map(|&child| left[child].take().unwrap()).collect();
+        let system = System::new(piece.layout.clone(), ordering);
+        let mut factor = done(system.factor(pool, &piece, &piece.prior, 0.0, &mut go));
+        assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
+        let contribution = factor.take_contribution();
+        let outer = system.symbolic().outer_unknowns();
+        assert!(
+            contribution.is_over(outer) && outer == piece.layout.unknowns_of(piece.layout.outer()).count()
+        );
+        left.push(Some(contribution));
+        nodes.push((piece, system, factor));
+    }
+    nodes
+}
+
+fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
+    assert!((actual - expected).abs() <= tolerance, "{what}: {actual:e} instead of {expected:e}");
+}
+
+/// Solution, sums and cofactors of a system that is cut against those of one piece.
+fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u64, ordering: Ordering) {
+    let pool = pool(2);
+    let cut = Cut::new(tree, &touched(&layout), node_of);
+    let all = whole(layout, seed);
+    let system = System::new(all.layout.clone(), ordering);
+    let factor = done(system.factor(&pool, &all, &all.prior, 0.0, &mut go));
+    let expected = done(system.solve(&pool, &factor, &all, &all.prior, 0.0, &mut go));
+    let (sum, decrease) = (factor.sum_of_squares, factor.decrease);
+    let cofactors = done(system.invert(&pool, factor, &all, &all.prior, &mut go));
+    let nodes = upward(&all, &cut, ordering, &pool);
+    let sums = nodes.iter().map(|(.., factor)| factor.sum_of_squares).sum();
+    assert_close(sums, sum, 1e-12 * sum, "sum of squares");
+    assert_close(
+        nodes.iter().map(|(.., factor)| factor.decrease).sum(),
+        decrease,
+        1e-9 * decrease,
+        "decrease",
+    );
+    let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let mut handed: Vec<(Vec<f64>, Vec<f64>)> = vec![Default::default(); nodes.len()];
+    for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
+        let (outer_step, outer_cofactors) = std::mem::take(&mut handed[p]);
+        let step = done(system.solve_below(&pool, &factor, &piece, &piece.prior, 0.0, &outer_step, &mut go));
+        let own = system.layout();
+        let unknowns = piece.locals.iter().flat_map(|&local| all.layout.local_range(local));
+        let unknowns = unknowns.chain(piece.kept.iter().flat_map(|&block| all.layout.kept_range(block)));
+        for (x, unknown) in step.iter().zip(unknowns) {
+            assert_close(*x, expected[unknown], 1e-9 * largest, "solution");
+        }
+        let found = done(system.invert_below(&pool, factor, &piece, &piece.prior, &outer_cofactors, &mut go));
+        for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
+            let outer_step = own.unknowns_of(blocks).map(|unknown| step[unknown]).collect();
+            handed[child] = (outer_step, found.selected.triangle(own, blocks));
+        }
+        for (i, &block) in piece.kept.iter().enumerate() {
+            let pair =
+                [found.selected.block(i, i), cofactors.selected.block(block, block)].map(Option::unwrap);
+            pair[0]
+                .iter()
+                .zip(&pair[1])
+                .for_each(|(q, exact)| assert_close(*q, *exact, 1e-9, "kept cofactor"));
+        }
+        let squares = own.local_dim() * own.local_dim();
+        for (i, &local) in piece.locals.iter().enumerate() {
+            for k in 0..squares {
+                let exact = cofactors.cofactors.local[squares * local + k];
+                assert_close(found.cofactors.local[squares * i + k], exact, 1e-9, "local cofactor");
+            }
+        }
+        let rows = own.rows();
+        let of_groups = piece.groups.iter().flat_map(|&group| rows * group..rows * (group + 1));
+        let first = rows * all.layout.groups();
+        let of_ties = piece.ties.iter().flat_map(|&tie| all.layout.tie_rows(tie)).map(|row| first + row);
+        for (share, row) in found.cofactors.equations.iter().zip(of_groups.chain(of_ties)) {
+            assert_close(*share, cofactors.cofactors.equations[row], 1e-9, "adjusted equation");
+        }
+    }
+}
+
+const ALL: [Ordering; 4] =
+    [Ordering::Auto, Ordering::Input, Ordering::MinimumDegree, Ordering::DissectionByGraph];
+
+/// Systems of local blocks on one to three of some main blocks, with common ones and ties.
+fn systems() -> impl Strategy<Value = (Layout, u64)> {
+    let shape = (1..4usize, prop::collection::vec(1..8usize, 4..16), 0..3u32);
+    let of_shape = |(l, kept, common): (usize, Vec<usize>, u32)| {
+        let main = common..kept.len() as u32;
+        let further = prop::collection::btree_set(0..common.max(1), 0..=common as usize);
+        let groups = prop::collection::vec(prop::collection::vec((main, further), 1..4), 1..40);
+        let tied = prop::collection::btree_set(0..kept.len() as u32, 1..4);
+        (Just((l, kept)), groups, prop::collection::vec((1..4usize, tied), 0..6), any::<u64>())
+    };
+    shape.prop_flat_map(of_shape).prop_map(|((l, kept), locals, ties, seed)| {
+        let mut ptr = vec![0];
+        locals.iter().for_each(|groups| ptr.push(ptr[ptr.len() - 1] + groups.len()));
+        let (main, further): (Vec<u32>, Vec<BTreeSet<u32>>) = locals.into_iter().flatten().unzip();
+        let mut further_ptr = vec![0];
+        further.iter().for_each(|own| further_ptr.push(further_ptr[further_ptr.len() - 1] + own.len()));
+        let further = further.into_iter().flatten().collect();
+        let tie = |(rows, kept): (usize, BTreeSet<u32>)| Tie {
+            rows,
+            kept: kept.into_iter().collect(),
+            border: 0..0,
+        };
+        let layout = Layout::new(2, l, &kept, ptr, main).unwrap().with_further(further_ptr, further).unwrap();
+        (layout.with_ties(ties.into_iter().map(tie).collect()).unwrap(), seed)
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+
+    #[test]
+    fn parts_agree_with_one_piece(
+        (layout, seed) in systems(),
+        ordering in prop::sample::select(ALL.to_vec()),
+        tree in 0..TREES.len(),
+    ) {
+        let tree = TREES[tree];
+        let place = |block: usize| (number(seed, block, 17).abs() * tree.len() as f64) as usize;
+        let node_of = (0..layout.kept()).map(place).collect();
+        compare(layout, tree, node_of, seed, ordering);
+    }
+}
+
+/// A block of strips, with a camera for every strip.
+fn strips(count: usize, length: usize) -> Layout {
+    let (mut ptr, mut kept, mut further_ptr, mut further) = (vec![0], vec![], vec![0], vec![]);
+    for strip in 0..count {
+        for photo in 0..length {
+            for reach in [2, 3] {
+                for s in strip..count.min(strip + 2) {
+                    for p in photo..length.min(photo + reach) {
+                        kept.push((s * length + p) as u32);
+                        further.push((count * length + s) as u32);
+                        further_ptr.push(further.len());
+                    }
+                }
+                ptr.push(kept.len());
+            }
+        }
+    }
+    let dims = [vec![6; count * length], vec![3; count]].concat();
+    Layout::new(2, 3, &dims, ptr, kept).unwrap().with_further(further_ptr, further).unwrap()
+}
+
+#[test]
+fn a_block_with_cameras_in_seven_nodes_agrees_with_one_piece() {
+    let (count, length) = (5, 24);
+    let layout = strips(count, length);
+    // Four leaves across the strips; what they share goes up.
+    let node_of = (0..count * length).map(|photo| [0, 1, 3, 4][4 * (photo % length) / length]);
+    let node_of: Vec<usize> = node_of.chain([6; 5]).collect();
+    compare(
+        layout,
+        &[Some(2), Some(2), Some(6), Some(5), Some(5), Some(6), None],
+        node_of,
+        3,
+        Ordering::Auto,
+    );
+}
+
+#[test]
+fn bits_of_a_node_do_not_depend_on_the_number_of_threads() {
+    let layout = strips(4, 30);
+    let node_of = (0..120).map(|photo| usize::from(photo % 30 >= 15)).chain([2; 4]).collect();
+    let cut = Cut::new(&[Some(2), Some(2), None], &touched(&layout), node_of);
+    let all = whole(layout, 5);
+    let left = [1, 3].map(|threads| {
+        let pool = pool(threads);
+        let mut numbers = vec![];
+        for p in 0..2 {
+            let piece = piece(&all, &cut, p);
+            let system = System::new(piece.layout.clone(), Ordering::Auto);
+            let mut factor = done(system.factor(&pool, &piece, &piece.prior, 0.0, &mut go));
+            let Contribution { matrix, right, diagonal } = factor.take_contribution();
+            numbers.extend([matrix, right, diagonal].concat());
+            assert!(factor.take_contribution().matrix.is_empty(), "handed out once");
+        }
+        numbers
+    });
+    assert!(left[0].iter().zip(&left[1]).all(|(a, b)| a.to_bits() == b.to_bits()));
+}
+
+#[test]
+fn parts_that_contradict_their_layout_are_refused() {
+    let layout = || Layout::new(1, 1, &[1, 1], vec![0, 2], vec![0, 1]).unwrap();
+    for (outer, below) in
+        [(vec![2], vec![]), (vec![1, 1], vec![]), (vec![], vec![vec![0, 2]]), (vec![], vec![vec![1, 1]])]
+    {
+        assert_eq!(layout().as_part(outer, below).err(), Some(LayoutError::Outer));
+    }
+    let bordered = layout().with_border(1, vec![0..1; 2]).unwrap();
+    assert_eq!(bordered.clone().as_part(vec![1], vec![]).err(), Some(LayoutError::Outer));
+    assert!(bordered.as_part(vec![], vec![]).is_ok());
+}

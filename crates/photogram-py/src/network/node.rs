@@ -1,0 +1,318 @@
+//! A node of the elimination tree of a block that is adjusted in parts; its documentation is in `_photocore.pyi`.
+
+use std::borrow::Cow;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use numpy::{PyArray1, PyReadonlyArrayDyn};
+use photocore::network::{
+    BlockOf, FormedNode as Formed, NetworkError as Failure, Node as Core, NodePrediction, Surroundings,
+};
+use photocore::normals::{Contribution, packed};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::block_network::BlockNetwork;
+use super::covariances::refused;
+use super::solution::BlockSolution;
+use super::{FailureRow, failure};
+use crate::arrays::{InputError, numbers};
+use crate::options::unknown;
+use crate::work::{Workers, watched};
+
+/// Adds the classes to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Node>()?;
+    module.add_class::<FormedNode>()
+}
+
+type Numbers<'py> = PyReadonlyArrayDyn<'py, f64>;
+type Vector<'py> = Bound<'py, PyArray1<f64>>;
+
+/// Matrix, right-hand side and diagonal of what a node leaves.
+type ContributionRow<'py> = (Numbers<'py>, Numbers<'py>, Numbers<'py>);
+
+/// What a block of unknowns belongs to, and its index.
+pub type BlockRow = (String, usize);
+
+fn block_of((kind, index): BlockRow) -> PyResult<BlockOf> {
+    Ok(match kind.as_str() {
+        "photo" => BlockOf::Photo(index),
+        "camera" => BlockOf::Camera(index),
+        "unknown" => BlockOf::Common(index),
+        "point" => BlockOf::Point(index),
+        other => return Err(unknown("kind of block", other)),
+    })
+}
+
+/// A failure of a node: what is wrong with its arguments, or with the block.
+fn failed(error: &Failure) -> PyErr {
+    match error {
+        Failure::NoBlock(_) | Failure::Node(_) | Failure::State | Failure::Layout(_) => {
+            InputError::new_err(error.to_string())
+        }
+        error => refused(error),
+    }
+}
+
+fn indices<'py>(py: Python<'py>, places: &[usize]) -> Bound<'py, PyArray1<i64>> {
+    PyArray1::from_iter(py, places.iter().map(|&place| place as i64))
+}
+
+/// What stands together in memory: large arrays are not copied.
+fn slice<'a>(name: &str, array: &'a Numbers<'_>) -> PyResult<&'a [f64]> {
+    array.as_slice().map_err(|_| InputError::new_err(format!("{name} must be contiguous")))
+}
+
+/// A node, its blocks ordered.
+#[pyclass(frozen, module = "photogram._photocore")]
+pub struct Node {
+    node: Arc<Core>,
+}
+
+#[pymethods]
+impl Node {
+    #[getter]
+    fn size(&self) -> usize {
+        self.node.size()
+    }
+
+    #[getter]
+    fn outer<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        indices(py, self.node.outer())
+    }
+
+    #[getter]
+    fn children<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyArray1<i64>>> {
+        self.node.below().iter().map(|places| indices(py, places)).collect()
+    }
+
+    #[getter]
+    fn counts(&self) -> (usize, usize, usize) {
+        let counts = self.node.counts();
+        (counts.observations, counts.weighted, counts.unknowns)
+    }
+
+    #[getter]
+    fn dropped(&self) -> Vec<(usize, &'static str)> {
+        self.node.dropped().iter().map(|dropped| (dropped.point, dropped.reason.name())).collect()
+    }
+
+    #[getter]
+    fn initial<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        PyArray1::from_slice(py, self.node.initial())
+    }
+
+    #[getter]
+    fn prediction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let NodePrediction { points, interior, outer, images, observations, operations, factor, memory } =
+            self.node.prediction();
+        let bytes = |count: usize| (size_of::<f64>() * count) as f64;
+        let dict = PyDict::new(py);
+        let facts = [
+            ("points", points as f64),
+            ("interior", interior as f64),
+            ("outer", outer as f64),
+            ("images", images as f64),
+            ("observations", observations as f64),
+            ("reduction", operations.reduction),
+            ("factor", operations.factor),
+            ("inverse", operations.inverse),
+            ("factor_bytes", bytes(factor)),
+            ("memory_bytes", memory as f64),
+            ("contribution_bytes", bytes(packed(outer) + 2 * outer)),
+            ("cofactor_bytes", bytes(packed(outer))),
+            ("step_bytes", bytes(outer)),
+        ];
+        facts.into_iter().try_for_each(|(name, value)| dict.set_item(name, value))?;
+        Ok(dict)
+    }
+
+    fn advance<'py>(
+        &self,
+        py: Python<'py>,
+        state: Numbers<'py>,
+        step: Numbers<'py>,
+    ) -> PyResult<Vector<'py>> {
+        let (state, step) = (numbers("state", &state)?, numbers("step", &step)?);
+        let reached = py.detach(|| self.node.advance(&state, &step));
+        reached.map(|reached| PyArray1::from_vec(py, reached)).map_err(|error| failed(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads))]
+    fn relocate<'py>(&self, py: Python<'py>, state: Numbers<'py>, threads: usize) -> PyResult<Vector<'py>> {
+        let state = numbers("state", &state)?;
+        let moved = watched(py, self.workers(threads), None, |pool, _| self.node.relocate(&state, pool))?;
+        moved.map(|moved| PyArray1::from_vec(py, moved)).map_err(|error| failed(&error))
+    }
+
+    #[pyo3(signature = (state, *, threads))]
+    fn objective(
+        &self,
+        py: Python<'_>,
+        state: Numbers<'_>,
+        threads: usize,
+    ) -> PyResult<(f64, f64, f64, f64)> {
+        let state = numbers("state", &state)?;
+        let sums = watched(py, self.workers(threads), None, |pool, _| self.node.objective(&state, pool))?;
+        let sums = sums.map_err(|error| failed(&error))?;
+        Ok((sums.camera, sums.ground, sums.plates, sums.observations))
+    }
+
+    #[pyo3(signature = (state, contributions, *, damping, threads, progress = None))]
+    fn form(
+        &self,
+        py: Python<'_>,
+        state: Numbers<'_>,
+        contributions: Vec<ContributionRow<'_>>,
+        damping: f64,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<FormedNode> {
+        let state = numbers("state", &state)?;
+        let mut given = Vec::with_capacity(contributions.len());
+        for (matrix, right, diagonal) in &contributions {
+            given.push(Contribution {
+                matrix: Cow::Borrowed(slice("the matrix of a contribution", matrix)?),
+                right: Cow::Borrowed(slice("the right-hand side of a contribution", right)?),
+                diagonal: Cow::Borrowed(slice("the diagonal of a contribution", diagonal)?),
+            });
+        }
+        let formed = watched(py, self.workers(threads), progress, |pool, watch| {
+            let mut formed = self.node.form(&state, &given, damping, pool, watch)?;
+            let contribution = formed.take_contribution();
+            Ok((formed, contribution))
+        })?;
+        let (formed, contribution) = formed.map_err(|error: Failure| failed(&error))?;
+        Ok(FormedNode {
+            node: Arc::clone(&self.node),
+            sum_of_squares: formed.sum_of_squares(),
+            decrease: formed.decrease(),
+            undetermined: self.node.undetermined(&formed).map(|error| failure(&error, "block")),
+            contribution: Mutex::new(Some(contribution)),
+            formed: Mutex::new(Some(formed)),
+        })
+    }
+
+    #[pyo3(signature = (state, before, *, threads))]
+    fn solution(
+        &self,
+        py: Python<'_>,
+        state: Numbers<'_>,
+        before: Numbers<'_>,
+        threads: usize,
+    ) -> PyResult<BlockSolution> {
+        let (state, before) = (numbers("state", &state)?, numbers("before", &before)?);
+        let told =
+            watched(py, self.workers(threads), None, |pool, _| self.node.solution(&state, &before, pool))?;
+        told.map(|solution| BlockSolution { solution, unknowns: 6 }).map_err(|error| failed(&error))
+    }
+}
+
+impl Node {
+    /// A block as a node of a larger one, whose blocks are named for the nodes above and below.
+    pub fn new(
+        py: Python<'_>,
+        block: &BlockNetwork,
+        outer: Vec<BlockRow>,
+        children: Vec<Vec<BlockRow>>,
+        middle: Option<[f64; 3]>,
+        threads: usize,
+    ) -> PyResult<Self> {
+        let BlockNetwork { network, options } = block;
+        let blocks = |rows: Vec<BlockRow>| rows.into_iter().map(block_of).collect::<PyResult<Vec<BlockOf>>>();
+        let below = children.into_iter().map(blocks).collect::<PyResult<_>>()?;
+        let surroundings = Surroundings { outer: blocks(outer)?, below, middle };
+        let workers = Workers::of(threads, network.images.len());
+        let node = watched(py, workers, None, |pool, _| network.node(options, surroundings, pool))?;
+        node.map(|node| Self { node: Arc::new(node) }).map_err(|error| failed(&error))
+    }
+
+    fn workers(&self, threads: usize) -> Workers {
+        Workers::of(threads, self.node.images())
+    }
+}
+
+/// A node at a state, its points and blocks eliminated.
+#[pyclass(frozen, module = "photogram._photocore")]
+pub struct FormedNode {
+    node: Arc<Core>,
+    sum_of_squares: f64,
+    decrease: f64,
+    undetermined: Option<FailureRow>,
+    contribution: Mutex<Option<Contribution<'static>>>,
+    /// None once it is inverted.
+    formed: Mutex<Option<Formed>>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn used_up(what: &str) -> PyErr {
+    PyValueError::new_err(format!("{what} of this node was taken before"))
+}
+
+#[pymethods]
+impl FormedNode {
+    #[getter]
+    fn contribution<'py>(&self, py: Python<'py>) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>)> {
+        let taken = lock(&self.contribution).take().ok_or_else(|| used_up("the contribution"))?;
+        let [matrix, right, diagonal] = [taken.matrix, taken.right, taken.diagonal]
+            .map(|values| PyArray1::from_vec(py, values.into_owned()));
+        Ok((matrix, right, diagonal))
+    }
+
+    #[getter]
+    fn sum_of_squares(&self) -> f64 {
+        self.sum_of_squares
+    }
+
+    #[getter]
+    fn decrease(&self) -> f64 {
+        self.decrease
+    }
+
+    #[getter]
+    fn undetermined(&self) -> Option<FailureRow> {
+        self.undetermined.clone()
+    }
+
+    #[pyo3(signature = (outer, *, threads, progress = None))]
+    fn solve<'py>(
+        &self,
+        py: Python<'py>,
+        outer: Numbers<'py>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Vector<'py>> {
+        let outer = numbers("outer", &outer)?;
+        let workers = Workers::of(threads, self.node.images());
+        let step = watched(py, workers, progress, |pool, watch| match &*lock(&self.formed) {
+            Some(formed) => self.node.solve(formed, &outer, pool, watch).map(Some),
+            None => Ok(None),
+        })?;
+        let step = step.map_err(|error: Failure| failed(&error))?.ok_or_else(|| used_up("the factor"))?;
+        Ok(PyArray1::from_vec(py, step))
+    }
+
+    #[pyo3(signature = (outer, state, *, threads, progress = None))]
+    fn invert<'py>(
+        &self,
+        py: Python<'py>,
+        outer: Numbers<'py>,
+        state: Numbers<'py>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(BlockSolution, Vec<Vector<'py>>)> {
+        let (given, state) = (slice("outer", &outer)?, numbers("state", &state)?);
+        let formed = lock(&self.formed).take().ok_or_else(|| used_up("the factor"))?;
+        let workers = Workers::of(threads, self.node.images());
+        let found = watched(py, workers, progress, |pool, watch| {
+            self.node.invert(formed, given, &state, pool, watch)
+        })?;
+        let (solution, below) = found.map_err(|error| failed(&error))?;
+        let below = below.into_iter().map(|triangle| PyArray1::from_vec(py, triangle)).collect();
+        Ok((BlockSolution { solution, unknowns: 6 }, below))
+    }
+}

@@ -1,0 +1,508 @@
+"""The iterations of a block that is adjusted in parts: up the tree, down again, and control of the steps.
+
+Steps and their rules are those of one process (`crates/photocore/src/adjustment/damped.rs`): full steps, one
+that raises the sum of squares is taken back and damped, the last one is told by its length or by the rate at
+which steps fall. What is decided here rests on sums over all nodes, added in the order of their numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from photogram.adjustment.adjustment import Progress
+from photogram.arguments.types import Floats
+from photogram.distributed.cut import Tree
+from photogram.distributed.executors import Executor, Handle
+from photogram.distributed.files import read_json, write_json
+from photogram.distributed.tasks import (
+    Formed,
+    Job,
+    LostFactorError,
+    Point,
+    about,
+    counted,
+    evaluated,
+    finished,
+    formed,
+    inverted,
+    relocated,
+    solved,
+    state_path,
+)
+from photogram.errors import AdjustmentError, RankError
+from photogram.results.iteration import Iteration
+
+__all__ = ["Driver", "Outcome", "Stop"]
+
+ROUNDING = 1e-12
+"""A step is accepted when the sum of squares does not rise by more than this fraction of it."""
+NEGLIGIBLE = 1e-3
+"""A full step that changes no unknown by more than this multiple of its standard deviation is accepted."""
+FAR = 30.0
+"""Beyond so many standard deviations in the mean points are intersected anew."""
+STILL = 1e-4
+"""The sum of squares stands still where three damped steps lower it by less than this multiple of the
+variance of unit weight."""
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-5, 1e9
+ATTEMPTS = 20
+"""So often is a node formed again that a worker has taken with it."""
+PROGRESS = "progress.json"
+
+
+@dataclass(frozen=True)
+class Stop:
+    """When to stop: the options of :func:`photogram.adjust` of the same names."""
+
+    tolerance: float = 1e-5
+    max_iterations: int = 50
+    covariance: bool = True
+    unit_variance: str = "constrained"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What an adjustment in parts has come to.
+
+    Attributes
+    ----------
+    status
+        `converged`, `not converged` or `diverged`.
+    initial_sum_of_squares, iterations
+        The history.
+    sums_of_squares
+        Weighted, of camera, ground, plates and observations beside images.
+    counts
+        Observations, weighted unknowns, unknowns.
+    degrees_of_freedom, variance_of_unit_weight
+        Of the chosen unit variance; None without degrees of freedom.
+    state, before
+        The last state of the nodes, and the one before the last step.
+    formations
+        How often the normal equations were formed.
+    """
+
+    status: str
+    initial_sum_of_squares: float
+    iterations: list[Iteration]
+    sums_of_squares: tuple[float, float, float, float]
+    counts: tuple[int, int, int]
+    degrees_of_freedom: int
+    variance_of_unit_weight: float | None
+    state: str
+    before: str
+    formations: int
+
+
+@dataclass
+class _Course:
+    """How far the iterations have come: what a run that died goes on from.
+
+    `ending`, when they are over: the status, the state whose equations give cofactors, and the state reached.
+    """
+
+    state: str = "0"
+    before: str = "0"
+    damping: float = 0.0
+    best: float = math.nan
+    initial: float = math.nan
+    refused: float | None = None
+    ending: tuple[str, str, str] | None = None
+    trials: int = 0
+    formations: int = 0
+    iterations: list[Iteration] = field(default_factory=list)
+
+
+@dataclass
+class _Up:
+    """Normal equations that are formed: what every node leaves, and the sums."""
+
+    at: Point
+    contributions: dict[int, Handle]
+    places: dict[int, str]
+    sum_of_squares: float
+    decrease: float
+
+
+class Driver:
+    """Adjusts in parts.
+
+    Parameters
+    ----------
+    job
+        What tasks are told.
+    tree
+        The tree of the nodes.
+    executor
+        Does the tasks.
+    stop
+        When to stop.
+    progress
+        Told of parts done.
+    """
+
+    def __init__(
+        self,
+        job: Job,
+        tree: Tree,
+        executor: Executor,
+        stop: Stop,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> None:
+        self.job, self.tree, self.executor, self.stop = job, tree, executor, stop
+        self._progress = progress
+        self._course = _Course()
+        self._nodes = range(len(tree))
+        heights = np.zeros(len(tree))
+        for node in range(tree.root - 1, -1, -1):
+            heights[node] = heights[tree.parents[node]] + 1
+        # Deep nodes first: what waits for them waits longest.
+        self._costs = heights.tolist()
+
+    def run(self, *, resume: bool = False) -> Outcome:
+        """Adjust; with `resume` from the last complete iteration that the folder of the run has.
+
+        Raises
+        ------
+        RankError
+            The observations do not determine all unknowns.
+        AdjustmentError
+            The initial values give no finite sum of squares; a disk is full, a worker was lost too often: the
+            state of the last complete iteration stays.
+        """
+        if resume:
+            self._course = _read_course(self.job)
+        try:
+            return self._run()
+        except BaseException:
+            self.executor.stop()
+            raise
+
+    def _run(self) -> Outcome:
+        course = self._course
+        self._unknowns = self._counts()
+        if course.ending is not None:
+            return self._finish(self._up(Point(course.ending[1])))
+        up = self._up(Point(course.state, course.damping))
+        if not math.isfinite(up.sum_of_squares):
+            raise AdjustmentError("the initial values give no finite image coordinates")
+        if not course.iterations:
+            course.initial = course.best = up.sum_of_squares
+        while len(course.iterations) < self.stop.max_iterations and up.at.damping <= MOST_DAMPING:
+            change = math.sqrt(max(up.decrease, 0.0))
+            if up.at.damping == 0.0 and self._is_last(change):
+                return self._end("converged", up, change)
+            up, still = self._take(up, change)
+            if still:
+                return self._end("converged", up, None)
+        return self._end("diverged" if up.at.damping > MOST_DAMPING else "not converged", up, None)
+
+    def _is_last(self, change: float) -> bool:
+        """Whether a full step is the last one, by its length or by those that would follow (Hairer, IV.8)."""
+        if change <= self.stop.tolerance:
+            return True
+        before = self._course.iterations[-1] if self._course.iterations else None
+        rate = change / before.largest_change if before is not None and before.damping == 0.0 else 1.0
+        return change <= NEGLIGIBLE and rate < 1.0 and rate / (1.0 - rate) * change <= self.stop.tolerance
+
+    def _take(self, up: _Up, change: float) -> tuple[_Up, bool]:
+        """Take a step, or take it back and go on with more damping.
+
+        Returns
+        -------
+        What is formed next, and whether the sum of squares has stood still there.
+        """
+        course, damping = self._course, up.at.damping
+        after = self._step(up)
+        if change > FAR * math.sqrt(self._unknowns[4]):
+            after = self._relocated(after)
+        self._forget(up)
+        relaxed = damping / 10.0 if damping / 10.0 >= LEAST_DAMPING else 0.0
+        negligible = damping == 0.0 and change <= NEGLIGIBLE
+        try:
+            following = self._up(Point(after, relaxed))
+        except RankError:
+            # A step that leaves something undetermined has failed.
+            return self._refuse(damping)
+        if not (negligible or following.sum_of_squares <= course.best * (1.0 + ROUNDING)):
+            self._forget(following)
+            self._remove(after)
+            return self._refuse(damping)
+        course.best = following.sum_of_squares
+        iteration = Iteration(len(course.iterations) + 1, following.sum_of_squares, change, damping)
+        self._accept(iteration, after, relaxed)
+        return following, False
+
+    def _refuse(self, damping: float) -> tuple[_Up, bool]:
+        """Go on from the same values with more damping, or end where the sum of squares has stood still."""
+        course, still = self._course, False
+        if damping == 0.0:
+            freedom = max(self._unknowns[0] + self._unknowns[1] - self._unknowns[2], 1)
+            least = STILL * max(course.best / freedom, 1.0)
+            before, course.refused = course.refused, course.best
+            still = before is not None and before - course.best <= least
+        harder = 0.0 if still else max(10.0 * damping, FIRST_DAMPING)
+        return self._up(Point(course.state, harder)), still
+
+    def _accept(self, iteration: Iteration, state: str, damping: float) -> None:
+        """Keep an iteration that stands; the states before it are needed no longer."""
+        course = self._course
+        old, course.before, course.state = course.before, course.state, state
+        course.damping = damping
+        course.iterations.append(iteration)
+        _write_course(self.job, course)
+        if old not in (course.before, course.state):
+            self._remove(old)
+        self._tell("iteration", iteration.number, 0, iteration)
+
+    def _end(self, status: str, up: _Up, change: float | None) -> Outcome:
+        """Take the last step, where there is one, and finish.
+
+        Where the iterations end without a step the cofactors are those of the equations at the values
+        reached; else of those that have given the last step.
+        """
+        course = self._course
+        if change is None:
+            if up.at.damping > 0.0:
+                self._forget(up)
+                up = self._up(Point(course.state))
+            course.ending = status, course.state, course.state
+            _write_course(self.job, course)
+            return self._finish(up)
+        after = self._step(up)
+        total = sum(self._evaluated(after))
+        course.ending = status, course.state, after
+        self._accept(Iteration(len(course.iterations) + 1, total, change, 0.0), after, 0.0)
+        return self._finish(up)
+
+    def _finish(self, up: _Up) -> Outcome:
+        """Invert, and write the results: all that is left when the iterations are over."""
+        course = self._course
+        assert course.ending is not None
+        status, _, after = course.ending
+        sums = self._evaluated(after)
+        freedom, variance = self._variance(sums)
+        if self.stop.covariance:
+            self._invert(up, after, variance)
+        else:
+            self._sums([self._do(finished, n, course.before, after, variance) for n in self._nodes], "invert")
+        self._forget(up)
+        return Outcome(
+            status,
+            course.initial,
+            course.iterations,
+            sums,
+            self._unknowns[:3],
+            freedom,
+            variance,
+            after,
+            course.before,
+            course.formations,
+        )
+
+    def _evaluated(self, state: str) -> tuple[float, float, float, float]:
+        """Return weighted sums of squares of all nodes, by kinds."""
+        found = np.array(self._sums([self._do(evaluated, n, state) for n in self._nodes], "solve"))
+        # One after the other: NumPy's own order depends on how many there are.
+        camera, ground, plates, others = (sum(column) for column in found.T.tolist())
+        return camera, ground, plates, others
+
+    def _variance(self, sums: tuple[float, float, float, float]) -> tuple[int, float | None]:
+        """Return degrees of freedom and variance of unit weight (GIANT guide, Appendix E)."""
+        observations, weighted, unknowns, stations, _ = self._unknowns
+        freedom, kind = observations + weighted - unknowns, self.stop.unit_variance
+        total = sum(sums)
+        if kind != "constrained":
+            freedom, total = freedom - stations, total - sums[0]
+        if kind == "unity":
+            return freedom, 1.0
+        return freedom, total / freedom if freedom > 0 else None
+
+    def _counts(self) -> tuple[int, int, int, int, int]:
+        found = self._sums([self._do(counted, n) for n in self._nodes], "read")
+        observations, weighted, unknowns, stations, size = np.array(found).sum(axis=0).tolist()
+        return observations, weighted, unknowns, stations, size
+
+    def _up(self, at: Point) -> _Up:
+        """Form all nodes, children before parents."""
+        handles: dict[int, Handle] = {}
+        for node in self._nodes:
+            below = [handles[child] for child in self.tree.children[node]]
+            handles[node] = self._do(formed, node, at, below)
+        told = [self.executor.submit(about, handles[node]) for node in self._nodes]
+        try:
+            found: list[Formed] = self._sums(told, "form")
+        except BaseException:
+            self.executor.forget([*told, *handles.values()])
+            raise
+        self._course.formations += 1
+        return _Up(
+            at,
+            handles,
+            {each.number: each.place for each in found},
+            sum(each.sum_of_squares for each in found),
+            sum(each.decrease for each in found),
+        )
+
+    def _step(self, up: _Up) -> str:
+        """Solve from the root down; every node writes its state after the step. Return the name of that."""
+        self._course.trials += 1
+        after = f"{self._course.trials}"
+        wanted: dict[int, Floats] = {self.tree.root: np.zeros(0)}
+
+        def task(node: int) -> Handle:
+            return self._do(solved, node, up.at, after, wanted[node], near=up.places[node])
+
+        def then(node: int, handle: Handle) -> None:
+            wanted.update(zip(self.tree.children[node], self.executor.value(handle), strict=True))
+            self.executor.forget([handle])
+
+        self._down(up, task, then, "solve")
+        return after
+
+    def _invert(self, up: _Up, after: str, variance: float | None) -> None:
+        """Invert from the root down; every node writes what has become of it.
+
+        What a node has handed down, and what its children have left, stays until all below it is done: they
+        are needed again where a worker is lost.
+        """
+        done: dict[int, Handle] = {}
+        left = [1 + sum(1 for other in self._nodes if node in self.tree.above(other)) for node in self._nodes]
+
+        def task(node: int) -> Handle:
+            parent = int(self.tree.parents[node])
+            place = 0 if parent < 0 else self.tree.children[parent].index(node)
+            above = None if parent < 0 else done[parent]
+            return self._do(inverted, node, up.at, after, variance, above, place, near=up.places[node])
+
+        def then(node: int, handle: Handle) -> None:
+            # Cofactors stay where they are: this asks only whether they are there.
+            self.executor.value(self.executor.submit(_nothing, handle))
+            if node in done:
+                self.executor.forget([done[node]])
+            else:
+                for each in (node, *self.tree.above(node)):
+                    left[each] -= 1
+                    if not left[each] and each != node:
+                        below = [up.contributions[child] for child in self.tree.children[each]]
+                        self.executor.forget([done[each], *below])
+            done[node] = handle
+            if not self.tree.children[node]:
+                self.executor.forget([handle])
+
+        self._down(up, task, then, "invert")
+
+    def _down(
+        self, up: _Up, task: Callable[[int], Handle], then: Callable[[int, Handle], None], phase: str
+    ) -> None:
+        """Do a task of every node, parents before children.
+
+        A node whose factor was lost with its worker is formed again from what its children have left. What a
+        parent has handed down may be lost too, and Dask cannot make it again without that factor: then the
+        parent goes first, and what waits for it after it.
+        """
+        parents = self.tree.parents.tolist()
+        waiting: dict[Handle, tuple[int, int]] = {}
+        rounds = [0] * (len(self.tree) + 1)
+        again: dict[int, list[int]] = {}
+        failures = 0
+
+        def begin(node: int) -> None:
+            waiting[task(node)] = node, rounds[parents[node]]
+
+        begin(self.tree.root)
+        while waiting:
+            handle = self.executor.first(waiting)
+            node, since = waiting.pop(handle)
+            parent = parents[node]
+            try:
+                then(node, handle)
+            except LostFactorError as lost:
+                failures += 1
+                if failures > ATTEMPTS * len(self.tree):
+                    raise AdjustmentError(
+                        "workers were lost too often; the run can be taken up again"
+                    ) from None
+                if lost.number == node:
+                    self._form_again(up, node)
+                    begin(node)
+                elif parent in again:
+                    again[parent].append(node)
+                elif rounds[parent] > since:
+                    begin(node)
+                else:
+                    again[parent] = [node]
+                    begin(parent)
+                continue
+            rounds[node] += 1
+            if rounds[node] == 1:
+                self._tell(phase, sum(map(bool, rounds)), len(self.tree))
+            for each in again.pop(node, []) if rounds[node] > 1 else self.tree.children[node]:
+                begin(each)
+
+    def _form_again(self, up: _Up, node: int) -> None:
+        """Form a node again whose factor was lost."""
+        below = [up.contributions[child] for child in self.tree.children[node]]
+        old = up.contributions[node]
+        up.contributions[node] = self._do(formed, node, up.at, below)
+        told: Formed = self.executor.value(self.executor.submit(about, up.contributions[node]))
+        up.places[node] = told.place
+        self.executor.forget([old])
+
+    def _relocated(self, state: str) -> str:
+        """Return the state with points intersected anew, where that lowers the sum of squares."""
+        self._course.trials += 1
+        other = f"{self._course.trials}"
+        sums = np.array(self._sums([self._do(relocated, n, state, other) for n in self._nodes], "solve"))
+        before, moved = sums.sum(axis=0).tolist()
+        self._remove(state if moved < before else other)
+        return other if moved < before else state
+
+    def _do(self, function: Callable[..., Any], node: int, *given: Any, near: str = "") -> Handle:
+        return self.executor.submit(function, self.job, node, *given, near=near, cost=self._costs[node])
+
+    def _sums(self, handles: list[Handle], phase: str) -> list[Any]:
+        """Return what tasks of all nodes give, in the order of the nodes, however they arrive."""
+        waiting = dict(zip(handles, self._nodes, strict=True))
+        found: dict[int, Any] = {}
+        while waiting:
+            handle = self.executor.first(waiting)
+            found[waiting.pop(handle)] = self.executor.value(handle)
+            self._tell(phase, len(found), len(handles))
+        self.executor.forget(handles)
+        return [found[node] for node in self._nodes]
+
+    def _forget(self, up: _Up) -> None:
+        self.executor.forget(list(up.contributions.values()))
+
+    def _remove(self, state: str) -> None:
+        for node in self._nodes:
+            state_path(self.job.folder, node, state).unlink(missing_ok=True)
+
+    def _tell(self, phase: str, done: int, total: int, iteration: Iteration | None = None) -> None:
+        if self._progress is not None:
+            self._progress(Progress(phase, done, total, iteration))
+
+
+def _nothing(found: object) -> None:
+    del found
+
+
+def _write_course(job: Job, course: _Course) -> None:
+    document = {name: each for name, each in vars(course).items() if name != "iterations"}
+    document["iterations"] = [asdict(each) for each in course.iterations]
+    write_json(job.folder / PROGRESS, document)
+
+
+def _read_course(job: Job) -> _Course:
+    if not (job.folder / PROGRESS).is_file():
+        return _Course()
+    document = read_json(job.folder / PROGRESS)
+    rows: Iterable[dict[str, Any]] = document.pop("iterations")
+    ending = document.pop("ending")
+    iterations = [Iteration(**row) for row in rows]
+    return _Course(**document, ending=None if ending is None else tuple(ending), iterations=iterations)

@@ -1,0 +1,429 @@
+"""What a node of the tree has of a block: a block of its own on disk, as tables in Parquet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.distributed.cut import Incidence, homes, joined
+from photogram.distributed.files import read_json, write_file, write_json
+from photogram.errors import InputError
+from photogram.io.parquet import Column, Repeated, parquet_content, read_sheet
+from photogram.io.structure import Decoder, Encoder
+from photogram.network.block import Block
+from photogram.network.cameras import Camera
+from photogram.network.frame import Frame
+from photogram.network.geometry import Spheroid
+from photogram.network.observations import Observation
+from photogram.network.refraction import Refraction
+from photogram.network.rigs import Mount
+from photogram.network.unknowns import Unknown
+
+__all__ = [
+    "AtHome",
+    "Homes",
+    "Names",
+    "Part",
+    "assembled_part",
+    "homes_of",
+    "incidence_of",
+    "names_above",
+    "part_of",
+    "read_part",
+    "shared_cameras",
+    "vertices_of",
+    "write_part",
+]
+
+TABLES: dict[str, tuple[str, ...]] = {
+    "photos": (
+        "photo_positions",
+        "photo_attitudes",
+        "photo_position_sd",
+        "photo_attitude_sd",
+        "photo_positions_observed",
+        "photo_attitudes_observed",
+        "principal_distances",
+        "photo_cameras",
+    ),
+    "points": ("point_positions", "point_sd"),
+    "images": ("image_photos", "image_points", "image_xy", "image_sd"),
+}
+"""The arrays of a block that have a row for each photo, point or image."""
+SETTINGS = "part.json"
+_MEMBERS = {"node", "block", "unknowns", "observations", "common"}
+_ROWS = ("photo_ids", "point_ids")
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """What a node has of a block.
+
+    Attributes
+    ----------
+    node
+        Its number in the tree.
+    block
+        Its photos, which are its own and those of nodes above that its observations or those of nodes below
+        touch, and the points, images and other observations that are at home here. Its cameras are all of the
+        whole block.
+    owners
+        (P,) the node that each photo belongs to: this one or one above it.
+    photos, points, images, observations
+        Which photo, point, image and observation of the whole block each one is.
+    unknowns
+        Which common unknowns of the whole block are known here.
+    common
+        These themselves.
+    """
+
+    node: int
+    block: Block
+    owners: Indices
+    photos: Indices
+    points: Indices
+    images: Indices
+    observations: Indices
+    unknowns: Indices
+    common: tuple[Unknown, ...]
+
+
+@dataclass(frozen=True)
+class Names:
+    """Blocks of unknowns that belong to nodes above, as rows of the whole block, ascending."""
+
+    photos: list[int] = field(default_factory=list)
+    cameras: list[int] = field(default_factory=list)
+    unknowns: list[int] = field(default_factory=list)
+
+    def union(self, other: Names) -> Names:
+        """Return these and others."""
+        return Names(*(sorted({*one, *two}) for one, two in zip(self.rows, other.rows, strict=True)))
+
+    @property
+    def rows(self) -> tuple[list[int], list[int], list[int]]:
+        """Photos, cameras and unknowns."""
+        return self.photos, self.cameras, self.unknowns
+
+
+@dataclass(frozen=True, eq=False)
+class Homes:
+    """The nodes where points, images and other observations are at home.
+
+    Attributes
+    ----------
+    owners
+        (P,) of photos; one on a frame belongs to the node of its frame.
+    points, images, observations
+        (n,), (m,) and of each other observation.
+    """
+
+    owners: Indices
+    points: Indices
+    images: Indices
+    observations: Indices
+
+
+@dataclass(frozen=True, eq=False)
+class AtHome:
+    """The n points, m images and other observations that are at home in a node.
+
+    Attributes
+    ----------
+    points
+        (n,) which points of the whole block they are.
+    names, point_positions, point_sd
+        Of the points, as of a block.
+    images
+        (m,) which images of the whole block they are.
+    image_photos
+        (m,) photos of the whole block.
+    image_points
+        (m,) points of these.
+    image_xy, image_sd
+        (m, 2) as of a block.
+    observations
+        Which of the other observations.
+    """
+
+    points: Indices
+    names: list[str]
+    point_positions: Floats
+    point_sd: Floats
+    images: Indices
+    image_photos: Indices
+    image_points: Indices
+    image_xy: Floats
+    image_sd: Floats
+    observations: Indices
+
+
+def vertices_of(block: Block) -> Indices:
+    """Return (P,) the photo whose pose each photo has: that of its frame, where it is on one."""
+    rows = {name: row for row, name in enumerate(block.photo_ids)} if block.mounts else {}
+    found = np.arange(len(block.photo_ids), dtype=np.int64)
+    for each in block.mounts:
+        found[rows[each.photo]] = rows[each.frame]
+    return found
+
+
+def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
+    """Return what each point and observation touches; the edge of each point, and of each observation.
+
+    Points that are observed together are one edge: they stay together in one node.
+    """
+    vertices = vertices_of(block)
+    points = {name: row for row, name in enumerate(block.point_ids)} if block.observations else {}
+    photos = {name: row for row, name in enumerate(block.photo_ids)} if block.observations else {}
+    tied = [tuple(points[name] for name in each.points) for each in block.observations]
+    edges = joined(len(block.point_ids), (each for each in tied if len(each) > 1))
+    own_edges, others, of_observations = [], [], []
+    count = len(block.point_ids)
+    for each, members in zip(block.observations, tied, strict=True):
+        edge = int(edges[members[0]]) if members else count
+        count += not members
+        of_observations.append(edge)
+        for name in each.photos:
+            own_edges.append(edge)
+            others.append(int(vertices[photos[name]]))
+    incidence = Incidence(
+        np.concatenate([vertices[block.image_photos], np.array(others, dtype=np.int64)]),
+        np.concatenate([edges[block.image_points], np.array(own_edges, dtype=np.int64)]),
+        count,
+    )
+    return incidence, edges, np.array(of_observations, dtype=np.int64)
+
+
+def homes_of(block: Block, owners: Indices, root: int) -> Homes:
+    """Return the nodes where everything is at home.
+
+    Parameters
+    ----------
+    block
+        The block.
+    owners
+        (P,) the nodes of photos; those on frames do not count.
+    root
+        The root of the tree, to which observations of common unknowns alone belong.
+    """
+    incidence, edges, of_observations = incidence_of(block)
+    found = homes(owners, incidence, root)
+    points = found[edges]
+    return Homes(owners[vertices_of(block)], points, points[block.image_points], found[of_observations])
+
+
+def part_of(block: Block, homes: Homes, node: int, below: Names) -> Part:
+    """Return what a node has of a block.
+
+    Parameters
+    ----------
+    block, homes
+        The block, and where everything is at home.
+    node
+        The node.
+    below
+        What nodes below hand up.
+    """
+    images = np.flatnonzero(homes.images == node)
+    points = np.flatnonzero(homes.points == node)
+    new_points = np.full(len(homes.points), -1, dtype=np.int64)
+    new_points[points] = np.arange(len(points))
+    at_home = AtHome(
+        points,
+        [block.point_ids[row] for row in points],
+        block.point_positions[points],
+        block.point_sd[points],
+        images,
+        block.image_photos[images],
+        new_points[block.image_points[images]],
+        block.image_xy[images],
+        block.image_sd[images],
+        np.flatnonzero(homes.observations == node),
+    )
+    return assembled_part(block, homes.owners, node, at_home, below)
+
+
+def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, below: Names) -> Part:
+    """Return what a node has, from what is at home there.
+
+    Parameters
+    ----------
+    block
+        The whole block, or all of it but points and images.
+    owners
+        (P,) the node of each photo of it.
+    node, at_home
+        The node, and what is at home there.
+    below
+        What nodes below hand up.
+    """
+    own = [block.observations[row] for row in at_home.observations.tolist()]
+    touched = owners == node
+    touched[at_home.image_photos] = True
+    touched[below.photos] = True
+    _touch(block, touched, own)
+    photos = np.flatnonzero(touched)
+    names = [block.photo_ids[row] for row in photos]
+    new_photos = np.full(len(touched), -1, dtype=np.int64)
+    new_photos[photos] = np.arange(len(photos))
+    changes: dict[str, Any] = {
+        name: None if getattr(block, name) is None else getattr(block, name)[photos]
+        for name in TABLES["photos"]
+    }
+    present = set(names)
+    reduced = block.replace(
+        **changes,
+        photo_ids=names,
+        point_ids=at_home.names,
+        point_positions=at_home.point_positions,
+        point_sd=at_home.point_sd,
+        image_photos=new_photos[at_home.image_photos],
+        image_points=at_home.image_points,
+        image_xy=at_home.image_xy,
+        image_sd=at_home.image_sd,
+        observations=own,
+        mounts=[each for each in block.mounts if each.photo in present],
+    )
+    whole = {id(each): row for row, each in enumerate(block.unknowns)}
+    # Those of the block come first: in this order it knows them.
+    unknowns = [whole[id(each)] for each in reduced.unknowns]
+    unknowns += sorted(set(below.unknowns) - set(unknowns))
+    return Part(
+        node,
+        reduced,
+        owners[photos],
+        photos,
+        at_home.points,
+        at_home.images,
+        at_home.observations,
+        np.array(unknowns, dtype=np.int64),
+        tuple(block.unknowns[row] for row in unknowns),
+    )
+
+
+def names_above(part: Part, below: Names, shared: Indices, *, root: bool) -> Names:
+    """Return what a part hands up: photos of nodes above, cameras and unknowns that belong to the root.
+
+    Parameters
+    ----------
+    part, below
+        The part, and what nodes below it hand up.
+    shared
+        The cameras that have unknown parameters and several photos in the whole block.
+    root
+        Whether it is the root, which hands nothing up.
+    """
+    if root:
+        return Names()
+    # A photo on a frame has no unknowns of its own.
+    free = vertices_of(part.block) == np.arange(len(part.photos))
+    photos = part.photos[(part.owners != part.node) & free]
+    cameras = part.block.photo_cameras
+    used = set() if cameras is None else set(cameras.tolist()) & set(shared.tolist())
+    return Names(photos.tolist(), sorted(used | set(below.cameras)), sorted(part.unknowns.tolist()))
+
+
+def shared_cameras(block: Block) -> Indices:
+    """Return which cameras have an unknown parameter and several photos: they belong to the root."""
+    if block.photo_cameras is None:
+        return np.zeros(0, dtype=np.int64)
+    photos = np.bincount(block.photo_cameras, minlength=len(block.cameras))
+    own = [row for row, each in enumerate(block.cameras) if photos[row] > 1 and not each.is_held]
+    return np.array(own, dtype=np.int64)
+
+
+def _touch(block: Block, touched: Bools, observations: list[Observation]) -> None:
+    """Add the photos of observations, and of the frames that photos are on."""
+    if not (observations or block.mounts):
+        return
+    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    for each in observations:
+        touched[[rows[name] for name in each.photos]] = True
+    vertices = vertices_of(block)
+    touched[vertices[np.flatnonzero(touched)]] = True
+
+
+def write_part(folder: Path, part: Part) -> None:
+    """Write the tables of a node into a folder, its settings last: with these it is whole.
+
+    Raises
+    ------
+    AdjustmentError
+        The folder cannot be written to.
+    """
+    block = part.block
+    for table, fields in TABLES.items():
+        columns = []
+        if table != "images":
+            names = getattr(block, f"{table[:-1]}_ids")
+            columns.append(Column(table[:-1], Repeated(names, np.arange(len(names))), "", "its name"))
+        columns.append(Column("row", getattr(part, table), "", f"which of the {table} of the whole"))
+        if table == "photos":
+            columns.append(Column("owner", part.owners, "", "the node it belongs to"))
+        for name in fields:
+            values = getattr(block, name)
+            if values is not None:
+                columns.append(Column(name, np.asarray(values), "", f"as Block.{name}"))
+        write_file(folder / f"{table}.parquet", parquet_content(columns, {}))
+    encoder = Encoder()
+    document = {
+        "node": part.node,
+        "observations": part.observations.tolist(),
+        "unknowns": part.unknowns.tolist(),
+        "block": encoder.fields(block, [*_ROWS, *(name for each in TABLES.values() for name in each)]),
+        # After the block, whose unknowns are the same objects.
+        "common": encoder.value(list(part.common)),
+    }
+    write_json(folder / SETTINGS, document)
+
+
+def read_part(folder: Path) -> Part:
+    """Read what :func:`write_part` has written.
+
+    Raises
+    ------
+    InputError
+        A table is missing or damaged.
+    """
+    document = read_json(folder / SETTINGS)
+    if (
+        not isinstance(document, dict)
+        or not {"node", "block", "unknowns", "observations", "common"} <= document.keys()
+    ):
+        raise InputError("is not what was written of a node", file=folder / SETTINGS)
+    sheets = {table: read_sheet(folder / f"{table}.parquet") for table in TABLES}
+    decoder = Decoder(_classes(), folder / SETTINGS)
+    given: dict[str, Any] = decoder.fields(document["block"])
+    common = tuple(decoder.value(document["common"]))
+    for table, fields in TABLES.items():
+        given |= {name: sheets[table].columns.get(name) for name in fields}
+    for table in ("photos", "points"):
+        names = sheets[table].column(table[:-1])
+        given[f"{table[:-1]}_ids"] = [names.names[row] for row in names.rows.tolist()]
+    return Part(
+        document["node"],
+        Block(**given),
+        sheets["photos"].column("owner"),
+        sheets["photos"].column("row"),
+        sheets["points"].column("row"),
+        sheets["images"].column("row"),
+        np.array(document["observations"], dtype=np.int64),
+        np.array(document["unknowns"], dtype=np.int64),
+        common,
+    )
+
+
+def _classes() -> list[type]:
+    return [Camera, Frame, Mount, Refraction, Spheroid, *_below(Observation), *_below(Unknown)]
+
+
+def _below(base: type) -> Iterator[type]:
+    subclasses: list[type] = base.__subclasses__()
+    for each in subclasses:
+        yield each
+        yield from _below(each)

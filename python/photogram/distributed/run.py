@@ -1,0 +1,227 @@
+"""The folder of a run: the tree and who hands up what, the parts, the states and what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
+from photogram.distributed.cut import Tree, cut, tree_of
+from photogram.distributed.files import read_json, write_json
+from photogram.distributed.parts import (
+    Names,
+    Part,
+    homes_of,
+    incidence_of,
+    names_above,
+    part_of,
+    shared_cameras,
+    vertices_of,
+    write_part,
+)
+from photogram.errors import InputError
+from photogram.network.block import Block
+from photogram.network.core import CoreOptions
+from photogram.network.unknowns import Unknown
+
+__all__ = ["Manifest", "divided", "part_folder", "partition", "places_of", "read_manifest", "result_folder"]
+
+MANIFEST = "run.json"
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What all nodes of a run have in common.
+
+    Attributes
+    ----------
+    version
+        Of the package that made it.
+    source
+        What tells the block from others.
+    tree
+        The tree.
+    outer
+        What each node hands up.
+    middle
+        (3,) the median of the positions of all photos.
+    options
+        How the core adjusts.
+    weighted
+        Weighted unknowns of photos, cameras and common unknowns that are at home in each node.
+    photos, points, images
+        How many each node has at home.
+    """
+
+    version: str
+    source: str
+    tree: Tree
+    outer: list[Names]
+    middle: tuple[float, float, float]
+    options: CoreOptions
+    weighted: list[int]
+    photos: list[int]
+    points: list[int]
+    images: list[int]
+
+
+def part_folder(run: Path, number: int) -> Path:
+    """Return where the part of a node is."""
+    return run / "parts" / f"{number:05d}"
+
+
+def result_folder(run: Path, number: int) -> Path:
+    """Return where what was found of a node is."""
+    return run / "results" / f"{number:05d}"
+
+
+def places_of(block: Block) -> Floats:
+    """Return (P, 3) positions of photos in one unit of length, for cutting."""
+    positions = np.array(block.photo_positions)
+    if block.spheroid is not None:
+        positions[:, 0] *= block.spheroid.a * np.cos(np.mean(positions[:, 1]))
+        positions[:, 1] *= block.spheroid.a
+    return positions
+
+
+def partition(block: Block, run: Path, parts: int, options: CoreOptions, source: str) -> Manifest:
+    """Cut a block that is in memory into parts on disk.
+
+    Parameters
+    ----------
+    block
+        With poses of all photos and values of common unknowns.
+    run
+        The folder, which is made.
+    parts
+        How many.
+    options, source
+        As in :class:`Manifest`.
+
+    Raises
+    ------
+    AdjustmentError
+        The folder cannot be written to.
+    """
+    incidence, _, _ = incidence_of(block)
+    images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
+    found = cut(places_of(block), images.astype(float), lambda: [incidence], parts)
+    homes = homes_of(block, found.owners, found.tree.root)
+    return divided(
+        block, run, found.tree, lambda node, below: part_of(block, homes, node, below), options, source
+    )
+
+
+def divided(
+    block: Block,
+    run: Path,
+    tree: Tree,
+    part_at: Callable[[int, Names], Part],
+    options: CoreOptions,
+    source: str,
+) -> Manifest:
+    """Write the parts of a block, one after the other.
+
+    Parameters
+    ----------
+    block
+        The block, or all of it but points and images.
+    run, options, source
+        As of :func:`partition`.
+    tree
+        The tree.
+    part_at
+        Gives the part of a node, told what nodes below hand up.
+
+    Raises
+    ------
+    AdjustmentError
+        The folder cannot be written to.
+    """
+    shared = shared_cameras(block)
+    outer: list[Names] = []
+    counts: list[tuple[int, int, int, int]] = []
+    for node in range(len(tree)):
+        below = Names()
+        for child in tree.children[node]:
+            below = below.union(outer[child])
+        part = part_at(node, below)
+        root = node == tree.root
+        outer.append(names_above(part, below, shared, root=root))
+        folder = part_folder(run, node)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_part(folder, part)
+        own = np.flatnonzero(part.owners == node)
+        weighted = _weighted(part.block, own, shared, part.common if root else None)
+        counts.append((weighted, len(own), len(part.points), len(part.images)))
+    middle = np.median(block.photo_positions, axis=0)
+    manifest = Manifest(
+        _photocore.__version__,
+        source,
+        tree,
+        outer,
+        (float(middle[0]), float(middle[1]), float(middle[2])),
+        options,
+        *([row[k] for row in counts] for k in range(4)),
+    )
+    write_manifest(run, manifest)
+    return manifest
+
+
+def _weighted(block: Block, own: Indices, shared: Indices, common: Sequence[Unknown] | None) -> int:
+    """Count the weighted unknowns of photos, cameras and common unknowns that are at home in a node.
+
+    `common` are those of the whole block, in the root; None elsewhere.
+    """
+    sd = [np.hstack([block.photo_position_sd[own], block.photo_attitude_sd[own]]).ravel()]
+    cameras = set() if block.photo_cameras is None else set(block.photo_cameras[own].tolist())
+    cameras -= set(shared.tolist())
+    if common is not None:
+        cameras |= set(shared.tolist())
+        sd += [each.deviations for each in common]
+    sd += [block.cameras[row].deviations for row in sorted(cameras)]
+    return sum(int(np.count_nonzero(np.isfinite(each) & (each > 0))) for each in sd)
+
+
+def write_manifest(run: Path, manifest: Manifest) -> None:
+    """Write what all nodes have in common: with it a partition is whole."""
+    document = {name: getattr(manifest, name) for name in _PLAIN}
+    document["parts"] = (len(manifest.tree) + 1) // 2
+    document["outer"] = [each.rows for each in manifest.outer]
+    document["options"] = asdict(manifest.options)
+    write_json(run / MANIFEST, document)
+
+
+_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images")
+
+
+def read_manifest(run: Path) -> Manifest:
+    """Read what :func:`write_manifest` has written.
+
+    Raises
+    ------
+    InputError
+        It is missing, damaged or of another version.
+    """
+    document: dict[str, Any] = read_json(run / MANIFEST)
+    if not isinstance(document, dict) or document.get("version") != _photocore.__version__:
+        raise InputError(
+            f"is no run of photogram {_photocore.__version__}: a run ends with the version that began it",
+            file=run / MANIFEST,
+        )
+    options = document["options"]
+    for name in ("loss", "minimum"):
+        options[name] = None if options[name] is None else tuple(options[name])
+    plain = {name: document[name] for name in _PLAIN}
+    plain["middle"] = tuple(plain["middle"])
+    return Manifest(
+        tree=tree_of(document["parts"]),
+        outer=[Names(*rows) for rows in document["outer"]],
+        options=CoreOptions(**options),
+        **plain,
+    )

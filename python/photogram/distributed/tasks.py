@@ -1,0 +1,373 @@
+"""What is done of a node, wherever it is done: functions of the folder of a run and of what they are given.
+
+A worker keeps nodes and factors on a shelf of its own. What is not there any more is made again: a node from
+its part, the state from its file. A factor also takes what the children have left, which only the driver can
+ask for: a task that misses one says so (:class:`LostFactorError`).
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.distributed.engine import ContributionRow, Engine, FormedNode, Node
+from photogram.distributed.files import write_file
+from photogram.errors import AdjustmentError, InputError, PhotogramError
+
+__all__ = [
+    "Contribution",
+    "Formed",
+    "Inverted",
+    "Job",
+    "LostFactorError",
+    "Point",
+    "about",
+    "counted",
+    "evaluated",
+    "finished",
+    "formed",
+    "inverted",
+    "predicted",
+    "relocated",
+    "shelf",
+    "solved",
+    "state_path",
+]
+
+GIVEN = "0"
+"""The state that the nodes themselves give."""
+
+
+class LostFactorError(PhotogramError):
+    """The factor of a node is not on this worker: it has to be formed again.
+
+    Parameters
+    ----------
+    number
+        The node.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"the factor of node {number} is not on this worker")
+        self.number = number
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all tasks of a run are told.
+
+    Attributes
+    ----------
+    folder
+        Of the run, on a disk that all workers see.
+    engine
+        Makes the nodes.
+    version
+        Of the package on the machine that drives; every worker must have it.
+    threads
+        Of each task; 0 for all processors.
+    memory
+        Bytes that a worker may take for nodes and factors; None for any number.
+    """
+
+    folder: Path
+    engine: Engine
+    version: str
+    threads: int = 0
+    memory: int | None = None
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where normal equations are formed: a state of all nodes and the damping."""
+
+    state: str
+    damping: float = 0.0
+
+
+@dataclass(frozen=True)
+class Formed:
+    """What the driver wants to know of a node that was formed."""
+
+    number: int
+    sum_of_squares: float
+    decrease: float
+    seconds: float
+    place: str
+
+
+@dataclass(frozen=True, eq=False)
+class Contribution:
+    """What a node leaves to its parent, and what the driver wants to know."""
+
+    row: ContributionRow
+    formed: Formed
+
+
+@dataclass(frozen=True, eq=False)
+class Inverted:
+    """The cofactors that the children of a node go on with, in their order."""
+
+    children: list[Floats]
+
+
+class Shelf:
+    """The nodes and factors that a worker keeps, the ones used last longest."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self._kept: OrderedDict[tuple[Any, ...], tuple[Any, float]] = OrderedDict()
+
+    def get(self, key: tuple[Any, ...]) -> Any:
+        """Return what is kept under a key; None where nothing is."""
+        if key not in self._kept:
+            return None
+        self._kept.move_to_end(key)
+        return self._kept[key][0]
+
+    def put(self, key: tuple[Any, ...], value: object, size: float) -> None:
+        """Keep something of so many bytes."""
+        self._kept[key] = value, size
+        self._kept.move_to_end(key)
+
+    def take(self, key: tuple[Any, ...]) -> Any:
+        """Return what is kept under a key, and keep it no longer."""
+        return self._kept.pop(key, (None, 0.0))[0]
+
+    def make_room(self, needed: float, memory: int | None, spared: tuple[Any, ...]) -> None:
+        """Give up what was used longest ago until so many bytes more fit."""
+        while memory is not None and sum(size for _, size in self._kept.values()) + needed > memory:
+            oldest = next((key for key in self._kept if key != spared), None)
+            if oldest is None:
+                return
+            del self._kept[oldest]
+
+    def drop(self, of: Callable[[tuple[Any, ...]], bool]) -> None:
+        """Give up what some keys stand for."""
+        for key in [key for key in self._kept if of(key)]:
+            del self._kept[key]
+
+    def clear(self) -> None:
+        """Give up everything."""
+        self._kept.clear()
+
+
+shelf = Shelf()
+"""Of this process. Its lock lets one task work at a time: memory is planned for that."""
+
+
+def state_path(folder: Path, number: int, state: str) -> Path:
+    """Return where a state of a node is kept."""
+    return folder / "states" / f"{number:05d}" / f"{state}.npy"
+
+
+def formed(job: Job, number: int, at: Point, contributions: Sequence[Contribution]) -> Contribution:
+    """Form a node at a state and eliminate what is at home there; its factor stays on the shelf.
+
+    Raises
+    ------
+    RankError
+        Its observations leave something undetermined.
+    AdjustmentError, InputError, OutOfMemoryError
+        As the engine.
+    """
+    with shelf.lock:
+        start = time.perf_counter()
+        node = _node(job, number)
+        prediction = node.prediction
+        own = ("node", job.folder, number)
+        # A factor at another state is of no use any more.
+        shelf.drop(lambda key: key[0] == "factor" and key[1:3] == (job.folder, number))
+        shelf.make_room(prediction["memory_bytes"], job.memory, own)
+        found = node.form(
+            _state(job, node, number, at.state),
+            [(_plain(each.row[0]), _plain(each.row[1]), _plain(each.row[2])) for each in contributions],
+            damping=at.damping,
+            threads=job.threads,
+        )
+        row = found.contribution
+        told = Formed(number, found.sum_of_squares, found.decrease, time.perf_counter() - start, _place())
+        if found.undetermined is not None:
+            raise job.engine.failure(job.folder, number, found.undetermined)
+        shelf.put(_factor_key(job, number, at), found, prediction["factor_bytes"])
+        return Contribution(row, told)
+
+
+def about(contribution: Contribution) -> Formed:
+    """Return what the driver wants to know, without the matrix."""
+    return contribution.formed
+
+
+def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[Floats]:
+    """Solve a node for its step, given that of the outer unknowns, and write the state after it.
+
+    Returns
+    -------
+    The steps of what each child is over.
+
+    Raises
+    ------
+    LostFactorError
+        It has to be formed again.
+    """
+    with shelf.lock:
+        factor = _factor(job, number, at)
+        node = _node(job, number)
+        step = factor.solve(_plain(outer), threads=job.threads)
+        state = node.advance(_state(job, node, number, at.state), step)
+        _write_state(job, number, after, state)
+        return [step[rows] for rows in node.children]
+
+
+def relocated(job: Job, number: int, state: str, after: str) -> tuple[float, float]:
+    """Write the state with points where their rays meet; return the sums of squares of both."""
+    with shelf.lock:
+        node = _node(job, number)
+        before = _state(job, node, number, state)
+        moved = node.relocate(before, threads=job.threads)
+        _write_state(job, number, after, moved)
+        one, other = (sum(node.objective(each, threads=job.threads)) for each in (before, moved))
+        return one, other
+
+
+def evaluated(job: Job, number: int, state: str) -> tuple[float, ...]:
+    """Return the weighted sums of squares of a node at a state, by kinds."""
+    with shelf.lock:
+        node = _node(job, number)
+        return tuple(node.objective(_state(job, node, number, state), threads=job.threads))
+
+
+def inverted(
+    job: Job,
+    number: int,
+    at: Point,
+    after: str,
+    variance: float | None,
+    above: Inverted | None,
+    place: int,
+) -> Inverted:
+    """Invert a node, and write what has become of its observations and unknowns.
+
+    Parameters
+    ----------
+    job, number, at
+        As in :func:`formed`; the factor is used up.
+    after
+        The state reached.
+    variance
+        The variance of unit weight of the whole.
+    above, place
+        What the parent has handed down, and which of its children this one is; None for the root.
+
+    Raises
+    ------
+    LostFactorError
+        It has to be formed again.
+    """
+    with shelf.lock:
+        _factor(job, number, at)
+        node = _node(job, number)
+        shelf.make_room(node.prediction["memory_bytes"], job.memory, _factor_key(job, number, at))
+        factor = shelf.take(_factor_key(job, number, at))
+        outer = np.zeros(0) if above is None else _plain(above.children[place])
+        solution, children = factor.invert(outer, _state(job, node, number, after), threads=job.threads)
+        job.engine.keep(job.folder, number, solution, variance)
+        return Inverted(children)
+
+
+def finished(job: Job, number: int, before: str, after: str, variance: float | None) -> None:
+    """Write what has become of a node, without cofactors."""
+    with shelf.lock:
+        node = _node(job, number)
+        states = [_state(job, node, number, each) for each in (after, before)]
+        job.engine.keep(job.folder, number, node.solution(*states, threads=job.threads), variance)
+
+
+def counted(job: Job, number: int) -> tuple[int, int, int, int, int]:
+    """Return how many observations and unknowns are at home in a node.
+
+    Returns
+    -------
+    Observations, weighted unknowns, unknowns that are not fixed; weighted unknowns of photos and cameras;
+    unknowns, fixed ones too.
+    """
+    with shelf.lock:
+        node = _node(job, number)
+        size = len(node.initial) - len(node.outer)
+        return *node.counts, job.engine.stations(job.folder, number), size
+
+
+def predicted(job: Job, number: int) -> dict[str, float]:
+    """Return what work and memory a node takes."""
+    with shelf.lock:
+        return dict(_node(job, number).prediction)
+
+
+def _plain(values: Floats) -> Floats:
+    """Return an array as the core takes it: what comes over the wire may stand at any address."""
+    return np.require(values, np.float64, ["C_CONTIGUOUS", "ALIGNED"])
+
+
+def _place() -> str:
+    """Return the address of the worker that this is; empty where it is none."""
+    distributed = sys.modules.get("distributed")
+    try:
+        return "" if distributed is None else str(distributed.get_worker().address)
+    except ValueError:
+        return ""
+
+
+def _node(job: Job, number: int) -> Node:
+    if job.version != _photocore.__version__:
+        raise InputError(
+            f"a worker has photogram {_photocore.__version__}, and the run is one of {job.version}: all"
+            " must have the same version"
+        )
+    key = "node", job.folder, number
+    found: Node | None = shelf.get(key)
+    if found is None:
+        found = job.engine.node(job.folder, number)
+        size = found.prediction.get("node_bytes", 0.0)
+        shelf.make_room(size, job.memory, key)
+        shelf.put(key, found, size)
+    return found
+
+
+def _factor_key(job: Job, number: int, at: Point) -> tuple[Any, ...]:
+    return "factor", job.folder, number, at
+
+
+def _factor(job: Job, number: int, at: Point) -> FormedNode:
+    found: FormedNode | None = shelf.get(_factor_key(job, number, at))
+    if found is None:
+        raise LostFactorError(number)
+    return found
+
+
+def _state(job: Job, node: Node, number: int, state: str) -> Floats:
+    if state == GIVEN:
+        return node.initial
+    path = state_path(job.folder, number, state)
+    try:
+        found: Floats = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"the state of a node cannot be read ({error})", file=path) from None
+    if found.shape != node.initial.shape:
+        raise AdjustmentError(f"{path}: is the state of another node or run")
+    return found
+
+
+def _write_state(job: Job, number: int, state: str, values: Floats) -> None:
+    path = state_path(job.folder, number, state)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_file(path, lambda file: np.save(file, values, allow_pickle=False))

@@ -1,0 +1,183 @@
+"""Tasks on the workers of a Dask cluster: scheduling, transport and retries are those of `distributed`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from photogram import _photocore
+from photogram.errors import AdjustmentError, InputError
+
+Client = Any
+Future = Any
+"""Of `distributed`, an extra that takes long to import."""
+
+__all__ = ["Workers", "check_workers", "connected"]
+
+SETTINGS = {
+    # A factor stays with its worker; what it takes is planned, and must not make the worker pause.
+    "distributed.worker.memory.pause": False,
+    # A stolen task would have to form its factor again.
+    "distributed.scheduler.work-stealing": False,
+}
+"""Of clusters that are started here."""
+
+
+class Workers:
+    """Has tasks done by the workers of a cluster.
+
+    Lost results are computed again by Dask itself: tasks are functions of what they are given. Where a task
+    asks for a factor that was lost with a worker, the driver has it formed again.
+
+    Parameters
+    ----------
+    client
+        Connected to the scheduler.
+    """
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._futures: set[Future] = set()
+        self._count = 0
+
+    def submit(
+        self, function: Callable[..., Any], *arguments: Any, near: str = "", cost: float = 0.0
+    ) -> Future:
+        """Have a task done."""
+        self._count += 1
+        found = self._client.submit(
+            function,
+            *arguments,
+            key=f"photogram-{function.__name__}-{id(self):x}-{self._count}",
+            pure=False,
+            priority=cost,
+            workers=[near] if near else None,
+            allow_other_workers=bool(near),
+        )
+        self._futures.add(found)
+        return found
+
+    def first(self, handles: Collection[Future]) -> Future:
+        """Wait until one of some tasks is done."""
+        return next(iter(_library().wait(list(handles), return_when="FIRST_COMPLETED").done))
+
+    def value(self, handle: Future) -> Any:
+        """Return what a task has given."""
+        from distributed.client import FutureCancelledError
+
+        from distributed import KilledWorker
+
+        try:
+            return handle.result()
+        except KilledWorker as error:
+            raise AdjustmentError(
+                f"workers died again and again at one task, mostly for want of memory ({error}); the run can"
+                " be taken up again, with more parts or larger workers"
+            ) from None
+        except (FutureCancelledError, OSError) as error:
+            raise AdjustmentError(f"the scheduler is lost ({error}); the run can be taken up again") from None
+
+    def forget(self, handles: Collection[Future]) -> None:
+        """Let go of what tasks have given."""
+        for each in handles:
+            each.release()
+            self._futures.discard(each)
+
+    def stop(self) -> None:
+        """Give up all tasks."""
+        futures, self._futures = list(self._futures), set()
+        if futures and self._client.status == "running":
+            self._client.cancel(futures, force=True)
+
+
+@contextmanager
+def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator[Client]:
+    """Connect to a scheduler, or start a cluster on this machine.
+
+    Parameters
+    ----------
+    cluster
+        A client, which is left as it is; `local`; or the address of a scheduler.
+    workers, memory
+        Of a cluster on this machine: how many, and bytes of each.
+
+    Raises
+    ------
+    InputError
+        Nobody answers at the address.
+    ModuleNotFoundError
+        dask.distributed is not installed.
+    """
+    import dask
+
+    library = _library()
+
+    if isinstance(cluster, library.Client):
+        yield cluster
+    elif cluster == "local":
+        with (
+            dask.config.set(SETTINGS),
+            library.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                memory_limit=memory or "auto",
+                dashboard_address=None,
+            ) as own,
+            library.Client(own) as client,
+        ):
+            yield client
+    elif isinstance(cluster, str):
+        try:
+            client = library.Client(cluster, timeout="10s")
+        except (OSError, ValueError) as error:
+            raise InputError(f"no scheduler answers at {cluster}: {error}") from None
+        with client:
+            yield client
+    else:
+        raise InputError(
+            f"cluster is a client of dask.distributed, an address or 'local', not {type(cluster).__name__}"
+        )
+
+
+def check_workers(client: Client, folder: Path) -> int:
+    """Return how many workers there are; refuse what cannot work together.
+
+    Raises
+    ------
+    InputError
+        No worker, another version of the package on one of them, or one that does not see the folder.
+    """
+    versions: dict[str, str] = client.run(_version)
+    if not versions:
+        raise InputError("the cluster has no workers")
+    own = _photocore.__version__
+    others = sorted({f"{address} has {each or 'none'}" for address, each in versions.items() if each != own})
+    if others:
+        raise InputError(f"all workers must have photogram {own}, as here: {'; '.join(others)}")
+    blind = [address for address, seen in client.run(_sees, str(folder)).items() if not seen]
+    if blind:
+        raise InputError(
+            f"the workers at {', '.join(sorted(blind))} do not see {folder}: parts and results lie on a disk"
+            " that all workers share"
+        )
+    return len(versions)
+
+
+def _library() -> Any:
+    import distributed
+
+    return distributed
+
+
+def _version() -> str:
+    try:
+        from photogram import _photocore
+    except ImportError:
+        return ""
+    return _photocore.__version__
+
+
+def _sees(folder: str) -> bool:
+    return Path(folder).is_dir()

@@ -1,0 +1,244 @@
+"""A network that is being snooped: what is out, how the rest stands, and the log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats
+from photogram.statistics.snooping.choosing import Choice, Choosing, Level
+from photogram.statistics.snooping.conditioning import UnitWeight
+from photogram.statistics.snooping.log import Removal, Rival, Round
+from photogram.statistics.snooping.settings import Settings
+from photogram.statistics.snooping.suspects import LostSupportError, Out, Prediction, Suspects, Tests, Trial
+
+__all__ = ["TakingOut"]
+
+RESCUES = 5
+"""Attempts to leave a round with everything determined."""
+_NOT_DETERMINED = "its point is no longer determined and has left the network"
+
+
+class TakingOut:
+    """A network that is being snooped.
+
+    Parameters
+    ----------
+    trial
+        The network.
+    settings
+        How.
+    out
+        What takes no part from the start; nothing by default.
+    """
+
+    def __init__(self, trial: Trial, settings: Settings, out: Out | None = None) -> None:
+        self.trial, self.settings = trial, settings
+        suspects = trial.suspects
+        self.suspects: Suspects = suspects
+        self.out = Out(np.zeros(int(suspects.row_starts[-1]), dtype=bool)) if out is None else out
+        self.log: list[Removal] = []
+        self.rounds: list[Round] = []
+        self.remarks: list[str] = []
+        self.returns: set[int] = set()
+        self.kept: set[int] = set()
+        self.predicted: dict[int, tuple[Prediction, float]] = {}
+        self.before = self.standing = trial.adjust(self.out)
+        self.tests = trial.tests()
+        self.level = Level(settings.level, int(self.testable().sum()), settings.fdr)
+        self.factors: dict[str, float] = {}
+        self.scales: Floats = np.ones(len(suspects))
+        self.images = frozenset(np.flatnonzero(suspects.kinds == 0).tolist())
+
+    def unit(self) -> UnitWeight:
+        """Return what tests of the network as it stands rest on."""
+        standing = self.standing
+        return UnitWeight(self.settings.known, standing.weighted_sum_of_squares, standing.degrees_of_freedom)
+
+    def choosing(self, allowed: Bools, out: int, *, ahead: bool) -> Choosing:
+        """Return what chooses among allowed groups when so many are out."""
+        return Choosing(
+            trial=self.trial,
+            tests=self.tests,
+            unit=self.unit(),
+            scales=self.scales,
+            allowed=allowed,
+            level=self.level,
+            out=out,
+            ahead=ahead,
+        )
+
+    def allowed(self) -> Bools:
+        """Return (G,) which groups may go: testable, and not kept before."""
+        allowed = self.suspects.removable & self.testable()
+        allowed[list(self.kept)] = False
+        return allowed
+
+    def testable(self) -> Bools:
+        """Return (G,) which groups have a direction whose errors show notably in their own residuals."""
+        return self.tests.testable(self.suspects.row_starts)
+
+    def as_it_was(self, group: int, tests: Tests) -> Removal:
+        """Return the entry of a group that goes without a test of its own."""
+        rows = self.suspects.rows(group)
+        statistic, dimension = float(tests.statistic[group]), int(tests.rank[group])
+        return self.entry(
+            group,
+            rows,
+            0,
+            statistic,
+            statistic,
+            dimension,
+            self.unit().fisher(statistic, dimension),
+            math.nan,
+            tests.error[rows],
+            tests.error_sd[rows],
+            self.level.limit(0),
+            (),
+        )
+
+    def entries(self, choices: list[Choice], number: int) -> list[Removal]:
+        """Return what was chosen as entries of the log."""
+        entries = []
+        for choice in choices:
+            own = choice.chosen
+            deviations = self.trial.deviations[own.rows]
+            rivals = tuple(
+                Rival(self.suspects.name(group), statistic, dimension, odds)
+                for group, statistic, dimension, odds in own.rivals
+            )
+            entries.append(
+                self.entry(
+                    choice.group,
+                    own.rows,
+                    number,
+                    choice.first_statistic,
+                    own.statistic,
+                    own.dimension,
+                    own.fisher,
+                    own.log_probability,
+                    own.error * deviations,
+                    np.sqrt(np.diagonal(own.cofactors)) * deviations,
+                    choice.limit,
+                    rivals,
+                )
+            )
+        return entries
+
+    def entry(
+        self,
+        group: int,
+        rows: np.ndarray,
+        number: int,
+        first: float,
+        statistic: float,
+        dimension: int,
+        fisher: float,
+        log_probability: float,
+        error: Floats,
+        error_sd: Floats,
+        limit: float,
+        rivals: tuple[Rival, ...],
+    ) -> Removal:
+        """Return the entry of a group, or of some of its rows; see :class:`Removal`."""
+        suspects = self.suspects
+        name = suspects.name(group)
+        if len(rows) < len(suspects.rows(group)):
+            name = f"{', '.join(suspects.row_name(int(row)) for row in rows)} of {name}"
+        return Removal(
+            round=number,
+            group=group,
+            kind=suspects.kind(group),
+            name=name,
+            rows=tuple(rows.tolist()),
+            components=tuple(suspects.row_name(int(row)) for row in rows),
+            units=tuple(suspects.unit(int(row)) for row in rows),
+            dimension=dimension,
+            first_statistic=first,
+            statistic=statistic,
+            fisher=fisher,
+            log_probability=log_probability,
+            limit=limit,
+            error=tuple(error.tolist()),
+            error_sd=tuple(error_sd.tolist()),
+            redundancy=float(self.tests.least[group]),
+            rivals=rivals,
+        )
+
+    def apply(self, entries: list[Removal], remarks: list[str], returning: Sequence[int] = ()) -> list[int]:
+        """Take groups out with what cannot stay without them, and adjust.
+
+        Groups without which the network falls apart stay, and are said to.
+        """
+        if not entries and not returning:
+            return []
+        pending = entries
+        for _ in range(RESCUES):
+            out = self.out.copy()
+            for place in returning:
+                out.rows[list(self.log[place].rows)] = False
+            log = [self._out_with(out, entry) for entry in pending]
+            try:
+                self.adjust(out)
+            except LostSupportError as lost:
+                if lost.points and not lost.photos:
+                    pending = [self._forced(each, lost.points) for each in pending]
+                    continue
+                kept = [each for each in pending if self._concerns(each, lost)]
+                for each in kept or pending:
+                    self._keep(each)
+                pending = [each for each in pending if each.group not in self.kept]
+                continue
+            first = len(self.log)
+            self.log += log
+            return [first + place for place, each in enumerate(log) if not each.kept]
+        for each in pending:
+            self._keep(each)
+        return []
+
+    def _forced(self, entry: Removal, points: tuple[int, ...]) -> Removal:
+        own = int(self.suspects.points[entry.group])
+        if own not in points:
+            return entry
+        return entry.with_(consequences=(*entry.consequences, _NOT_DETERMINED))
+
+    def _concerns(self, entry: Removal, lost: LostSupportError) -> bool:
+        photos = set(self.suspects.loads(entry.group).tolist()) | {int(self.suspects.photos[entry.group])}
+        return bool(photos & set(lost.photos))
+
+    def _keep(self, entry: Removal) -> None:
+        self.kept.add(entry.group)
+        self.log.append(entry.with_(kept="nothing else determines what it belongs to"))
+
+    def _out_with(self, out: Out, entry: Removal) -> Removal:
+        """Put a group out, and what cannot stay without it."""
+        out.rows[list(entry.rows)] = True
+        points, photos = self.trial.consequences(out, entry.group)
+        consequences = list(entry.consequences)
+        if photos:
+            out.rows[list(entry.rows)] = False
+            self.kept.add(entry.group)
+            return entry.with_(kept="it would leave a photo with fewer than three points")
+        own = int(self.suspects.points[entry.group])
+        if _NOT_DETERMINED in consequences and own >= 0:
+            points = points | {own}
+        for point in sorted(points - out.points):
+            out.points.add(point)
+            consequences += self.left(out, point)
+        return entry.with_(consequences=tuple(dict.fromkeys(consequences))) if consequences else entry
+
+    def left(self, out: Out, point: int) -> Iterator[str]:
+        """Put everything of a point out, and say so."""
+        for group in self.suspects.on_point(point).tolist():
+            rows = self.suspects.rows(group)
+            if not out.rows[rows].all():
+                out.rows[rows] = True
+                yield f"{self.suspects.name(group)} is no longer used (its point is left with one ray)"
+
+    def adjust(self, out: Out) -> None:
+        """Adjust without what is out, and test the rest; raises LostSupportError."""
+        self.standing = self.trial.adjust(out)
+        self.out = out
+        self.tests = self.trial.tests()

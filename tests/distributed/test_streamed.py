@@ -1,0 +1,106 @@
+"""Parts of a project on disk, read batch by batch: those of the same project read whole."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from test_parts import OPTIONS, tied_block
+
+from photogram.distributed.parts import read_part
+from photogram.distributed.run import part_folder, partition
+from photogram.errors import InputError
+from photogram.formats import Wishes, read, to_files
+from photogram.formats.plain import streamed
+from photogram.formats.plain.streamed import Streamed, streamable
+from photogram.formats.project import Project
+from photogram.network.observations import Distance, Position, Relative
+
+
+def project_of(block, folder):
+    """Write a block as a plain project whose images lie in Parquet."""
+    kinds = (Distance, Position, Relative)
+    block = block.replace(observations=[each for each in block.observations if isinstance(each, kinds)])
+    count = len(block.cameras)
+    starts = np.full((len(block.point_ids), 3), np.nan)
+    none = (None,) * count
+    project = Project(block=block, path=folder, title="", sizes=none, pixel_mm=none, starts=starts)
+    folder.mkdir()
+    for name, content in to_files(project, "plain").items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    table = pd.read_csv(folder / "images.csv", dtype={"photo": str, "point": str}, comment="#")
+    table.to_parquet(folder / "images.parquet")
+    (folder / "images.csv").unlink()
+    return folder
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    return project_of(tied_block(), tmp_path_factory.mktemp("project") / "tied")
+
+
+@pytest.mark.parametrize("rows", [10**6, 700])
+def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatch, rows):
+    monkeypatch.setattr(streamed, "BUCKET", rows)
+    monkeypatch.setattr(streamed, "BATCH", 500)
+    block = read(project).block
+    expected = partition(block, tmp_path / "whole", 4, OPTIONS, "")
+    assert streamable(project)
+    own = Streamed(project, Wishes(), tmp_path / "parts")
+    np.testing.assert_array_equal(own.images, np.bincount(block.image_photos))
+    assert own.source(OPTIONS) == own.source(OPTIONS)
+    tree, counts = own.counted(4)
+    assert len(tree) == 7
+    assert counts.photos.sum() == len(block.photo_ids)
+    found = own.divided(tmp_path / "parts", 4, OPTIONS, "")
+    assert not (tmp_path / "parts" / "buckets").exists()
+    assert found.tree == expected.tree
+    assert found.outer == expected.outer
+    for name in ("middle", "weighted", "photos", "points", "images"):
+        assert getattr(found, name) == getattr(expected, name)
+    for node in range(len(tree)):
+        one, other = (read_part(part_folder(tmp_path / each, node)) for each in ("parts", "whole"))
+        same(one, other)
+
+
+def same(one, other):
+    """Compare two parts: the order of points is free."""
+    for name in ("photos", "owners", "observations", "unknowns"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    for name in ("photo_positions", "photo_attitudes", "photo_position_sd", "photo_cameras"):
+        np.testing.assert_array_equal(getattr(one.block, name), getattr(other.block, name))
+    assert one.block.cameras == other.block.cameras
+    order = [one.block.point_ids.index(name) for name in other.block.point_ids]
+    assert len(order) == len(one.block.point_ids)
+    np.testing.assert_array_equal(one.block.point_positions[order], other.block.point_positions)
+    np.testing.assert_array_equal(one.block.point_sd[order], other.block.point_sd)
+    first, second = np.argsort(one.images), np.argsort(other.images)
+    np.testing.assert_array_equal(one.images[first], other.images[second])
+    for name in ("image_photos", "image_xy", "image_sd"):
+        np.testing.assert_array_equal(getattr(one.block, name)[first], getattr(other.block, name)[second])
+    names = [[each.block.point_ids[row] for row in each.block.image_points] for each in (one, other)]
+    assert [names[0][row] for row in first] == [names[1][row] for row in second]
+    for mine, theirs in zip(one.block.observations, other.block.observations, strict=True):
+        assert mine.name == theirs.name
+        np.testing.assert_array_equal(mine.observed, theirs.observed)
+
+
+def test_a_photo_that_is_not_there_is_named(project, tmp_path):
+    folder = tmp_path / "copy"
+    folder.mkdir()
+    for each in project.iterdir():
+        (folder / each.name).write_bytes(each.read_bytes())
+    table = pd.read_parquet(folder / "images.parquet")
+    table.loc[7, "photo"] = "nowhere"
+    table.to_parquet(folder / "images.parquet")
+    with pytest.raises(InputError, match=r"images\.parquet: there is no photo 'nowhere'"):
+        Streamed(folder, Wishes(), tmp_path / "parts").counted(2)
+
+
+def test_what_has_to_be_read_whole_is_not_streamed(project, tmp_path):
+    folder = tmp_path / "copy"
+    folder.mkdir()
+    for each in project.iterdir():
+        (folder / each.name).write_bytes(each.read_bytes())
+    (folder / "levels.csv").write_text("level,z\nlake,3\n")
+    assert not streamable(folder)
+    assert not streamable(folder / "images.parquet")

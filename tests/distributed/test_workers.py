@@ -1,0 +1,73 @@
+"""The driver on a cluster of two processes: the same bits whoever does what, and workers that die."""
+
+import cloudpickle
+import numpy as np
+import pytest
+import toy
+from test_driver import agrees, run
+from toy import ToyEngine, kept, make
+
+from photogram import _photocore
+from photogram.distributed.driver import Driver, Stop
+from photogram.distributed.tasks import Job
+from photogram.distributed.workers import Workers, check_workers, connected
+from photogram.errors import InputError
+
+cloudpickle.register_pickle_by_value(toy)
+
+
+@pytest.fixture(scope="module")
+def client():
+    with connected("local", 2, 2**30) as found:
+        yield found
+
+
+def on(client, folder, tree, engine=None):
+    job = Job(folder, engine or ToyEngine(), _photocore.__version__, threads=1)
+    executor = Workers(client)
+    try:
+        return Driver(job, tree, executor, Stop()).run()
+    finally:
+        executor.stop()
+
+
+@pytest.fixture
+def alone(tmp_path):
+    """Return a network in four parts, and what one process gives."""
+    tree = make(tmp_path, 40, 60, 4)
+    outcome = run(tmp_path, tree)
+    return tree, outcome, kept(tmp_path, len(tree))
+
+
+def same(folder, tree, expected):
+    for one, other in zip(kept(folder, len(tree)), expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_two_workers_give_the_bits_of_one_process(client, tmp_path, alone):
+    tree, outcome, expected = alone
+    assert on(client, tmp_path, tree) == outcome
+    same(tmp_path, tree, expected)
+    agrees(tmp_path, tree, outcome)
+
+
+@pytest.mark.parametrize("kill", [("form", 0), ("solve", 2), ("keep", 1)], ids=lambda each: each[0])
+def test_a_worker_that_dies_costs_its_tasks_alone(client, tmp_path, alone, kill):
+    tree, outcome, expected = alone
+    for each in tmp_path.glob("kept*"):
+        each.unlink()
+    assert on(client, tmp_path, tree, ToyEngine(kill)) == outcome
+    assert (tmp_path / f"killed-{kill[0]}-{kill[1]}").exists()
+    same(tmp_path, tree, expected)
+
+
+def test_another_version_is_refused(client, tmp_path, monkeypatch):
+    check_workers(client, tmp_path)
+    monkeypatch.setattr(_photocore, "__version__", "0.0.1")
+    with pytest.raises(InputError, match=r"all workers must have photogram 0\.0\.1, as here: tcp://.* has"):
+        check_workers(client, tmp_path)
+
+
+def test_a_folder_that_workers_do_not_see_is_refused(client, tmp_path):
+    with pytest.raises(InputError, match="do not see"):
+        check_workers(client, tmp_path / "nowhere")

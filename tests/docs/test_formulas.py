@@ -1,0 +1,85 @@
+"""Formulas of the pages: all can be set, and what cannot be set ends a strict build."""
+
+from __future__ import annotations
+
+import logging
+import re
+from pathlib import Path
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import formulas
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+PAGES = [path.relative_to(DOCS).as_posix() for path in sorted(DOCS.rglob("*.md"))]
+CODE = re.compile(r"<!--.*?-->|```(?!math)\w*\n.*?```|`[^`\n]+`", re.DOTALL)
+DISPLAYED = re.compile(r"^ *```math\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
+INLINE = re.compile(r"(?<![\\$])\$(?! )([^$\n]+?)(?<! )\$(?!\d)")
+PAGE = SimpleNamespace(file=SimpleNamespace(src_uri="page.md"))
+
+
+def written(page: str) -> list[tuple[str, bool]]:
+    """Return the formulas of a page, and whether each stands by itself."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    inline = INLINE.findall(CODE.sub("", DISPLAYED.sub("", text)))
+    return [(latex, True) for latex in DISPLAYED.findall(text)] + [(latex, False) for latex in inline]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_all_formulas_of_a_page_can_be_set(page):
+    for latex, displayed in written(page):
+        ElementTree.fromstring(formulas.as_mathml(latex.strip(), displayed))
+
+
+def test_the_concepts_have_formulas():
+    counts = {page: len(written(page)) for page in PAGES}
+    wanted = ("adjustment", "blunders", "cameras", "conventions", "datum", "refraction", "tests", "weights")
+    assert all(counts[f"{name}.md"] > 8 for name in wanted), counts
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_no_formula_stands_as_code(page):
+    text = re.sub(r"```.*?```", "", (DOCS / page).read_text(encoding="utf-8"), flags=re.DOTALL)
+    formulas_as_code = [
+        code
+        for code in re.findall(r"`([^`\n]+)`", text)
+        if re.search(r"\^-?\d|\bsqrt\(|\w'(?: |\))|~[a-z]\b", code) and "import" not in code
+    ]
+    assert formulas_as_code == []
+
+
+def test_a_formula_becomes_mathml_and_a_sign_of_dollars_does_not():
+    html = '<p><span class="arithmatex">\\(w = v / \\sqrt{r} &lt; 3\\)</span></p>'
+    made = formulas.on_page_content(html, PAGE)
+    assert "<msqrt><mi>r</mi></msqrt>" in made
+    assert "data-search-exclude" in made
+    assert 'aria-label="w = v / \\sqrt{r} &lt; 3"' in made
+    assert formulas.on_page_content("<p>5 $ and 6 $</p>", PAGE) == "<p>5 $ and 6 $</p>"
+
+
+def test_a_formula_that_cannot_be_set_is_a_warning_of_the_build(caplog):
+    html = '<div class="arithmatex">\\[\\frac{a}{\\]</div>'
+    with caplog.at_level(logging.WARNING, "mkdocs"):
+        formulas.on_page_content(html, PAGE)
+    [record] = caplog.records
+    assert record.name.startswith("mkdocs.")
+    assert "page.md: a formula cannot be set" in record.message
+
+
+def test_widths_are_those_of_the_widest_line():
+    narrow, wide = (
+        formulas.width(
+            ElementTree.fromstring(re.sub(r"<div[^>]*>|</div>", "", formulas.as_mathml(each, True)))
+        )
+        for each in ("a = b", r"\begin{aligned} a &= b \\ c &= d + e + f + g + h \end{aligned}")
+    )
+    assert 1.5 < narrow < 3.5
+    assert 8.0 < wide < 14.0
+
+
+def test_long_lines_of_figures_are_measured():
+    html = '<div class="language-text highlight"><pre><code>ab\n<a>cdef</a>\n</code></pre></div>'
+    made = formulas.on_page_content(html, PAGE)
+    assert 'class="language-text highlight" style="--characters: 4"' in made

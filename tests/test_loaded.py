@@ -1,0 +1,52 @@
+"""What small work loads: nothing that it does not need, so that it feels instant (`benches/entrance.py`)."""
+
+import subprocess
+import sys
+
+import pytest
+
+COMMAND = """
+import sys
+sys.argv = ["photogram", *{arguments!r}]
+from photogram.cli import main
+try:
+    main()
+except SystemExit as end:
+    assert not end.code, end.code
+"""
+HEAVY = ("matplotlib", "jinja2", "pandas", "pyarrow", "pyproj", "geopandas", "scipy", "erfa", "tetra3rs")
+NUMERICAL = ("numpy", "orjson", "photogram._photocore")
+
+
+def loaded(program, among, folder):
+    """Return which modules a program leaves loaded."""
+    said = f"\nimport sys; print(*sorted(set({among!r}) & set(sys.modules)), file=sys.stderr)"
+    done = subprocess.run(
+        [sys.executable, "-c", program + said], check=True, capture_output=True, text=True, cwd=folder
+    )
+    return done.stderr.split()
+
+
+@pytest.mark.parametrize(
+    "program", ["import photogram", COMMAND.format(arguments=["--help"])], ids=["import", "help"]
+)
+def test_import_and_help_load_no_numbers(program, tmp_path):
+    assert loaded(program, (*HEAVY, *NUMERICAL, "photogram.giant", "photogram.formats"), tmp_path) == []
+
+
+@pytest.mark.parametrize("command", ["giant", "adjust"])
+def test_examples_load_what_they_need(command, tmp_path):
+    program = COMMAND.format(arguments=[command, "--example", "--no-html", "--quiet"])
+    others = ("photogram.comparator", "photogram.stellar")
+    assert loaded(program, (*HEAVY, *others, "photogram._photocore"), tmp_path) == ["photogram._photocore"]
+
+
+def test_giant_does_not_wait_for_readers_of_other_formats(tmp_path):
+    program = COMMAND.format(arguments=["giant", "--example", "--no-html", "--quiet"])
+    among = ("photogram.formats.registry", "photogram.formats.colmap", "photogram.formats.planes")
+    assert loaded(program, among, tmp_path) == ["photogram.formats.planes"]
+
+
+def test_adjust_and_its_block_load_no_pictures(tmp_path):
+    program = "from photogram import Block, adjust, simulate\nassert adjust(simulate().block).converged"
+    assert loaded(program, HEAVY, tmp_path) == []
