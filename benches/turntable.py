@@ -1,6 +1,6 @@
 """A weak collection: an object on a turntable, nearly parallel rays, a camera for each photo.
 
-python benches/turntable.py [--photos 177] [--points 4217] [--rays 31] [--distance 225] [--seed 0]
+python benches/turntable.py [--photos 177] [--points 4217] [--rays 31] [--distance 175] [--seed 0]
 
 Prints how many steps the adjustment takes, with all covariances, and how long.
 """
@@ -23,7 +23,7 @@ def main() -> None:
     parser.add_argument("--photos", type=int, default=177)
     parser.add_argument("--points", type=int, default=4217)
     parser.add_argument("--rays", type=int, default=31)
-    parser.add_argument("--distance", type=float, default=225.0)
+    parser.add_argument("--distance", type=float, default=175.0)
     parser.add_argument("--seed", type=int, default=0)
     shape = vars(parser.parse_args())
     start = collection.simulate_turntable(**shape).collection

@@ -118,7 +118,7 @@ def simulate_turntable(
     photos: int = 177,
     points: int = 4217,
     rays: int = 31,
-    distance: float = 225.0,
+    distance: float = 175.0,
     noise: float = 0.5,
     coarseness: float = 1.0,
     seed: int = 0,
@@ -136,7 +136,7 @@ def simulate_turntable(
     rays
         The nearest photos that see a point, two at least.
     distance
-        Of the photos from the axis. By default the standard deviation of a focal length is a third of it.
+        Of the photos from the axis. By default the standard deviation of a focal length is a fifth of it.
     noise
         Standard deviation of image coordinates, pixels.
     coarseness
