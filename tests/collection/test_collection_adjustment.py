@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from photogram import AdjustmentError, InputError
-from photogram.collection import PARAMETERS, Collection, adjust, simulate
+from photogram.collection import PARAMETERS, Collection, adjust, simulate, simulate_turntable
 
 
 def computed(collection: Collection, unknowns: np.ndarray) -> np.ndarray:
@@ -50,6 +50,25 @@ def test_far_starts_lead_to_the_minimum_near_the_truth(seed):
     assert far.converged
     assert far.cost == pytest.approx(near.cost, rel=1e-7)
     assert near.variance_of_unit_weight == pytest.approx(1, abs=0.15)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_weak_collection_takes_few_steps_along_its_valley(seed):
+    made = simulate_turntable(photos=60, points=800, rays=10, distance=60, seed=seed)
+    far, near = adjust(made.collection), adjust(made.truth)
+    assert far.converged
+    assert len(far.iterations) <= 30
+    assert far.cost == pytest.approx(near.cost, rel=1e-7)
+    assert far.variance_of_unit_weight == pytest.approx(1, abs=0.1)
+    relative = np.sqrt(far.photo_cofactors[:, 6, 6]) / np.abs(far.photo_parameters[:, 6])
+    assert np.median(relative) > 0.1
+
+
+def test_a_turntable_that_cannot_be_is_refused():
+    with pytest.raises(InputError, match="two rays"):
+        simulate_turntable(photos=5, rays=6)
+    with pytest.raises(InputError, match="distance"):
+        simulate_turntable(distance=2)
 
 
 def test_flawless_images_give_the_truth_up_to_a_similarity():

@@ -17,7 +17,7 @@ from photogram.collection.adjust import adjust
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import PARAMETERS, Collection
 from photogram.collection.formats import read, to_bytes
-from photogram.collection.simulation import Simulation, simulate
+from photogram.collection.simulation import Simulation, simulate, simulate_turntable
 
 __all__ = [
     "PARAMETERS",
@@ -27,6 +27,7 @@ __all__ = [
     "adjust",
     "read",
     "simulate",
+    "simulate_turntable",
     "to_bytes",
 ]
 

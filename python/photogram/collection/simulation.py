@@ -1,4 +1,4 @@
-"""Simulated collections: photos all around a cloud of points."""
+"""Simulated collections: photos all around a cloud of points, and an object on a turntable seen from afar."""
 
 from __future__ import annotations
 
@@ -12,12 +12,16 @@ from photogram.arguments.types import Floats
 from photogram.collection.collection import Collection
 from photogram.errors import InputError
 
-__all__ = ["Simulation", "simulate"]
+__all__ = ["Simulation", "simulate", "simulate_turntable"]
 
 DISTANCE = 10.0
 """Of the photos from the centre of the cloud."""
 SIZE = 4.0
 """Side of the cloud, a cube."""
+
+
+FIELD = 400.0
+"""Image radius of the object on a turntable, pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +111,90 @@ def simulate(
     start[:, 7:] *= 0.0 if coarseness else 1.0
     coarse = positions + coarseness * random.normal(0, 0.5, positions.shape)
     return Simulation(truth.replace(photo_parameters=start, point_positions=coarse), truth, outliers)
+
+
+def simulate_turntable(
+    *,
+    photos: int = 177,
+    points: int = 4217,
+    rays: int = 31,
+    distance: float = 175.0,
+    noise: float = 0.5,
+    coarseness: float = 1.0,
+    seed: int = 0,
+) -> Simulation:
+    """Simulate an object on a turntable before a camera with a long focal length: rays are nearly parallel.
+
+    The object is a bumpy pillar with a radius of about 1 and a height of 2; its image is 800 pixels wide.
+    Each photo has a camera of its own, whose focal length and distance can hardly be told apart: a weak
+    network, whose sum of squares has a long bent valley.
+
+    Parameters
+    ----------
+    photos, points
+        How many; photos stand all around.
+    rays
+        The nearest photos that see a point, two at least.
+    distance
+        Of the photos from the axis. By default the standard deviation of a focal length is a fifth of it.
+    noise
+        Standard deviation of image coordinates, pixels.
+    coarseness
+        Of the initial values: 1 gives standard deviations of 0.01 rad, of 0.02 across the line of sight, of
+        20 percent for focal lengths and distances together, of half a percent for distances by themselves and
+        of 0.05 for points, and starts without distortion; 0 starts at the truth.
+    seed
+        The same seed gives the same collection.
+
+    Raises
+    ------
+    InputError
+        Fewer than two photos or rays, no points, what is negative.
+    """
+    if photos < 2 or points < 1 or not 2 <= rays <= photos:
+        raise InputError(
+            "there must be two photos, two rays and a point at least, and no more rays than photos; "
+            f"not {photos}, {rays} and {points}"
+        )
+    if not (noise >= 0 and coarseness >= 0 and seed >= 0 and distance > 2):
+        raise InputError("noise, coarseness and seed are not negative; the distance exceeds 2")
+    random = np.random.default_rng(seed)
+    around = 2 * np.pi * np.arange(photos) / photos
+    parameters = np.zeros((photos, 9))
+    parameters[:, 1] = -around
+    parameters[:, :3] += random.normal(0, 0.01, (photos, 3))
+    parameters[:, 3:5] = random.normal(0, 0.02, (photos, 2))
+    parameters[:, 5] = -distance * (1 + random.normal(0, 0.005, photos))
+    parameters[:, 6] = FIELD * distance * (1 + random.normal(0, 0.02, photos))
+    # A thousandth of the radius at the edge of the object.
+    parameters[:, 7] = random.normal(0, 0.001, photos) * distance**2
+    angle, height = random.uniform(0, 2 * np.pi, points), random.uniform(-1, 1, points)
+    radius = 0.8 + 0.2 * np.cos(3 * angle) * np.cos(2 * height) + random.normal(0, 0.05, points)
+    positions = np.column_stack([radius * np.sin(angle), height, radius * np.cos(angle)])
+    apart = np.abs((angle[:, None] - around + np.pi) % (2 * np.pi) - np.pi)
+    image_photos = np.sort(np.argsort(apart, axis=1, kind="stable")[:, :rays], axis=1).ravel()
+    image_points = np.repeat(np.arange(points), rays)
+    exact = _photocore.collection_images("bal", parameters[image_photos], positions[image_points])
+    truth = Collection(
+        photo_parameters=parameters,
+        point_positions=positions,
+        image_photos=image_photos,
+        image_points=image_points,
+        image_xy=exact + random.normal(0, noise, exact.shape),
+        image_sd=np.array(noise if noise > 0 else 1.0),
+    )
+    start = parameters.copy()
+    start[:, :3] += coarseness * random.normal(0, 0.01, (photos, 3))
+    start[:, 3:5] += coarseness * random.normal(0, 0.02, (photos, 2))
+    # A focal length that is too long makes the camera stand too far away.
+    longer = np.exp(coarseness * random.normal(0, 0.2, photos))
+    start[:, 5] *= longer * (1 + coarseness * random.normal(0, 0.005, photos))
+    start[:, 6] *= longer
+    start[:, 7:] *= 0.0 if coarseness else 1.0
+    coarse = positions + coarseness * random.normal(0, 0.05, positions.shape)
+    return Simulation(
+        truth.replace(photo_parameters=start, point_positions=coarse), truth, np.zeros(len(exact), dtype=bool)
+    )
 
 
 def _cameras(photos: int, random: np.random.Generator) -> Floats:

@@ -126,6 +126,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let moved = (damping == 0.0).then(|| basis.factor.moved(&self.problem.system, &step));
         basis.factor.recycle(&self.problem.system);
         let far = change > FAR * (unknowns.len() as f64).sqrt();
+        self.look_ahead(&iteration);
         let next = self.form(if far { self.relocated(trial) } else { trial }, relaxed(damping))?;
         let negligible = damping == 0.0 && change <= NEGLIGIBLE;
         let highest = if negligible { f64::MAX } else { control.best * (1.0 + ROUNDING) };

@@ -262,6 +262,16 @@ impl<'a, M: Model> Linearized<'a, M> {
         Self { problem, prepared, observation_sd, fixed: None, reweighting: None, contributions: &[] }
     }
 
+    /// The problem that they are of.
+    pub fn problem(&self) -> &'a Problem<M> {
+        self.problem
+    }
+
+    /// Standard deviation of an observation.
+    pub fn deviation(&self, observation: usize) -> f64 {
+        self.observation_sd[observation]
+    }
+
     /// The values that the equations are of, prepared.
     pub fn at(&self) -> &M::Prepared {
         &self.prepared

@@ -97,6 +97,7 @@ fn adjusted<M: Model>(
         options,
         by_groups,
         target,
+        is_near: false,
         has_moved: false,
         pool,
         watch,
@@ -206,6 +207,8 @@ pub(super) struct Run<'a, 'w, M: Model> {
     by_groups: bool,
     /// The datum to end in.
     target: Option<Target<'a>>,
+    /// Whether the next formation will be the last one, there being a datum to end in.
+    is_near: bool,
     /// Whether the network was moved on its way.
     has_moved: bool,
     pub pool: &'a ThreadPool,
@@ -282,8 +285,9 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a, M>, AdjustError> {
-        let (unknowns, at_target) = match damping == 0.0 && self.foresees_end() {
-            true => self.moved_to_target(unknowns),
+        let near = std::mem::take(&mut self.is_near);
+        let (unknowns, at_target) = match damping == 0.0 && near {
+            true => self.at_its_target(unknowns),
             false => (unknowns, None),
         };
         let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
@@ -292,19 +296,16 @@ impl<'a, M: Model> Run<'a, '_, M> {
         Ok(State { at_target, ..state })
     }
 
-    /// Whether the next formation will be the last one, there being a datum to end in: steps converge quadratically.
-    fn foresees_end(&self) -> bool {
+    /// Says that the next formation is that after a step, which will be the last one where full steps that converge quadratically say so.
+    pub(super) fn look_ahead(&mut self, last: &Iteration) {
         let full = |iteration: &Iteration| iteration.damping == 0.0;
-        match &self.iterations[..] {
-            [.., before, last] if self.target.is_some() && full(before) && full(last) => {
-                last.largest_change.powi(3) / before.largest_change.powi(2) <= NEGLIGIBLE
-            }
-            _ => false,
-        }
+        let before = self.iterations.last().filter(|before| full(before) && full(last));
+        let next = before.map(|before| last.largest_change.powi(3) / before.largest_change.powi(2));
+        self.is_near = self.target.is_some() && next.is_some_and(|next| next <= NEGLIGIBLE);
     }
 
     /// Moves the network to the datum that it is to end in; it stays where it cannot be moved there.
-    fn moved_to_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<AtTarget>) {
+    fn at_its_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<AtTarget>) {
         let Some(Target { datum, reference }) = self.target else { return (unknowns, None) };
         let adjusted = Adjusted { unknowns: &unknowns, held: &self.datum, loss: None };
         match moved(self.problem, adjusted, datum, reference, self.pool) {
@@ -381,6 +382,23 @@ impl<'a, M: Model> Run<'a, '_, M> {
         self.seconds.solve += start.elapsed().as_secs_f64();
         let change = factor.decrease.sqrt();
         Ok(Solved { basis: Basis { equations, prior, factor, at_target }, step, change })
+    }
+
+    /// Solves the same equations for another right-hand side.
+    pub(super) fn solve_again(
+        &mut self,
+        basis: &Basis<'a, M>,
+        damping: f64,
+        right: &[f64],
+    ) -> Result<Vec<f64>, AdjustError> {
+        let start = Instant::now();
+        let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
+        let Basis { equations, prior, factor, .. } = basis;
+        let system = &self.problem.system;
+        let solved = system.solve_again(self.pool, factor, equations, prior, damping, right, &mut between);
+        let found = unless_stopped(solved)?;
+        self.seconds.solve += start.elapsed().as_secs_f64();
+        Ok(found)
     }
 
     fn finish(mut self, mut end: End<'a, M>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {

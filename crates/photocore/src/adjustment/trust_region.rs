@@ -1,11 +1,12 @@
 //! Levenberg-Marquardt: steps damped by how well the linearized equations predict what they do (Nielsen 1999; Madsen, Nielsen and
 //! Tingleff 2004, section 3.2).
 
+use super::acceleration::PART;
 use super::method::{FIRST_DAMPING, Stop};
 use super::options::{Iteration, Status};
 use super::problem::Model;
 use super::result::AdjustError;
-use super::run::{End, Run, Solved, State};
+use super::run::{Basis, End, Run, Solved, State};
 
 /// Less would leave the seven pivots of a network without datum among rounding errors.
 const LEAST_DAMPING: f64 = 1e-10;
@@ -22,10 +23,17 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// the sum stands still, however much they are damped.
 const PATIENCE: usize = 50;
 
+/// Steps are accelerated once one has lowered the sum of squares by less than this fraction of what was predicted,
+const BENDS: f64 = 0.75;
+/// until the second-order term, in the metric of the normal equations, is smaller than this part of a step.
+const STRAIGHT: f64 = 0.1;
+
 /// The damping, and by how much the next failure raises it.
 struct Damping {
     value: f64,
     rise: f64,
+    /// Whether the valley that steps follow bends.
+    bends: bool,
 }
 
 /// A step that may fail.
@@ -37,6 +45,15 @@ struct Trial<P> {
     predicted: f64,
     /// No unknown changes by more than this multiple of its standard deviation.
     change: f64,
+    /// The second-order term as a part of the step, where it was asked for.
+    bend: Option<f64>,
+}
+
+impl<P> Trial<P> {
+    /// By how much it lowers a sum of squares, as a fraction of what was predicted.
+    fn gain(&self, lowest: f64) -> f64 {
+        (lowest - self.sum_of_squares) / self.predicted
+    }
 }
 
 impl Damping {
@@ -66,7 +83,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     ) -> Result<End<'a, M>, AdjustError> {
         let mut state = start;
         let mut lowest = state.sum_of_squares;
-        let mut damping = Damping { value: state.damping, rise: 2.0 };
+        let mut damping = Damping { value: state.damping, rise: 2.0, bends: false };
         let (mut mark, mut steps) = (lowest, 0);
         while self.iterations.len() < self.options.max_iterations {
             if damping.value > MOST_DAMPING {
@@ -85,11 +102,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 state = self.form(unknowns, damping.value)?;
                 continue;
             };
-            let trial = self.tried(&unknowns, solved);
+            let trial = self.tried(&unknowns, solved, used, lowest, damping.bends)?;
             let whole = used <= FIRST_DAMPING;
             let last = whole && (stop.at_change(trial.change) || stop.at_decrease(trial.predicted, lowest));
-            let gain = (lowest - trial.sum_of_squares) / trial.predicted;
-            // Written so that a gain that is not a number is a failure.
+            let gain = trial.gain(lowest);
+            damping.bends &= trial.bend.is_none_or(|bend| bend > STRAIGHT);
+            damping.bends |= (gain.is_nan() || gain < BENDS) && self.options.loss.is_none();
             if gain > LEAST_GAIN && trial.sum_of_squares <= lowest {
                 let decrease = lowest - trial.sum_of_squares;
                 if let Some(end) = self.keep(&unknowns, &trial, used)? {
@@ -112,14 +130,52 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     /// Where a step leads, and by how much it was predicted to lower the sum of squares.
-    fn tried(&self, before: &[f64], solved: Solved<'a, M>) -> Trial<M::Prepared> {
+    ///
+    /// Where the valley bends, the step is accelerated; the plain one is tried besides where that is not good.
+    fn tried(
+        &mut self,
+        before: &[f64],
+        solved: Solved<'a, M>,
+        damping: f64,
+        lowest: f64,
+        bends: bool,
+    ) -> Result<Trial<M::Prepared>, AdjustError> {
         let Solved { basis, step, change } = solved;
         let predicted = basis.equations.decrease(self.pool, &basis.prior, &step);
+        let term = if bends { Some(self.second_order(before, &basis, &step, damping)?) } else { None };
         basis.factor.recycle(&self.problem.system);
-        let unknowns = self.problem.advanced(before, &step);
-        let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
-        let sum_of_squares = self.objective_at(&unknowns, &prepared);
-        Trial { unknowns, prepared, sum_of_squares, predicted, change }
+        let trial = |step: &[f64], bend: Option<f64>| {
+            let unknowns = self.problem.advanced(before, step);
+            let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
+            let sum_of_squares = self.objective_at(&unknowns, &prepared);
+            Trial { unknowns, prepared, sum_of_squares, predicted, change, bend }
+        };
+        let Some((term, square)) = term else { return Ok(trial(&step, None)) };
+        let bend = Some(square.max(0.0).sqrt() / change);
+        let along: Vec<f64> = step.iter().zip(&term).map(|(v, a)| v + 0.5 * a).collect();
+        let accelerated = trial(&along, bend);
+        if accelerated.gain(lowest) >= BENDS {
+            return Ok(accelerated);
+        }
+        let plain = trial(&step, bend);
+        let is_better = accelerated.sum_of_squares < plain.sum_of_squares;
+        Ok(if is_better { accelerated } else { plain })
+    }
+
+    /// The second-order term a of a step (see [`super::acceleration`]), and a^T (N + damping) a.
+    fn second_order(
+        &mut self,
+        before: &[f64],
+        basis: &Basis<'a, M>,
+        step: &[f64],
+        damping: f64,
+    ) -> Result<(Vec<f64>, f64), AdjustError> {
+        let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
+        let ahead = self.problem.residuals(self.pool, &self.problem.advanced(before, &part));
+        let right = basis.equations.bending(self.pool, &ahead, step);
+        let term = self.solve_again(basis, damping, &right)?;
+        let square = right.iter().zip(&term).map(|(right, value)| right * value).sum();
+        Ok((term, square))
     }
 
     /// Keeps a step; the end where it has led local blocks to where they harm all others.

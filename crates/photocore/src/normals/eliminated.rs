@@ -60,25 +60,105 @@ impl Coupled {
 }
 
 /// Solves for the local blocks of a stack with the others in place, x = L^-T (v - V x_o), and adds them to `found`; what is kept of the
-/// stack is taken off the front of `kept`. `others` are in the order of elimination.
-pub(super) fn solve(
+/// stack is taken off the front of `kept`, and so is v of `own` where there is another right-hand side. `others` are in the order of
+/// elimination.
+pub(super) fn solve<'k>(
     system: &System,
     locals: &[u32],
     coupled: &mut Coupled,
-    kept: &mut &[f64],
+    kept: &mut &'k [f64],
+    own: Option<&mut &'k [f64]>,
     others: &[f64],
     found: &mut Vec<f64>,
 ) {
     let Some(&first) = locals.first() else { return };
     coupled.find(system, first);
     let dim = coupled.main_dim();
-    run(&system.layout, dim, Solve { coupled, depth: locals.len(), kept, others, found });
+    run(&system.layout, dim, Solve { coupled, depth: locals.len(), kept, own, others, found });
+}
+
+/// What local blocks take off another right-hand side of the others.
+#[derive(Default)]
+pub(super) struct Taken {
+    /// L^-1 r, local block by local block.
+    pub own: Vec<f64>,
+    /// V^T L^-1 r where unknowns are coupled, which stand in `ranges`, stack by stack.
+    values: Vec<f64>,
+    ranges: Vec<Range<usize>>,
+}
+
+impl Taken {
+    /// Takes it off.
+    pub fn subtract_from(&self, others: &mut [f64]) {
+        let mut values = &self.values[..];
+        for range in &self.ranges {
+            let own = skip_ref(&mut values, range.len());
+            others[range.clone()].iter_mut().zip(own).for_each(|(right, value)| *right -= value);
+        }
+    }
+}
+
+/// Reduces another right-hand side, over all unknowns, by a stack; what is kept of it is taken off the front of `kept`.
+pub(super) fn reduce(
+    system: &System,
+    locals: &[u32],
+    coupled: &mut Coupled,
+    kept: &mut &[f64],
+    right: &[f64],
+    found: &mut Taken,
+) {
+    let Some(&first) = locals.first() else { return };
+    coupled.find(system, first);
+    run(
+        &system.layout,
+        coupled.main_dim(),
+        Reduce { layout: &system.layout, locals, coupled, kept, right, found },
+    );
+}
+
+struct Reduce<'a, 'k> {
+    layout: &'a Layout,
+    locals: &'a [u32],
+    coupled: &'a Coupled,
+    kept: &'a mut &'k [f64],
+    right: &'a [f64],
+    found: &'a mut Taken,
+}
+
+impl Kernel for Reduce<'_, '_> {
+    #[inline(always)]
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
+        let (count, start) = (L * self.locals.len(), self.found.own.len());
+        let width: usize = self.coupled.ranges.iter().map(Range::len).sum();
+        let coupling = skip_ref(self.kept, count * width);
+        skip_ref(self.kept, count);
+        let triangles = skip_ref(self.kept, self.locals.len() * Triangle::numbers(L));
+        for (&local, numbers) in self.locals.iter().zip(triangles.chunks_exact(Triangle::numbers(L))) {
+            let mut own = [0.0; L];
+            own.copy_from_slice(&self.right[self.layout.local_range(local as usize)]);
+            Triangle::of(L, numbers).forward::<L>(&mut own, 1);
+            self.found.own.extend_from_slice(&own);
+        }
+        let mut at = 0;
+        for range in &self.coupled.ranges {
+            let first = self.found.values.len();
+            self.found.values.resize(first + range.len(), 0.0);
+            let sums = &mut self.found.values[first..];
+            let rows = coupling[at..][..count * range.len()].chunks_exact(range.len().max(1));
+            for (row, value) in rows.zip(&self.found.own[start..]) {
+                sums.iter_mut().zip(row).for_each(|(sum, v)| *sum += v * value);
+            }
+            self.found.ranges.push(range.clone());
+            at += count * range.len();
+        }
+    }
 }
 
 struct Solve<'a, 'k> {
     coupled: &'a Coupled,
     depth: usize,
     kept: &'a mut &'k [f64],
+    own: Option<&'a mut &'k [f64]>,
     others: &'a [f64],
     found: &'a mut Vec<f64>,
 }
@@ -89,7 +169,8 @@ impl Kernel for Solve<'_, '_> {
         let (count, start) = (L * self.depth, self.found.len());
         let width: usize = self.coupled.ranges.iter().map(Range::len).sum();
         let coupling = skip_ref(self.kept, count * width);
-        self.found.extend_from_slice(skip_ref(self.kept, count));
+        let reduced = skip_ref(self.kept, count);
+        self.found.extend_from_slice(self.own.map_or(reduced, |own| skip_ref(own, count)));
         let triangles = skip_ref(self.kept, self.depth * Triangle::numbers(L));
         let own = &mut self.found[start..];
         let mut at = 0;

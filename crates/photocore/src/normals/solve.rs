@@ -5,9 +5,10 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::eliminated::{self, Coupled};
+use super::eliminated::{self, Coupled, Taken};
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
+use super::further::of_others;
 use super::incidence::Stacks;
 use super::stack::Stack;
 use super::system::System;
@@ -46,41 +47,93 @@ impl System {
         outer: &[f64],
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Vec<f64>> {
-        let (layout, symbolic) = (&self.layout, &*self.symbolic);
+        let symbolic = &*self.symbolic;
         watched(pool, between, |control| {
             let mut others = factor.right.clone();
             let first = others.len() - symbolic.outer_unknowns();
             others[first..].iter_mut().zip(outer).for_each(|(x, given)| *x = *given);
             factor.solve_backward(&mut others);
             let found = match factor.eliminated.is_empty() {
-                false => self.kept_locals(&factor.eliminated, &others, control),
+                false => self.kept_locals(&factor.eliminated, None, &others, control),
                 true => self.written_locals(equations, prior, damping, &others, control),
             };
-            let mut values = control.allocated(zeros(layout.unknowns()))?;
-            for position in 0..symbolic.blocks() {
-                let range = symbolic.unknowns_at(layout, position);
-                values[range].copy_from_slice(&others[symbolic.range(position)]);
-            }
-            let found = found.iter().flat_map(|part| part.chunks_exact(layout.local_dim()));
-            for (&local, x) in self.incidence.locals().iter().zip(found) {
-                values[layout.local_range(local as usize)].copy_from_slice(x);
-            }
-            Some(values)
+            self.in_order_of_layout(&found, &others, control)
         })
     }
 
-    /// The local blocks in the order of the incidence, from what was kept of them.
-    fn kept_locals(&self, eliminated: &Eliminated, others: &[f64], control: &Control) -> Vec<Vec<f64>> {
+    /// Solves the normal equations for another right-hand side over all unknowns, with what the factor has kept of the local blocks; as
+    /// [`System::solve_for`] does where it has kept nothing.
+    ///
+    /// `equations`, `prior` and `damping` must be those that the factor comes from.
+    pub fn solve_again<E: Equations>(
+        &self,
+        pool: &ThreadPool,
+        factor: &Factor,
+        equations: &E,
+        prior: &Prior,
+        damping: f64,
+        right: &[f64],
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, Vec<f64>> {
+        if factor.eliminated.is_empty() {
+            return self.solve_for(pool, factor, equations, prior, damping, right, between);
+        }
+        watched(pool, between, |control| {
+            let mut others = control.allocated(of_others(self, right))?;
+            let reduced = |coupled: &mut Coupled, (index, kept): (usize, &Vec<f64>)| {
+                let mut kept = &kept[..];
+                let mut found = Taken::default();
+                for run in self.incidence.stacks_at(index).iter().take_while(|_| !control.stopped()) {
+                    eliminated::reduce(self, run, coupled, &mut kept, right, &mut found);
+                }
+                found
+            };
+            let taken: Vec<Taken> =
+                factor.eliminated.par_iter().enumerate().map_init(Coupled::default, reduced).collect();
+            // One after the other in a fixed order, whichever thread has found them.
+            taken.iter().for_each(|taken| taken.subtract_from(&mut others));
+            factor.solve_columns(&mut others);
+            let own: Vec<Vec<f64>> = taken.into_iter().map(|taken| taken.own).collect();
+            let found = self.kept_locals(&factor.eliminated, Some(&own), &others, control);
+            self.in_order_of_layout(&found, &others, control)
+        })
+    }
+
+    /// The local blocks in the order of the incidence, from what was kept of them; `own`: with other right-hand sides.
+    fn kept_locals(
+        &self,
+        eliminated: &Eliminated,
+        own: Option<&[Vec<f64>]>,
+        others: &[f64],
+        control: &Control,
+    ) -> Vec<Vec<f64>> {
         let solve = |coupled: &mut Coupled, (index, kept): (usize, &Vec<f64>)| {
             let (stacks, mut kept) = (self.incidence.stacks_at(index), &kept[..]);
+            let mut own = own.map(|own| &own[index][..]);
             let mut found = Vec::with_capacity(stacks.locals() * self.layout.local_dim());
             for run in stacks.iter().take_while(|_| !control.stopped()) {
-                eliminated::solve(self, run, coupled, &mut kept, others, &mut found);
+                eliminated::solve(self, run, coupled, &mut kept, own.as_mut(), others, &mut found);
             }
             control.count(stacks.locals());
             found
         };
         eliminated.par_iter().enumerate().map_init(Coupled::default, solve).collect()
+    }
+
+    /// Puts local blocks in the order of the incidence, and the others in that of elimination, in the order of the layout; None without
+    /// memory.
+    fn in_order_of_layout(&self, found: &[Vec<f64>], others: &[f64], control: &Control) -> Option<Vec<f64>> {
+        let (layout, symbolic) = (&self.layout, &*self.symbolic);
+        let mut values = control.allocated(zeros(layout.unknowns()))?;
+        for position in 0..symbolic.blocks() {
+            let range = symbolic.unknowns_at(layout, position);
+            values[range].copy_from_slice(&others[symbolic.range(position)]);
+        }
+        let found = found.iter().flat_map(|part| part.chunks_exact(layout.local_dim()));
+        for (&local, x) in self.incidence.locals().iter().zip(found) {
+            values[layout.local_range(local as usize)].copy_from_slice(x);
+        }
+        Some(values)
     }
 
     /// The same from their equations.

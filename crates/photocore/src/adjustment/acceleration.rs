@@ -1,0 +1,79 @@
+//! Geodesic acceleration: the second-order term of a step (Transtrum and Sethna 2012, "Improvements to the Levenberg-Marquardt algorithm
+//! for nonlinear least-squares minimization").
+//!
+//! Where observations determine a combination of unknowns weakly, the sum of squares has a valley that bends, and straight steps along it
+//! are short. With r the residuals, v the step and r_vv their second derivative along it, (N + damping) a = A^T r_vv, and v + a/2 follows
+//! the valley by one order more. It takes no derivatives besides: r_vv = 2/h ((r(x + h v) - r(x)) / h + A v).
+
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use super::problem::{Linearized, Model};
+use super::walk::Buffers;
+use crate::normals::Equations;
+
+/// The part h of the step at which residuals are compared with those that the linearized equations predict.
+pub(super) const PART: f64 = 0.1;
+/// Parts of the local blocks that are summed by themselves, at the most: the same for any number of threads.
+const PARTS: usize = 64;
+/// Local blocks of one at the least.
+const AT_LEAST: usize = 64;
+
+impl<M: Model> Linearized<'_, M> {
+    /// A^T r_vv over all unknowns; ties, which are few, are taken as straight.
+    ///
+    /// * `ahead`: r(x + h v), in the units of the observations.
+    pub fn bending(&self, pool: &ThreadPool, ahead: &[f64], step: &[f64]) -> Vec<f64> {
+        let problem = self.problem();
+        let layout = problem.layout();
+        let first = layout.all_locals().end;
+        let each = layout.locals().div_ceil(PARTS).max(AT_LEAST);
+        let part = |start: usize| {
+            let locals = start..(start + each).min(layout.locals());
+            let mut own = Vec::with_capacity(locals.len() * layout.local_dim());
+            let mut others = vec![0.0; layout.unknowns() - first];
+            let mut buffers = Buffers::default();
+            for local in locals {
+                let own_step = &step[layout.local_range(local)];
+                let begin = own.len();
+                own.resize(begin + own_step.len(), 0.0);
+                for group in layout.groups_of(local) {
+                    let mut rows = buffers.rows(layout, group);
+                    self.write(local, group, &mut rows);
+                    let kept = layout.kept_range(layout.kept_of(group));
+                    let common: Vec<usize> = layout.common_columns(group).collect();
+                    for row in 0..layout.rows() {
+                        let observation = group * layout.rows() + row;
+                        let local_row = &rows.local[row * own_step.len()..][..own_step.len()];
+                        let kept_row = &rows.kept[row * kept.len()..][..kept.len()];
+                        let common_row = &rows.common[row * common.len()..][..common.len()];
+                        let change = dot(local_row, own_step)
+                            + dot(kept_row, &step[kept.clone()])
+                            + common_row.iter().zip(&common).map(|(a, &k)| a * step[k]).sum::<f64>();
+                        let difference =
+                            ahead[observation] / self.deviation(observation) - rows.constant[row];
+                        let bend = 2.0 / PART * (difference / PART + change);
+                        own[begin..].iter_mut().zip(local_row).for_each(|(sum, a)| *sum += a * bend);
+                        let target = &mut others[kept.start - first..];
+                        target.iter_mut().zip(kept_row).for_each(|(sum, a)| *sum += a * bend);
+                        common_row.iter().zip(&common).for_each(|(a, &k)| others[k - first] += a * bend);
+                    }
+                }
+            }
+            (own, others)
+        };
+        let starts: Vec<usize> = (0..layout.locals()).step_by(each).collect();
+        let found: Vec<(Vec<f64>, Vec<f64>)> = pool.install(|| starts.into_par_iter().map(part).collect());
+        let mut right = Vec::with_capacity(layout.unknowns());
+        found.iter().for_each(|(own, _)| right.extend_from_slice(own));
+        right.resize(layout.unknowns(), 0.0);
+        for (_, others) in &found {
+            right[first..].iter_mut().zip(others).for_each(|(sum, value)| *sum += value);
+        }
+        right
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
