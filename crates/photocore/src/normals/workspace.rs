@@ -35,6 +35,11 @@ impl Workspace {
         }
     }
 
+    /// Gives all spare buffers back to the system.
+    pub fn clear(&self) {
+        lock(&self.spare).clear();
+    }
+
     fn take(&self, length: usize) -> Result<Vec<f64>, usize> {
         let capacity = capacity(length);
         let found = lock(&self.spare).get_mut(&capacity).and_then(Vec::pop);
