@@ -197,6 +197,8 @@ def with_positions(change: Callable[[Block, Position], dict[str, object]], said:
     def plant(seed: int, _rng: np.random.Generator) -> Planted:
         simulation = simulation_of(seed, rectangular=True, photos_per_strip=7)
         block = with_gnss(simulation, **{"sd": 0.05, "seconds": 5.0, "seed": seed, **gnss}).block
+        # What was flown, not what the initial values are.
+        flown = block.replace(photo_positions=simulation.truth.photo_positions)
         changed = [
             Position(
                 **{
@@ -205,7 +207,7 @@ def with_positions(change: Callable[[Block, Position], dict[str, object]], said:
                     "sd": 0.05,
                     "lever_arm": each.lever_arm.value if isinstance(each.lever_arm, LeverArm) else 0.0,
                     "time": each.time,
-                    **change(block, each),
+                    **change(flown, each),
                 }
             )
             for each in block.observations

@@ -8,12 +8,12 @@ residuals is a simulated block whose camera bends a little more than the adjustm
 
 from __future__ import annotations
 
-import re
 import sys
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
+from walk import rounded
 
 from photogram import Block, Result, adjust, simulate
 from photogram.giant import read_project
@@ -45,19 +45,20 @@ def results() -> dict[str, tuple[Result, tuple[str, ...]]]:
     }
 
 
-def rounded(svg: bytes) -> str:
-    """Return a drawing with hundredths of a point, which nobody sees: a third of the size."""
-    text = re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}", svg.decode())
-    return "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
+def pictures() -> dict[str, str]:
+    """Return the drawings by their names."""
+    return {
+        name: rounded(drawn(figure, FOLDER / f"{name}.svg").decode())
+        for result, names in results().values()
+        for name, figure in figures(result, names).items()
+    }
 
 
 def main() -> None:
     """Write the pictures."""
     FOLDER.mkdir(exist_ok=True)
-    for result, names in results().values():
-        for name, figure in figures(result, names).items():
-            path = FOLDER / f"{name}.svg"
-            path.write_text(rounded(drawn(figure, path)), encoding="utf-8")
+    for name, svg in pictures().items():
+        (FOLDER / f"{name}.svg").write_text(svg, encoding="utf-8")
 
 
 if __name__ == "__main__":

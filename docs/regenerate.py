@@ -29,12 +29,14 @@ from pathlib import Path
 
 import calibration_numbers
 import comparator_numbers
+import redundancy_figure
 import stellar_numbers
 import tests_numbers
 
 DOCS = Path(__file__).parent
 BLOCKS: dict[str, Mapping[str, Callable[[], list[str] | None]]] = {
     "comparator.md": comparator_numbers.BLOCKS,
+    "redundancy.md": redundancy_figure.BLOCKS,
     "self-calibration.md": calibration_numbers.BLOCKS,
     "stellar-camera.md": stellar_numbers.BLOCKS,
     "tests.md": tests_numbers.BLOCKS,
@@ -47,7 +49,8 @@ QUOTE = re.compile(r"(<!-- quote: (\S+)(?: \| (.*?))? -->\n).*?(<!-- end -->)", 
 PRINTED = re.compile(r"(<!-- printed: (.+?) -->\n```text\n)(.*?)(```\n<!-- end -->)", re.DOTALL)
 MEASURED = re.compile(r"<!-- measured: (.+?) -->\n(.*?)<!-- end -->", re.DOTALL)
 MARKED = re.compile(
-    r"<!-- (?:numbers|printed|measured|quote): .*?<!-- end -->|<!-- (\w+) -->.*?<!-- /\1 -->", re.DOTALL
+    r"<!-- (?:numbers|printed|measured|quote): .*?<!-- end -->|<!-- (\w+) -->.*?<!-- (?:/|end of )\1 -->",
+    re.DOTALL,
 )
 FIGURES = re.compile(r"```text\n.*?```|(?:^\|[^\n]*\n){3,}", re.DOTALL | re.MULTILINE)
 """What may hold figures: what was printed, and tables."""

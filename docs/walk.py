@@ -20,7 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 DOCS = Path(__file__).parent
-PAGES = ("first-ten-minutes.md", *(f"tutorials/{path.name}" for path in (DOCS / "tutorials").glob("*.md")))
+TUTORIALS = tuple(f"tutorials/{path.name}" for path in sorted((DOCS / "tutorials").glob("*.md")))
+PAGES = ("index.md", "first-ten-minutes.md", *TUTORIALS, "gallery.md")
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 PICTURE = re.compile(r"<!-- picture: (\S+) -->\n!\[[^\]]*\]\(([^)]+)\)")
 MARKS = re.compile(r"<(path|use|text|image)\b")

@@ -50,8 +50,8 @@ def main(pictures: Path | None) -> None:
     print(function.report())
     if pictures is not None:
         pictures.mkdir(parents=True, exist_ok=True)
-        draw_components(components, pictures / "components.png")
-        draw_variance_function(function, pictures / "radius.png")
+        draw_components(components, pictures / "components.svg")
+        draw_variance_function(function, pictures / "radius.svg")
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from photogram import Block, Camera, adjust, collection, errors, simulate
 from photogram.adjustment.adjustment import Progress
 from photogram.arguments.equality import alike
 from photogram.results.iteration import Iteration
+from photogram.stellar.plain import read_plain
 
 
 @pytest.fixture(scope="module")
@@ -243,7 +244,11 @@ def made(kind):
 )
 def test_all_results_are_short_and_pickled(kind):
     thing = made(kind)
-    assert len(repr(thing)) < 7000
+    lines = repr(thing).splitlines()
+    assert len(lines) <= 22
+    assert max(map(len, lines)) <= 110
+    if kind != "plan":  # which is a table of its own
+        assert len(thing._repr_html_()) < 5000
     again = pickle.loads(pickle.dumps(thing))
     assert type(again) is type(thing)
     assert repr(again) == repr(thing)
@@ -251,3 +256,29 @@ def test_all_results_are_short_and_pickled(kind):
         assert again.report() == thing.report()
         assert len(repr(thing).splitlines()) <= 22
         assert "removed" in repr(thing)
+
+
+EXAMPLES = files("photogram") / "examples"
+
+
+@pytest.mark.parametrize("kind", ["orientation", "projector", "plate", "comparator", "verdict"])
+def test_results_of_programs_fit_on_a_screen(kind):
+    thing = {
+        "orientation": lambda: photogram.orient(
+            photogram.absolute_orientation.read_csv(EXAMPLES / "absolute_orientation" / "stations.csv")
+        ),
+        "projector": lambda: photogram.perspective_center.run_deck(
+            EXAMPLES / "perspective_center" / "grid.deck"
+        ),
+        "plate": lambda: photogram.stellar.calibrate(read_plain(EXAMPLES / "stellar" / "plate.toml")),
+        "comparator": lambda: photogram.comparator.calibrate(
+            *photogram.comparator.read([EXAMPLES / "comparator" / "comparator-3.txt"])
+        ),
+        "verdict": lambda: adjust(simulate(strips=2, photos_per_strip=3).block).verdict,
+    }[kind]()
+    lines = repr(thing).splitlines()
+    assert len(lines) <= 22
+    assert kind == "verdict" or max(map(len, lines)) <= 110
+    assert len(repr(thing)) < 1000
+    again = pickle.loads(pickle.dumps(thing))
+    assert repr(again) == repr(thing)

@@ -458,7 +458,7 @@ def test_the_picture_has_a_panel_for_each_pattern(two_patterns):
     pytest.importorskip("matplotlib")
     figure = two_patterns.plot()
     panels, bar = figure.axes[:2], figure.axes[2]
-    assert [axes.get_title().split("\n")[0] for axes in panels] == ["perimeter", "corners"]
+    assert [axes.get_title(loc="left").split("\n")[0] for axes in panels] == ["perimeter", "corners"]
     limits = {axes.collections[0].get_clim() for axes in panels}
     assert len(limits) == 1
     heights = [pattern.point_sd[pattern.new_points, 2] for pattern in two_patterns.patterns]

@@ -135,7 +135,7 @@ _HOMES = {
     "Snooped": "results.snooped",
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
-    "adjust": "adjustment.adjustment",
+    "adjust": "distributed.entrance",
     "camera_from": "stellar.cameras",
     "check": "checks.checking",
     "Cleaned": "adjustment.cleaning",

@@ -72,3 +72,10 @@ def test_a_mistake_that_is_not_there_is_not_named(script):
     assert script["outcome"](lambda *_: wrong, 8000, False)[0] is False
     none = type(planted)(planted.block, [], [])
     assert script["outcome"](lambda *_: none, 8000, False)[1] >= 1
+
+
+@pytest.mark.parametrize("seed", [9015, 9016, 9033])
+def test_rays_of_two_points_that_meet_behind_the_cameras(seed, script):
+    """All rays together miss by metres then, and by less without any one: no measure of what is wrong."""
+    found = script["outcome"](script["KINDS"]["one name for two points"], seed, False)
+    assert found == (True, 0)

@@ -143,7 +143,7 @@ class ToyNode:
         """Return the state after a step."""
         return state + step
 
-    def relocate(self, state):
+    def relocate(self, state, *, threads):
         """Return the state: points stay."""
         return state.copy()
 

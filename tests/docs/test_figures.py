@@ -69,3 +69,30 @@ def test_figures_are_seen_where_they_stand(tmp_path, monkeypatch):
     (tmp_path / "a.md").write_text(f"# A\n\n<!-- measured: python benches/none.py -->\n{table}<!-- end -->\n")
     assert regenerate.unmarked_figures("a.md") == []
     assert regenerate.strange_words("a.md") == ["a.md: no program in 'python benches/none.py'"]
+
+
+def test_the_picture_of_redundancy_is_what_its_command_draws():
+    import redundancy_figure
+    import walk
+
+    drawn = redundancy_figure.svg(redundancy_figure.draw)
+    assert walk.alike((ROOT / "docs" / "redundancy.svg").read_text(encoding="utf-8"), drawn)
+
+
+def test_redundancy_numbers_of_rays_are_those_of_theory():
+    import redundancy_figure
+
+    shares = redundancy_figure.shares()
+    # Of three images in a row the middle one has 2/3 along the base, the others 1/6: the median is theirs.
+    assert shares[2][0] < 0.01
+    assert 0.1 < shares[3][0] < 0.25
+    assert shares[2][1] < shares[3][1] < shares[4][1] < shares[5][1]
+
+
+def test_the_pictures_of_results_are_what_their_command_draws():
+    import pictures_figures
+    import walk
+
+    for name, drawn in pictures_figures.pictures().items():
+        shown = (ROOT / "docs" / "pictures" / f"{name}.svg").read_text(encoding="utf-8")
+        assert walk.alike(shown, drawn), f"{name}: run python docs/pictures_figures.py"

@@ -7,6 +7,8 @@ import walk
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = {
+    "gallery.md": 10,
+    "index.md": 1,
     "tutorials/aerial-block.md": 6,
     "tutorials/drone.md": 7,
     "tutorials/metrology.md": 8,
@@ -31,7 +33,7 @@ def test_every_step_of_the_page(page, tmp_path):
         assert walk.alike(place.read_text(encoding="utf-8"), drawn), f"{made}: run python docs/walk.py {page}"
 
 
-@pytest.mark.parametrize("page", COMMANDS)
+@pytest.mark.parametrize("page", walk.TUTORIALS)
 def test_a_tutorial_has_pictures_and_ends_in_a_decision(page):
     text = (ROOT / "docs" / page).read_text(encoding="utf-8")
     assert len(walk.pictures(page)) >= 2
@@ -51,3 +53,9 @@ def test_lines_that_are_left_out_and_lines_that_have_changed():
 def test_drawings_are_alike_where_they_have_the_same_marks():
     assert walk.alike('<path d="M 1 2"/><text>a</text>', '<text>b</text><path d="M 3 4"/>')
     assert not walk.alike('<path d="M 1 2"/>', '<path d="M 1 2"/><path d="M 1 2"/>')
+
+
+def test_the_first_page_leads_to_every_other():
+    first = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
+    assert {page for page in pages if f"({page}" not in first} == {"index.md"}

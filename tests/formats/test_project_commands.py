@@ -197,3 +197,21 @@ def test_nothing_goes_over_what_is_read(run, tmp_path, command):
     assert done.exit_code == 1
     assert "over the input" in done.stderr
     assert (tmp_path / "own" / "images.csv").read_bytes() == before
+
+
+def test_the_unit_variance_of_redundancy_numbers(run, tmp_path):
+    """With weak stations `free` counts unknowns that their observations determine."""
+    assert run("new", "own").exit_code == 0
+    done = run("adjust", "own", "--unit-variance", "redundancy", "--json", "result.json", "--quiet")
+    assert done.exit_code == 0, done.output
+    result = adjust(formats.read(tmp_path / "own").block, unit_variance="redundancy")
+    document = json.loads((tmp_path / "result.json").read_text())
+    assert document["unit_variance"] == "redundancy"
+    assert document["variance_of_unit_weight"] == pytest.approx(result.variance_of_unit_weight)
+    assert (
+        'unit_variance = "redundancy"'
+        in (tmp_path / "own-adjusted" / "adjusted" / "project.toml").read_text()
+    )
+    again = run("adjust", "own-adjusted/adjusted", "--out", "again", "--json", "again.json", "--quiet")
+    assert again.exit_code == 0, again.output
+    assert json.loads((tmp_path / "again.json").read_text())["unit_variance"] == "redundancy"

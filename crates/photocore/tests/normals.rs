@@ -211,12 +211,21 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let factor = done(system.factor(&pool, dense, &dense.prior, 0.0, &mut go));
     assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
     let solution = done(system.solve(&pool, &factor, dense, &dense.prior, 0.0, &mut go));
+    let rights = vec![1.0; 11 * layout.unknowns()];
+    let alone = done(system.factor_with(&pool, dense, &dense.prior, &rights, false, &mut go));
+    let written = done(system.solve(&pool, &alone, dense, &dense.prior, 0.0, &mut go));
+    let further = done(system.solve_further(&pool, &alone, dense, &dense.prior, &rights, &mut go));
     let cholesky = dense.normal_matrix().llt(faer::Side::Lower).unwrap();
+    let ones = cholesky.solve(Mat::<f64>::full(layout.unknowns(), 1, 1.0));
+    for (i, value) in further.iter().enumerate() {
+        assert_close(*value, ones[(i % layout.unknowns(), 0)], 1e-9 * ones.norm_max(), "further solution");
+    }
     let logarithm: f64 = (0..layout.unknowns()).map(|i| 2.0 * cholesky.L()[(i, i)].ln()).sum();
     assert_close(determinant(dense, &factor), logarithm, 1e-9 * logarithm.abs().max(1.0), "determinant");
     let expected = cholesky.solve(dense.normal_right());
     for (i, value) in solution.iter().enumerate() {
         assert_close(*value, expected[(i, 0)], 1e-9 * expected.norm_max(), "solution");
+        assert_close(written[i], *value, 1e-12 * expected.norm_max(), "solution from the equations");
     }
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
     compare_columns(dense, &system, &factor, &inverse);

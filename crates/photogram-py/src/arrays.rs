@@ -11,7 +11,10 @@ import_exception!(photogram.errors, InputError);
 /// The rows of an (n, N) array.
 pub fn rows<const N: usize>(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<[f64; N]>> {
     match array.shape() {
-        [_, columns] if *columns == N => Ok(chunks(values(array))),
+        [_, columns] if *columns == N => {
+            let view = array.as_array();
+            Ok(view.as_slice().map_or_else(|| chunks(values(array)), |values| values.as_chunks().0.to_vec()))
+        }
         shape => Err(wrong_shape(name, &format!("(n, {N})"), shape)),
     }
 }
@@ -47,7 +50,12 @@ pub fn numbers(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<
 pub fn indices(name: &str, array: &PyReadonlyArrayDyn<'_, i64>) -> PyResult<Vec<usize>> {
     let negative = |index: i64| InputError::new_err(format!("{name} holds the negative index {index}"));
     match array.shape() {
-        [_] => array.as_array().iter().map(|&i| usize::try_from(i).map_err(|_| negative(i))).collect(),
+        [_] => {
+            let (view, index) = (array.as_array(), |&i: &i64| usize::try_from(i).map_err(|_| negative(i)));
+            // A slice tells its length: there is room for all at once.
+            view.as_slice()
+                .map_or_else(|| view.iter().map(index).collect(), |all| all.iter().map(index).collect())
+        }
         shape => Err(wrong_shape(name, "(n,)", shape)),
     }
 }
@@ -103,7 +111,8 @@ pub fn check_lengths(first: (&str, usize), others: &[(&str, usize)]) -> PyResult
 }
 
 fn values(array: &PyReadonlyArrayDyn<'_, f64>) -> Vec<f64> {
-    array.as_array().iter().copied().collect()
+    let view = array.as_array();
+    view.as_slice().map_or_else(|| view.iter().copied().collect(), <[f64]>::to_vec)
 }
 
 fn chunks<T: Copy, const N: usize>(values: Vec<T>) -> Vec<[T; N]> {

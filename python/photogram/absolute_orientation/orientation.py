@@ -14,6 +14,7 @@ from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Floats
 from photogram.messages import Message, listed
 from photogram.results.iteration import Iteration
+from photogram.show.brief import Brief
 from photogram.show.ways import Shown, picture_of
 from photogram.statistics.limits import GlobalTest, normal_limit, studentized_limit
 from photogram.statistics.reliability import TESTABLE
@@ -53,8 +54,8 @@ class Trace:
     parameters: list[float]
 
 
-@dataclass(frozen=True, eq=False)
-class Orientation(Shown):
+@dataclass(frozen=True, eq=False, repr=False)
+class Orientation(Shown, Brief):
     """An absolutely oriented model; arrays in the order of the n stations, NaN for what took no part.
 
     Covariances are cofactors times `covariance_scale`.

@@ -9,19 +9,22 @@ from numpy.typing import NDArray
 
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
+from photogram.plots.panels import Where, labels, panels, scale_bars
 from photogram.show.pictures import arrows, drawn, new_figure, round_length
-from photogram.show.style import PURPLE, VERMILION
+from photogram.show.style import INK, PURPLE, VERMILION
 from photogram.show.ways import picture_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["figure"]
+__all__ = ["figure", "residuals"]
 
 
 LONGEST = 0.12
 """Length of the longest residual, as a fraction of the plan's larger side."""
+WIDE = 4.0
+"""Inches of axes beyond which the legend has two columns."""
 
 
 @picture_of.register(Orientation)
@@ -31,31 +34,61 @@ def picture(result: Orientation) -> bytes:
 
 
 def figure(result: Orientation) -> Figure:
+    """Return the plan of :func:`residuals` as a figure that belongs to no window."""
+    made = new_figure(1.0, 1.0)
+    residuals(result, made)
+    return made
+
+
+def residuals(result: Orientation, ax: Where = None) -> Axes:
     """Draw plan residuals as arrows and those of elevations as bars, given minus transformed.
 
-    Needs matplotlib (`pip install 'photogram[plots]'`).
+    Parameters
+    ----------
+    result
+        An orientation.
+    ax
+        Axes, or a figure to put them in; a new figure when None.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        matplotlib is absent (`pip install 'photogram[plots]'`).
     """
-    made = new_figure(8, 7.5)
-    axes = made.add_subplot()
     rows = np.flatnonzero(result.took_part)
     plan = result.adjusted_control[rows, :2]
-    residuals = result.residuals_ground[rows]
+    own, unit = result.residuals_ground[rows], result.stations.ground_unit
     size = float(np.ptp(plan, axis=0).max())
-    largest = float(np.nanmax(np.abs(residuals)))
+    largest = float(np.nanmax(np.abs(own)))
     factor = LONGEST * size / largest if largest > 0 else 0.0
-    _stations(axes, result, rows, plan)
-    _residuals(axes, plan, residuals * factor)
-    _key(axes, plan, size, factor, result.stations.ground_unit)
-    axes.set_aspect("equal")
-    axes.margins(0.15)
-    axes.ticklabel_format(useOffset=False, style="plain")
-    axes.set_xlabel(f"X, {result.stations.ground_unit}")
-    axes.set_ylabel(f"Y, {result.stations.ground_unit}")
-    rms = result.rms / result.similarity.scale
-    axes.set_title(f"Control, given minus transformed; rms {rms:.3g} {result.stations.ground_unit}")
-    axes.locator_params(nbins=6)
-    made.legend(loc="outside lower center", ncols=3, frameon=False)
-    return made
+    high = float(np.clip(5.5 * np.ptp(plan[:, 1]) / (np.ptp(plan[:, 0]) or 1.0), 2.0, 8.0))
+    with panels(ax, 1, 1, 6.5, high + 1.8) as [axes]:
+        _stations(axes, result, rows, plan)
+        ends = _residuals(axes, plan, own * factor)
+        axes.set_aspect("equal")
+        axes.margins(0.1)
+        axes.autoscale_view()
+        axes.ticklabel_format(useOffset=False, style="plain")
+        axes.set_xlabel(f"X, {unit}")
+        axes.set_ylabel(f"Y, {unit}")
+        axes.locator_params(nbins=6)
+        # Below the labels of the axis: beside small axes there would be no room for names.
+        room = axes.get_window_extent().width / axes.figure.dpi
+        columns = 2 if room > WIDE else 1
+        axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), borderaxespad=4.5, ncols=columns)
+        axes.set_xlim(axes.get_xlim())
+        axes.set_ylim(axes.get_ylim())
+        rms = result.rms / result.similarity.scale
+        length = round_length(LONGEST * size / factor) if factor else 0.0
+        bars = [(length * factor, INK, f"{length:g} {unit}, given minus transformed")] if factor else []
+        scale_bars(axes, bars, f"Residuals of control, rms {rms:.3g} {unit}")
+        names = [result.stations.ids[row] for row in rows.tolist()]
+        labels(axes, plan, names, [INK] * len(names), ends, gap=6.0)
+    return axes
 
 
 def _stations(axes: Axes, result: Orientation, rows: NDArray[np.intp], plan: Floats) -> None:
@@ -68,31 +101,28 @@ def _stations(axes: Axes, result: Orientation, rows: NDArray[np.intp], plan: Flo
     )
     for name, chosen, marker in kinds:
         if chosen.any():
-            axes.plot(*plan[chosen].T, marker, color="0.25", markerfacecolor="none", label=name)
-    for row, place in zip(rows.tolist(), plan, strict=True):
-        axes.annotate(result.stations.ids[row], place, (6, 6), textcoords="offset points", fontsize=8)
+            axes.plot(*plan[chosen].T, marker, color=INK, markerfacecolor="none", label=name)
 
 
-def _residuals(axes: Axes, plan: Floats, enlarged: Floats) -> None:
-    """Draw residuals, already in the scale of the plan."""
+def _residuals(axes: Axes, plan: Floats, enlarged: Floats) -> Floats:
+    """Draw residuals, already in the scale of the plan; return places along them, which names spare."""
     flat = np.isfinite(enlarged[:, :2]).any(axis=1)
+    steps = np.nan_to_num(enlarged)
     if flat.any():
-        arrows(axes, plan[flat], np.nan_to_num(enlarged[flat, :2]), width=0.004, zorder=3, color=VERMILION)
+        arrows(axes, plan[flat], steps[flat, :2], width=0.004, zorder=3, color=VERMILION)
         axes.plot([], [], color=VERMILION, label="plan residual")
     high = np.isfinite(enlarged[:, 2])
-    ends = plan[high, 1] + enlarged[high, 2]
+    up = np.column_stack([np.zeros(len(plan)), steps[:, 2]])
+    ends = plan[high] + up[high]
     axes.vlines(
-        plan[high, 0], plan[high, 1], ends, color=PURPLE, linewidth=3, label="height residual (up: positive)"
+        plan[high, 0],
+        plan[high, 1],
+        ends[:, 1],
+        color=PURPLE,
+        linewidth=3,
+        label="height residual (up: positive)",
     )
     # Bars do not widen the limits of the axes by themselves.
-    axes.update_datalim(np.column_stack([plan[high, 0], ends]))
-
-
-def _key(axes: Axes, plan: Floats, size: float, factor: float, unit: str) -> None:
-    """Draw a bar of a round length below the plan."""
-    if factor == 0:
-        return
-    length = round_length(LONGEST * size / factor)
-    corner = plan.min(axis=0) - [0.0, 0.2 * size]
-    axes.plot([corner[0], corner[0] + length * factor], [corner[1]] * 2, color="0.25", linewidth=2)
-    axes.annotate(f"{length:g} {unit}", corner, (0, -12), textcoords="offset points", fontsize=8)
+    axes.update_datalim(ends)
+    parts = np.linspace(0.25, 1.0, 4)[:, np.newaxis, np.newaxis]
+    return np.concatenate([plan + parts * steps[:, :2], plan + parts * up]).reshape(-1, 2)

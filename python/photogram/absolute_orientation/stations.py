@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import frozen, names, numbers, text
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.show.brief import Brief
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,8 +34,8 @@ CONTROL_SD_COLUMNS = ("sd_X", "sd_Y", "sd_Z")
 MODEL_SD_COLUMNS = ("sd_x", "sd_y", "sd_z")
 
 
-@dataclass(frozen=True, eq=False)
-class Stations:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stations(Brief):
     """The stations of a model, in their order; arrays are copied and checked.
 
     A station without any control coordinate is a point to be transformed. The arrays cannot be written, so

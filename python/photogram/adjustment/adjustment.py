@@ -6,11 +6,13 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal, get_args
+from os import PathLike
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from photogram import _photocore
+from photogram.adjustment.elsewhere import IN_PARTS, Division
 from photogram.adjustment.ends import behind, folded, harmful, rounded, too_coarse, undetermined
 from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
@@ -101,6 +103,11 @@ def adjust(
     ordering: Ordering = "auto",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
+    cluster: Any = None,
+    workers: int | None = None,
+    parts: int | None = None,
+    memory: int | str | None = None,
+    folder: str | PathLike[str] | None = None,
 ) -> Result:
     """Adjust a block by least squares.
 
@@ -151,6 +158,21 @@ def adjust(
         processors. The result does not depend on it, to the last bit.
     progress
         Called now and then with what is going on; an exception it raises stops the adjustment.
+    cluster
+        Where to adjust in parts (docs/distributed.md): a `dask.distributed.Client`, the address of a
+        scheduler, or `local` for workers on this machine. The result is that of one process, to rounding;
+        covariances between photos or points, and other datums, are not asked of it.
+    workers
+        Of a local cluster: how many; one for each processor when None.
+    parts
+        How many parts; as many as `memory` and the workers ask for when None. Without a cluster they are
+        worked off one after the other in this process.
+    memory
+        Bytes that a worker, or this process, may take for them, or text such as `4GB`. A block that fits as a
+        whole, and is not for a cluster, is adjusted as a whole.
+    folder
+        Where parts and states are kept, on a disk that all workers see; a run that died is taken up there.
+        None: a temporary folder.
 
     Returns
     -------
@@ -206,6 +228,13 @@ def adjust(
         unit_variance=unit_variance,
         minimum=minimum_row(block, datum) if isinstance(datum, MinimumConstraints) else None,
     )
+    division = Division(cluster, workers, parts, memory, folder)
+    if division.is_asked_for:
+        if inner is not None or options.minimum is not None or row or as_published:
+            raise InputError("in parts there is no loss, no datum to choose and no published iteration")
+        found = IN_PARTS[0](block, options, division, threads, progress)
+        if found is not None:
+            return found
     return _adjusted(block, options, processors, progress, inner, as_published)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from photogram import _photocore
 from photogram.checks.parts import Figure, Part
 from photogram.io import json
+from photogram.show.brief import Brief, Rows
 from photogram.show.sections import composed, headline
 from photogram.show.ways import html_of
 from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Verdict
@@ -103,8 +104,8 @@ class Section:
         return [self.why, *self.lines, *(shown or ["nothing found"])]
 
 
-@dataclass
-class Check:
+@dataclass(repr=False)
+class Check(Brief):
     """The outcome of a check.
 
     Attributes
@@ -120,6 +121,15 @@ class Check:
     title: str
     sections: list[Section]
     result: Result | None
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return how many findings there are, and which, the grave ones first."""
+        grave = self.grave
+        found = [*grave, *(each for each in self.findings if each.level == "look")]
+        title = (
+            f"Check of {self.title or 'a network'}: {len(grave)} grave, {len(found) - len(grave)} to look at"
+        )
+        return title, [(each.level, each.text) for each in found]
 
     @property
     def findings(self) -> list[Finding]:

@@ -281,7 +281,9 @@ def _parted(
     for pair in combinations(rows.tolist(), 2):
         position = solver.changed(point, rows[~np.isin(rows, pair)].tolist(), [])
         residuals, in_front = solver.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
-        near = in_front & (np.linalg.norm(residuals, axis=1) < PARTED * before)
+        # Rays of two points may meet anywhere, even behind the cameras, and then miss by any number.
+        sizes = np.linalg.norm(residuals, axis=1)
+        near = in_front & (sizes < PARTED * min(before, float(np.nan_to_num(sizes, nan=0.0).max())))
         one, other = rows[near], rows[~near]
         if min(len(one), len(other)) < FEWEST_OF_TWO:
             continue

@@ -234,18 +234,20 @@ def _later(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Tri
     axes = local_axes(block)
     number = {name: row for row, name in enumerate(block.photo_ids)}
     centres = axes.positions(block.photo_positions)[[number[each.photo] for each in given]]
+    # Initial positions are coarse; differences of observed ones are not, whatever all of them are off by.
+    flown = axes.positions(np.array([each.observed[:3] for each in given]))
     times = np.array([each.time for each in given])
     velocities = np.full(centres.shape, np.nan)
     timed = bool(np.ptp(times) > 0)
     for strip in strips_of(centres):
         steps = times[strip] if timed else np.arange(len(strip), dtype=np.float64)
         if len(strip) > 1 and (np.diff(steps) > 0).all():
-            velocities[strip] = np.gradient(centres[strip], steps, axis=0)
+            velocities[strip] = np.gradient(flown[strip], steps, axis=0)
     if not np.isfinite(velocities).all():
         return []
 
     def earlier(tau: float) -> list[Position]:
-        places = axes.positions(np.array([each.observed[:3] for each in given])) - tau * velocities
+        places = flown - tau * velocities
         return [_changed(each, place) for each, place in zip(given, axes.from_local(places), strict=True)]
 
     def omega(tau: float) -> float:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from photogram.cli.console import print_remark, print_sections
+from photogram.cli.components import UnitVarianceName
+from photogram.cli.console import NOT_CONVERGED, output, print_remark, print_sections
+from photogram.cli.division import WHOLE, Parts
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.maps import CloudFile, CloudOrigin, Crs, MapFile, check_maps, drawn_maps, point_clouds
@@ -39,10 +42,12 @@ from photogram.cli.projects import (
     project_path,
     read_project,
     with_additions,
+    with_options,
 )
 
 if TYPE_CHECKING:
     from photogram import Block, Result
+    from photogram.adjustment.elsewhere import Division
     from photogram.formats import Project
     from photogram.results.snooped import Snooped
 
@@ -66,6 +71,7 @@ class LossName(StrEnum):
 
 
 @with_job
+@with_options("divided", Parts)
 @with_additions()
 def adjust(
     job: Job,
@@ -103,6 +109,14 @@ def adjust(
         LossName | None,
         typer.Option(help="Robust loss of image coordinates. Default: what PATH says.", show_default=False),
     ] = None,
+    unit_variance: Annotated[
+        UnitVarianceName | None,
+        typer.Option(
+            help="What the variance of unit weight is based on; `redundancy`: on redundancy numbers, whatever"
+            " the weights of the stations. Default: what PATH says.",
+            show_default=False,
+        ),
+    ] = None,
     self_calibrate: Annotated[
         str | None,
         typer.Option(
@@ -115,6 +129,7 @@ def adjust(
         bool,
         typer.Option("--snoop", help="Take gross errors out, one after the other; removed.csv lists them."),
     ] = False,
+    divided: Parts = WHOLE,
     ordering: Ordering = OrderingName.AUTO,
     threads: Threads = None,
     strict: Strict = False,
@@ -135,10 +150,18 @@ def adjust(
         from photogram.show.ways import page_of
 
         pictures = Pictures(job, plots, plot_format, target)
+        if (
+            divided.division.is_asked_for
+            and added == NOTHING
+            and _on_disk(job, path, target, divided, threads)
+        ):
+            return
         project = read_project(job, path, added)
         check_maps(map)  # now that all inputs are known, which it must not be
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
+        if unit_variance is not None:
+            project = project.replace(options=replace(project.options, unit_variance=unit_variance.value))
         sections = described(project)
         if not quiet:
             print_sections(sections, "`photogram info`")
@@ -147,18 +170,27 @@ def adjust(
 
             check_place(project.block, crs)
         block, remarks = _started(project)
+        if divided.plan:
+            from photogram.distributed.entrance import plan_in_parts
+
+            plan = plan_in_parts(block, divided.division, unit_variance=project.options.unit_variance)
+            output.print("\n".join(plan.lines()))
+            plan.check()
+            return
         for remark in remarks:
             if not quiet:
                 print_remark(remark)
         removed = None
         if snoop:
+            if divided.division.is_asked_for:
+                raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--snoop")
             if datum is not None or loss is not None or project.options.datum in ("inner", "minimum"):
                 raise typer.BadParameter("goes without --datum and --loss", param_hint="--snoop")
             removed = _snooped(job, project, block, threads)
             result = removed.result
             assert isinstance(result, Result)
         else:
-            result = _adjusted(job, project, block, datum, loss, ordering, threads)
+            result = _adjusted(job, project, block, datum, loss, ordering, threads, divided.division)
         files = _files(project, result, sections)
         if crs is not None:
             from photogram.formats.placing import placed, placed_files
@@ -179,6 +211,33 @@ def adjust(
             summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
             code=result.verdict.exit_code(strict=strict),
         )
+
+
+def _on_disk(job: Job, path: Path, target: Path, divided: Parts, threads: int | None) -> bool:
+    """Plan or adjust a project that is read batch by batch; False where it has to be read whole."""
+    from photogram.formats import Wishes
+    from photogram.formats.plain.streamed import streamable
+
+    if not streamable(path):
+        return False
+    from photogram.formats.in_parts import adjusted_on_disk, planned_on_disk
+
+    folder = divided.run or target / "run"
+    if divided.plan:
+        plan = planned_on_disk(path, Wishes(), folder, divided.division)
+        output.print("\n".join(plan.lines()))
+        plan.check()
+        return True
+    with job.status("adjusting") as status:
+        told = shown(status, "weighted sum of squares", 1.0) if status is not None else None
+        found = adjusted_on_disk(path, Wishes(), folder, divided.division, threads=threads, progress=told)
+    lines = [*found.lines(), f"what was found of each node: {folder / 'results'}"]
+    report = {target / "report.txt": ("\n".join(lines) + "\n").encode()}
+    code = 0 if found.outcome.status == "converged" else NOT_CONVERGED
+    job.finish(
+        report, summary=lambda: print_sections([("adjusted in parts", lines)], "report.txt"), code=code
+    )
+    return True
 
 
 def _started(project: Project) -> tuple[Block, list[str]]:
@@ -214,9 +273,8 @@ def _adjusted(
     loss: LossName | None,
     ordering: OrderingName,
     threads: int | None,
+    division: Division,
 ) -> Result:
-    from dataclasses import replace
-
     from photogram import InnerConstraints, InputError, MinimumConstraints
     from photogram import adjust as adjust_block
 
@@ -238,6 +296,7 @@ def _adjusted(
             ordering=ordering.value,
             threads=threads,
             progress=shown(status, "weighted sum of squares", 1.0) if status is not None else None,
+            **vars(division),
         )
     if chosen == "control" and result.datum.is_chosen:
         raise InputError(

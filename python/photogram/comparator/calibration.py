@@ -45,6 +45,7 @@ from photogram.comparator.variance import VarianceAnalysis, analyse_variance
 from photogram.errors import AdjustmentError
 from photogram.memory import require
 from photogram.messages import Message
+from photogram.show.brief import Brief
 from photogram.show.ways import Judged, html_of
 
 if TYPE_CHECKING:
@@ -119,8 +120,8 @@ class PlateResult:
     unbiased_um: float
 
 
-@dataclass(frozen=True, eq=False)
-class Calibration(Judged):
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Judged, Brief):
     """A calibrated comparator.
 
     Attributes

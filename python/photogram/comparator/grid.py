@@ -14,6 +14,7 @@ from photogram.arguments.annotations import path
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
 from photogram.io.numbers import is_whole_number, whole_number
+from photogram.show.brief import Brief
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,8 +27,8 @@ BUILT_IN = (773, 1320, 778)
 """The master grids of the program, in the order of its option MASTER (0, 1, 2)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Grid:
+@dataclass(frozen=True, eq=False, repr=False)
+class Grid(Brief):
     """A grid plate.
 
     Attributes

@@ -12,6 +12,7 @@ import numpy as np
 from photogram.errors import InputError
 from photogram.io.places import Place
 from photogram.messages import Message
+from photogram.show.brief import Brief
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -144,8 +145,8 @@ def _medians(groups: Integers, values: Floats) -> Floats:
     return medians
 
 
-@dataclass(frozen=True, eq=False)
-class Session:
+@dataclass(frozen=True, eq=False, repr=False)
+class Session(Brief):
     """Everything measured for one calibration of one comparator.
 
     Attributes

@@ -24,7 +24,7 @@ FORMATION, PAIR = 200.0, 108.0
 """Multiply-adds for an image point, and for every two photos that share a point."""
 WORD = 8.0
 """Bytes of a number."""
-IMAGE_BYTES = 150.0
+IMAGE_BYTES = 1300.0
 """Of an image point with its share of its point, as it is read, formed and handed back."""
 
 

@@ -218,7 +218,7 @@ class Driver:
         """
         course, damping = self._course, up.at.damping
         after = self._step(up)
-        if change > FAR * math.sqrt(max(self._unknowns[2], 1)):
+        if change > FAR * math.sqrt(self._unknowns[4]):
             after = self._relocated(after)
         self._forget(up)
         relaxed = damping / 10.0 if damping / 10.0 >= LEAST_DAMPING else 0.0
@@ -313,7 +313,7 @@ class Driver:
 
     def _variance(self, sums: tuple[float, float, float, float]) -> tuple[int, float | None]:
         """Return degrees of freedom and variance of unit weight (GIANT guide, Appendix E)."""
-        observations, weighted, unknowns, stations = self._unknowns
+        observations, weighted, unknowns, stations, _ = self._unknowns
         freedom, kind = observations + weighted - unknowns, self.stop.unit_variance
         total = sum(sums)
         if kind != "constrained":
@@ -322,10 +322,10 @@ class Driver:
             return freedom, 1.0
         return freedom, total / freedom if freedom > 0 else None
 
-    def _counts(self) -> tuple[int, int, int, int]:
+    def _counts(self) -> tuple[int, int, int, int, int]:
         found = self._sums([self._do(counted, n) for n in self._nodes], "read")
-        observations, weighted, unknowns, stations = np.array(found).sum(axis=0).tolist()
-        return observations, weighted, unknowns, stations
+        observations, weighted, unknowns, stations, size = np.array(found).sum(axis=0).tolist()
+        return observations, weighted, unknowns, stations, size
 
     def _up(self, at: Point) -> _Up:
         """Form all nodes, children before parents."""

@@ -66,7 +66,7 @@ class Node(Protocol):
     def advance(self, state: Floats, step: Floats) -> Floats:
         """Return the state after a step."""
 
-    def relocate(self, state: Floats) -> Floats:
+    def relocate(self, state: Floats, *, threads: int) -> Floats:
         """Return the state with points where their rays meet."""
 
     def objective(self, state: Floats, *, threads: int) -> Sequence[float]:

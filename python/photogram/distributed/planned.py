@@ -173,14 +173,14 @@ def measured_rates(part: Node, bandwidth: float = 1e9) -> Rates:
     Parameters
     ----------
     part
-        A part, formed and inverted here for nothing else.
+        A part, formed and inverted here, at what it starts from, for nothing else.
     bandwidth
         Bytes a second between workers: 10 Gbit Ethernet.
     """
     prediction = part.prediction
     size = len(part.outer)
     start = time.perf_counter()
-    formed = part.form(part.initial, [], damping=1.0, threads=0)
+    formed = part.form(part.initial, [], damping=0.0, threads=0)
     forming = time.perf_counter() - start
     start = time.perf_counter()
     formed.invert(np.zeros(size * (size + 1) // 2), part.initial, threads=0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from photogram.distributed.parts import (
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions
+from photogram.network.unknowns import Unknown
 
 __all__ = ["Manifest", "divided", "part_folder", "partition", "places_of", "read_manifest", "result_folder"]
 
@@ -52,7 +53,7 @@ class Manifest:
     options
         How the core adjusts.
     weighted
-        Weighted unknowns of photos and cameras that are at home in each node.
+        Weighted unknowns of photos, cameras and common unknowns that are at home in each node.
     photos, points, images
         How many each node has at home.
     """
@@ -156,7 +157,7 @@ def divided(
         folder.mkdir(parents=True, exist_ok=True)
         write_part(folder, part)
         own = np.flatnonzero(part.owners == node)
-        weighted = _weighted(part.block, own, shared, root=root)
+        weighted = _weighted(part.block, own, shared, part.common if root else None)
         counts.append((weighted, len(own), len(part.points), len(part.images)))
     middle = np.median(block.photo_positions, axis=0)
     manifest = Manifest(
@@ -172,13 +173,19 @@ def divided(
     return manifest
 
 
-def _weighted(block: Block, own: Indices, shared: Indices, *, root: bool) -> int:
-    """Count the weighted unknowns of photos and cameras that are at home in a node."""
-    sd = np.hstack([block.photo_position_sd[own], block.photo_attitude_sd[own]])
-    cameras = [] if block.photo_cameras is None else block.photo_cameras[own].tolist()
-    here = (set(cameras) - set(shared.tolist())) | (set(shared.tolist()) if root else set())
-    deviations = np.concatenate([np.zeros(0), *(block.cameras[row].deviations for row in sorted(here))])
-    return int(sum(np.count_nonzero(np.isfinite(each) & (each > 0)) for each in (sd, deviations)))
+def _weighted(block: Block, own: Indices, shared: Indices, common: Sequence[Unknown] | None) -> int:
+    """Count the weighted unknowns of photos, cameras and common unknowns that are at home in a node.
+
+    `common` are those of the whole block, in the root; None elsewhere.
+    """
+    sd = [np.hstack([block.photo_position_sd[own], block.photo_attitude_sd[own]]).ravel()]
+    cameras = set() if block.photo_cameras is None else set(block.photo_cameras[own].tolist())
+    cameras -= set(shared.tolist())
+    if common is not None:
+        cameras |= set(shared.tolist())
+        sd += [each.deviations for each in common]
+    sd += [block.cameras[row].deviations for row in sorted(cameras)]
+    return sum(int(np.count_nonzero(np.isfinite(each) & (each > 0))) for each in sd)
 
 
 def write_manifest(run: Path, manifest: Manifest) -> None:

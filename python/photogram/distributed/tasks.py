@@ -191,7 +191,7 @@ def formed(job: Job, number: int, at: Point, contributions: Sequence[Contributio
         shelf.make_room(prediction["memory_bytes"], job.memory, own)
         found = node.form(
             _state(job, node, number, at.state),
-            [each.row for each in contributions],
+            [(_plain(each.row[0]), _plain(each.row[1]), _plain(each.row[2])) for each in contributions],
             damping=at.damping,
             threads=job.threads,
         )
@@ -223,7 +223,7 @@ def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[
     with shelf.lock:
         factor = _factor(job, number, at)
         node = _node(job, number)
-        step = factor.solve(np.ascontiguousarray(outer), threads=job.threads)
+        step = factor.solve(_plain(outer), threads=job.threads)
         state = node.advance(_state(job, node, number, at.state), step)
         _write_state(job, number, after, state)
         return [step[rows] for rows in node.children]
@@ -234,7 +234,7 @@ def relocated(job: Job, number: int, state: str, after: str) -> tuple[float, flo
     with shelf.lock:
         node = _node(job, number)
         before = _state(job, node, number, state)
-        moved = node.relocate(before)
+        moved = node.relocate(before, threads=job.threads)
         _write_state(job, number, after, moved)
         one, other = (sum(node.objective(each, threads=job.threads)) for each in (before, moved))
         return one, other
@@ -279,7 +279,7 @@ def inverted(
         node = _node(job, number)
         shelf.make_room(node.prediction["memory_bytes"], job.memory, _factor_key(job, number, at))
         factor = shelf.take(_factor_key(job, number, at))
-        outer = np.zeros(0) if above is None else above.children[place]
+        outer = np.zeros(0) if above is None else _plain(above.children[place])
         solution, children = factor.invert(outer, _state(job, node, number, after), threads=job.threads)
         job.engine.keep(job.folder, number, solution, variance)
         return Inverted(children)
@@ -293,21 +293,29 @@ def finished(job: Job, number: int, before: str, after: str, variance: float | N
         job.engine.keep(job.folder, number, node.solution(*states, threads=job.threads), variance)
 
 
-def counted(job: Job, number: int) -> tuple[int, int, int, int]:
-    """Return how many observations, weighted unknowns (those of stations apart, too) and unknowns are there.
+def counted(job: Job, number: int) -> tuple[int, int, int, int, int]:
+    """Return how many observations and unknowns are at home in a node.
 
     Returns
     -------
-    Observations, weighted unknowns, unknowns; weighted unknowns of photos and cameras.
+    Observations, weighted unknowns, unknowns that are not fixed; weighted unknowns of photos and cameras;
+    unknowns, fixed ones too.
     """
     with shelf.lock:
-        return *_node(job, number).counts, job.engine.stations(job.folder, number)
+        node = _node(job, number)
+        size = len(node.initial) - len(node.outer)
+        return *node.counts, job.engine.stations(job.folder, number), size
 
 
 def predicted(job: Job, number: int) -> dict[str, float]:
     """Return what work and memory a node takes."""
     with shelf.lock:
         return dict(_node(job, number).prediction)
+
+
+def _plain(values: Floats) -> Floats:
+    """Return an array as the core takes it: what comes over the wire may stand at any address."""
+    return np.require(values, np.float64, ["C_CONTIGUOUS", "ALIGNED"])
 
 
 def _place() -> str:

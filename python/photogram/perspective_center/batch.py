@@ -10,6 +10,7 @@ from photogram.messages import Message
 from photogram.perspective_center.deck import Deck
 from photogram.perspective_center.grid import Grid
 from photogram.perspective_center.solution import PerspectiveCenter, Weights, determine
+from photogram.show.brief import Brief
 from photogram.show.ways import html_of
 
 __all__ = ["Run", "Stop", "run_deck"]
@@ -35,8 +36,8 @@ class Stop:
     grid: Grid | None
 
 
-@dataclass
-class Run:
+@dataclass(repr=False)
+class Run(Brief):
     """What a run through a deck gave.
 
     Attributes

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from photogram.arguments.arrays import names, number, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.show.brief import Brief
 
 __all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "reduce"]
 
@@ -49,8 +50,8 @@ class Coordinatograph:
         return result
 
 
-@dataclass(frozen=True, eq=False)
-class Grid:
+@dataclass(frozen=True, eq=False, repr=False)
+class Grid(Brief):
     """A projected grid of n points: one set of readings.
 
     Attributes

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.show.pictures import arrows, drawn, new_figure, open_frame, round_length
-from photogram.show.style import INK, MARKED
+from photogram.show.pictures import arrows, drawn, new_figure, round_length
+from photogram.show.style import INK, MARKED, in_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,6 +46,7 @@ def draw(results: list[PerspectiveCenter], path: Path) -> bytes:
     return drawn(figure(results), path)
 
 
+@in_style
 def figure(results: list[PerspectiveCenter]) -> Figure:
     """Return a figure with a row for each set: residual vectors, radial distortion."""
     drawing = new_figure(WIDTH, ROW * len(results))
@@ -84,10 +85,7 @@ def residual_vectors(axes: Axes, result: PerspectiveCenter, longest: float) -> N
     axes.set_xlim(x.min() - margin, x.max() + margin)
     axes.set_ylim(y.min() - 2 * margin, y.max() + margin)
     axes.set_aspect("equal")
-    axes.set(
-        xlabel="X (model)", ylabel="Y (model)", title=f"{_name(result)}: residuals, measured − projected"
-    )
-    _quiet(axes)
+    axes.set(xlabel="X, model units", ylabel="Y, model units", title=f"{_name(result)}: measured − projected")
 
 
 def distortion_curve(axes: Axes, result: PerspectiveCenter, largest: float) -> None:
@@ -110,12 +108,11 @@ def distortion_curve(axes: Axes, result: PerspectiveCenter, largest: float) -> N
     axes.set_ylim(-reach, reach)
     axes.set_xlim(left=0.0)
     axes.set(
-        xlabel="radius on the plate (mm)",
-        ylabel="distortion (µm), positive outward",
+        xlabel="radius on the plate, mm",
+        ylabel="distortion, µm, positive outward",
         title="Radial distortion on the plate",
     )
-    axes.legend(loc="lower left", fontsize=8, frameon=False, ncols=3, columnspacing=1.2)
-    _quiet(axes)
+    axes.legend(loc="lower left", ncols=3, columnspacing=1.2)
 
 
 def _means(radius: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -129,11 +126,3 @@ def _means(radius: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 def _name(result: PerspectiveCenter) -> str:
     return f"Set {result.grid.number}, Z = {result.grid.model[:, 2].mean():g}"
-
-
-def _quiet(axes: Axes) -> None:
-    axes.grid(color="#eceff3", linewidth=0.8)
-    axes.set_axisbelow(True)
-    axes.tick_params(labelsize=8)
-    axes.title.set_fontsize(10)
-    open_frame(axes)

@@ -23,6 +23,7 @@ from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message, listed
 from photogram.network.geometry import rotation_matrix
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid
+from photogram.show.brief import Brief
 from photogram.show.ways import Judged
 from photogram.statistics.limits import externally_studentized, studentized_limit
 
@@ -52,8 +53,8 @@ class Cycle:
     attitude_minutes: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class PerspectiveCenter(Judged):
+@dataclass(frozen=True, eq=False, repr=False)
+class PerspectiveCenter(Judged, Brief):
     """Perspective centre and attitude of a projector, and how good they are; n points.
 
     Lengths in the model are in its unit, on the plate in millimetres; angles are omega, phi, kappa.

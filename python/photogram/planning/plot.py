@@ -13,7 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import PhotogramError
 from photogram.show.pictures import new_figure
-from photogram.show.style import ORDERED, VERMILION
+from photogram.show.style import FAINT, ORDERED, VERMILION, in_style
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -33,6 +33,7 @@ _ELONGATED = 2.5
 _KINDS = (("full control", "^"), ("height control", "o"), ("plane control", "s"))
 
 
+@in_style
 def figure(patterns: Sequence[Pattern]) -> Figure:
     """Return a figure with a panel for each pattern, in one scale of lengths and one of colours."""
     heights = np.concatenate([pattern.point_sd[pattern.new_points, 2] for pattern in patterns])
@@ -47,7 +48,7 @@ def figure(patterns: Sequence[Pattern]) -> Figure:
     for each in axes:
         handles, labels = each.get_legend_handles_labels()
         named |= dict(zip(labels, handles, strict=True))
-    made.legend(named.values(), named.keys(), loc="outside lower center", ncols=4, frameon=False)
+    made.legend(named.values(), named.keys(), loc="outside lower center", ncols=4)
     return made
 
 
@@ -82,7 +83,7 @@ def _panel(axes: Axes, pattern: Pattern, heights: Floats) -> PathCollection:
         cmap=ORDERED,
         linewidths=0,
     )
-    axes.plot(*pattern.photo_plan.T, "+", color="0.4", markersize=4, label="photo")
+    axes.plot(*pattern.photo_plan.T, "+", color=FAINT, markersize=4, label="photo")
     held = np.isfinite(pattern.block.point_sd) & pattern.result.used_points[:, np.newaxis]
     plane, height = held[:, :2].any(axis=1), held[:, 2]
     for (name, marker), chosen in zip(
@@ -95,7 +96,7 @@ def _panel(axes: Axes, pattern: Pattern, heights: Floats) -> PathCollection:
             )
     quality = pattern.points[-1]
     figures = f"rms {quality.rms_sd[2]:#.3g} {unit}, largest {quality.max_sd[2]:#.3g} {unit}"
-    axes.set_title(f"{pattern.name}\n{figures}", fontsize="medium")
+    axes.set_title(f"{pattern.name}\n{figures}")
     axes.set_xlabel(f"{pattern.axes[0]}, {unit}")
     axes.set_ylabel(f"{pattern.axes[1]}, {unit}")
     axes.label_outer()

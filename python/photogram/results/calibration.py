@@ -233,10 +233,10 @@ def calibrations(result: Result) -> list[Calibration]:
     """Return what has been found of each camera with unknown parameters; none without covariances.
 
     Correlations with the poses of photos take a factor of the normal equations, and a solution for each
-    parameter; they are computed of the first 20 cameras.
+    parameter; they are computed of the first 20 cameras, and not of a block that was adjusted in parts.
     """
     cameras = [each for each in result.cameras if each.estimated and np.isfinite(each.cofactors).all()]
-    covariances = result.covariances() if cameras else None
+    covariances = result.covariances() if cameras and result.WHOLE else None
     return [
         _calibration(result, each, covariances if number < ASKED else None)
         for number, each in enumerate(cameras)

@@ -14,8 +14,8 @@ from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.lens_field import LensField, lens_field
 from photogram.results.pictured import curves_of
 from photogram.results.result import Result
-from photogram.show.pictures import arrows, drawn, new_figure, open_frame, round_length
-from photogram.show.style import BLUE, INK, styled
+from photogram.show.pictures import arrows, drawn, new_figure, round_length
+from photogram.show.style import BLUE, INK, in_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,6 +55,7 @@ def draw_lens_field(result: Result, camera: AdjustedCamera, path: Path) -> None:
     write_whole({path: drawn(figure_of_lens_field(camera, field), path)})
 
 
+@in_style
 def figure_of_lens_field(camera: AdjustedCamera, field: LensField) -> Figure:
     """Return vectors on a grid of the image with their standard ellipses, all enlarged alike."""
     from matplotlib.patches import Ellipse  # takes long to import
@@ -77,21 +78,18 @@ def figure_of_lens_field(camera: AdjustedCamera, field: LensField) -> Figure:
     axes.set_aspect("equal")
     axes.set_title(
         f"{', '.join(field.names)} of {camera.name}: a width of the grid is"
-        f" {factor * scale * spacing:.3g} {written}",
-        loc="left",
-        fontsize="medium",
+        f" {factor * scale * spacing:.3g} {written}"
     )
     axes.set_xlabel(f"x, {unit}")
     axes.set_ylabel(f"y, {unit}")
-    open_frame(axes)
     return figure
 
 
+@in_style
 def figure_of_distortion(camera: AdjustedCamera, curve: DistortionCurve) -> Figure:
     """Return the curve and its balanced form, one standard deviation on either side, dashed beyond images."""
     curves = curves_of(camera, curve)
     figure = new_figure(6.4, 7.5)
-    with styled():
-        panels = figure.subplots(rows_of(curves), 1, sharex=True)
-        draw_curves(panels.tolist(), curves)
+    panels = figure.subplots(rows_of(curves), 1, sharex=True)
+    draw_curves(panels.tolist(), curves)
     return figure

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from photogram import _photocore
 from photogram.io import json
 from photogram.results.network import AdjustedNetwork
+from photogram.show.brief import Brief
 from photogram.show.sections import Section, composed, headline
 from photogram.show.ways import Shown, columns_of, document_of, findings_of, report_of
 from photogram.statistics.components import Component, Estimate
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["VarianceComponents", "component_lines", "statement"]
 
 
-@dataclass(frozen=True, eq=False)
-class VarianceComponents(Shown):
+@dataclass(frozen=True, eq=False, repr=False)
+class VarianceComponents(Shown, Brief):
     """Variance components of groups of observations.
 
     Attributes

@@ -9,8 +9,8 @@ import numpy as np
 
 from photogram.io.writing import write_whole
 from photogram.results.components import VarianceComponents
-from photogram.show.pictures import drawn, new_figure, open_frame
-from photogram.show.style import FAINT, INK, MARKED
+from photogram.show.pictures import drawn, new_figure
+from photogram.show.style import FAINT, INK, MARKED, in_style
 from photogram.show.ways import picture_of
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def _picture(found: VarianceComponents) -> bytes:
     return drawn(figure_of_components(found))
 
 
+@in_style
 def figure_of_components(found: VarianceComponents) -> Figure:
     """Draw factors of standard deviations with 95 percent intervals, held ones as circles."""
     from matplotlib.ticker import LogLocator, NullFormatter  # takes long to import
@@ -60,5 +61,4 @@ def figure_of_components(found: VarianceComponents) -> Figure:
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("factor of the given standard deviation, 95 percent; circles: held")
     axes.invert_yaxis()
-    open_frame(axes)
     return figure

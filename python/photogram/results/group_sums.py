@@ -29,6 +29,7 @@ from photogram.network.strips import strips_of
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
+from photogram.show.brief import Brief
 from photogram.show.ways import Shown, columns_of, report_of
 from photogram.statistics.components import balanced
 from photogram.statistics.distributions import bonferroni
@@ -121,8 +122,8 @@ class GroupSum:
         return math.sqrt(self.squares / self.redundancy) if self.redundancy > 0 else math.nan
 
 
-@dataclass(frozen=True, eq=False)
-class GroupSums(Shown):
+@dataclass(frozen=True, eq=False, repr=False)
+class GroupSums(Shown, Brief):
     """Groups of the observations of an adjusted network, with their tests.
 
     A group is judged after gross errors are out, and jointly with the others by variance components: its sum

@@ -31,6 +31,7 @@ from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import INTERIOR
 from photogram.results.group_sums import factored
 from photogram.results.result import Result
+from photogram.show.brief import Brief
 from photogram.show.ways import Shown, columns_of, report_of
 
 if TYPE_CHECKING:
@@ -106,8 +107,8 @@ class Model:
     checks: float
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison(Shown):
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Shown, Brief):
     """Models of the same observations side by side.
 
     Attributes

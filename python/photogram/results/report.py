@@ -38,6 +38,7 @@ _ORDERINGS = {
     "amd": "by minimum degree",
     "dissection": "by nested dissection",
     "graph-dissection": "by dissection of the graph",
+    "parts": "in parts, and the separators between them",
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,6 +143,9 @@ class Result(AdjustedNetwork):
     options: CoreOptions
     state: _photocore.BlockState
     hints: tuple[str, ...] = ()
+
+    WHOLE: ClassVar[bool] = True
+    """Whether the normal equations of all of it may be asked again."""
 
     @classmethod
     def from_solution(

@@ -14,9 +14,10 @@ from photogram.io import json
 from photogram.io.writing import write_whole
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
-from photogram.show.pictures import drawn, new_figure, open_frame
+from photogram.show.brief import Brief
+from photogram.show.pictures import drawn, new_figure
 from photogram.show.sections import composed, headline
-from photogram.show.style import FAINT, INK, MARKED
+from photogram.show.style import FAINT, INK, MARKED, in_style
 from photogram.show.ways import Shown, columns_of, document_of, picture_of, report_of
 from photogram.statistics.variance_function import FunctionEstimate
 
@@ -66,8 +67,8 @@ class Bin:
         return cls(value, each.count, each.redundancy, found, interval)
 
 
-@dataclass(frozen=True, eq=False)
-class VarianceFunction(Shown):
+@dataclass(frozen=True, eq=False, repr=False)
+class VarianceFunction(Shown, Brief):
     """The variance of image coordinates as a function: sigma^2 = sd^2 (a^2 + b^2 (r / R)^2).
 
     Attributes
@@ -188,6 +189,7 @@ def draw_variance_function(found: VarianceFunction, path: Path) -> None:
     write_whole({path: drawn(_figure(found), path)})
 
 
+@in_style
 def _figure(found: VarianceFunction) -> Figure:
     """Draw the bins with their intervals, and the function."""
     figure = new_figure(6.4, 4.0)
@@ -202,6 +204,5 @@ def _figure(found: VarianceFunction) -> Figure:
     axes.set_xlabel(found.name)
     axes.set_ylabel("factor of the given variance")
     axes.set_ylim(bottom=0.0)
-    axes.legend(frameon=False)
-    open_frame(axes)
+    axes.legend()
     return figure

@@ -24,10 +24,10 @@ def inlined(drawing: Drawing) -> Picture | None:
     ModuleNotFoundError
         matplotlib is missing: `pip install 'photogram[report]'`.
     """
-    from matplotlib import rc_context
+    from photogram.show.style import styled
 
-    # Text stays text, which readers can search, and identifiers are the same in every run.
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": drawing.name}):
+    # Ticks are made when a figure is saved; identifiers are the same in every run.
+    with styled({"svg.hashsalt": drawing.name}):
         figure = drawing.draw()
         if figure is None:
             return None

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.quiver import Quiver
 
-__all__ = ["arrows", "drawn", "ellipses", "files", "new_figure", "open_frame", "round_length"]
+__all__ = ["arrows", "drawn", "ellipses", "files", "new_figure", "round_length"]
 
 DPI = 120
 """Dots an inch of pictures that are made of dots."""
@@ -87,11 +87,6 @@ def ellipses(axes: Axes, places: Floats, covariances: Floats, scale: float = 1.0
             np.sqrt(np.maximum(variance, 0.0))[:, np.newaxis] * circle
         )
         axes.plot(*outline, **style)
-
-
-def open_frame(axes: Axes) -> None:
-    """Take away the frame above and to the right."""
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def round_length(value: float) -> float:

@@ -6,8 +6,10 @@ The colours of kinds are those of Okabe and Ito (2008, "Color Universal Design")
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Any
+from functools import wraps
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
@@ -22,10 +24,14 @@ __all__ = [
     "PURPLE",
     "SKY",
     "VERMILION",
+    "in_style",
     "need_matplotlib",
     "signed",
     "styled",
 ]
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 BLACK = "#000000"
 BLUE = "#0072b2"
@@ -84,13 +90,24 @@ def need_matplotlib() -> None:
         raise ModuleNotFoundError(said, name="matplotlib") from None
 
 
-def styled() -> AbstractContextManager[None]:
-    """Return a context in which axes, letters and legends are those of the house."""
+def styled(further: Mapping[str, Any] | None = None) -> AbstractContextManager[None]:
+    """Return a context in which axes, letters and legends are those of the house, with further settings."""
     need_matplotlib()
     import matplotlib as mpl
 
-    settings: Any = SETTINGS
+    settings: Any = {**SETTINGS, **(further or {})}
     return mpl.rc_context(settings)
+
+
+def in_style(draws: Callable[P, T]) -> Callable[P, T]:
+    """Give a function that draws the style of the house while it does."""
+
+    @wraps(draws)
+    def with_style(*args: P.args, **options: P.kwargs) -> T:
+        with styled():
+            return draws(*args, **options)
+
+    return with_style
 
 
 def signed() -> Colormap:

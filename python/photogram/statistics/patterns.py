@@ -24,6 +24,7 @@ __all__ = [
     "frame_pattern",
     "group_patterns",
     "moran",
+    "moran_index",
     "normality",
     "regression",
 ]
@@ -293,11 +294,19 @@ def moran(xy: Floats, photos: Indices, residuals: Floats) -> float:
     squares = float((residuals**2).sum())
     if not (seen.any() and squares > 0):
         return math.nan
-    products = 0.0
-    for z in residuals.T:
+    lagged = np.zeros_like(residuals)
+    for z, own in zip(residuals.T, lagged.T, strict=True):
         others = np.bincount(cells, weights=z)[cells] - np.bincount(shared, weights=z)[shared]
-        products += float((z[seen] * others[seen] / neighbours[seen]).sum())
-    return len(xy) / int(seen.sum()) * products / squares
+        own[seen] = others[seen] / neighbours[seen]
+    return moran_index(residuals, lagged, float(seen.sum()))
+
+
+def moran_index(values: Floats, lagged: Floats, total: float) -> float:
+    """Return Moran's I of values whose neighbours, weighted, sum to `lagged`; `total` of all weights.
+
+    I = (n / total) sum z_i lagged_i / sum z_i^2 of (n, ...) values that are about zero on average.
+    """
+    return len(values) / total * float((values * lagged).sum()) / float((values**2).sum())
 
 
 def durbin_watson(photos: Indices, count: int, residuals: Floats, redundancy: Floats) -> float:

@@ -32,7 +32,7 @@ LARGEST_FACTOR = 3.0
 """Standard deviations wrong by more than this are no matter of weights."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Verdict:
     """Whether a result can be used.
 
@@ -63,6 +63,9 @@ class Verdict:
     removed: tuple[Any, ...] = ()
     rivals: tuple[str, ...] = ()
     hints: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"Verdict {self.code}: {self.headline} (exit code {self.exit}, {len(self.tests)} tests)"
 
     @property
     def usable(self) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.show.pictures import arrows, new_figure
-from photogram.show.style import COLOURS, SKY
+from photogram.show.style import COLOURS, INK, MARKED, SKY
 from photogram.stellar.curves import histogram
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def vectors(
     bar = float(f"{2 * size:.0e}")
     axes.margins(0.08)
     axes.autoscale_view()
-    key = axes.quiver([], [], [], [], angles="xy", scale_units="xy", scale=scale, width=0.0035, color="black")
+    key = axes.quiver([], [], [], [], angles="xy", scale_units="xy", scale=scale, width=0.0035, color=INK)
     axes.quiverkey(key, 0.86, 1.02, bar, f"{bar:g} {unit}", labelpos="E", coordinates="axes")
     figure.legend(loc="outside lower center", ncols=6)
 
@@ -70,5 +70,5 @@ def bell(axes: Any, values: Floats, title: str, unit: str) -> None:
     axes.bar(middle, found.counts, width=width, color=SKY, alpha=0.6, edgecolor="white")
     curve = np.linspace(found.edges[0], found.edges[-1], 200)
     density = np.exp(-0.5 * ((curve - found.mean) / found.sd) ** 2) / (found.sd * np.sqrt(2 * np.pi))
-    axes.plot(curve, len(values) * width[0] * density, color=COLOURS[1])
+    axes.plot(curve, len(values) * width[0] * density, color=MARKED)
     axes.set(title=f"{title}: sd {found.sd:.3g} {unit}", xlabel=unit, ylabel="number")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photogram.show.style import FAINT, INK, in_style
 from photogram.stellar.drawing import COLOURS, band, bell, panels, vectors
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ _NAMED = len(COLOURS)
 """Exposures that have a colour of their own; more are drawn alike."""
 
 
+@in_style
 def figures(result: CalibratedNight) -> dict[str, Figure]:
     """Return all pictures by name."""
     return {
@@ -34,10 +36,10 @@ def _frame(result: CalibratedNight, title: str) -> tuple[Figure, Any]:
     """Draw the frame as the picture is seen: y downward."""
     width, height = result.night.frame
     figure, axes = panels(7.5, 1.8 + 6.5 * height / width)
-    axes.set(xlabel="x (px)", ylabel="y (px)", aspect="equal")
-    axes.set_title(title, loc="left")
-    axes.plot([0, width, width, 0, 0], [0, 0, height, height, 0], color="0.8", linewidth=0.8)
-    axes.plot(*result.camera.values[2:4], marker="+", color="black", markersize=12)
+    axes.set(xlabel="x, px", ylabel="y, px", aspect="equal")
+    axes.set_title(title)
+    axes.plot([0, width, width, 0, 0], [0, 0, height, height, 0], color=FAINT, linewidth=0.8)
+    axes.plot(*result.camera.values[2:4], marker="+", color=INK, markersize=12)
     return figure, axes
 
 
@@ -94,10 +96,10 @@ def _of_angle(result: CalibratedNight) -> Figure:
     figure, (axes, errors) = panels(11.0, 4.4, 2)
     axes.plot(np.degrees(theta), seen, color=COLOURS[0], label=camera.lens)
     band(errors, np.degrees(theta), seen - straight, np.sqrt(np.maximum(variance, 0)), COLOURS[0], "terms")
-    axes.set(ylabel="distance from the principal point (px)")
-    errors.set(ylabel="change by the terms of the lens (px)")
+    axes.set(ylabel="distance from the principal point, px")
+    errors.set(ylabel="change by the terms of the lens, px")
     for panel in (axes, errors):
-        panel.set_xlabel("angle from the axis (degrees)")
+        panel.set_xlabel("angle from the axis, degrees")
         panel.legend()
     return figure
 
@@ -118,9 +120,9 @@ def _of_brown(result: CalibratedNight) -> Figure:
     figure, (axes, errors) = panels(11.0, 4.4, 2)
     used = np.linalg.norm(result.calibration.xy - camera.values[2:4], axis=1).max()
     for panel in (axes, errors):
-        panel.axvline(used, color="0.5", linestyle=":", linewidth=1, label="outermost star")
-        panel.set_xlabel("distance from the principal point (px)")
-    axes.axhline(0, color="0.7", linewidth=0.8)
+        panel.axvline(used, color=FAINT, linestyle=":", linewidth=1, label="outermost star")
+        panel.set_xlabel("distance from the principal point, px")
+    axes.axhline(0, color=FAINT, linewidth=0.8)
     curves = (
         ("radial", radial @ camera.values[4:7], error),
         ("decentering", f * r**2 * size, f * r**2 * size_error),

@@ -11,6 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import Message, listed
+from photogram.show.brief import Brief
 from photogram.show.ways import Judged, html_of
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.catalogue import Catalogue
@@ -34,8 +35,8 @@ SIGNIFICANT = 1.96
 """Distortion terms below this multiple of their mean error are named (5 % of error)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Night:
+@dataclass(frozen=True, eq=False, repr=False)
+class Night(Brief):
     """Exposures of one camera, and what is known of it beforehand.
 
     Attributes
@@ -129,8 +130,8 @@ class Night:
             raise InputError("a prior is of one lens: none can be chosen")
 
 
-@dataclass(frozen=True, eq=False)
-class CalibratedNight(Judged):
+@dataclass(frozen=True, eq=False, repr=False)
+class CalibratedNight(Judged, Brief):
     """A calibrated camera, and what happened to the images.
 
     Attributes

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.show.angles import ARCSEC
+from photogram.show.style import FAINT, in_style
 from photogram.stellar.curves import distortion_curves, refraction_curves, residual_classes
 from photogram.stellar.drawing import COLOURS, band, bell, panels, vectors
 from photogram.stellar.parameters import GROUPS
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["figures"]
 
 
+@in_style
 def figures(result: Result) -> dict[str, Figure]:
     """Return all pictures that the options ask for by name; stars and residuals always."""
     made = {"stars": _stars(result), "residuals": _residuals(result)}
@@ -34,10 +36,10 @@ def figures(result: Result) -> dict[str, Figure]:
 
 def _plate(title: str) -> tuple[Figure, Any]:
     figure, axes = panels(7.0, 6.6)
-    axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
-    axes.set_title(title, loc="left")
-    axes.axhline(0, color="0.85", linewidth=0.8, zorder=0)
-    axes.axvline(0, color="0.85", linewidth=0.8, zorder=0)
+    axes.set(xlabel="x, mm", ylabel="y, mm", aspect="equal")
+    axes.set_title(title)
+    axes.axhline(0, color=FAINT, linewidth=0.5, alpha=0.5, zorder=0)
+    axes.axvline(0, color=FAINT, linewidth=0.5, alpha=0.5, zorder=0)
     return figure, axes
 
 
@@ -85,10 +87,10 @@ def _distortion(result: Result) -> Figure:
     band(axes, d, 1e6 * curves.radial, 1e6 * curves.radial_error, COLOURS[0], "radial")
     band(axes, d, 1e6 * curves.transformed, 1e6 * curves.transformed_error, COLOURS[1], "radial, transformed")
     band(axes, d, 1e6 * curves.decentering, 1e6 * curves.decentering_error, COLOURS[2], "decentering")
-    axes.axhline(0, color="0.7", linewidth=0.8)
+    axes.axhline(0, color=FAINT, linewidth=0.8)
     axes.set(
-        xlabel="distance from the centre of distortion (mm)",
-        ylabel="distortion (µm), with its mean error",
+        xlabel="distance from the centre of distortion, mm",
+        ylabel="distortion with its mean error, µm",
         title=f"Distortion; calibrated principal distance {1e3 * curves.calibrated:.4f} mm",
     )
     axes.legend()
@@ -110,10 +112,10 @@ def _refraction(result: Result) -> Figure:
         ends = np.degrees(curves.zenith_distance[[0, -1]])
         level = low - 0.06 * (k + 1) * (high - low)
         axes.plot(ends, [level, level], color=COLOURS[group], linewidth=5, label=f"field of {GROUPS[group]}")
-    axes.axhline(0, color="0.7", linewidth=0.8)
+    axes.axhline(0, color=FAINT, linewidth=0.8)
     axes.set(
-        xlabel="observed zenith distance (degrees)",
-        ylabel="corrected minus given refraction (arcsec)",
+        xlabel="observed zenith distance, degrees",
+        ylabel="corrected minus given refraction, arcsec",
         title="Refraction",
     )
     axes.legend(loc="upper left")

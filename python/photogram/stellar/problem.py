@@ -10,6 +10,7 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import listed
+from photogram.show.brief import Brief
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.sky import TAU, Site
@@ -56,8 +57,8 @@ class Axis:
         return (-tangent * np.cos(self.azimuth), -tangent * np.sin(self.azimuth))
 
 
-@dataclass(frozen=True, eq=False)
-class Problem:
+@dataclass(frozen=True, eq=False, repr=False)
+class Problem(Brief):
     """A calibration of S stars and m images.
 
     Angles are radians, lengths metres; weights are for one unit weight (m0^2 times the inverse covariance).

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats
 from photogram.messages import Message
 from photogram.network.cameras import Camera
+from photogram.show.brief import Brief
 from photogram.show.ways import Judged, html_of
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.counts import Counts
@@ -142,8 +143,8 @@ class PreRun:
     residuals: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Result(Judged):
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Judged, Brief):
     """A calibration.
 
     Residuals are computed minus measured (the report's v), for stars adjusted minus catalogue: what has to be

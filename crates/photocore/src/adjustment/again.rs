@@ -105,6 +105,7 @@ impl Adjustment {
             redundancy_excess: None,
             unknowns,
             cofactors: None,
+            lost: None,
             selected: None,
             undetermined: None,
             counts: problem.counts(0),

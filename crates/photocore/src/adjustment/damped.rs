@@ -13,7 +13,7 @@ const ROUNDING: f64 = 1e-12;
 /// A Gauss-Newton step that changes no unknown by more than this multiple of its standard deviation is accepted as it is:
 /// it lowers the sum of squares by less than the square of this, which may drown in the rounding errors of the computed
 /// observations (geocentric coordinates are good to a nanometre only).
-const NEGLIGIBLE: f64 = 1e-3;
+pub(super) const NEGLIGIBLE: f64 = 1e-3;
 /// The sum of squares stands still where three damped steps lower it by less than this multiple of the variance of unit weight: a
 /// hundredth of a standard deviation of the combination of unknowns that they follow.
 const STILL: f64 = 1e-4;
@@ -157,7 +157,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         }
         let sum = next.sum_of_squares;
         let decrease = std::mem::replace(&mut control.best, sum) - sum;
-        self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, &next.unknowns)?;
+        self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, next.reached())?;
         // What harms all others makes full steps fail.
         if damping > 0.0 && self.has_collapsed(&unknowns, next.equations.at()) {
             return Ok(ControlFlow::Break(End::at(Status::NotConverged, next.unknowns, None)));

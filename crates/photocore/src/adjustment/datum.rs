@@ -142,6 +142,21 @@ impl InDatum {
     }
 }
 
+/// The datum that an adjustment is to end in, and the values from which its carriers move least.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Target<'a> {
+    pub datum: &'a Datum,
+    pub reference: &'a [f64],
+}
+
+/// Normal equations formed where a network was moved to on its way, with the right-hand sides for its datum.
+pub(super) struct AtTarget {
+    pub basis: Basis,
+    pub rights: Vec<f64>,
+    /// The unknowns before.
+    pub before: Vec<f64>,
+}
+
 /// B in the rows of the carriers, and T = G (B^T G)^-1, in the columns for which B divided by the factors is orthonormal.
 pub(super) struct Basis {
     b: Mat<f64>,
@@ -154,8 +169,30 @@ pub(super) struct Basis {
 }
 
 impl Basis {
-    /// Forms and factors the normal equations at some values, on the way to Q B; also the right-hand sides B. Held unknowns stand in the
-    /// normal equations with unit weight: their columns of Q are zero.
+    /// The right-hand sides B, over all unknowns, one after the other. Held unknowns stand in the normal equations with unit weight: their
+    /// columns of Q are zero.
+    pub fn rights<M>(&self, problem: &Problem<M>, count: usize, held: &[usize], datum: &Datum) -> Vec<f64> {
+        let mut rights = vec![0.0; count * self.d];
+        let free = |unknown: usize| !held.contains(&unknown) && problem.sd[unknown] != 0.0;
+        let carriers = datum.carriers.iter().enumerate();
+        for (row, &(carrier, _)) in carriers.filter(|(_, carrier)| free(carrier.0)) {
+            (0..self.d).for_each(|k| rights[k * count + carrier] = self.b[(row, k)]);
+        }
+        rights
+    }
+
+    /// Takes a step, in whatever datum it is, to this one: S dx = dx - T B^T dx.
+    pub fn take(&self, step: &mut [f64], datum: &Datum) {
+        let mut along = vec![0.0; self.d];
+        for (row, &(carrier, _)) in datum.carriers.iter().enumerate() {
+            (0..self.d).for_each(|k| along[k] += self.b[(row, k)] * step[carrier]);
+        }
+        for (value, t) in step.iter_mut().zip(self.t.chunks_exact(self.d.max(1))) {
+            *value -= t.iter().zip(&along).map(|(t, along)| t * along).sum::<f64>();
+        }
+    }
+
+    /// Forms and factors the normal equations at some values, on the way to Q B; also the right-hand sides B.
     fn form<M: Model>(
         &self,
         problem: &Problem<M>,
@@ -165,19 +202,13 @@ impl Basis {
         pool: &ThreadPool,
         between: &mut dyn FnMut(usize) -> ControlFlow<()>,
     ) -> Result<(Factored, Vec<f64>), DatumError> {
-        let count = unknowns.len();
-        let mut rights = vec![0.0; count * self.d];
-        let free = |unknown: usize| !held.contains(&unknown) && problem.sd[unknown] != 0.0;
-        let carriers = datum.carriers.iter().enumerate();
-        for (row, &(carrier, _)) in carriers.filter(|(_, carrier)| free(carrier.0)) {
-            (0..self.d).for_each(|k| rights[k * count + carrier] = self.b[(row, k)]);
-        }
+        let rights = self.rights(problem, unknowns.len(), held, datum);
         let formed = Factored::form_with(problem, loss, unknowns, held.to_vec(), &rights, pool, between)?;
         Ok((formed, rights))
     }
 
     /// The transformation, with W = Q B.
-    fn transformation(self, w: Vec<f64>, datum: &Datum) -> Transformation {
+    pub fn transformation(self, w: Vec<f64>, datum: &Datum) -> Transformation {
         let Self { b, t, d, condition } = self;
         let of = |row: usize, k: usize| w[datum.carriers[row].0 * d + k];
         let of_carriers = Mat::from_fn(datum.carriers.len(), d, of);

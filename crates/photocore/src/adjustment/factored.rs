@@ -72,7 +72,7 @@ impl Factored {
         let prior = problem.prior_equations(&values, &held);
         let factor = {
             let equations = linearized(problem, loss, &values, &held, pool);
-            unless_stopped(problem.system.factor_with(pool, &equations, &prior, rights, between))?
+            unless_stopped(problem.system.factor_with(pool, &equations, &prior, rights, false, between))?
         };
         if !factor.deficient_locals.is_empty() {
             return Err(AdjustError::UndeterminedLocals(factor.deficient_locals.clone()));

@@ -100,7 +100,7 @@ pub use problem::{Model, Motions, Problem, Weighted};
 pub use resistance::Classes;
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};
-pub use run::{Watch, adjust, on_all_processors};
+pub use run::{Watch, adjust, adjust_in_datum, on_all_processors};
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
 pub use traces::{EquationGroups, GroupSquares, Probing};
 pub use tried::{TieCofactors, Tried};

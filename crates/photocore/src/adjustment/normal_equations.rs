@@ -35,7 +35,8 @@ impl<'a, M: Model> NormalEquations<'a, M> {
     ) -> Result<Self, AdjustError> {
         let equations = pool.install(|| Linearized::new(problem, values, held, None));
         let prior = problem.prior_equations(values, held);
-        let factor = unless_stopped(problem.system.factor(pool, &equations, &prior, 0.0, between))?;
+        let factor =
+            unless_stopped(problem.system.factor_with(pool, &equations, &prior, &[], false, between))?;
         Ok(Self { problem, held, pool, equations, prior, factor })
     }
 

@@ -65,6 +65,8 @@ pub struct Adjustment {
     pub weak: Vec<usize>,
     /// The unknowns held to give a datum (see [`super::Model::motions`]), none where the problem has one.
     pub datum: Vec<usize>,
+    /// Where the cofactors are in the datum that the adjustment was to end in, about how large a part of the variances rounding may be.
+    pub lost: Option<f64>,
     /// Redundancy number of each observation, when asked for.
     pub redundancy: Option<Vec<f64>>,
     /// Redundancy number of each unknown as an observation of itself (zero unless weighted), when asked for.

@@ -5,6 +5,8 @@ use std::time::Instant;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use super::damped::NEGLIGIBLE;
+use super::datum::{Adjusted, AtTarget, Datum, Target, moved};
 use super::loss::Reweighting;
 use super::method::{FIRST_DAMPING, Method};
 use super::options::{Event, Iteration, Options, Phase, Status};
@@ -49,7 +51,25 @@ pub fn adjust<M: Model>(
     pool: &ThreadPool,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, pool, watch, false)
+    adjusted(problem, options, None, pool, watch, false)
+}
+
+/// Adjusts a network that is free, to end in a datum: it is moved there before the last formation, so that this one serves the cofactors
+/// in that datum. [`Adjustment::lost`] says whether it has; otherwise there are no cofactors, and [`Adjustment::take_to`] is still to do.
+///
+/// * `reference`: the values from which the carriers move least, usually the initial ones.
+///
+/// # Errors
+/// Those of [`adjust`].
+pub fn adjust_in_datum<M: Model>(
+    problem: &Problem<M>,
+    options: &Options,
+    datum: &Datum,
+    reference: &[f64],
+    pool: &ThreadPool,
+    watch: Watch<'_>,
+) -> Result<Adjustment, AdjustError> {
+    adjusted(problem, options, Some(Target { datum, reference }), pool, watch, false)
 }
 
 /// Adjusts, and keeps what tests of groups of observations need ([`Cofactors::groups`], [`Adjustment::selected`]).
@@ -62,12 +82,13 @@ pub(super) fn adjust_by_groups<M: Model>(
     pool: &ThreadPool,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, pool, watch, true)
+    adjusted(problem, options, None, pool, watch, true)
 }
 
 fn adjusted<M: Model>(
     problem: &Problem<M>,
     options: &Options,
+    target: Option<Target<'_>>,
     pool: &ThreadPool,
     watch: Watch<'_>,
     by_groups: bool,
@@ -76,6 +97,8 @@ fn adjusted<M: Model>(
         problem,
         options,
         by_groups,
+        target,
+        has_moved: false,
         pool,
         watch,
         seconds: Seconds::default(),
@@ -122,6 +145,15 @@ pub(super) struct State<'a, M: Model> {
     /// Whether the second-order term of the loss is taken in.
     pub curved: bool,
     pub sum_of_squares: f64,
+    /// Where the network was moved to its datum for it.
+    pub at_target: Option<AtTarget>,
+}
+
+impl<M: Model> State<'_, M> {
+    /// The unknowns as the last step has left them.
+    pub fn reached(&self) -> &[f64] {
+        self.at_target.as_ref().map_or(&self.unknowns, |at| &at.before)
+    }
 }
 
 /// What cofactors are computed from: the factor of the normal equations, and what they were formed from.
@@ -129,6 +161,7 @@ pub(super) struct Basis<'a, M: Model> {
     pub equations: Linearized<'a, M>,
     pub prior: Prior,
     pub factor: Factor,
+    pub at_target: Option<AtTarget>,
 }
 
 /// Normal equations solved.
@@ -172,6 +205,10 @@ pub(super) struct Run<'a, 'w, M: Model> {
     pub options: &'a Options,
     /// Whether to keep what tests of groups need.
     by_groups: bool,
+    /// The datum to end in.
+    target: Option<Target<'a>>,
+    /// Whether the network was moved on its way.
+    has_moved: bool,
     pub pool: &'a ThreadPool,
     watch: &'w mut dyn FnMut(Event) -> ControlFlow<()>,
     seconds: Seconds,
@@ -199,8 +236,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let state = if plain { state } else { self.form(state.unknowns, 0.0)? };
         match self.determined(&state.factor) {
             Ok(()) => {
-                let State { equations, prior, factor, .. } = state;
-                let basis = Some(Basis { equations, prior, factor });
+                let State { equations, prior, factor, at_target, .. } = state;
+                let basis = Some(Basis { equations, prior, factor, at_target });
                 Ok(End::at(status, unknowns, basis))
             }
             Err(error) => {
@@ -246,8 +283,39 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a, M>, AdjustError> {
+        let (unknowns, at_target) = match damping == 0.0 && self.foresees_end() {
+            true => self.to_target(unknowns),
+            false => (unknowns, None),
+        };
         let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
-        self.form_at(unknowns, prepared, damping)
+        let rights = at_target.as_ref().map_or(&[][..], |at| &at.rights);
+        let state = self.formed(unknowns, prepared, damping, rights)?;
+        Ok(State { at_target, ..state })
+    }
+
+    /// Whether the next formation will be the last one, there being a datum to end in: steps converge quadratically.
+    fn foresees_end(&self) -> bool {
+        let full = |iteration: &Iteration| iteration.damping == 0.0;
+        match &self.iterations[..] {
+            [.., before, last] if self.target.is_some() && full(before) && full(last) => {
+                last.largest_change.powi(3) / before.largest_change.powi(2) <= NEGLIGIBLE
+            }
+            _ => false,
+        }
+    }
+
+    /// Moves the network to the datum that it is to end in; it stays where it cannot be moved there.
+    fn to_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<AtTarget>) {
+        let Some(Target { datum, reference }) = self.target else { return (unknowns, None) };
+        let adjusted = Adjusted { unknowns: &unknowns, held: &self.datum, loss: None };
+        match moved(self.problem, adjusted, datum, reference, self.pool) {
+            Ok((there, basis)) => {
+                let rights = basis.rights(self.problem, there.len(), &self.datum, datum);
+                self.has_moved = true;
+                (there, Some(AtTarget { basis, rights, before: unknowns }))
+            }
+            Err(_) => (unknowns, None),
+        }
     }
 
     /// The same at values that are prepared already.
@@ -257,6 +325,17 @@ impl<'a, M: Model> Run<'a, '_, M> {
         prepared: M::Prepared,
         damping: f64,
     ) -> Result<State<'a, M>, AdjustError> {
+        self.formed(unknowns, prepared, damping, &[])
+    }
+
+    /// The same with further right-hand sides.
+    fn formed(
+        &mut self,
+        unknowns: Vec<f64>,
+        prepared: M::Prepared,
+        damping: f64,
+        rights: &[f64],
+    ) -> Result<State<'a, M>, AdjustError> {
         let start = Instant::now();
         let reweighting = self.options.loss.map(|loss| Reweighting { loss, curved: self.curved });
         let equations = Linearized::prepared(self.problem, prepared, &self.datum, reweighting);
@@ -264,7 +343,11 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let total = self.problem.layout().locals();
         let factored = {
             let mut between = between(&mut *self.watch, Phase::Form, total);
-            self.problem.system.factor(self.pool, &equations, &prior, damping, &mut between)
+            let system = &self.problem.system;
+            match rights.is_empty() {
+                true => system.factor(self.pool, &equations, &prior, damping, &mut between),
+                false => system.factor_with(self.pool, &equations, &prior, rights, true, &mut between),
+            }
         };
         let factor = unless_stopped(factored)?;
         let seconds = start.elapsed().as_secs_f64();
@@ -275,7 +358,9 @@ impl<'a, M: Model> Run<'a, '_, M> {
             Some(_) => self.objective(&unknowns),
         };
         self.formations += 1;
-        Ok(State { unknowns, equations, prior, factor, damping, curved: self.curved, sum_of_squares })
+        let curved = self.curved;
+        let at_target = None;
+        Ok(State { unknowns, equations, prior, factor, damping, curved, sum_of_squares, at_target })
     }
 
     /// Whether everything is determined.
@@ -288,7 +373,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     fn solve(&mut self, state: State<'a, M>) -> Result<Solved<'a, M>, AdjustError> {
         self.determined(&state.factor)?;
-        let State { equations, prior, factor, damping, .. } = state;
+        let State { equations, prior, factor, damping, at_target, .. } = state;
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
         let system = &self.problem.system;
@@ -296,13 +381,17 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let step = unless_stopped(solved)?;
         self.seconds.solve += start.elapsed().as_secs_f64();
         let change = factor.decrease.sqrt();
-        Ok(Solved { basis: Basis { equations, prior, factor }, step, change })
+        Ok(Solved { basis: Basis { equations, prior, factor, at_target }, step, change })
     }
 
-    fn finish(mut self, end: End<'a, M>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
+    fn finish(mut self, mut end: End<'a, M>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
         let problem = self.problem;
         let mut unknowns = end.unknowns.clone();
-        if let Some((_, step)) = &end.last {
+        let at_target = end.basis.as_mut().and_then(|basis| basis.at_target.take()).zip(self.target);
+        if let Some((_, step)) = &mut end.last {
+            if let Some((at, target)) = &at_target {
+                at.basis.take(step, target.datum);
+            }
             problem.model.advance(&mut unknowns, step);
         }
         let residuals = problem.residuals(self.pool, &unknowns);
@@ -311,9 +400,14 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 self.observed_sum(&residuals) + problem.prior_sum_of_squares(&unknowns, 0..unknowns.len());
             self.accept(Iteration { sum_of_squares, ..last }, &end.unknowns, &unknowns)?;
         }
-        let (mut cofactors, mut prior_redundancy, mut selected) = (None, None, None);
-        if let Some(basis) = end.basis.filter(|_| self.options.covariance) {
-            let (found, redundancy) = self.cofactors(basis, &end.unknowns)?;
+        let (mut cofactors, mut prior_redundancy, mut selected, mut lost) = (None, None, None, None);
+        let asked = self.options.covariance && (self.target.is_none() || at_target.is_some());
+        if let Some(basis) = end.basis.filter(|_| asked) {
+            let (mut found, redundancy) = self.cofactors(basis, &end.unknowns, &at_target)?;
+            lost = at_target.map(|(at, target)| {
+                let transformation = at.basis.transformation(found.further, target.datum);
+                self.pool.install(|| transformation.apply(problem.layout(), &mut found.cofactors))
+            });
             (cofactors, prior_redundancy) = (Some(found.cofactors), Some(redundancy));
             selected = self.by_groups.then_some(found.selected);
         }
@@ -339,6 +433,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             redundancy,
             prior_redundancy,
             cofactors,
+            lost,
             selected,
             undetermined: end.undetermined,
             counts,
@@ -359,14 +454,18 @@ impl<'a, M: Model> Run<'a, '_, M> {
         &mut self,
         basis: Basis<'a, M>,
         values: &[f64],
+        at_target: &Option<(AtTarget, Target<'a>)>,
     ) -> Result<(Inversion, Vec<f64>), AdjustError> {
-        let Basis { equations, prior, factor } = basis;
+        let Basis { equations, prior, factor, .. } = basis;
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Invert, self.problem.layout().locals());
         let system = &self.problem.system;
         let mut found = unless_stopped(match self.by_groups {
             true => system.invert_by_groups(self.pool, factor, &equations, &prior, &mut between),
-            false => system.invert(self.pool, factor, &equations, &prior, &mut between),
+            false => {
+                let rights = at_target.as_ref().map_or(&[][..], |(at, _)| &at.rights);
+                system.invert_with(self.pool, factor, &equations, &prior, rights, &mut between)
+            }
         })?;
         let prior_redundancy = self.problem.finish_cofactors(&mut found.cofactors, &self.datum, values);
         let seconds = start.elapsed().as_secs_f64();
@@ -393,7 +492,15 @@ impl<'a, M: Model> Run<'a, '_, M> {
             before[locals.clone()].iter().zip(&after[locals.clone()]).map(|(from, to)| to - from);
         self.last_local_corrections = corrections.collect();
         self.curved = self.options.loss.is_some() && iteration.largest_change <= SHORT;
-        self.history.push(after[locals.end..].to_vec());
+        let corrected = match (self.has_moved, self.history.last()) {
+            // A move is no correction.
+            (true, Some(last)) => {
+                let steps = before[locals.end..].iter().zip(&after[locals.end..]);
+                last.iter().zip(steps).map(|(value, (from, to))| value + (to - from)).collect()
+            }
+            _ => after[locals.end..].to_vec(),
+        };
+        self.history.push(corrected);
         self.iterations.push(iteration);
         stopped((self.watch)(Event::Iteration(iteration)))
     }

@@ -89,7 +89,7 @@ impl Tried {
         let equations = pool.install(|| Linearized::new(problem, &values, &held, None));
         let prior = problem.prior_equations(&values, &held);
         let system = &problem.system;
-        let factor = unless_stopped(system.factor(pool, &equations, &prior, 0.0, &mut between))?;
+        let factor = unless_stopped(system.factor_with(pool, &equations, &prior, &[], false, &mut between))?;
         if !factor.deficient_locals.is_empty() {
             return Err(AdjustError::UndeterminedLocals(factor.deficient_locals.clone()));
         }

@@ -90,7 +90,7 @@ use std::ops::ControlFlow;
 use nalgebra::DMatrix;
 use rayon::ThreadPool;
 
-use crate::adjustment::{self, Adjustment, Event};
+use crate::adjustment::{self, Adjustment, Event, Method};
 use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
 use crate::normals::Ordering;
 
@@ -363,9 +363,20 @@ impl Network {
             let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
             let mut own = options.adjustment;
             own.max_iterations = own.max_iterations.saturating_sub(done);
-            // Cofactors are those of the datum that is asked for.
-            own.covariance &= datum.is_none();
-            let adjusted = adjustment::adjust(problem, &own, pool, watch);
+            let adjusted = match datum {
+                // Cofactors are those of the datum that is asked for; weights that a loss leaves are known at the end only.
+                Some(inner)
+                    if own.covariance && own.loss.is_none() && matches!(own.method, Method::Damped(_)) =>
+                {
+                    self.check_carriers(inner, &assembled)?;
+                    let (datum, reference) = assembled.datum(inner);
+                    adjustment::adjust_in_datum(problem, &own, &datum, &reference, pool, watch)
+                }
+                _ => {
+                    own.covariance &= datum.is_none();
+                    adjustment::adjust(problem, &own, pool, watch)
+                }
+            };
             if let Ok(Adjustment { undetermined: Some(error), .. }) | Err(error) = &adjusted {
                 let (points, photos) = (assembled.few_points(error), assembled.few_photos(error));
                 if !(points.is_empty() && photos.is_empty()) {
@@ -383,8 +394,8 @@ impl Network {
             let earlier = before.take();
             adjusted.go_on_from(earlier.map(|(adjustment, _)| adjustment));
             if adjusted.collapsed.is_empty() {
-                let mut lost = 0.0;
-                if let Some(inner) = datum {
+                let mut lost = adjusted.lost.unwrap_or(0.0);
+                if let Some(inner) = datum.filter(|_| adjusted.lost.is_none()) {
                     lost =
                         self.take_to(inner, &options.adjustment, &assembled, &mut adjusted, pool, watch)?;
                 }

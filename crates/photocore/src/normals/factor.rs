@@ -10,16 +10,19 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::dense::{Pivots, factor_front};
+use super::eliminated::{Eliminated, numbers_at};
 use super::equations::{Equations, Prior};
 use super::front::Front;
-use super::further::{Reduced, of_others, reduce};
+use super::further::{Side, blocks_of, of_others, subtract_sides};
 use super::layout::Layout;
 use super::panels::{Handover, Panels, lock};
 use super::stack::Stack;
 use super::symbolic::Supernode;
 use super::system::System;
 use super::tie_equations::TieEquations;
+use super::vectorised::dot_in_lanes;
 use super::watch::{Between, Control, Stopped, watched};
+use super::workspace::reserved;
 
 /// The Cholesky factor L of the reduced normal equations.
 #[derive(Debug)]
@@ -29,6 +32,8 @@ pub struct Factor {
     pub(super) right: Vec<f64>,
     /// Right-hand sides that it was formed with, the local blocks reduced out, in the order of elimination, one after the other.
     pub(super) further: Vec<f64>,
+    /// What the elimination of the local blocks has left, for [`System::solve`]; empty where it is not kept.
+    pub(super) eliminated: Eliminated,
     /// Diagonal of the normal equations before any elimination, in the order of elimination.
     pub(super) diagonal: Vec<f64>,
     /// Lost pivots, in the order of elimination.
@@ -50,6 +55,7 @@ struct Update {
     matrix: Vec<f64>,
     right: Vec<f64>,
     diagonal: Vec<f64>,
+    sides: Vec<Side>,
 }
 
 /// What the formation at one supernode adds up.
@@ -58,7 +64,8 @@ struct Sums {
     sum_of_squares: f64,
     decrease: f64,
     deficient: Vec<usize>,
-    reduced: Vec<Reduced>,
+    /// What is kept of the local blocks.
+    kept: Vec<f64>,
 }
 
 /// What a visit to a supernode leaves to the result.
@@ -69,6 +76,8 @@ struct Visited {
     /// Own part of L^-1 n and of the diagonal.
     right: Vec<f64>,
     diagonal: Vec<f64>,
+    /// What the local blocks take off further right-hand sides.
+    sides: Vec<Side>,
     formation: f64,
     factorisation: f64,
 }
@@ -81,6 +90,8 @@ struct Formation<'a, E> {
     damping: f64,
     /// Over all unknowns, one after the other.
     rights: &'a [f64],
+    /// Whether to keep what [`System::solve`] needs of the local blocks.
+    keeps: bool,
     control: &'a Control,
 }
 
@@ -99,6 +110,8 @@ impl System {
     /// thread, in an order that depends on the pattern only.
     ///
     /// Whether everything is determined is for the caller to ask: see [`Factor::deficient_locals`] and [`Factor::deficiency`].
+    ///
+    /// What the elimination of the local blocks leaves is kept for [`System::solve`], where that takes no more memory than results will.
     pub fn factor<E: Equations>(
         &self,
         pool: &ThreadPool,
@@ -107,20 +120,21 @@ impl System {
         damping: f64,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Factor> {
-        self.factored(pool, equations, prior, damping, &[], between)
+        self.factored(pool, equations, prior, damping, &[], true, between)
     }
 
-    /// The same with further right-hand sides over all unknowns, one after the other: they are reduced on the way, and wait to be solved for
-    /// ([`System::solve_further`], [`System::invert_with`]).
+    /// The same, undamped, with further right-hand sides over all unknowns, one after the other: they are reduced on the way, and wait to
+    /// be solved for ([`System::solve_further`], [`System::invert_with`]). `keeps`: whether [`System::solve`] will be asked for a solution.
     pub fn factor_with<E: Equations>(
         &self,
         pool: &ThreadPool,
         equations: &E,
         prior: &Prior,
         rights: &[f64],
+        keeps: bool,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Factor> {
-        self.factored(pool, equations, prior, 0.0, rights, between)
+        self.factored(pool, equations, prior, 0.0, rights, keeps, between)
     }
 
     fn factored<E: Equations>(
@@ -130,10 +144,12 @@ impl System {
         prior: &Prior,
         damping: f64,
         rights: &[f64],
+        keeps: bool,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Factor> {
         watched(pool, between, |control| {
-            let formation = Formation { system: self, equations, prior, damping, rights, control };
+            let keeps = keeps && self.keeps;
+            let formation = Formation { system: self, equations, prior, damping, rights, keeps, control };
             let mut given_up = Vec::new();
             loop {
                 let factor = formation.factor(&given_up)?;
@@ -162,9 +178,10 @@ impl<E: Equations> Formation<'_, E> {
         let updates = Handover::new(symbolic.supernode_count());
         let visited = Handover::new(symbolic.supernode_count());
         let divided = panels.divide();
+        let kept = self.room();
         self.system.tree.upward(|index| {
             if !self.control.stopped()
-                && let Some(found) = self.visit(index, &mut lock(&divided[index]), &updates, given_up)
+                && let Some(found) = self.visit(index, &mut lock(&divided[index]), &kept, &updates, given_up)
             {
                 visited.put(index, found);
             }
@@ -174,6 +191,7 @@ impl<E: Equations> Formation<'_, E> {
             panels,
             right: Vec::with_capacity(symbolic.unknowns()),
             further: self.control.allocated(of_others(self.system, self.rights))?,
+            eliminated: Vec::new(),
             diagonal: Vec::with_capacity(symbolic.unknowns()),
             lost: Vec::new(),
             doubtful: Vec::new(),
@@ -182,11 +200,12 @@ impl<E: Equations> Formation<'_, E> {
             deficient_locals: Vec::new(),
             formation_share: 1.0,
         };
-        let homeless = self.assemble(&mut Front::new(0, 0, &mut [], Vec::new()), symbolic.supernode_count());
-        factor.add(homeless);
         let (mut formation, mut factorisation) = (0.0, 0.0);
+        let none = Front::new(0, 0, &mut [], Vec::new(), 0);
+        let homeless = self.assemble(&mut { none }, symbolic.supernode_count(), &kept)?;
         for (index, visited) in visited.into_values().flatten().enumerate() {
-            factor.add(visited.sums);
+            factor.add(visited.sums, self.keeps);
+            subtract_sides(&mut factor.further, factor.right.len(), symbolic.unknowns(), &visited.sides);
             if symbolic.open() != Some(index) {
                 factor.decrease += visited.right.iter().map(|v| v * v).sum::<f64>();
             }
@@ -197,6 +216,7 @@ impl<E: Equations> Formation<'_, E> {
             formation += visited.formation;
             factorisation += visited.factorisation;
         }
+        factor.add(homeless, self.keeps);
         if formation + factorisation > 0.0 {
             factor.formation_share = formation / (formation + factorisation);
         }
@@ -209,6 +229,7 @@ impl<E: Equations> Formation<'_, E> {
         &self,
         index: usize,
         panel: &mut [f64],
+        kept: &Handover<Vec<f64>>,
         updates: &Handover<Update>,
         given_up: &[usize],
     ) -> Option<Visited> {
@@ -216,14 +237,15 @@ impl<E: Equations> Formation<'_, E> {
         let s = &symbolic.supernodes()[index];
         let start = Instant::now();
         let update = self.control.allocated(self.system.workspace.zeros(s.below() * s.below()))?;
-        let mut front = Front::new(s.width, s.height(), panel, update);
+        let further = blocks_of(&self.system.layout, self.rights);
+        let mut front = Front::new(s.width, s.height(), panel, update, further);
         for &child in &s.children {
             if let Some(update) = updates.take(child) {
                 front.add(&update, &symbolic.rows_in_parent(child));
                 self.system.workspace.put_back(update.matrix);
             }
         }
-        let mut sums = self.assemble(&mut front, index);
+        let mut sums = self.assemble(&mut front, index, kept)?;
         sums.sum_of_squares += self.add_ties(&mut front, index);
         self.add_contributions(&mut front, index);
         let open = symbolic.open() == Some(index);
@@ -237,10 +259,11 @@ impl<E: Equations> Formation<'_, E> {
             let own = given_up.iter().filter_map(|&pivot| pivot.checked_sub(first));
             pivots = front.factor(&own.filter(|&column| column < s.width).collect::<Vec<_>>(), self.control);
         }
-        let Front { width, update, mut right, mut diagonal, .. } = front;
+        let Front { width, update, mut right, mut diagonal, mut sides, .. } = front;
         if s.parent.is_some() {
             let (right, diagonal) = (right.split_off(width), diagonal.split_off(width));
-            updates.put(index, Update { matrix: update, right, diagonal });
+            let sides = sides.split_off(width * further);
+            updates.put(index, Update { matrix: update, right, diagonal, sides });
         }
         Some(Visited {
             sums,
@@ -248,27 +271,49 @@ impl<E: Equations> Formation<'_, E> {
             doubtful: pivots.doubtful.into_iter().map(|column| first + column).collect(),
             right,
             diagonal,
+            sides,
             formation,
             factorisation: start.elapsed().as_secs_f64() - formation,
         })
     }
 
-    /// Adds what the local blocks at home in a supernode leave, in their order.
-    fn assemble(&self, front: &mut Front<'_>, index: usize) -> Sums {
+    /// Room for what is kept at each supernode: that of the formation before, where there was one.
+    fn room(&self) -> Handover<Vec<f64>> {
+        let kept = Handover::new(self.system.symbolic.supernode_count() + 1);
+        if self.keeps {
+            let spare = self.system.workspace.take_eliminated().into_iter().enumerate();
+            spare.for_each(|(index, room)| kept.put(index, room));
+        }
+        kept
+    }
+
+    /// Adds what the local blocks at home in a supernode leave, in their order; None without memory.
+    fn assemble(&self, front: &mut Front<'_>, index: usize, kept: &Handover<Vec<f64>>) -> Option<Sums> {
         let Self { system, control, .. } = self;
+        let layout = &system.layout;
         let stacks = system.incidence.stacks_at(index);
         let mut sums = Sums::default();
+        if self.keeps {
+            sums.kept = kept.take(index).unwrap_or_default();
+            sums.kept.clear();
+            let numbers = numbers_at(&system.incidence, layout, index);
+            if sums.kept.capacity() < numbers {
+                sums.kept = control.allocated(reserved(numbers))?;
+            }
+        }
         if stacks.locals() < MANY || rayon::current_num_threads() == 1 {
             let mut stack = Stack::default();
             for run in stacks.iter() {
                 if !control.stopped() {
                     self.fill(&mut stack, run);
-                    stack.add_to(&mut front.columns(), &system.layout);
-                    reduce(system, &stack, self.rights, &mut sums.reduced);
+                    stack.add_to(&mut front.columns(), layout);
                     sums.add(&mut stack);
+                    if self.keeps {
+                        stack.keep(layout, &mut sums.kept);
+                    }
                 }
             }
-            return sums;
+            return Some(sums);
         }
         let mut filled: Vec<Stack> = (0..WAVE).map(|_| Stack::default()).collect();
         let starts = self.shares(index);
@@ -278,26 +323,23 @@ impl<E: Equations> Formation<'_, E> {
             filled.par_iter_mut().zip(runs).for_each(|(stack, run)| self.fill(stack, run));
             front.parts(&starts).into_par_iter().for_each(|mut columns| {
                 for stack in &*filled {
-                    stack.add_to(&mut columns, &system.layout);
+                    stack.add_to(&mut columns, layout);
                 }
             });
-            if !self.rights.is_empty() {
-                let reduced = |stack: &Stack| {
-                    let mut found = Vec::new();
-                    reduce(system, stack, self.rights, &mut found);
-                    found
-                };
-                let found: Vec<Vec<Reduced>> = filled.par_iter().map(reduced).collect();
-                sums.reduced.extend(found.into_iter().flatten());
+            for stack in filled {
+                sums.add(stack);
+                if self.keeps {
+                    stack.keep(layout, &mut sums.kept);
+                }
             }
-            filled.iter_mut().for_each(|stack| sums.add(stack));
         }
-        sums
+        Some(sums)
     }
 
     fn fill(&self, stack: &mut Stack, run: &[u32]) {
         stack.gather(self.system, self.equations, run);
         stack.eliminate(&self.system.layout, self.prior, self.damping);
+        stack.reduce(&self.system.layout, self.rights);
         self.control.count(run.len());
     }
 
@@ -374,6 +416,10 @@ impl Front<'_> {
                 let column = to_column + k;
                 self.right[column] += child.right[from_column + k];
                 self.diagonal[column] += child.diagonal[from_column + k];
+                let further = self.further;
+                let taken = &child.sides[(from_column + k) * further..][..further];
+                let own = self.sides[column * further..][..further].as_flattened_mut();
+                own.iter_mut().zip(taken.as_flattened()).for_each(|(sum, value)| *sum += value);
                 let source = &child.matrix[(from_column + k) * order..][..order];
                 let (target, shift) = if column < width {
                     (&mut self.panel[column * height..][..height], 0)
@@ -407,12 +453,18 @@ impl Front<'_> {
 }
 
 impl Factor {
-    fn add(&mut self, sums: Sums) {
+    fn add(&mut self, sums: Sums, keeps: bool) {
         self.sum_of_squares += sums.sum_of_squares;
         self.decrease += sums.decrease;
         self.deficient_locals.extend(sums.deficient);
-        let count = self.panels.symbolic.unknowns();
-        sums.reduced.iter().for_each(|reduced| reduced.subtract_from(&mut self.further, count));
+        if keeps {
+            self.eliminated.push(sums.kept);
+        }
+    }
+
+    /// Gives back what was kept for [`System::solve`].
+    pub(super) fn forget_locals(&mut self) {
+        self.eliminated = Vec::new();
     }
 
     /// The unknowns that are not local and that a solution of the equations moves, ascending: those that take at least a tenth of
@@ -488,6 +540,7 @@ impl Factor {
     /// Gives its memory back to the system that it is of, for the next one.
     pub fn recycle(self, system: &System) {
         system.workspace.put_back(self.panels.values);
+        system.workspace.put_back_eliminated(self.eliminated);
     }
 
     /// The doubtful pivots that are nothing but rounding.
@@ -525,8 +578,7 @@ impl Factor {
                 continue;
             }
             for (j, column) in self.panels.panel(index).chunks_exact(s.height()).enumerate().rev() {
-                let tied: f64 = column[j + 1..].iter().zip(&own[j + 1..]).map(|(a, b)| a * b).sum();
-                own[j] = (own[j] - tied) / column[j];
+                own[j] = (own[j] - dot_in_lanes(&column[j + 1..], &own[j + 1..])) / column[j];
             }
             x[first..first + s.width].copy_from_slice(&own[..s.width]);
         }

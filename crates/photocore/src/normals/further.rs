@@ -14,6 +14,22 @@ use super::workspace::reserved;
 /// One row of so many right-hand sides: they go through the local blocks side by side.
 pub(super) type Side = [f64; LANES];
 
+/// Right-hand sides over all unknowns as blocks of [`LANES`].
+pub(super) fn blocks_of(layout: &Layout, rights: &[f64]) -> usize {
+    rights.len().div_ceil((LANES * layout.unknowns()).max(1))
+}
+
+/// Takes some sides, block by block for each unknown from `first` on, off right-hand sides of so many unknowns, one after the other.
+pub(super) fn subtract_sides(rights: &mut [f64], first: usize, count: usize, sides: &[Side]) {
+    let columns = rights.len() / count.max(1);
+    let blocks = columns.div_ceil(LANES);
+    for (column, right) in rights.chunks_exact_mut(count.max(1)).enumerate() {
+        let own = sides.iter().skip(column / LANES).step_by(blocks);
+        let rows = right[first..].iter_mut().zip(own);
+        rows.for_each(|(value, side)| *value -= side[column % LANES]);
+    }
+}
+
 /// What a stack takes off the right-hand sides of the others.
 pub(super) struct Reduced {
     /// The first right-hand side.
@@ -118,6 +134,14 @@ impl<'a> Known<'a> {
 }
 
 impl Stack {
+    /// Computes L^-1 r of right-hand sides over all unknowns, [`LANES`] of them at a time.
+    pub fn reduce(&mut self, layout: &Layout, rights: &[f64]) {
+        self.sides.clear();
+        if !rights.is_empty() {
+            run(layout, self.kept_dim(), Sides { stack: self, layout, rights });
+        }
+    }
+
     /// L^-1 r of some right-hand sides over all unknowns, local block by local block.
     #[inline(always)]
     fn reduced<const L: usize>(&self, layout: &Layout, rights: &[f64], found: &mut Vec<Side>) {
@@ -131,6 +155,23 @@ impl Stack {
             }
             self.triangles[t].forward::<L>(own.as_flattened_mut(), LANES);
             found.extend_from_slice(&own);
+        }
+    }
+}
+
+struct Sides<'a> {
+    stack: &'a mut Stack,
+    layout: &'a Layout,
+    rights: &'a [f64],
+}
+
+impl Kernel for Sides<'_> {
+    #[inline(always)]
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
+        let mut reduced = Vec::new();
+        for rights in self.rights.chunks(LANES * self.layout.unknowns()) {
+            self.stack.reduced::<L>(self.layout, rights, &mut reduced);
+            self.stack.sides.extend_from_slice(&reduced);
         }
     }
 }

@@ -101,7 +101,9 @@ impl System {
         by_group: bool,
     ) -> ControlFlow<Stopped, Inversion> {
         watched(pool, between, |control| {
-            let mut others = factor.further.clone();
+            let mut factor = factor;
+            factor.forget_locals();
+            let mut others = std::mem::take(&mut factor.further);
             factor.solve_columns(&mut others);
             let known = Known::new(self, rights, &others);
             let walk = Walk { system: self, equations, prior, known, outer, control, by_group };

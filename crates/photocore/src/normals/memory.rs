@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::layout::Layout;
 use super::system::System;
 use super::workspace::capacity;
 
@@ -12,16 +13,26 @@ const PER_UNKNOWN: usize = 40;
 /// Numbers for each equation beside its coefficients: observed value, standard deviation, residual, redundancy number and test value,
 /// as given, as ordered for the adjustment and as handed back.
 const PER_EQUATION: usize = 28;
+/// Of these, the part that is made of the results after the last solution: what is kept from the formation to the solution may take it.
+const LATER: f64 = 0.5;
 /// Bytes for what does not grow with the problem, threads among them.
 const BASE: usize = 8 << 20;
+
+/// Numbers in vectors, the problem itself and its results counted.
+fn vectors(layout: &Layout) -> usize {
+    PER_UNKNOWN * layout.unknowns() + PER_EQUATION * layout.equations()
+}
+
+/// Numbers in what is made of results only.
+pub(super) fn made_of_results(layout: &Layout) -> usize {
+    (LATER * vectors(layout) as f64) as usize
+}
 
 impl System {
     /// Bytes that forming, factoring, solving and inverting take at the most, the problem itself and its results counted: the
     /// factor, the fronts that wait for each other, and vectors.
     pub fn memory(&self) -> usize {
-        let layout = &self.layout;
-        let vectors = PER_UNKNOWN * layout.unknowns() + PER_EQUATION * layout.equations();
-        BASE + BYTES * (capacity(self.symbolic.values()) + self.fronts() + vectors)
+        BASE + BYTES * (capacity(self.symbolic.values()) + self.fronts() + vectors(&self.layout))
     }
 
     /// Gives back what is kept for the next formation or inversion: where others need memory before it comes.

@@ -48,6 +48,7 @@ mod contribution;
 mod deficiency;
 mod dense;
 mod dissection;
+mod eliminated;
 mod equation_block;
 mod equations;
 mod factor;

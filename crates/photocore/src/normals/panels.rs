@@ -33,6 +33,13 @@ pub(super) fn skip<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     head
 }
 
+/// The same of a slice that is read.
+pub(super) fn skip_ref<'a, T>(rest: &mut &'a [T], count: usize) -> &'a [T] {
+    let (head, tail) = rest.split_at(count);
+    *rest = tail;
+    head
+}
+
 /// One value for each supernode, handed from the thread that visits one to the thread that visits another.
 pub(super) struct Handover<T>(Vec<Mutex<Option<T>>>);
 

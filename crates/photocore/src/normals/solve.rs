@@ -5,12 +5,13 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::eliminated::{self, Coupled, Eliminated};
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::incidence::Stacks;
 use super::stack::Stack;
 use super::system::System;
-use super::watch::{Between, Stopped, watched};
+use super::watch::{Between, Control, Stopped, watched};
 use super::workspace::zeros;
 
 /// Stacks that a thread takes at a time.
@@ -20,7 +21,8 @@ impl System {
     /// Solves the normal equations for all unknowns, in the order of the layout: the kept blocks and the border from the factor, the
     /// local blocks one by one.
     ///
-    /// `equations`, `prior` and `damping` must be those that the factor comes from.
+    /// `equations`, `prior` and `damping` must be those that the factor comes from. The equations are written again where the factor has
+    /// not kept what the elimination of the local blocks has left.
     pub fn solve<E: Equations>(
         &self,
         pool: &ThreadPool,
@@ -50,17 +52,10 @@ impl System {
             let first = others.len() - symbolic.outer_unknowns();
             others[first..].iter_mut().zip(outer).for_each(|(x, given)| *x = *given);
             factor.solve_backward(&mut others);
-            let solve = |stack: &mut Stack, stacks: Stacks<'_>| {
-                let mut found = Vec::with_capacity(stacks.locals() * layout.local_dim());
-                for run in stacks.iter().take_while(|_| !control.stopped()) {
-                    stack.gather(self, equations, run);
-                    stack.solve(self, prior, damping, &others, &mut found);
-                    control.count(run.len());
-                }
-                found
+            let found = match factor.eliminated.is_empty() {
+                false => self.kept_locals(&factor.eliminated, &others, control),
+                true => self.written_locals(equations, prior, damping, &others, control),
             };
-            let parts = self.incidence.stacks().parts(CHUNK);
-            let found: Vec<Vec<f64>> = parts.into_par_iter().map_init(Stack::default, solve).collect();
             let mut values = control.allocated(zeros(layout.unknowns()))?;
             for position in 0..symbolic.blocks() {
                 let range = symbolic.unknowns_at(layout, position);
@@ -72,5 +67,41 @@ impl System {
             }
             Some(values)
         })
+    }
+
+    /// The local blocks in the order of the incidence, from what was kept of them.
+    fn kept_locals(&self, eliminated: &Eliminated, others: &[f64], control: &Control) -> Vec<Vec<f64>> {
+        let solve = |coupled: &mut Coupled, (index, kept): (usize, &Vec<f64>)| {
+            let (stacks, mut kept) = (self.incidence.stacks_at(index), &kept[..]);
+            let mut found = Vec::with_capacity(stacks.locals() * self.layout.local_dim());
+            for run in stacks.iter().take_while(|_| !control.stopped()) {
+                eliminated::solve(self, run, coupled, &mut kept, others, &mut found);
+            }
+            control.count(stacks.locals());
+            found
+        };
+        eliminated.par_iter().enumerate().map_init(Coupled::default, solve).collect()
+    }
+
+    /// The same from their equations.
+    fn written_locals<E: Equations>(
+        &self,
+        equations: &E,
+        prior: &Prior,
+        damping: f64,
+        others: &[f64],
+        control: &Control,
+    ) -> Vec<Vec<f64>> {
+        let solve = |stack: &mut Stack, stacks: Stacks<'_>| {
+            let mut found = Vec::with_capacity(stacks.locals() * self.layout.local_dim());
+            for run in stacks.iter().take_while(|_| !control.stopped()) {
+                stack.gather(self, equations, run);
+                stack.solve(self, prior, damping, others, &mut found);
+                control.count(run.len());
+            }
+            found
+        };
+        let parts = self.incidence.stacks().parts(CHUNK);
+        parts.into_par_iter().map_init(Stack::default, solve).collect()
     }
 }

@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 
+use super::eliminated::numbers_at;
 use super::homes::Homes;
 use super::incidence::Incidence;
 use super::layout::Layout;
+use super::memory::made_of_results;
 use super::ordering::Ordering;
 use super::symbolic::Symbolic;
 use super::tree::Tree;
@@ -20,6 +22,8 @@ pub struct System {
     pub(super) contributions: Homes,
     pub(super) tree: Tree,
     pub(super) workspace: Workspace,
+    /// Whether what the elimination of local blocks leaves is kept for the solution.
+    pub(super) keeps: bool,
 }
 
 impl System {
@@ -30,13 +34,23 @@ impl System {
         let ties = Homes::new(layout.ties().iter().map(|tie| &tie.kept), &symbolic);
         let contributions = Homes::new(layout.contributions().iter(), &symbolic);
         let work = |(index, supernode): (usize, &super::symbolic::Supernode)| {
-            let formation =
-                incidence.locals_at(index).iter().map(|&local| formation_work(&layout, local as usize));
             let factored = if symbolic.open() == Some(index) { 0.0 } else { supernode.operations() };
-            factored + formation.sum::<f64>()
+            factored + formation_work(&incidence, &layout, index)
         };
         let tree = Tree::new(&symbolic, symbolic.supernodes().iter().enumerate().map(work).collect());
-        Self { layout, symbolic, incidence, ties, contributions, tree, workspace: Workspace::default() }
+        let kept: usize =
+            (0..=symbolic.supernode_count()).map(|index| numbers_at(&incidence, &layout, index)).sum();
+        let keeps = kept <= made_of_results(&layout);
+        Self {
+            layout,
+            symbolic,
+            incidence,
+            ties,
+            contributions,
+            tree,
+            workspace: Workspace::default(),
+            keeps,
+        }
     }
 
     /// The unknowns and groups.
@@ -55,9 +69,13 @@ impl System {
     }
 }
 
-/// Time for forming and eliminating a local block, in multiply-adds of a factorisation: those of its own, which run at a lower rate,
-/// and its equations.
-fn formation_work(layout: &Layout, local: usize) -> f64 {
-    let width = layout.reduced_width(local);
-    (2 * width * width * layout.local_dim() + 500 * layout.groups_of(local).len()) as f64
+/// Time for forming and eliminating the local blocks at home in a supernode, in multiply-adds of a factorisation: those of their own,
+/// which run at a lower rate, and their equations.
+fn formation_work(incidence: &Incidence, layout: &Layout, index: usize) -> f64 {
+    let of_stack = |run: &[u32]| {
+        let first = run.first().map_or(0, |&first| first as usize);
+        let width = layout.reduced_width(first);
+        run.len() * (2 * width * width * layout.local_dim() + 500 * layout.groups_of(first).len())
+    };
+    incidence.stacks_at(index).iter().map(of_stack).sum::<usize>() as f64
 }

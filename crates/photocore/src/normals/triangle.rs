@@ -18,6 +18,32 @@ pub(crate) struct Triangle {
 }
 
 impl Triangle {
+    /// Numbers in the lower triangle of so many rows.
+    pub const fn numbers(rows: usize) -> usize {
+        rows * (rows + 1) / 2
+    }
+
+    /// Appends them, row by row.
+    pub fn append_to(&self, rows: usize, numbers: &mut Vec<f64>) {
+        self.values
+            .iter()
+            .take(rows)
+            .enumerate()
+            .for_each(|(row, own)| numbers.extend_from_slice(&own[..=row]));
+    }
+
+    /// The triangle of such numbers.
+    #[inline(always)]
+    pub fn of(rows: usize, numbers: &[f64]) -> Self {
+        let mut found = Self::default();
+        let mut at = 0;
+        for row in 0..rows {
+            found.values[row][..=row].copy_from_slice(&numbers[at..=at + row]);
+            at += row + 1;
+        }
+        found
+    }
+
     /// Factors the lower triangle of a matrix; false when a pivot is lost in rounding (one then stands in its place).
     #[inline(always)]
     pub fn factor<const N: usize>(&mut self, matrix: &[[f64; N]; N]) -> bool {

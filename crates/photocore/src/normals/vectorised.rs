@@ -148,6 +148,36 @@ pub(super) fn add_right<S: Simd>(
     }
 }
 
+/// The product of two vectors, summed in as many parts as there are lanes.
+pub(super) fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, last), (b, end)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    let mut sums = [0.0; LANES];
+    for (a, b) in a.iter().zip(b) {
+        (0..LANES).for_each(|k| sums[k] += a[k] * b[k]);
+    }
+    sums.iter().sum::<f64>() + last.iter().zip(end).map(|(a, b)| a * b).sum::<f64>()
+}
+
+/// target += the sum over rows of a[row][i] b[row].
+#[inline(always)]
+pub(super) fn add_side<S: Simd>(
+    simd: S,
+    target: &mut [f64; LANES],
+    a: Rows<'_>,
+    i: usize,
+    b: &[[f64; LANES]],
+) {
+    let mut sums = [simd.splat_f64s(0.0); LANES];
+    for (row, b) in b.iter().enumerate() {
+        let factor = simd.splat_f64s(a.values[row * a.stride + i]);
+        let vectors = S::as_simd_f64s(b).0;
+        for k in 0..LANES / S::F64_LANES {
+            sums[k] = simd.mul_add_f64s(vectors[k], factor, sums[k]);
+        }
+    }
+    add_sums::<S, 1>(target, 0, 1.0, &[sums], LANES);
+}
+
 /// target += the sum over `parts` equal parts of a and v of a^T a - v^T v. Both are summed together, part by part: where the
 /// difference is small, so are the sums on the way to it.
 #[inline(always)]

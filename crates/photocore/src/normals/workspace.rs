@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Mutex;
 
+use super::eliminated::Eliminated;
 use super::panels::lock;
 
 /// Spare buffers, by their capacity (see [`capacity`]). Fronts come and go by the thousand; fresh pages for each of them, and
@@ -10,6 +11,7 @@ use super::panels::lock;
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
     spare: Mutex<HashMap<usize, Vec<Vec<f64>>>>,
+    eliminated: Mutex<Eliminated>,
 }
 
 impl Workspace {
@@ -38,6 +40,17 @@ impl Workspace {
     /// Gives all spare buffers back to the system.
     pub fn clear(&self) {
         lock(&self.spare).clear();
+        drop(self.take_eliminated());
+    }
+
+    /// Room for what is kept of local blocks, as it was given back; nothing where it was not.
+    pub fn take_eliminated(&self) -> Eliminated {
+        std::mem::take(&mut *lock(&self.eliminated))
+    }
+
+    /// Takes it back.
+    pub fn put_back_eliminated(&self, room: Eliminated) {
+        *lock(&self.eliminated) = room;
     }
 
     fn take(&self, length: usize) -> Result<Vec<f64>, usize> {

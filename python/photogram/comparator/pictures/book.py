@@ -24,6 +24,7 @@ from photogram.comparator.pictures.vectors import (
     joint_grid,
 )
 from photogram.show.pictures import new_figure
+from photogram.show.style import styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,10 +39,16 @@ def figures(calibration: Calibration) -> Iterator[tuple[str, Figure]]:
 
     Needs matplotlib (`pip install 'photogram[plots]'`).
     """
-    for name, figure in _figures(calibration):
-        # Panels of equal scales are laid out well only when their limits are known.
-        figure.draw_without_rendering()
-        yield name, figure
+    made = _figures(calibration)
+    while True:
+        # Who takes the figures has a style of their own in between.
+        with styled():
+            found = next(made, None)
+            if found is None:
+                return
+            # Panels of equal scales are laid out well only when their limits are known.
+            found[1].draw_without_rendering()
+        yield found
 
 
 def _figures(calibration: Calibration) -> Iterator[tuple[str, Figure]]:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.pictures.style import ACCENT, FAINT, MAIN
-from photogram.show.pictures import new_figure, open_frame
+from photogram.comparator.pictures.style import ACCENT, MAIN
+from photogram.show.pictures import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,15 +38,11 @@ def residual_histogram(calibration: Calibration) -> Figure:
         beyond = 100 * float((np.abs(own) > 2 * sigma).mean())
         panel.set_title(
             f"{'xy'[axis]}: {len(own)} residuals, rms {sigma:.3f} µm,"
-            f" {beyond:.1f} % beyond twice that (normal: 4.6 %)",
-            fontsize=9,
-            loc="left",
+            f" {beyond:.1f} % beyond twice that (normal: 4.6 %)"
         )
-        panel.set_xlabel("residual, µm", fontsize=8)
-        panel.tick_params(labelsize=7, color=FAINT)
-        open_frame(panel)
+        panel.set_xlabel("residual, µm")
     axes[0].yaxis.set_major_locator(MaxNLocator(integer=True))
-    axes[0].set_ylabel("number", fontsize=8)
+    axes[0].set_ylabel("number")
     figure.suptitle("Final residuals in the comparator system and the normal curve", fontsize=11)
     return figure
 
@@ -70,8 +66,6 @@ def variance_bars(calibration: Calibration) -> Figure:
         text = f" {components[name]:.3f} µm   {share:.0f} %"
         axes.text(bar.get_width(), bar.get_y() + bar.get_height() / 2, text, va="center", fontsize=8)
     axes.set_xlim(0, 1.25 * (max(values) or 1.0))
-    axes.set_xlabel("variance, µm²", fontsize=8)
-    axes.tick_params(labelsize=8, color=FAINT)
-    open_frame(axes)
-    axes.set_title(f"Components of the error: {components['total']:.3f} µm before calibration", fontsize=11)
+    axes.set_xlabel("variance, µm²")
+    axes.set_title(f"Components of the error: {components['total']:.3f} µm before calibration")
     return figure

@@ -39,13 +39,9 @@ def panels(
 def plain(axes: Axes, xlabel: str, ylabel: str) -> None:
     """Give a map its labels and equal scales, and take away what distracts."""
     axes.set_aspect("equal")
-    axes.set_xlabel(xlabel, fontsize=8)
-    axes.set_ylabel(ylabel, fontsize=8)
-    axes.tick_params(labelsize=7, length=2, color=FAINT)
+    axes.set_xlabel(xlabel)
+    axes.set_ylabel(ylabel)
     axes.margins(0.08)
-    pictures.open_frame(axes)
-    for side in ("left", "bottom"):
-        axes.spines[side].set_color(FAINT)
 
 
 def magnification(places_mm: Floats, vectors_um: Floats) -> float:

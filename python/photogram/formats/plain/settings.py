@@ -90,7 +90,7 @@ _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("axes", "photo"): ("y_up", "y_down"),
     ("adjust", "datum"): ("control", "minimum", "inner"),
     ("adjust", "loss"): ("none", "huber", "cauchy"),
-    ("adjust", "unit_variance"): ("free", "constrained", "unity"),
+    ("adjust", "unit_variance"): ("free", "constrained", "unity", "redundancy"),
 }
 """Words that a key may have; the first is the default."""
 _KEYS: Mapping[str, tuple[str, ...]] = {

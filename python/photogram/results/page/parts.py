@@ -166,4 +166,5 @@ _ORDERINGS = {
     "amd": "by minimum degree",
     "dissection": "by nested dissection",
     "graph-dissection": "by dissection of the graph",
+    "parts": "in parts, and the separators between them",
 }

@@ -100,23 +100,9 @@ impl Stack {
 
     /// Appends the parts of what a group has in common with others; returns how many unknowns they have.
     fn place_parts(&mut self, layout: &Layout, symbolic: &Symbolic, group: usize) -> usize {
-        let mut width = 0;
-        let mut add = |position: usize, unknowns: Range<usize>, column: usize| {
-            self.parts.push(Part { position, unknowns, segment: 0, shift: 0, column });
-        };
-        for &block in layout.further_of(group) {
-            let (position, block) = (symbolic.position(block as usize), block as usize);
-            for free in layout.free_of(block) {
-                add(position, free.clone(), width + free.start);
-            }
-            width += layout.kept_dim(block);
-        }
-        // The border is the last block.
-        let border = layout.border_of(group);
-        if !border.is_empty() {
-            add(symbolic.blocks() - 1, border.clone(), width);
-        }
-        width + border.len()
+        let part = |(position, unknowns, column)| Part { position, unknowns, segment: 0, shift: 0, column };
+        self.parts.extend(parts_of(layout, symbolic, group).map(part));
+        layout.common_width(group)
     }
 
     /// Unites the parts that overlap or meet in one block; each segment takes `depth` rows of the coupling from `start` on.
@@ -125,29 +111,21 @@ impl Stack {
         if self.parts.is_empty() {
             return start;
         }
-        let mut parts: SmallVec<[&Part; 16]> = self.parts.iter().collect();
-        parts.sort_unstable_by_key(|part| (part.position, part.unknowns.start));
-        for part in parts {
-            match self.segments.last_mut() {
-                Some(last) if part.position == last.position && part.unknowns.start <= last.unknowns.end => {
-                    last.unknowns.end = last.unknowns.end.max(part.unknowns.end);
-                }
-                _ => self.segments.push(Segment {
-                    position: part.position,
-                    unknowns: part.unknowns.clone(),
-                    row: 0,
-                    coupling: 0,
-                    runs: SmallVec::new(),
-                    plain: false,
-                }),
-            }
-        }
         let mut coupling = start;
-        for segment in &mut self.segments {
-            let first = symbolic.panel_row(home, segment.position).unwrap_or_default();
-            segment.row = first + segment.unknowns.start;
-            segment.coupling = coupling;
-            coupling += depth * segment.unknowns.len();
+        for (position, unknowns) in
+            united(self.parts.iter().map(|part| (part.position, part.unknowns.clone())))
+        {
+            let row = symbolic.panel_row(home, position).unwrap_or_default() + unknowns.start;
+            let width = unknowns.len();
+            self.segments.push(Segment {
+                position,
+                unknowns,
+                row,
+                coupling,
+                runs: SmallVec::new(),
+                plain: false,
+            });
+            coupling += depth * width;
         }
         for part in &mut self.parts {
             let key = (part.position, part.unknowns.start);
@@ -185,6 +163,53 @@ impl Stack {
             segment.plain = segment.runs.iter().map(|run| run.places.len()).sum::<usize>() == touching;
         }
     }
+}
+
+/// The parts of what a group has in common with others: the position of a block, some of its unknowns, and the first of their columns
+/// among those that the group has in common.
+pub(in crate::normals) fn parts_of<'a>(
+    layout: &'a Layout,
+    symbolic: &'a Symbolic,
+    group: usize,
+) -> impl Iterator<Item = (usize, Range<usize>, usize)> + 'a {
+    let blocks = layout.further_of(group).iter().scan(0, |width, &block| {
+        let block = block as usize;
+        let first = std::mem::replace(width, *width + layout.kept_dim(block));
+        Some((block, first))
+    });
+    let further = blocks.flat_map(move |(block, first)| {
+        let position = symbolic.position(block);
+        layout.free_of(block).map(move |free| (position, free.clone(), first + free.start))
+    });
+    // The border is the last block.
+    let border = layout.border_of(group);
+    let column = layout.common_width(group) - border.len();
+    let own = (!border.is_empty()).then(|| (symbolic.blocks() - 1, border, column));
+    further.chain(own)
+}
+
+/// Unites ranges of the unknowns of blocks that overlap or meet, in the order of their positions.
+pub(in crate::normals) fn united(
+    parts: impl Iterator<Item = (usize, Range<usize>)>,
+) -> SmallVec<[(usize, Range<usize>); 4]> {
+    let mut sorted: SmallVec<[(usize, Range<usize>); 4]> = SmallVec::new();
+    // Most groups have the same in common as the one before.
+    parts.for_each(|part| {
+        if sorted.last() != Some(&part) {
+            sorted.push(part);
+        }
+    });
+    sorted.sort_unstable_by_key(|(position, unknowns)| (*position, unknowns.start));
+    let mut found: SmallVec<[(usize, Range<usize>); 4]> = SmallVec::new();
+    for (position, unknowns) in sorted {
+        match found.last_mut() {
+            Some((at, last)) if position == *at && unknowns.start <= last.end => {
+                last.end = last.end.max(unknowns.end);
+            }
+            _ => found.push((position, unknowns)),
+        }
+    }
+    found
 }
 
 struct Gather<'a, E> {

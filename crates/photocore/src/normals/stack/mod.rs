@@ -10,9 +10,12 @@ use std::ops::Range;
 use smallvec::SmallVec;
 
 use super::front::Strip;
+use super::further::Side;
 use super::symbolic::Symbolic;
 use super::triangle::Triangle;
-use super::vectorised::{Rows, size};
+use super::vectorised::{LANES, Rows, size};
+
+pub(super) use gather::{parts_of, united};
 
 /// A main kept block that the local blocks are tied to.
 #[derive(Debug, Clone)]
@@ -121,7 +124,9 @@ pub(super) struct Stack {
     kept_rows: Vec<f64>,
     common_rows: Vec<f64>,
     coupling: Vec<f64>,
-    reduced: Vec<f64>,
+    pub reduced: Vec<f64>,
+    /// L^-1 r of further right-hand sides, so many at a time: row by row of all local blocks; empty where there are none.
+    pub sides: Vec<Side>,
 }
 
 impl Stack {
@@ -129,6 +134,11 @@ impl Stack {
     pub fn kept_dim(&self) -> Option<usize> {
         let dim = self.slots.first()?.dim;
         self.slots.iter().all(|slot| slot.dim == dim).then_some(dim)
+    }
+
+    /// The coupling to everything, main blocks before segments, each local block by local block.
+    pub fn coupling(&self) -> &[f64] {
+        &self.coupling[..self.coupling.len() - LANES]
     }
 
     /// The coupling to a main block, local block by local block.

@@ -1,6 +1,7 @@
 """What adjustments in parts take on up to 64 workers, by counted work and traffic: docs/distributed.md.
 
-python benches/distributed.py [--write docs/distributed.md] [--photos 500000]
+python benches/in_parts.py [--write docs/distributed.md] [--photos 500000]
+python benches/in_parts.py --run 50x100 --workers 2 --parts 8 --memory 1GiB --alone   a real one, printed
 
 Rates are measured beside: one thread adjusts 5,000 simulated photographs. Nothing of the large blocks is
 formed: their work, memory and traffic are counted on the tree that nested dissection gives, and a list
@@ -12,15 +13,22 @@ from __future__ import annotations
 import argparse
 import math
 import re
+import resource
+import time
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from photogram import adjust, simulate
+from photogram.adjustment.elsewhere import Division
 from photogram.distributed.counts import FORMATION, Counts, counted_work
 from photogram.distributed.cut import Incidence, Tree
+from photogram.distributed.entrance import plan_in_parts
+from photogram.distributed.running import bytes_of
 from photogram.distributed.schedule import Times, scheduled
+from photogram.distributed.workers import connected
 
 BANDWIDTH = 1.25e9 / 2
 """Bytes a second between two workers: half of 10 Gbit Ethernet."""
@@ -130,12 +138,56 @@ def page(photos: int) -> list[str]:
     ]
 
 
+def carried_out(size: str, workers: int, parts: int, memory: str, *, alone: bool) -> None:
+    """Adjust a simulated block on a cluster on this machine; print the plan and what came of it."""
+    strips, photos = (int(number) for number in size.split("x"))
+    block = simulate(strips=strips, photos_per_strip=photos, seed=1).block
+    with connected("local", workers, bytes_of(memory)) as client, TemporaryDirectory() as folder:
+        division = Division(cluster=client, parts=parts, memory=memory, folder=folder)
+        plan = plan_in_parts(block, division)
+        print("\n".join(plan.lines()), flush=True)
+        before = client.run(_peak)
+        start = time.perf_counter()
+        found = adjust(block, cluster=client, memory=memory, folder=folder)
+        seconds = time.perf_counter() - start
+        after = client.run(_peak)
+    print(f"{found.status} after {len(found.iterations)} iterations, {seconds:.1f} s, results merged")
+    for address, peak in sorted(after.items()):
+        grown = (peak - before.get(address, 0)) / 2**20
+        print(f"peak of a worker {peak / 2**20:,.0f} MiB, {grown:,.0f} MiB above what it began with")
+    if alone:
+        start = time.perf_counter()
+        whole = adjust(block)
+        print(f"in one process {time.perf_counter() - start:.1f} s, {len(whole.iterations)} iterations")
+        sd = np.sqrt(np.diagonal(whole.photo_cofactors, axis1=1, axis2=2))[:, :3]
+        apart = np.abs((found.photo_positions - whole.photo_positions) / sd).max()
+        scale = np.diagonal(whole.photo_cofactors, axis1=1, axis2=2)
+        cofactors = np.abs(np.diagonal(found.photo_cofactors, axis1=1, axis2=2) / scale - 1).max()
+        redundancy = np.abs(found.redundancy - whole.redundancy).max()
+        print(
+            f"photos differ by {apart:.0e} standard deviations, their cofactors by {cofactors:.0e},"
+            f" redundancy numbers by {redundancy:.0e}"
+        )
+
+
+def _peak() -> int:
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
 def main() -> None:
     """Print the tables, or write them into the page."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--run")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--parts", type=int, default=8)
+    parser.add_argument("--memory", default="1GiB")
+    parser.add_argument("--alone", action="store_true")
     parser.add_argument("--write", type=Path)
     parser.add_argument("--photos", type=int, default=500_000)
     given = parser.parse_args()
+    if given.run:
+        carried_out(given.run, given.workers, given.parts, given.memory, alone=given.alone)
+        return
     text = "\n".join(page(given.photos))
     print(text)
     if given.write:

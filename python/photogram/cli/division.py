@@ -1,0 +1,82 @@
+"""Options of a command that adjusts in parts: on a cluster, or one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from photogram.cli.job import Writes
+
+if TYPE_CHECKING:
+    from photogram.adjustment.elsewhere import Division
+
+__all__ = ["WHOLE", "Parts"]
+
+Cluster = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS|local",
+        help="Adjust in parts on a Dask cluster: the address of its scheduler, or `local` for workers on this"
+        " machine (needs photogram[distributed]).",
+        show_default=False,
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Workers of a local cluster; one for each processor.", show_default=False),
+]
+Count = Annotated[
+    int | None,
+    typer.Option(
+        "--parts", metavar="P", help="Parts. Default: some for each worker, that fit.", show_default=False
+    ),
+]
+Memory = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SIZE",
+        help="Memory of a worker, or of this process without a cluster (4GB, 1.5GiB): a block that takes more"
+        " is adjusted in parts.",
+        show_default=False,
+    ),
+]
+RunFolder = Annotated[
+    Path | None,
+    Writes.DIRECTORY,
+    typer.Option(
+        "--run",
+        metavar="DIR",
+        help="Keep parts and states there, on a disk that all workers see: the same command takes up a run"
+        " that died.",
+        show_default=False,
+    ),
+]
+PlanOnly = Annotated[
+    bool, typer.Option("--plan", help="Print parts, work, memory, traffic and time, and adjust nothing.")
+]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """How a user divides an adjustment, with the options that say it."""
+
+    cluster: Cluster = None
+    workers: Workers = None
+    parts: Count = None
+    memory: Memory = None
+    run: RunFolder = None
+    plan: PlanOnly = False
+
+    @property
+    def division(self) -> Division:
+        """As :func:`photogram.adjust` takes it."""
+        from photogram.adjustment.elsewhere import Division
+
+        return Division(self.cluster, self.workers, self.parts, self.memory, self.run)
+
+
+WHOLE = Parts()
+"""One process, one part."""

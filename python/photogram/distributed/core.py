@@ -1,0 +1,141 @@
+"""The nodes of a block in the core, from their parts on disk, and what becomes of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.adjustment.adjustment import named
+from photogram.distributed.files import read_json, write_file, write_json
+from photogram.distributed.parts import Names, Part, read_part
+from photogram.distributed.run import Manifest, part_folder, read_manifest, result_folder
+from photogram.io.structure import Decoder, Encoder
+from photogram.network.core import block_network
+from photogram.network.observations import observation_rows
+from photogram.results.datum import datum_of
+from photogram.results.result import Result
+from photogram.results.saved_block import block_files
+
+if TYPE_CHECKING:
+    from photogram._photocore import BlockSolution
+
+__all__ = ["CoreEngine", "read_outcome"]
+
+OUTCOME = "outcome.json"
+
+
+class CoreEngine:
+    """Nodes of the core."""
+
+    def node(self, run: Path, number: int) -> _photocore.Node:
+        """Return a node.
+
+        Raises
+        ------
+        InputError
+            Its part is missing or damaged.
+        RankError, AdjustmentError, OutOfMemoryError
+            It cannot be adjusted; names the photos and points concerned.
+        """
+        manifest, part = read_manifest(run), read_part(part_folder(run, number))
+        own = len(part.block.unknowns)
+        network = block_network(part.block, manifest.options, part.common[own:])
+        rows = [
+            {row: place for place, row in enumerate(each)}
+            for each in (part.photos.tolist(), range(len(part.block.cameras)), part.unknowns.tolist())
+        ]
+
+        def local(names: Names) -> list[tuple[str, int]]:
+            kinds = zip(("photo", "camera", "unknown"), rows, names.rows, strict=True)
+            return [(kind, places[row]) for kind, places, each in kinds for row in each]
+
+        children = [local(manifest.outer[child]) for child in manifest.tree.children[number]]
+        try:
+            return network.node(local(manifest.outer[number]), children, middle=manifest.middle, threads=0)
+        except _photocore.BlockError as error:
+            raise named(part.block, *error.args) from None
+
+    def stations(self, run: Path, number: int) -> int:
+        """Return how many weighted unknowns of photos and cameras are at home in a node."""
+        return read_manifest(run).weighted[number]
+
+    def failure(self, run: Path, number: int, undetermined: Any) -> Exception:
+        """Return what a node leaves undetermined as an error, with names."""
+        return named(read_part(part_folder(run, number)).block, *undetermined)
+
+    def keep(self, run: Path, number: int, solution: BlockSolution, variance: float | None) -> None:
+        """Write the result of a node as a folder that :func:`photogram.read_result` reads."""
+        manifest, part = read_manifest(run), read_part(part_folder(run, number))
+        folder = result_folder(run, number)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / OUTCOME).unlink(missing_ok=True)
+        for name, content in block_files(_result(part, manifest, solution, variance)).items():
+            if isinstance(content, bytes):
+                plain = content
+                write_file(folder / name, lambda file, plain=plain: file.write(plain))  # type: ignore[misc]
+            else:
+                write_file(folder / name, content)
+        # The last of its files: with it the node is done.
+        write_json(folder / OUTCOME, Encoder().value(_outcome(part, solution)))
+
+
+def read_outcome(folder: Path) -> dict[str, Any]:
+    """Return what the tables of a node have no place for.
+
+    Raises
+    ------
+    InputError
+        It is missing or damaged.
+    """
+    path = folder / OUTCOME
+    found: dict[str, Any] = Decoder([], path).value(read_json(path))
+    return found
+
+
+def _result(part: Part, manifest: Manifest, solution: BlockSolution, variance: float | None) -> Result:
+    """Return the result of a node, scaled by the variance of unit weight of the whole."""
+    scaled = cast("BlockSolution", _Scaled(part, solution, variance))
+    datum = datum_of(part.block, solution)
+    return Result.from_solution(part.block, scaled, manifest.options, datum, [], solution.degrees_of_freedom)
+
+
+class _Scaled:
+    """What the core found of a node, with the variance of unit weight of the whole.
+
+    The history of photos is not that of one node, and its block does not observe all unknowns that it has.
+    """
+
+    def __init__(self, part: Part, solution: BlockSolution, variance: float | None) -> None:
+        self._solution = solution
+        self.variance_of_unit_weight = variance
+        self.photo_corrections = np.zeros((0, len(part.photos), 6))
+        self.adjusted_unknowns = solution.adjusted_unknowns[: len(part.block.unknowns)]
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._solution, name)
+
+
+def _outcome(part: Part, solution: BlockSolution) -> dict[str, Any]:
+    """Return what tables have no place for; rows are those of the whole block."""
+    groups = observation_rows(
+        part.block.observations, part.block.point_ids, part.block.photo_ids, part.block.unknowns
+    )
+    places = [int(part.observations[row]) for rows, _ in groups for row in rows]
+    observed = zip(places, solution.adjusted_observations, strict=True)
+    return {
+        "sums_of_squares": solution.sums_of_squares,
+        "redundancies": solution.redundancies,
+        "behind": part.images[solution.images_behind].tolist(),
+        "folded": part.images[solution.images_folded].tolist(),
+        "loose": part.photos[solution.loose_photos].tolist(),
+        "weak_points": [(int(part.points[row]), *rest) for row, *rest in solution.weak_points],
+        "dropped": [(int(part.points[row]), reason) for row, reason in solution.dropped],
+        "cameras": solution.cameras,
+        "unknowns": list(zip(part.unknowns.tolist(), solution.adjusted_unknowns, strict=True)),
+        "observed": list(observed),
+        "operations": solution.operations,
+        "seconds": solution.seconds,
+    }

@@ -1,0 +1,250 @@
+"""The result of a whole block, from what its nodes have written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, cast
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.adjustment.adjustment import remarks_on
+from photogram.adjustment.hints import with_hints
+from photogram.arguments.types import Floats, Indices
+from photogram.distributed.core import read_outcome
+from photogram.distributed.driver import Outcome
+from photogram.distributed.parts import read_part, shared_cameras
+from photogram.distributed.run import Manifest, part_folder, result_folder
+from photogram.errors import AdjustmentError
+from photogram.network.block import Block
+from photogram.network.observations import observation_rows
+from photogram.results.datum import datum_messages, datum_of
+from photogram.results.result import Result
+from photogram.results.saved import read_summary
+from photogram.results.saved_block import read_block_result
+
+if TYPE_CHECKING:
+    from photogram._photocore import BlockSolution
+    from photogram.results.covariance import Covariances
+    from photogram.results.network_trial import NetworkTrial
+
+__all__ = ["InParts", "merged"]
+
+_OF_PHOTOS = ("photo_positions", "photo_attitudes", "photo_cofactors", "photo_redundancy")
+_OF_POINTS = (
+    "point_positions",
+    "point_cofactors",
+    "point_redundancy",
+    "point_rays",
+    "point_last_corrections",
+)
+_OF_IMAGES = ("residuals", "redundancy", "standardized", "image_weights")
+
+
+class InParts(Result):
+    """A block that was adjusted in parts.
+
+    It has what a :class:`Result` has. What asks for the normal equations of the whole block again is refused:
+    covariances between any two quantities, another datum, reliability beyond single observations.
+    """
+
+    WHOLE: ClassVar[bool] = False
+
+    @property
+    def reliability_summary(self) -> None:
+        """None: it would take a factor of all normal equations."""
+        return
+
+    def covariances(self) -> Covariances:
+        """Refuse; covariances of single photos, points and unknowns are there."""
+        self._refuse()
+
+    def _trial(self) -> NetworkTrial:
+        self._refuse()
+
+    def _in(self, row: object) -> NoReturn:
+        self._refuse()
+
+    def _refuse(self) -> NoReturn:
+        raise AdjustmentError(
+            "the block was adjusted in parts, whose normal equations are not kept together: adjust it in one"
+            " process for covariances between photos or points, reliability, and other datums"
+        )
+
+
+def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InParts:
+    """Return the result of a block, in the order of its photos, points and images.
+
+    Parameters
+    ----------
+    run, manifest
+        The folder of the run, and what all nodes have in common.
+    block
+        The block.
+    outcome
+        What the driver has come to.
+
+    Raises
+    ------
+    InputError
+        What a node has written is missing or damaged.
+    """
+    counts = len(block.photo_ids), len(block.point_ids), len(block.image_xy)
+    found: dict[str, np.ndarray] = {}
+    orders: list[int] = []
+    details: list[dict[str, Any]] = []
+    owners = np.zeros(counts[0], dtype=np.int64)
+    for node in range(len(manifest.tree)):
+        folder = result_folder(run, node)
+        details.append(read_outcome(folder))
+        result = read_block_result(folder, read_summary(folder))
+        part = read_part(part_folder(run, node))
+        own = np.flatnonzero(part.owners == node)
+        for names, rows, chosen, count in (
+            (_OF_PHOTOS, part.photos[own], own, counts[0]),
+            (_OF_POINTS, part.points, slice(None), counts[1]),
+            (_OF_IMAGES, part.images, slice(None), counts[2]),
+        ):
+            for name in names:
+                values = getattr(result, name)
+                if name not in found:
+                    found[name] = np.zeros((count, *values.shape[1:]), dtype=values.dtype)
+                found[name][rows] = values[chosen]
+        owners[part.photos[own]] = node
+        at_home = set(own.tolist())
+        orders += [int(part.photos[row]) for row in result.photo_order.tolist() if row in at_home]
+    rest = _rest(owners, block, outcome, orders, details)
+    solution = cast("BlockSolution", SimpleNamespace(**found, **rest))
+    datum = datum_of(block, solution)
+    messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
+    options = manifest.options
+    freedom = outcome.degrees_of_freedom
+    found_all = InParts.from_solution(block, solution, options, datum, messages, freedom)
+    return cast("InParts", with_hints(found_all))
+
+
+def _rest(
+    owners: Indices, block: Block, outcome: Outcome, order: list[int], details: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """Return what a solution has beside arrays of photos, points and images."""
+    redundancies = [each["redundancies"] for each in details]
+    sums = None if None in redundancies else tuple(map(math.fsum, zip(*redundancies, strict=True)))
+    excess = (
+        None
+        if sums is None
+        else math.fsum(sums) - (outcome.counts[0] + outcome.counts[1] - outcome.counts[2])
+    )
+    return {
+        "status": outcome.status,
+        "state": _photocore.BlockState([], [], [], [], "input", None, False),
+        "initial_sum_of_squares": outcome.initial_sum_of_squares,
+        "iterations": [tuple(vars(each).values()) for each in outcome.iterations],
+        "photo_corrections": np.zeros((0, len(block.photo_ids), 6)),
+        "photo_order": np.array(order, dtype=np.int64),
+        "undetermined": None,
+        "redundancy_excess": excess,
+        "redundancies": sums,
+        "variance_of_unit_weight": outcome.variance_of_unit_weight,
+        "counts": outcome.counts,
+        "ordering": "parts",
+        "predictions": {},
+        "operations": _added(each["operations"] for each in details),
+        "formations": outcome.formations,
+        "seconds": _added(each["seconds"] for each in details),
+        "images_behind": np.array(sorted(_all(details, "behind")), dtype=np.int64),
+        "images_folded": np.array(sorted(_all(details, "folded")), dtype=np.int64),
+        "loose_photos": sorted(set(_all(details, "loose"))),
+        "weak_points": sorted(map(tuple, _all(details, "weak_points"))),
+        "weak": [],
+        "weak_cameras": [],
+        "weak_unknowns": [],
+        "datum": [],
+        "lost_digits": 0.0,
+        "minimal_control": False,
+        "adjusted_unknowns": _unknowns(block, details),
+        "cameras": _cameras(block, owners, details),
+        "dropped": sorted((int(row), str(reason)) for row, reason in _all(details, "dropped")),
+        "sums_of_squares": outcome.sums_of_squares,
+        "adjusted_observations": _observed(block, details),
+        "degrees_of_freedom": outcome.degrees_of_freedom,
+    }
+
+
+def _all(details: list[dict[str, Any]], name: str) -> Iterator[Any]:
+    for each in details:
+        yield from each[name]
+
+
+def _added(tables: Iterable[dict[str, float]]) -> dict[str, float]:
+    total: dict[str, float] = {}
+    for each in tables:
+        for name, value in each.items():
+            total[name] = total.get(name, 0.0) + value
+    return total
+
+
+def _observed(block: Block, details: list[dict[str, Any]]) -> list[Any]:
+    """Return what has become of observations, in the order of the groups of the whole block."""
+    by_row = dict(_all(details, "observed"))
+    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
+    return [by_row[row] for rows, _ in groups for row in rows]
+
+
+def _cameras(block: Block, owners: Indices, details: list[dict[str, Any]]) -> list[Any]:
+    """Return the adjusted cameras: those of several photos are the root's, others their photo's.
+
+    What they have of the normal equations, and their images, add up over the nodes.
+    """
+    if block.photo_cameras is None:
+        return []
+    photos = np.bincount(block.photo_cameras, minlength=len(block.cameras)).tolist()
+    homes = np.full(len(block.cameras), len(details) - 1, dtype=np.int64)
+    homes[block.photo_cameras] = owners
+    homes[shared_cameras(block)] = len(details) - 1
+    rows = []
+    for camera, given in enumerate(block.cameras):
+        each = [own["cameras"][camera] for own in details]
+        covariance = given.prior_covariance
+        values, cofactors, redundancy = _of_home(
+            [row[:3] for row in each], int(homes[camera]), given.deviations, covariance
+        )
+        normal = np.sum([row[3] for row in each], axis=0).tolist()
+        rows.append((values, cofactors, redundancy, normal, photos[camera], sum(row[5] for row in each)))
+    return rows
+
+
+def _unknowns(block: Block, details: list[dict[str, Any]]) -> list[Any]:
+    """Return the adjusted common unknowns: those of the root, with the observations of all nodes."""
+    found = []
+    for row, given in enumerate(block.unknowns):
+        each = [own for node in details for place, own in node["unknowns"] if place == row]
+        # The last node that has it is the root.
+        change, cofactors, redundancy = _of_home(
+            [(own[0], own[3], own[4]) for own in each], len(each) - 1, given.deviations, None
+        )
+        found.append((change, *each[-1][1:3], cofactors, redundancy, sum(own[5] for own in each)))
+    return found
+
+
+def _of_home(
+    rows: list[Any], home: int, deviations: Floats, covariance: Floats | None
+) -> tuple[list[float], list[float], list[float]]:
+    """Return values, cofactors and redundancy numbers of what several nodes know.
+
+    A node where nothing observes it has no cofactors of it to show, the home itself perhaps: then they are
+    those of another, and the redundancy numbers of its own weights those of R = I - Q P.
+    """
+    values, cofactors, redundancy = rows[home]
+    if np.isfinite(np.array(cofactors, dtype=float)).all():
+        return values, cofactors, redundancy
+    shown = next((row[1] for row in rows if np.isfinite(np.array(row[1], dtype=float)).all()), cofactors)
+    q = np.array(shown, dtype=float).reshape(len(deviations), len(deviations))
+    weighted = np.flatnonzero((deviations > 0) & np.isfinite(deviations))
+    prior = np.diag(deviations[weighted] ** 2) if covariance is None else covariance
+    of_weights = 1.0 - np.diagonal(q[np.ix_(weighted, weighted)] @ np.linalg.inv(prior))
+    found = np.zeros(len(deviations))
+    found[weighted] = of_weights
+    return values, shown, found.tolist()

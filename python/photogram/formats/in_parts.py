@@ -1,0 +1,135 @@
+"""A project on disk adjusted in parts, without ever being in memory as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from photogram.adjustment.adjustment import Progress
+from photogram.adjustment.elsewhere import Division
+from photogram.distributed.driver import Outcome, Stop
+from photogram.distributed.planned import PartsPlan
+from photogram.distributed.run import Manifest, result_folder
+from photogram.distributed.running import Run, check, opened, parts_for
+from photogram.formats.format import Wishes
+from photogram.formats.plain.streamed import Streamed
+from photogram.network.core import CoreOptions
+
+__all__ = ["OnDisk", "adjusted_on_disk", "planned_on_disk"]
+
+TOLERANCE, MAX_ITERATIONS = 1e-5, 50
+"""As of :func:`photogram.adjust`."""
+
+
+@dataclass(frozen=True)
+class OnDisk:
+    """What the adjustment of a project on disk has come to.
+
+    Attributes
+    ----------
+    outcome
+        History, sums and variance.
+    manifest
+        The tree, and how much is in each node.
+    folders
+        What was found, one folder a node: :func:`photogram.read_result` reads each by itself. Photos of nodes
+        above stand in several, with the same values and covariances.
+    """
+
+    outcome: Outcome
+    manifest: Manifest
+    folders: list[Path]
+
+    def lines(self) -> list[str]:
+        """Return a report in a few lines."""
+        outcome, variance = self.outcome, self.outcome.variance_of_unit_weight
+        observations, weighted, unknowns = outcome.counts
+        camera, ground, plates, others = outcome.sums_of_squares
+        photos, points, images = (sum(each) for each in _sizes(self.manifest))
+        lines = [
+            f"{outcome.status} after {len(outcome.iterations)} iterations",
+            f"{photos:,} photos, {points:,} points, {images:,} image points in {len(self.folders)} nodes",
+            f"{observations:,} observations and {weighted:,} weighted unknowns, {unknowns:,} unknowns:"
+            f" {outcome.degrees_of_freedom:,} degrees of freedom",
+            f"weighted sum of squares {sum(outcome.sums_of_squares):.6g}: camera {camera:.6g}, ground"
+            f" {ground:.6g}, plates {plates:.6g}, observations {others:.6g}",
+        ]
+        if variance is not None:
+            lines.append(f"sigma0 {variance**0.5:.6g} (a priori 1)")
+        lines += [
+            f"iteration {each.number}: weighted sum of squares {each.weighted_sum_of_squares:.6g}, largest"
+            f" change {each.largest_change:.2g} standard deviations"
+            for each in outcome.iterations
+        ]
+        return lines
+
+
+def _sizes(manifest: Manifest) -> tuple[list[int], list[int], list[int]]:
+    return manifest.photos, manifest.points, manifest.images
+
+
+def adjusted_on_disk(
+    path: Path,
+    wishes: Wishes,
+    folder: Path,
+    division: Division,
+    *,
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> OnDisk:
+    """Adjust a project whose images lie in Parquet; everything goes to a folder, in parts.
+
+    Parameters
+    ----------
+    path, wishes
+        The project (:func:`photogram.formats.plain.streamed.streamable`).
+    folder
+        Of the run, on a disk that all workers see: a run that died is taken up there.
+    division
+        Cluster, workers, parts and memory.
+    threads, progress
+        As of :func:`photogram.adjust`.
+
+    Raises
+    ------
+    RankError, AdjustmentError, OutOfMemoryError, InputError
+        As of :func:`photogram.adjust`, and as of projects that are read whole.
+    """
+    with _run(path, wishes, folder, division, threads) as run:
+        options = run.manifest.options
+        stop = Stop(TOLERANCE, MAX_ITERATIONS, options.covariance, options.unit_variance)
+        outcome = run.adjust(stop, progress)
+        found = [result_folder(folder, node) for node in range(len(run.manifest.tree))]
+        return OnDisk(outcome, run.manifest, found)
+
+
+def planned_on_disk(path: Path, wishes: Wishes, folder: Path, division: Division) -> PartsPlan:
+    """Plan the same: its parts are written, and wait in the folder for the adjustment."""
+    with _run(path, wishes, folder, division, None) as run:
+        return run.plan()
+
+
+@contextmanager
+def _run(path: Path, wishes: Wishes, folder: Path, division: Division, threads: int | None) -> Iterator[Run]:
+    folder.mkdir(parents=True, exist_ok=True)
+    streamed = Streamed(path, wishes, folder)
+    try:
+        variance = streamed.project.options.unit_variance
+        options = CoreOptions("fraction", TOLERANCE, MAX_ITERATIONS, True, None, "auto", variance, None)
+        check(streamed.block, options)
+        source = streamed.source(options)
+        with opened(
+            folder,
+            source,
+            lambda parts: streamed.divided(folder, parts, options, source),
+            lambda workers, memory: parts_for(
+                lambda parts: streamed.counted(parts)[1], len(streamed.block.photo_ids), workers, memory
+            ),
+            division,
+            threads,
+        ) as run:
+            yield run
+    finally:
+        streamed.close()

@@ -1,0 +1,183 @@
+"""Blocks in parts by the core: what one process gives."""
+
+import numpy as np
+import pytest
+from test_parts import tied_block
+
+import photogram
+from example_scripts import load
+from photogram import adjust
+from photogram.adjustment.elsewhere import Division
+from photogram.distributed import running
+from photogram.distributed.core import CoreEngine
+from photogram.distributed.entrance import plan_in_parts
+from photogram.distributed.run import read_manifest
+from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
+from photogram.network.observations import Relative
+
+
+@pytest.fixture(scope="module")
+def block():
+    return photogram.simulate(strips=6, photos_per_strip=24, points_per_photo=40, seed=3).block
+
+
+@pytest.fixture(scope="module")
+def whole(block):
+    return adjust(block)
+
+
+def agrees(found, whole, least=1e-9, *, tied=False):
+    """Compare with one process: values in standard deviations, cofactors as correlations.
+
+    Points that are tied are intersected anew after a long first step in one process, and not in parts: the
+    way there is another one, and the end the same.
+    """
+    sd = np.sqrt(np.diagonal(whole.photo_cofactors, axis1=1, axis2=2))
+    free = sd > 0
+    values = [np.hstack([each.photo_positions, each.photo_attitudes]) for each in (found, whole)]
+    assert np.abs((values[0] - values[1])[free] / sd[free]).max() < least
+    point_sd = np.sqrt(np.diagonal(whole.point_cofactors, axis1=1, axis2=2))
+    used = np.isfinite(point_sd) & (point_sd > 0)
+    assert np.abs((found.point_positions - whole.point_positions)[used] / point_sd[used]).max() < least
+    for name, deviations in (("photo_cofactors", sd), ("point_cofactors", point_sd)):
+        scale = np.einsum("ij,ik->ijk", deviations, deviations)
+        apart = getattr(found, name) - getattr(whole, name)
+        good = np.isfinite(scale) & (scale > 0)
+        assert np.abs(apart[good] / scale[good]).max() < least
+    for name in ("residuals", "redundancy", "photo_redundancy", "point_redundancy", "point_rays"):
+        np.testing.assert_allclose(getattr(found, name), getattr(whole, name), rtol=0, atol=least)
+    # Where the redundancy is next to nothing, test values are quotients of rounding.
+    tested = whole.redundancy > 1e-3
+    np.testing.assert_allclose(found.standardized[tested], whole.standardized[tested], rtol=0, atol=1e-6)
+    assert found.status == whole.status
+    assert len(found.iterations) == len(whole.iterations)
+    assert found.degrees_of_freedom == whole.degrees_of_freedom
+    assert found.variance_of_unit_weight == pytest.approx(whole.variance_of_unit_weight, rel=1e-11)
+    last = -1 if tied else 0
+    for one, other in zip(found.iterations[last:], whole.iterations[last:], strict=True):
+        assert one.weighted_sum_of_squares == pytest.approx(other.weighted_sum_of_squares, rel=1e-11)
+        assert tied or one.largest_change == pytest.approx(other.largest_change, rel=1e-5, abs=1e-9)
+
+
+@pytest.mark.parametrize("parts", [2, 4, 16])
+def test_parts_give_what_one_process_gives(block, whole, parts):
+    found = adjust(block, parts=parts)
+    agrees(found, whole)
+    assert found.messages == whole.messages
+    assert found.sums_of_squares.total == pytest.approx(whole.sums_of_squares.total, rel=1e-11)
+    assert sorted(found.photo_order.tolist()) == list(range(len(block.photo_ids)))
+
+
+def test_cameras_ties_and_common_unknowns_cross_cuts():
+    block = tied_block()
+    block = block.replace(
+        observations=[each for each in block.observations if not isinstance(each, Relative)]
+    )
+    whole, found = adjust(block), adjust(block, parts=4)
+    agrees(found, whole, tied=True)
+    for one, other in zip(found.cameras, whole.cameras, strict=True):
+        np.testing.assert_allclose(one.values, other.values, rtol=1e-12)
+        np.testing.assert_allclose(one.cofactors, other.cofactors, rtol=1e-8, atol=1e-20)
+    for one, other in zip(found.unknowns, whole.unknowns, strict=True):
+        np.testing.assert_allclose(one.cofactors, other.cofactors, rtol=1e-8, atol=1e-20)
+        np.testing.assert_allclose(one.redundancy, other.redundancy, rtol=1e-8)
+        assert one.observations == other.observations
+    assert list(found.kinds) == list(whole.kinds)
+    for kind, other in whole.kinds.items():
+        for name in ("residuals", "redundancy", "standardized", "squares"):
+            np.testing.assert_allclose(
+                getattr(found.kinds[kind], name), getattr(other, name), rtol=1e-6, atol=1e-8
+            )
+
+
+@pytest.mark.parametrize("unit_variance", ["free", "unity"])
+def test_every_unit_variance_is_that_of_one_process(block, unit_variance):
+    weighted = block.replace(photo_position_sd=np.full((len(block.photo_ids), 3), 5.0))
+    found = adjust(weighted, parts=3, unit_variance=unit_variance)
+    agrees(found, adjust(weighted, unit_variance=unit_variance))
+
+
+def test_weighted_cameras_and_unknowns_count_in_the_free_unit_variance():
+    block = tied_block()
+    whole, found = adjust(block, unit_variance="free"), adjust(block, parts=2, unit_variance="free")
+    assert found.degrees_of_freedom == whole.degrees_of_freedom
+    assert found.variance_of_unit_weight == pytest.approx(whole.variance_of_unit_weight, rel=1e-9)
+
+
+def test_without_covariances(block):
+    whole, found = adjust(block, covariance=False), adjust(block, parts=4, covariance=False)
+    np.testing.assert_allclose(found.photo_positions, whole.photo_positions, rtol=0, atol=1e-9)
+    assert np.isnan(found.photo_cofactors).all()
+    assert found.variance_of_unit_weight == pytest.approx(whole.variance_of_unit_weight, rel=1e-11)
+
+
+def test_memory_decides_whether_there_are_parts(block, whole, monkeypatch):
+    assert type(adjust(block, memory="1GB")) is photogram.Result
+    monkeypatch.setattr(running, "WHOLE", 1e9 / len(block.image_xy))
+    found = adjust(block, memory="1GB")
+    assert type(found) is not photogram.Result
+    agrees(found, whole)
+
+
+def test_a_plan_is_what_is_needed(block, tmp_path):
+    plan = plan_in_parts(block, Division(parts=4, folder=tmp_path))
+    assert plan.of("images").sum() == len(block.image_xy)
+    assert sum(plan.photos) == len(block.photo_ids)
+    engine, contributions = CoreEngine(), {}
+    for node, children in enumerate(read_manifest(tmp_path).tree.children):
+        own = engine.node(tmp_path, node)
+        formed = own.form(own.initial, [contributions.pop(c) for c in children], damping=0.0, threads=1)
+        contributions[node] = formed.contribution
+        sent = sum(each.nbytes for each in contributions[node])
+        assert sent == plan.predictions[node]["contribution_bytes"]
+    text = "\n".join(plan.lines())
+    assert "4 parts and 3 separators for 1 workers" in text
+    assert "at the rate measured" in text
+
+
+def test_a_plan_that_does_not_fit_says_what_would(block):
+    plan = plan_in_parts(block, Division(parts=2, memory=4_000_000))
+    with pytest.raises(OutOfMemoryError, match=r"parts would fit, in place of 2|separator alone"):
+        plan.check()
+
+
+def test_a_run_is_taken_up_in_its_folder_alone(block, whole, tmp_path):
+    def stop(told):
+        if told.phase == "iteration":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        adjust(block, parts=2, folder=tmp_path, progress=stop)
+    agrees(adjust(block, parts=2, folder=tmp_path), whole)
+    with pytest.raises(InputError, match="another block, or with other options"):
+        adjust(block, parts=2, folder=tmp_path, tolerance=1e-3)
+
+
+def test_what_is_not_determined_is_named(block):
+    free = block.replace(point_sd=np.full((len(block.point_ids), 3), np.inf))
+    with pytest.raises(RankError):
+        adjust(free, parts=2)
+
+
+def test_what_parts_cannot_do_is_refused(block):
+    found = adjust(block, parts=2)
+    with pytest.raises(AdjustmentError, match="adjusted in parts"):
+        found.covariances()
+    with pytest.raises(InputError, match="no loss"):
+        adjust(block, parts=2, loss="huber")
+    with pytest.raises(InputError, match="not based on redundancy"):
+        adjust(block, parts=2, unit_variance="redundancy")
+    with pytest.raises(InputError, match="memory is a number of bytes"):
+        adjust(block, memory="much")
+    with pytest.raises(InputError, match="parts must be positive"):
+        adjust(block, parts=0)
+
+
+def test_the_example_is_right(capsys):
+    script = load("in_parts")
+    script.main()
+    assert "4 parts and 3 separators for 1 workers" in capsys.readouterr().out
+    block = script.flown(seed=12)
+    values, redundancy = script.apart(adjust(block, parts=3), adjust(block))
+    assert values < 1e-9
+    assert redundancy < 1e-9

@@ -1,0 +1,69 @@
+"""Pictures of orientations, plates, nights, comparators, plans: the style of the house, letters, names."""
+
+from importlib.resources import files
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation
+
+from photogram import orient
+from photogram.absolute_orientation import plot, read_csv
+
+EXAMPLES = Path(str(files("photogram").joinpath("examples")))
+COMMANDS = [
+    "absolute-orientation --example --out out --plots --no-html",
+    "perspective-center --example --out out --plots --no-html",
+    "stellar-camera --example --out out --plots --no-html",
+    "stellar-camera exposures --example --out out --plots --no-html",
+    "plan --strips 2 --photos-per-strip 4 --out out --plots --no-html",
+    "comparator --example --out out",
+]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_pictures_have_the_style_of_the_house(run, monkeypatch, command, tmp_path):
+    made = []
+    save = Figure.savefig
+
+    def watched(figure, *arguments, **options):
+        made.append(figure)
+        return save(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", watched)
+    plotted = ["--plot-format", "svg"] if "--plots" in command else []
+    result = run(*command.split(), *plotted, "--quiet")
+    assert result.exit_code == 0, result.output
+    assert made
+    for figure in made:
+        for axes in figure.axes:
+            bar = axes.get_label() == "<colorbar>"
+            assert bar or not (axes.spines["top"].get_visible() or axes.spines["right"].get_visible())
+            assert not axes.get_title(loc="center")
+            legend = axes.get_legend()
+            assert legend is None or not legend.get_frame_on()
+        assert not any(legend.get_frame_on() for legend in figure.legends)
+    for path in tmp_path.rglob("*.svg"):
+        assert "<text" in path.read_text()
+
+
+def overlapping(axes):
+    """Return names that cover one another."""
+    names = [each for each in axes.texts if isinstance(each, Annotation)]
+    boxes = [(each.get_text(), each.get_window_extent()) for each in names]
+    return [(a, b) for (a, one), (b, other) in combinations(boxes, 2) if one.overlaps(other)]
+
+
+@pytest.mark.parametrize("size", [(8.5, 6.0), (4.0, 4.5)])
+def test_names_of_control_do_not_cover_each_other_in_given_axes(size):
+    result = orient(read_csv(EXAMPLES / "absolute_orientation" / "stations.csv"))
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.subplots()
+    assert plot.residuals(result, axes) is axes
+    figure.draw_without_rendering()
+    written = {each.get_text() for each in axes.texts}
+    assert {"H101", "V205"} <= written
+    assert overlapping(axes) == []
