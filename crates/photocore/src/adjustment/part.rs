@@ -68,6 +68,8 @@ impl Part {
             let mut between = between(watch, Phase::Form, layout.locals());
             unless_stopped(problem.system.factor(pool, &equations, &prior, damping, &mut between))?
         };
+        // The factor waits for the way down, perhaps beside those of many others.
+        problem.system.release();
         let sum_of_squares = factor.sum_of_squares + problem.prior_sum_of_squares(&values, 0..values.len());
         let (took, share) = (start.elapsed().as_secs_f64(), factor.formation_share);
         let seconds = Seconds { form: took * share, factor: took * (1.0 - share), ..Seconds::default() };
@@ -148,6 +150,7 @@ impl Part {
             let mut between = between(watch, Phase::Invert, layout.locals());
             unless_stopped(system.invert_below(pool, factor, &equations, &prior, outer, &mut between))?
         };
+        system.release();
         let below =
             layout.contributions().iter().map(|blocks| found.selected.triangle(layout, blocks)).collect();
         let prior_redundancy = problem.finish_cofactors(&mut found.cofactors, &[], &values);

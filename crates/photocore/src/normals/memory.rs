@@ -18,6 +18,11 @@ impl System {
         BASE + BYTES * (capacity(self.symbolic.values()) + self.fronts() + vectors(&self.layout))
     }
 
+    /// Gives back what is kept for the next formation or inversion: where others need memory before it comes.
+    pub fn release(&self) {
+        self.workspace.clear();
+    }
+
     /// Numbers in the buffers of fronts: the walks up and down the elimination tree take and give back what these do.
     fn fronts(&self) -> usize {
         let supernodes = self.symbolic.supernodes();

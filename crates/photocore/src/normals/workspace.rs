@@ -40,6 +40,12 @@ impl Workspace {
         }
     }
 
+    /// Gives all spare buffers back to the system.
+    pub fn clear(&self) {
+        lock(&self.spare).clear();
+        drop(self.take_eliminated());
+    }
+
     /// Room for what is kept of local blocks, as it was given back; nothing where it was not.
     pub fn take_eliminated(&self) -> Eliminated {
         std::mem::take(&mut *lock(&self.eliminated))
