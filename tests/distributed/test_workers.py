@@ -22,6 +22,12 @@ def client():
         yield found
 
 
+@pytest.fixture(autouse=True)
+def both_workers(client):
+    """Wait for a worker that the test before has killed: it is started again."""
+    client.wait_for_workers(2, timeout=60)
+
+
 def on(client, folder, tree, engine=None):
     job = Job(folder, engine or ToyEngine(), _photocore.__version__, threads=1)
     executor = Workers(client)

@@ -7,11 +7,12 @@ mod cut;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
-use cut::Cut;
+use cut::{Cut, TREES};
 use photocore::normals::{
     Contribution, Equations, Factor, GroupRows, Layout, LayoutError, Ordering, Prior, Stopped, System, Tie,
     TieRows,
 };
+use proptest::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Numbers between -1 and 1 that a seed and two places give.
@@ -254,6 +255,52 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
         for (share, row) in found.cofactors.equations.iter().zip(of_groups.chain(of_ties)) {
             assert_close(*share, cofactors.cofactors.equations[row], 1e-9, "adjusted equation");
         }
+    }
+}
+
+const ALL: [Ordering; 4] =
+    [Ordering::Auto, Ordering::Input, Ordering::MinimumDegree, Ordering::DissectionByGraph];
+
+/// Systems of local blocks on one to three of some main blocks, with common ones and ties.
+fn systems() -> impl Strategy<Value = (Layout, u64)> {
+    let shape = (1..4usize, prop::collection::vec(1..8usize, 4..16), 0..3u32);
+    let of_shape = |(l, kept, common): (usize, Vec<usize>, u32)| {
+        let main = common..kept.len() as u32;
+        let further = prop::collection::btree_set(0..common.max(1), 0..=common as usize);
+        let groups = prop::collection::vec(prop::collection::vec((main, further), 1..4), 1..40);
+        let tied = prop::collection::btree_set(0..kept.len() as u32, 1..4);
+        (Just((l, kept)), groups, prop::collection::vec((1..4usize, tied), 0..6), any::<u64>())
+    };
+    shape.prop_flat_map(of_shape).prop_map(|((l, kept), locals, ties, seed)| {
+        let mut ptr = vec![0];
+        locals.iter().for_each(|groups| ptr.push(ptr[ptr.len() - 1] + groups.len()));
+        let (main, further): (Vec<u32>, Vec<BTreeSet<u32>>) = locals.into_iter().flatten().unzip();
+        let mut further_ptr = vec![0];
+        further.iter().for_each(|own| further_ptr.push(further_ptr[further_ptr.len() - 1] + own.len()));
+        let further = further.into_iter().flatten().collect();
+        let tie = |(rows, kept): (usize, BTreeSet<u32>)| Tie {
+            rows,
+            kept: kept.into_iter().collect(),
+            border: 0..0,
+        };
+        let layout = Layout::new(2, l, &kept, ptr, main).unwrap().with_further(further_ptr, further).unwrap();
+        (layout.with_ties(ties.into_iter().map(tie).collect()).unwrap(), seed)
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+
+    #[test]
+    fn parts_agree_with_one_piece(
+        (layout, seed) in systems(),
+        ordering in prop::sample::select(ALL.to_vec()),
+        tree in 0..TREES.len(),
+    ) {
+        let tree = TREES[tree];
+        let place = |block: usize| (number(seed, block, 17).abs() * tree.len() as f64) as usize;
+        let node_of = (0..layout.kept()).map(place).collect();
+        compare(layout, tree, node_of, seed, ordering);
     }
 }
 

@@ -365,10 +365,12 @@ fn places(order: &[usize]) -> Vec<usize> {
     place
 }
 
-/// Reorders so that every subtree of the elimination tree of the first `inner` blocks is contiguous; the fill stays the same.
+/// Reorders so that every subtree of the elimination tree of the first `inner` blocks is contiguous, and that of all others, which
+/// become one front, too; the fill stays the same.
 fn postorder(graph: &Graph, order: &[usize], inner: usize) -> Vec<usize> {
     let mut parent = elimination_tree(graph, order, &places(order));
     parent.truncate(inner);
+    let is_apart: Vec<bool> = parent.iter().map(Option::is_none).collect();
     parent.iter_mut().for_each(|above| *above = above.filter(|&above| above < inner));
     let mut children = vec![Vec::new(); inner];
     for (k, above) in parent.iter().enumerate() {
@@ -377,7 +379,8 @@ fn postorder(graph: &Graph, order: &[usize], inner: usize) -> Vec<usize> {
         }
     }
     let mut result = Vec::with_capacity(order.len());
-    for root in (0..inner).filter(|&k| parent[k].is_none()) {
+    let roots = || (0..inner).filter(|&k| parent[k].is_none());
+    for root in roots().filter(|&k| is_apart[k]).chain(roots().filter(|&k| !is_apart[k])) {
         // Depth first with an explicit stack, parents before children; the subtree is then reversed.
         let start = result.len();
         let mut stack = vec![root];

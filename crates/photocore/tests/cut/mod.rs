@@ -2,6 +2,13 @@
 
 use std::collections::BTreeSet;
 
+pub const TREES: [&[Option<usize>]; 4] = [
+    &[Some(1), None],
+    &[Some(2), Some(2), None],
+    &[Some(3), Some(3), Some(3), None],
+    &[Some(2), Some(2), Some(6), Some(5), Some(5), Some(6), None],
+];
+
 /// Blocks of unknowns on the nodes of a tree.
 pub struct Cut {
     pub parent: Vec<Option<usize>>,
