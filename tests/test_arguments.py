@@ -185,6 +185,7 @@ def good(tmp_path_factory):
             "adjust": {"collection": photos},
             "read": {"path": ring},
             "simulate": {"photos": 3, "points": 8},
+            "simulate_turntable": {"photos": 4, "points": 8, "rays": 3},
             "to_bytes": {"collection": photos},
         },
         "photogram.comparator": {
@@ -292,7 +293,11 @@ def good(tmp_path_factory):
     }
 
 
-OF_THE_SIZE = {("photogram", "simulate"), ("photogram.collection", "simulate")}
+OF_THE_SIZE = {
+    ("photogram", "simulate"),
+    ("photogram.collection", "simulate"),
+    ("photogram.collection", "simulate_turntable"),
+}
 """Numbers of these are sizes: large ones are refused for their memory in tests of their own."""
 BIG = {"1e300", "2^64", "10^400", "inf"}
 

@@ -11,12 +11,19 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from photogram.arguments.annotations import path
+from photogram.arguments.arrays import shown, whole_number
+from photogram.errors import InputError
+
 if TYPE_CHECKING:
     from photogram.network.block import Block
     from photogram.network.core import CoreOptions
     from photogram.results.result import Result
 
 __all__ = ["IN_PARTS", "Division", "InParts"]
+
+MOST = 100_000
+"""Workers or parts: more is a slip."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +35,14 @@ class Division:
     parts: int | None = None
     memory: int | str | None = None
     folder: str | PathLike[str] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("workers", "parts"):
+            given = getattr(self, name)
+            if given is not None and not 1 <= whole_number(name, given) <= MOST:
+                raise InputError(f"{name} must be 1 to {MOST}, not {shown(given)}")
+        if self.folder is not None:
+            path("folder", self.folder)
 
     @property
     def is_asked_for(self) -> bool:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from photogram import _photocore
+from photogram.arguments.arrays import shown
 from photogram.errors import AdjustmentError, InputError
 
 Client = Any
@@ -92,6 +94,10 @@ class Workers:
             self._client.cancel(futures, force=True)
 
 
+ADDRESS = re.compile(r"(?:[a-z]+://)?[\w.\-\[\]:]+:\d{1,5}", re.ASCII)
+"""Of a scheduler. Dask looks for other things in what is no address (scheduler files, plug-ins)."""
+
+
 @contextmanager
 def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator[Client]:
     """Connect to a scheduler, or start a cluster on this machine.
@@ -116,7 +122,7 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
 
     if isinstance(cluster, library.Client):
         yield cluster
-    elif cluster == "local":
+    elif isinstance(cluster, str) and cluster == "local":
         with (
             dask.config.set(SETTINGS),
             library.LocalCluster(
@@ -128,7 +134,7 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
             library.Client(own) as client,
         ):
             yield client
-    elif isinstance(cluster, str):
+    elif isinstance(cluster, str) and ADDRESS.fullmatch(cluster):
         try:
             client = library.Client(cluster, timeout="10s")
         except (OSError, ValueError) as error:
@@ -137,7 +143,8 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
             yield client
     else:
         raise InputError(
-            f"cluster is a client of dask.distributed, an address or 'local', not {type(cluster).__name__}"
+            "cluster is a client of dask.distributed, an address such as 'tcp://host:8786' or 'local', not"
+            f" {shown(cluster)}"
         )
 
 
