@@ -20,7 +20,7 @@ Cluster = Annotated[
     typer.Option(
         metavar="ADDRESS|local",
         help="Adjust in parts on a Dask cluster: the address of its scheduler, or `local` for workers on this"
-        " machine (needs photogram[distributed]).",
+        " machine (needs the extra `distributed`).",
         show_default=False,
     ),
 ]
