@@ -27,6 +27,8 @@ const PATIENCE: usize = 50;
 const BENDS: f64 = 0.75;
 /// until the second-order term, in the metric of the normal equations, is smaller than this part of a step.
 const STRAIGHT: f64 = 0.1;
+/// A term that is larger than this part of a step says nothing of where the valley leads (Transtrum and Sethna 2012).
+const TOO_LARGE: f64 = 0.75;
 
 /// The damping, and by how much the next failure raises it.
 struct Damping {
@@ -152,6 +154,9 @@ impl<'a, M: Model> Run<'a, '_, M> {
         };
         let Some((term, square)) = term else { return Ok(trial(&step, None)) };
         let bend = Some(square.max(0.0).sqrt() / change);
+        if !bend.is_some_and(|bend| bend <= TOO_LARGE) {
+            return Ok(trial(&step, bend));
+        }
         let along: Vec<f64> = step.iter().zip(&term).map(|(v, a)| v + 0.5 * a).collect();
         let accelerated = trial(&along, bend);
         if accelerated.gain(lowest) >= BENDS {
