@@ -169,7 +169,7 @@ def test_what_parts_cannot_do_is_refused(block):
         adjust(block, parts=2, unit_variance="redundancy")
     with pytest.raises(InputError, match="memory is a number of bytes"):
         adjust(block, memory="much")
-    with pytest.raises(InputError, match="parts must be positive"):
+    with pytest.raises(InputError, match="parts must be 1 to"):
         adjust(block, parts=0)
 
 
