@@ -27,8 +27,9 @@ const PATIENCE: usize = 50;
 const BENDS: f64 = 0.75;
 /// until the second-order term, in the metric of the normal equations, is smaller than this part of a step.
 const STRAIGHT: f64 = 0.1;
-/// A term that is larger than this part of a step says nothing of where the valley leads (Transtrum and Sethna 2012).
-const TOO_LARGE: f64 = 0.75;
+/// Local blocks of a network, at the least, whose steps are accelerated: the valley of a few numbers may lead far away (Eckerle4 of NIST's
+/// problems, from its first start), that of a network ends near where it began.
+const NETWORK: usize = 64;
 
 /// The damping, and by how much the next failure raises it.
 struct Damping {
@@ -87,6 +88,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let mut lowest = state.sum_of_squares;
         let mut damping = Damping { value: state.damping, rise: 2.0, bends: false };
         let (mut mark, mut steps) = (lowest, 0);
+        let is_network = self.problem.layout().locals() >= NETWORK;
         while self.iterations.len() < self.options.max_iterations {
             if damping.value > MOST_DAMPING {
                 return self.rest(state.unknowns, Status::Diverged);
@@ -109,7 +111,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let last = whole && (stop.at_change(trial.change) || stop.at_decrease(trial.predicted, lowest));
             let gain = trial.gain(lowest);
             damping.bends &= trial.bend.is_none_or(|bend| bend > STRAIGHT);
-            damping.bends |= (gain.is_nan() || gain < BENDS) && self.options.loss.is_none();
+            damping.bends |= (gain.is_nan() || gain < BENDS) && self.options.loss.is_none() && is_network;
             if gain > LEAST_GAIN && trial.sum_of_squares <= lowest {
                 let decrease = lowest - trial.sum_of_squares;
                 if let Some(end) = self.keep(&unknowns, &trial, used)? {
@@ -154,9 +156,6 @@ impl<'a, M: Model> Run<'a, '_, M> {
         };
         let Some((term, square)) = term else { return Ok(trial(&step, None)) };
         let bend = Some(square.max(0.0).sqrt() / change);
-        if !bend.is_some_and(|bend| bend <= TOO_LARGE) {
-            return Ok(trial(&step, bend));
-        }
         let along: Vec<f64> = step.iter().zip(&term).map(|(v, a)| v + 0.5 * a).collect();
         let accelerated = trial(&along, bend);
         if accelerated.gain(lowest) >= BENDS {
