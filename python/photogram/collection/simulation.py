@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
 from photogram.errors import InputError
 
@@ -18,8 +18,6 @@ DISTANCE = 10.0
 """Of the photos from the centre of the cloud."""
 SIZE = 4.0
 """Side of the cloud, a cube."""
-
-
 FIELD = 400.0
 """Image radius of the object on a turntable, pixels."""
 
@@ -96,14 +94,7 @@ def simulate(
     outliers = random.random(len(exact)) < outlier_share
     errors = random.normal(0, noise, exact.shape)
     errors[outliers] += random.normal(0, outlier_size, (int(outliers.sum()), 2))
-    truth = Collection(
-        photo_parameters=parameters,
-        point_positions=positions,
-        image_photos=image_photos,
-        image_points=image_points,
-        image_xy=exact + errors,
-        image_sd=np.array(noise if noise > 0 else 1.0),
-    )
+    truth = _measured(parameters, positions, (image_photos, image_points), exact + errors, noise)
     start = parameters.copy()
     start[:, :3] += coarseness * random.normal(0, 0.05, (photos, 3))
     start[:, 3:6] += coarseness * random.normal(0, 0.5, (photos, 3))
@@ -159,30 +150,15 @@ def simulate_turntable(
     if not (noise >= 0 and coarseness >= 0 and seed >= 0 and distance > 2):
         raise InputError("noise, coarseness and seed are not negative; the distance exceeds 2")
     random = np.random.default_rng(seed)
+    parameters = _on_turntable(photos, distance, random)
+    positions, angle = _pillar(points, random)
     around = 2 * np.pi * np.arange(photos) / photos
-    parameters = np.zeros((photos, 9))
-    parameters[:, 1] = -around
-    parameters[:, :3] += random.normal(0, 0.01, (photos, 3))
-    parameters[:, 3:5] = random.normal(0, 0.02, (photos, 2))
-    parameters[:, 5] = -distance * (1 + random.normal(0, 0.005, photos))
-    parameters[:, 6] = FIELD * distance * (1 + random.normal(0, 0.02, photos))
-    # A thousandth of the radius at the edge of the object.
-    parameters[:, 7] = random.normal(0, 0.001, photos) * distance**2
-    angle, height = random.uniform(0, 2 * np.pi, points), random.uniform(-1, 1, points)
-    radius = 0.8 + 0.2 * np.cos(3 * angle) * np.cos(2 * height) + random.normal(0, 0.05, points)
-    positions = np.column_stack([radius * np.sin(angle), height, radius * np.cos(angle)])
     apart = np.abs((angle[:, None] - around + np.pi) % (2 * np.pi) - np.pi)
     image_photos = np.sort(np.argsort(apart, axis=1, kind="stable")[:, :rays], axis=1).ravel()
     image_points = np.repeat(np.arange(points), rays)
     exact = _photocore.collection_images("bal", parameters[image_photos], positions[image_points])
-    truth = Collection(
-        photo_parameters=parameters,
-        point_positions=positions,
-        image_photos=image_photos,
-        image_points=image_points,
-        image_xy=exact + random.normal(0, noise, exact.shape),
-        image_sd=np.array(noise if noise > 0 else 1.0),
-    )
+    measured = exact + random.normal(0, noise, exact.shape)
+    truth = _measured(parameters, positions, (image_photos, image_points), measured, noise)
     start = parameters.copy()
     start[:, :3] += coarseness * random.normal(0, 0.01, (photos, 3))
     start[:, 3:5] += coarseness * random.normal(0, 0.02, (photos, 2))
@@ -209,3 +185,38 @@ def _cameras(photos: int, random: np.random.Generator) -> Floats:
     parameters[:, 7] = random.uniform(-0.1, 0.1, photos)
     parameters[:, 8] = random.uniform(-0.05, 0.05, photos)
     return parameters
+
+
+def _on_turntable(photos: int, distance: float, random: np.random.Generator) -> Floats:
+    """Return (photos, 9) parameters of photos that see the axis of a turntable from far away."""
+    parameters = np.zeros((photos, 9))
+    parameters[:, 1] = -2 * np.pi * np.arange(photos) / photos
+    parameters[:, :3] += random.normal(0, 0.01, (photos, 3))
+    parameters[:, 3:5] = random.normal(0, 0.02, (photos, 2))
+    parameters[:, 5] = -distance * (1 + random.normal(0, 0.005, photos))
+    parameters[:, 6] = FIELD * distance * (1 + random.normal(0, 0.02, photos))
+    # A thousandth of the radius at the edge of the object.
+    parameters[:, 7] = random.normal(0, 0.001, photos) * distance**2
+    return parameters
+
+
+def _pillar(points: int, random: np.random.Generator) -> tuple[Floats, Floats]:
+    """Return (points, 3) places on a bumpy pillar and (points,) the directions from its axis, radians."""
+    angle, height = random.uniform(0, 2 * np.pi, points), random.uniform(-1, 1, points)
+    radius = 0.8 + 0.2 * np.cos(3 * angle) * np.cos(2 * height) + random.normal(0, 0.05, points)
+    return np.column_stack([radius * np.sin(angle), height, radius * np.cos(angle)]), angle
+
+
+def _measured(
+    parameters: Floats, positions: Floats, incidence: tuple[Indices, Indices], xy: Floats, noise: float
+) -> Collection:
+    """Return a collection with the measured images; exact ones have a standard deviation of one pixel."""
+    photos, points = incidence
+    return Collection(
+        photo_parameters=parameters,
+        point_positions=positions,
+        image_photos=photos,
+        image_points=points,
+        image_xy=xy,
+        image_sd=np.array(noise if noise > 0 else 1.0),
+    )

@@ -39,6 +39,7 @@ from photogram.results.iteration import Iteration
 
 __all__ = ["Driver", "Outcome", "Stop"]
 
+# As those of one process: see `adjustment/damped.rs`.
 ROUNDING = 1e-12
 """A step is accepted when the sum of squares does not rise by more than this fraction of it."""
 NEGLIGIBLE = 1e-3

@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::problem::{Linearized, Model};
-use super::walk::Buffers;
+use super::walk::{Buffers, GroupStep};
 use crate::normals::Equations;
 
 /// The part h of the step at which residuals are compared with those that the linearized equations predict.
@@ -34,29 +34,23 @@ impl<M: Model> Linearized<'_, M> {
             let mut others = vec![0.0; layout.unknowns() - first];
             let mut buffers = Buffers::default();
             for local in locals {
-                let own_step = &step[layout.local_range(local)];
                 let begin = own.len();
-                own.resize(begin + own_step.len(), 0.0);
+                own.resize(begin + layout.local_dim(), 0.0);
                 for group in layout.groups_of(local) {
                     let mut rows = buffers.rows(layout, group);
                     self.write(local, group, &mut rows);
-                    let kept = layout.kept_range(layout.kept_of(group));
-                    let common: Vec<usize> = layout.common_columns(group).collect();
+                    let of_group = GroupStep::of(step, layout, local, group);
+                    let kept = layout.kept_range(layout.kept_of(group)).start - first;
                     for row in 0..layout.rows() {
                         let observation = group * layout.rows() + row;
-                        let local_row = &rows.local[row * own_step.len()..][..own_step.len()];
-                        let kept_row = &rows.kept[row * kept.len()..][..kept.len()];
-                        let common_row = &rows.common[row * common.len()..][..common.len()];
-                        let change = dot(local_row, own_step)
-                            + dot(kept_row, &step[kept.clone()])
-                            + common_row.iter().zip(&common).map(|(a, &k)| a * step[k]).sum::<f64>();
                         let difference =
                             ahead[observation] / self.deviation(observation) - rows.constant[row];
-                        let bend = 2.0 / PART * (difference / PART + change);
-                        own[begin..].iter_mut().zip(local_row).for_each(|(sum, a)| *sum += a * bend);
-                        let target = &mut others[kept.start - first..];
-                        target.iter_mut().zip(kept_row).for_each(|(sum, a)| *sum += a * bend);
-                        common_row.iter().zip(&common).for_each(|(a, &k)| others[k - first] += a * bend);
+                        let bend = 2.0 / PART * (difference / PART + of_group.change(&rows, row));
+                        add_row(&mut own[begin..], rows.local, row, of_group.local.len(), bend);
+                        add_row(&mut others[kept..], rows.kept, row, of_group.kept.len(), bend);
+                        let common = &rows.common[row * of_group.common.len()..];
+                        let columns = layout.common_columns(group);
+                        columns.zip(common).for_each(|(k, a)| others[k - first] += a * bend);
                     }
                 }
             }
@@ -74,6 +68,8 @@ impl<M: Model> Linearized<'_, M> {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+/// target += factor times a row of `width` coefficients.
+fn add_row(target: &mut [f64], rows: &[f64], row: usize, width: usize, factor: f64) {
+    let row = &rows[row * width..][..width];
+    target.iter_mut().zip(row).for_each(|(sum, a)| *sum += a * factor);
 }

@@ -9,7 +9,6 @@ use thiserror::Error;
 use super::loss::{Loss, Reweighting};
 use super::problem::{Linearized, Model, Problem};
 use super::result::{AdjustError, Seconds, gib, unless_stopped};
-
 use super::transformation::Transformation;
 use crate::normals::{Factor, Function, Inversion, Prior};
 

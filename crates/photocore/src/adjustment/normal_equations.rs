@@ -6,7 +6,6 @@ use rayon::ThreadPool;
 
 use super::problem::{Linearized, Model, Problem};
 use super::result::{AdjustError, unless_stopped};
-
 use crate::normals::{Factor, Prior};
 
 /// The normal equations of a problem at given values, factored.

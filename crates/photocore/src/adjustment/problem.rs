@@ -6,7 +6,8 @@ use rayon::ThreadPool;
 use smallvec::SmallVec;
 
 use super::loss::Reweighting;
-use crate::normals::{Contribution, Equations, GroupRows, Layout, Prior, System, TieRows};
+use super::walk::GroupStep;
+use crate::normals::{Contribution, Equations, GroupRows, Layout, Prior, System, TieRows, dot};
 
 /// How observations follow from unknowns.
 pub trait Model: Sync {
@@ -281,18 +282,13 @@ impl<'a, M: Model> Linearized<'a, M> {
     pub fn decrease(&self, pool: &ThreadPool, prior: &Prior, step: &[f64]) -> f64 {
         let layout = self.problem.layout();
         let observed = self.problem.for_locals(pool, |buffers, local| {
-            let own = &step[layout.local_range(local)];
             let mut sum = 0.0;
             for group in layout.groups_of(local) {
                 let mut rows = buffers.rows(layout, group);
                 self.write(local, group, &mut rows);
-                let kept = &step[layout.kept_range(layout.kept_of(group))];
-                let common: Vec<f64> = layout.common_columns(group).map(|unknown| step[unknown]).collect();
+                let of_group = GroupStep::of(step, layout, local, group);
                 for row in 0..layout.rows() {
-                    let part = |values: &[f64], unknowns: &[f64]| {
-                        dot(&values[row * unknowns.len()..][..unknowns.len()], unknowns)
-                    };
-                    let change = part(rows.local, own) + part(rows.kept, kept) + part(rows.common, &common);
+                    let change = of_group.change(&rows, row);
                     sum += change * (2.0 * rows.constant[row] - change);
                 }
             }
@@ -383,8 +379,4 @@ fn leave_out(part: &mut [f64], rows: usize, fixed: impl Iterator<Item = bool>) {
     for (column, _) in fixed.enumerate().filter(|&(_, fixed)| fixed) {
         (0..rows).for_each(|row| part[row * width + column] = 0.0);
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -10,7 +10,7 @@ use super::group_tests::{in_units, sub};
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
 use crate::adjustment::{TieCofactors, Tried, Weighted};
-use crate::normals::LocalCofactors;
+use crate::normals::{LocalCofactors, dot};
 
 /// What is out against what the rest predicts of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -241,9 +241,4 @@ impl Trial {
         }
         (rows, off)
     }
-}
-
-/// The product of two vectors.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -11,11 +11,10 @@ use super::further::Known;
 use super::incidence::Stacks;
 use super::layout::Layout;
 use super::selected::SelectedInverse;
-use super::stack::{Part, Slot, Stack, dot};
+use super::stack::{Part, Slot, Stack};
 use super::system::System;
 use super::tie_equations::TieEquations;
-use super::vectorised::Side;
-use super::vectorised::{Kernel, LANES, Rows, copy_vectors, run, size};
+use super::vectorised::{Kernel, LANES, Rows, Side, copy_vectors, dot, run, size};
 use super::watch::Control;
 use super::workspace::zeros;
 

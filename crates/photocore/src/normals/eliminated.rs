@@ -7,9 +7,10 @@ use smallvec::SmallVec;
 
 use super::layout::Layout;
 use super::panels::skip_ref;
-use super::stack::{Stack, dot, parts_of, united};
+use super::stack::{Stack, parts_of, united};
 use super::system::System;
 use super::triangle::Triangle;
+use super::vectorised::dot;
 use super::vectorised::{Kernel, run, size};
 
 impl Stack {

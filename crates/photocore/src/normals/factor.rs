@@ -20,8 +20,7 @@ use super::stack::Stack;
 use super::symbolic::Supernode;
 use super::system::System;
 use super::tie_equations::TieEquations;
-use super::vectorised::Side;
-use super::vectorised::dot_in_lanes;
+use super::vectorised::{Side, dot_in_lanes};
 use super::watch::{Between, Control, Stopped, watched};
 use super::workspace::{Eliminated, reserved};
 

@@ -5,8 +5,7 @@ use std::ops::Range;
 use pulp::Simd;
 
 use super::panels::skip;
-use super::vectorised::Side;
-use super::vectorised::{LANES, Rows, add_difference, add_product, add_products, add_right, add_side};
+use super::vectorised::{LANES, Rows, Side, add_difference, add_product, add_products, add_right, add_side};
 
 /// A front: the columns of a supernode, and what their elimination will leave for the parent. Rows and columns are those of the
 /// supernode's panel, its own blocks before the coupled ones. Lower triangles; what stands above carries no meaning.

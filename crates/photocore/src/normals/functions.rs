@@ -18,11 +18,11 @@ use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::layout::Layout;
 use super::products::Products;
-use super::stack::{Stack, dot};
+use super::stack::Stack;
 use super::symbolic::Symbolic;
 use super::system::System;
 use super::triangle::Triangle;
-use super::vectorised::{Kernel, run};
+use super::vectorised::{Kernel, dot, run};
 use super::watch::{Between, Control, Stopped, watched};
 use super::workspace::zeros;
 

@@ -94,4 +94,5 @@ pub use ordering::Ordering;
 pub use selected::SelectedInverse;
 pub use symbolic::{Operations, Symbolic};
 pub use system::System;
+pub(crate) use vectorised::dot;
 pub use watch::{Between, Stopped};

@@ -120,22 +120,6 @@ impl System {
         eliminated.par_iter().enumerate().map_init(Coupled::default, solve).collect()
     }
 
-    /// Puts local blocks in the order of the incidence, and the others in that of elimination, in the order of the layout; None without
-    /// memory.
-    fn in_order_of_layout(&self, found: &[Vec<f64>], others: &[f64], control: &Control) -> Option<Vec<f64>> {
-        let (layout, symbolic) = (&self.layout, &*self.symbolic);
-        let mut values = control.allocated(zeros(layout.unknowns()))?;
-        for position in 0..symbolic.blocks() {
-            let range = symbolic.unknowns_at(layout, position);
-            values[range].copy_from_slice(&others[symbolic.range(position)]);
-        }
-        let found = found.iter().flat_map(|part| part.chunks_exact(layout.local_dim()));
-        for (&local, x) in self.incidence.locals().iter().zip(found) {
-            values[layout.local_range(local as usize)].copy_from_slice(x);
-        }
-        Some(values)
-    }
-
     /// The same from their equations.
     fn written_locals<E: Equations>(
         &self,
@@ -156,5 +140,21 @@ impl System {
         };
         let parts = self.incidence.stacks().parts(CHUNK);
         parts.into_par_iter().map_init(Stack::default, solve).collect()
+    }
+
+    /// Puts local blocks in the order of the incidence, and the others in that of elimination, in the order of the layout; None without
+    /// memory.
+    fn in_order_of_layout(&self, found: &[Vec<f64>], others: &[f64], control: &Control) -> Option<Vec<f64>> {
+        let (layout, symbolic) = (&self.layout, &*self.symbolic);
+        let mut values = control.allocated(zeros(layout.unknowns()))?;
+        for position in 0..symbolic.blocks() {
+            let range = symbolic.unknowns_at(layout, position);
+            values[range].copy_from_slice(&others[symbolic.range(position)]);
+        }
+        let found = found.iter().flat_map(|part| part.chunks_exact(layout.local_dim()));
+        for (&local, x) in self.incidence.locals().iter().zip(found) {
+            values[layout.local_range(local as usize)].copy_from_slice(x);
+        }
+        Some(values)
     }
 }

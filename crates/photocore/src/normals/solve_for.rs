@@ -15,8 +15,7 @@ use super::incidence::Stacks;
 use super::layout::Layout;
 use super::stack::Stack;
 use super::system::System;
-use super::vectorised::LANES;
-use super::vectorised::Side;
+use super::vectorised::{LANES, Side};
 use super::watch::{Between, Control, Stopped, watched};
 use super::workspace::zeros;
 

@@ -151,6 +151,12 @@ pub(super) fn add_right<S: Simd>(
     }
 }
 
+/// The product of two vectors.
+#[inline(always)]
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
 /// The product of two vectors, summed in as many parts as there are lanes.
 pub(super) fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
     let ((a, last), (b, end)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());

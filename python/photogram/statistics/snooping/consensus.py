@@ -15,7 +15,7 @@ import numpy as np
 
 from photogram.arguments.types import Indices
 from photogram.statistics.snooping.factors import ENOUGH, robust_factor, values
-from photogram.statistics.snooping.log import Removal, Round
+from photogram.statistics.snooping.log import Removal
 from photogram.statistics.snooping.returning import log_probability
 from photogram.statistics.snooping.settings import Settings
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out, Standing, Trial
@@ -116,18 +116,7 @@ def _decide(work: TakingOut, aside: Aside, before: Standing | None) -> None:
         f"the adjustment of everything {why}: it was started anew from a consensus of resections and"
         f" intersections, without {' and '.join(parts)}; tests against the rest decided about them{said}"
     )
-    work.rounds.append(
-        Round(
-            number=0,
-            status=first.status,
-            weighted_sum_of_squares=first.weighted_sum_of_squares,
-            degrees_of_freedom=first.degrees_of_freedom,
-            tests=work.level.tests,
-            limit=work.level.limit(0),
-            removed=removed,
-            returned=[],
-        )
-    )
+    work.note_round(0, first, removed, [])
 
 
 def _put_aside(trial: Trial, out: Out, groups: list[int]) -> list[int]:

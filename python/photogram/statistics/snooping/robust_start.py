@@ -10,7 +10,6 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.statistics.snooping.choosing import Choice
 from photogram.statistics.snooping.factors import ENOUGH, OPTIMISTIC, robust_factor, scales, values
-from photogram.statistics.snooping.log import Round
 from photogram.statistics.snooping.returning import take_back
 from photogram.statistics.snooping.suspects import LostSupportError, Standing, Tests
 from photogram.statistics.snooping.taking_out import TakingOut
@@ -99,18 +98,7 @@ def start_without(work: TakingOut, candidates: Indices, first: Tests, standing: 
         " their rays stay out"
     )
     returned = take_back(work, 0)
-    work.rounds.append(
-        Round(
-            number=0,
-            status=standing.status,
-            weighted_sum_of_squares=standing.weighted_sum_of_squares,
-            degrees_of_freedom=standing.degrees_of_freedom,
-            tests=work.level.tests,
-            limit=work.level.limit(0),
-            removed=removed,
-            returned=returned,
-        )
-    )
+    work.note_round(0, standing, removed, returned)
 
 
 def _robust_sizes(work: TakingOut) -> tuple[Floats, float] | None:

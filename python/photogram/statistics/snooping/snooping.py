@@ -108,19 +108,7 @@ def _round(work: TakingOut, number: int) -> tuple[list[int], list[int]]:
     if work.trial.whole:
         returned = take_back(work, number)
     removed += take_photos_out(work, number)
-    work.rounds.append(
-        Round(
-            number=number,
-            status=standing.status,
-            weighted_sum_of_squares=standing.weighted_sum_of_squares,
-            degrees_of_freedom=standing.degrees_of_freedom,
-            tests=work.level.tests,
-            limit=work.level.limit(count),
-            removed=removed,
-            returned=returned,
-            remarks=remarks,
-        )
-    )
+    work.note_round(number, standing, removed, returned, out=count, remarks=remarks)
     return removed, returned
 
 

@@ -12,7 +12,15 @@ from photogram.statistics.snooping.choosing import Choice, Choosing, Level
 from photogram.statistics.snooping.conditioning import UnitWeight
 from photogram.statistics.snooping.log import Removal, Rival, Round
 from photogram.statistics.snooping.settings import Settings
-from photogram.statistics.snooping.suspects import LostSupportError, Out, Prediction, Suspects, Tests, Trial
+from photogram.statistics.snooping.suspects import (
+    LostSupportError,
+    Out,
+    Prediction,
+    Standing,
+    Suspects,
+    Tests,
+    Trial,
+)
 
 __all__ = ["TakingOut"]
 
@@ -68,6 +76,31 @@ class TakingOut:
             level=self.level,
             out=out,
             ahead=ahead,
+        )
+
+    def note_round(
+        self,
+        number: int,
+        standing: Standing,
+        removed: Sequence[int],
+        returned: Sequence[int],
+        *,
+        out: int = 0,
+        remarks: Sequence[str] = (),
+    ) -> None:
+        """Add a round to the log: how the network stood before it, with so many out, and what it changed."""
+        self.rounds.append(
+            Round(
+                number=number,
+                status=standing.status,
+                weighted_sum_of_squares=standing.weighted_sum_of_squares,
+                degrees_of_freedom=standing.degrees_of_freedom,
+                tests=self.level.tests,
+                limit=self.level.limit(out),
+                removed=removed,
+                returned=returned,
+                remarks=remarks,
+            )
         )
 
     def allowed(self) -> Bools:

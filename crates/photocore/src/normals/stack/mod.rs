@@ -12,8 +12,7 @@ use smallvec::SmallVec;
 use super::front::Strip;
 use super::symbolic::Symbolic;
 use super::triangle::Triangle;
-use super::vectorised::Side;
-use super::vectorised::{LANES, Rows, size};
+use super::vectorised::{LANES, Rows, Side, size};
 
 pub(super) use gather::{parts_of, united};
 
@@ -208,9 +207,4 @@ impl Stack {
         let at = self.segments[part.segment].row + part.shift;
         Strip { at, rows: Rows { values, width: part.width(), stride, count: equations.len() } }
     }
-}
-
-#[inline(always)]
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -2,11 +2,11 @@
 
 use pulp::Simd;
 
-use super::{Segment, Slot, Stack, dot};
+use super::{Segment, Slot, Stack};
 use crate::normals::equations::Prior;
 use crate::normals::system::System;
 use crate::normals::triangle::Triangle;
-use crate::normals::vectorised::{Kernel, run, size};
+use crate::normals::vectorised::{Kernel, dot, run, size};
 
 impl Stack {
     /// Solves for the local blocks with the others in place: N x = A^T (l - A_other x_other). `others` are the unknowns that are
