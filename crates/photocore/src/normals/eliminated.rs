@@ -10,8 +10,7 @@ use super::panels::skip_ref;
 use super::stack::{Stack, parts_of, united};
 use super::system::System;
 use super::triangle::Triangle;
-use super::vectorised::dot;
-use super::vectorised::{Kernel, run, size};
+use super::vectorised::{Kernel, dot, run, size};
 
 impl Stack {
     /// Appends what the elimination has left.
