@@ -170,8 +170,9 @@ class Driver:
         self.job, self.tree, self.executor, self.stop = job, tree, executor, stop
         self._progress = progress
         self._course = _Course()
-        # Where nodes were last: a worker that has read a node need not read it again.
-        self._places: dict[int, str] = {}
+        # Neighbours to one worker: less is sent. Later, where nodes were last: they need not be read again.
+        places, parts = executor.places(), int(tree.spans[:, 1].max())
+        self._places = [places[first * len(places) // parts] for first in tree.spans[:, 0].tolist()]
         self._nodes = range(len(tree))
         heights = np.zeros(len(tree))
         for node in range(tree.root - 1, -1, -1):
@@ -340,9 +341,7 @@ class Driver:
 
     def _counts(self) -> tuple[int, int, int, int, int]:
         found = self._sums([self._do(counted, n) for n in self._nodes], "read")
-        self._places = {node: place for node, (place, _) in enumerate(found)}
-        counts = np.array([each for _, each in found])
-        observations, weighted, unknowns, stations, size = counts.sum(axis=0).tolist()
+        observations, weighted, unknowns, stations, size = np.array(found).sum(axis=0).tolist()
         return observations, weighted, unknowns, stations, size
 
     def _up(self, at: Point) -> _Up:
@@ -350,7 +349,7 @@ class Driver:
         handles: dict[int, Handle] = {}
         for node in self._nodes:
             below = [handles[child] for child in self.tree.children[node]]
-            handles[node] = self._do(formed, node, at, below, near=self._places[node])
+            handles[node] = self._do(formed, node, at, below)
         told = [self.executor.submit(about, handles[node]) for node in self._nodes]
         try:
             found: list[Formed] = self._sums(told, "form")
@@ -358,7 +357,7 @@ class Driver:
             self.executor.forget([*told, *handles.values()])
             raise
         self._course.formations += 1
-        self._places = {each.number: each.place for each in found}
+        self._places = [each.place for each in found]
         return _Up(
             at,
             handles,
@@ -373,7 +372,7 @@ class Driver:
         wanted: dict[int, Floats] = {self.tree.root: np.zeros(0)}
 
         def task(node: int) -> Handle:
-            return self._do(solved, node, up.at, after, wanted[node], near=self._places[node])
+            return self._do(solved, node, up.at, after, wanted[node])
 
         def then(node: int, handle: Handle) -> None:
             wanted.update(zip(self.tree.children[node], self._found(handle), strict=True))
@@ -395,7 +394,7 @@ class Driver:
             parent = int(self.tree.parents[node])
             place = 0 if parent < 0 else self.tree.children[parent].index(node)
             above = None if parent < 0 else done[parent]
-            return self._do(inverted, node, up.at, after, variance, above, place, near=self._places[node])
+            return self._do(inverted, node, up.at, after, variance, above, place)
 
         def then(node: int, handle: Handle) -> None:
             # Cofactors stay where they are: this asks only whether they are there.
@@ -480,8 +479,9 @@ class Driver:
         self._remove(state if moved < before else other)
         return other if moved < before else state
 
-    def _do(self, function: Callable[..., Any], node: int, *given: Any, near: str = "") -> Handle:
-        return self.executor.submit(function, self.job, node, *given, near=near, cost=self._costs[node])
+    def _do(self, function: Callable[..., Any], node: int, *given: Any) -> Handle:
+        near, cost = self._places[node], self._costs[node]
+        return self.executor.submit(function, self.job, node, *given, near=near, cost=cost)
 
     def _found(self, handle: Handle) -> Any:
         """Return what a task has given that needs a factor; raises LostFactorError."""

@@ -327,18 +327,18 @@ def finished(job: Job, number: int, before: str, after: str, variance: float | N
         job.engine.keep(job.folder, number, node.solution(*states, threads=job.threads), variance)
 
 
-def counted(job: Job, number: int) -> tuple[str, tuple[int, int, int, int, int]]:
-    """Return where a node now is, and how many observations and unknowns are at home in it.
+def counted(job: Job, number: int) -> tuple[int, int, int, int, int]:
+    """Return how many observations and unknowns are at home in a node.
 
     Returns
     -------
-    The worker; observations, weighted unknowns, unknowns that are not fixed; weighted unknowns of photos and
-    cameras; unknowns, fixed ones too.
+    Observations, weighted unknowns, unknowns that are not fixed; weighted unknowns of photos and cameras;
+    unknowns, fixed ones too.
     """
     with shelf.lock:
         node = _node(job, number)
         size = len(node.initial) - len(node.outer)
-        return _place(), (*node.counts, job.engine.stations(job.folder, number), size)
+        return *node.counts, job.engine.stations(job.folder, number), size
 
 
 def predicted(job: Job, number: int) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
@@ -61,6 +62,10 @@ class Workers:
         )
         self._futures.add(found)
         return found
+
+    def places(self) -> list[str]:
+        """Return the addresses of the workers."""
+        return sorted(self._client.nthreads())
 
     def first(self, handles: Collection[Future]) -> Future:
         """Wait until one of some tasks is done."""
@@ -131,6 +136,8 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
                 threads_per_worker=1,
                 memory_limit=memory or "auto",
                 dashboard_address=None,
+                # Nodes and factors are memory that Dask does not manage: it warns of them.
+                silence_logs=logging.ERROR,
             ) as own,
             library.Client(own) as client,
         ):
