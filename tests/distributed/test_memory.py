@@ -57,9 +57,9 @@ def test_a_node_takes_what_the_plan_says(tmp_path):
     done = subprocess.run(run, capture_output=True, text=True, check=True)
     node, formed, inverted, most = (int(line) for line in done.stdout.split())
     said = plan.predictions[largest]
-    # Some of it does not grow with the node.
+    # A part of it does not grow with the node.
     assert node == pytest.approx(said["node_bytes"], abs=BASE)
-    assert formed == pytest.approx(said["node_bytes"] + said["factor_bytes"], abs=BASE)
+    assert formed == pytest.approx(said["node_bytes"] + said["factor_bytes"], rel=0.2)
     assert formed < inverted < most
     assert most == pytest.approx(said["memory_bytes"], rel=0.2)
 
