@@ -175,7 +175,8 @@ def _snooped(e: Evidence) -> _Line | None:
     if e.high:
         return None
     names = listed([str(each.get("name", "")) for each in found.removed], NAMED)
-    text = "; ".join([f"Usable after removal of {count} observations: {names}", *found.exchanged])
+    noun = "observation" if count == 1 else "observations"
+    text = "; ".join([f"Usable after removal of {count} {noun}: {names}", *found.exchanged])
     return _Line("usable-after-removal", text)
 
 
