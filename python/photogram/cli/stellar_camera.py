@@ -184,6 +184,7 @@ def exposures(
 ) -> None:
     """Calibrate a digital camera, also one of the whole sky, by exposures of the stars (needs pyerfa)."""
     with job:
+        from photogram.errors import InputError
         from photogram.show.ways import page_of
         from photogram.stellar.night import calibrate_night
         from photogram.stellar.night_document import to_json
@@ -195,7 +196,10 @@ def exposures(
         job.reads(*inputs(night))
         pictures = plot_format.value if plots else ""
         said = _said(lens, common_scale, without or [], any_roll, blind)
-        result = calibrate_night(read_night(night, said), threads)
+        try:
+            result = calibrate_night(read_night(night, said), threads)
+        except InputError as error:
+            raise error if error.file else InputError(error.message, file=night) from None
         target = out or Path(f"{night.stem}-calibrated")
         place = html_place(html, no_html, target)
         written = _night_files(result, target, pictures)

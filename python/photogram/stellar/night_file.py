@@ -67,6 +67,8 @@ _TABLES = {
 _FILES = (("images", "file"), ("catalogue", "file"), ("camera", "start"), ("camera", "prior"))
 _LARGEST_FRAME = 1e6
 """Pixels."""
+_SHORTEST = 0.1
+"""Principal distance over the longer side of the frame: 157 degrees of a central perspective."""
 _LARGEST_DUT1 = 1.0
 """Seconds; leap seconds keep UT1 - UTC within 0.9."""
 
@@ -170,9 +172,10 @@ def _start(table: Table, frame: tuple[float, float], prior: SkyCamera | None) ->
     """Return the camera to begin with: a file, the prior, or an ideal one of the field of view."""
     if "start" in table:
         file = table.path("start")
-        return read_yaml(file)[0] if file.suffix.lower() in (".yaml", ".yml") else SkyCamera.read(file)
+        yaml = file.suffix.lower() in (".yaml", ".yml")
+        return _in_pixels(read_yaml(file)[0] if yaml else SkyCamera.read(file), frame, file)
     if prior is not None:
-        return prior
+        return _in_pixels(prior, frame, table.path("prior"))
     field = table.number("field_of_view_deg")
     lens = table.word("lens", "brown")
     if lens not in (*LENSES, AUTO):
@@ -182,6 +185,18 @@ def _start(table: Table, frame: tuple[float, float], prior: SkyCamera | None) ->
         return SkyCamera.of_field(*frame, math.radians(field), "kannala_brandt" if lens == AUTO else lens)
     except InputError as error:
         raise table.error("field_of_view_deg", f": {error.message}") from None
+
+
+def _in_pixels(camera: SkyCamera, frame: tuple[float, float], file: Path) -> SkyCamera:
+    """Refuse a principal distance that is too short for any lens, as millimetres are."""
+    f = float(camera.values[0])
+    if f < _SHORTEST * max(frame):
+        raise InputError(
+            f"fx is {f:g} pixels, and the frame is {frame[0]:g} x {frame[1]:g} pixels: no lens sees so much;"
+            " the principal distance may be in millimetres",
+            file=file,
+        )
+    return camera
 
 
 def _catalogue(table: Table, named: Set[str]) -> Catalogue:
