@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 import re
-from html import escape, unescape
+from html import unescape
 from itertools import zip_longest
 from typing import Any
 from xml.etree import ElementTree
@@ -17,11 +17,16 @@ from xml.etree import ElementTree
 from math_core import LatexError, LatexToMathML
 
 FORMULA = re.compile(r'<(span|div) class="arithmatex">(.*?)</\1>', re.DOTALL)
-LINES = re.compile(r'(<div class="language-text highlight")(>.*?</div>)', re.DOTALL)
+LINES = re.compile(r'(<div class="language-(\w+) highlight")(>.*?</div>)', re.DOTALL)
 NAMED = re.compile(r"&(?!amp;|lt;|gt;|quot;)[a-zA-Z]+;")
 MARKS = re.compile(r"\\[(\[](.*)\\[)\]]", re.DOTALL)
+PRIMES = ("′", "″", "‴")
+STRUT = {"height": "0.8em", "depth": "0.2em"}
+"""What keeps the sign of a root, which is a line high at the least, from hanging below its line."""
 LETTER, SIGN, SCRIPT, PADDING = 0.52, 1.3, 0.7, 0.35
 """Widths in em: of a letter, of a sign with the room around it; the size of indices; beside cells."""
+WRAPPED = 116
+"""Characters of a line of a terminal above which it is wrapped."""
 log = logging.getLogger("mkdocs.plugins.formulas")
 
 
@@ -48,20 +53,65 @@ def width(element: ElementTree.Element) -> float:
     return sum(parts) + LETTER * len((element.text or "").strip())
 
 
+def _row(*parts: ElementTree.Element) -> ElementTree.Element:
+    """Return one part, or a row of several."""
+    if len(parts) == 1:
+        return parts[0]
+    row = ElementTree.Element("mrow")
+    row.extend(parts)
+    return row
+
+
+def _unraised(element: ElementTree.Element) -> ElementTree.Element:
+    """Return a letter with primes, which are raised by themselves, before what else stands above it."""
+    if element.tag not in ("msup", "msubsup"):
+        return element
+    *below, above = element
+    signs = list(above) if above.tag == "mrow" else [above]
+    primes = [sign for sign in signs if sign.tag == "mo" and sign.text in PRIMES]
+    if not primes or primes != signs[: len(primes)]:
+        return element
+    for prime in primes:
+        prime.attrib.update(lspace="0", rspace="0")
+    if len(below) == 2:
+        made = ElementTree.Element("msub")
+        made.extend(below)
+        below = [made]
+    base, rest = _row(*below, *primes), signs[len(primes) :]
+    if not rest:
+        return base
+    raised = ElementTree.Element("msup")
+    raised.extend([base, _row(*rest)])
+    return raised
+
+
+def _mended(element: ElementTree.Element) -> ElementTree.Element:
+    """Return a formula with roots and primes as print has them."""
+    element[:] = [_mended(part) for part in element]
+    if element.tag == "msqrt":
+        element.append(ElementTree.Element("mspace", STRUT))
+    return _unraised(element)
+
+
 def as_mathml(latex: str, displayed: bool) -> str:
     """Return a formula as MathML, which the search does not read. LatexError where it cannot be set."""
     made = LatexToMathML(fancy_error=False).convert_with_local_state(latex, displaystyle=displayed)
-    made = NAMED.sub(lambda name: unescape(name[0]), made)
-    marked = made.replace("<math", f'<math data-search-exclude="" aria-label="{escape(latex)}"', 1)
+    formula = _mended(ElementTree.fromstring(NAMED.sub(lambda name: unescape(name[0]), made)))
+    formula.attrib.update({"data-search-exclude": "", "aria-label": latex})
+    marked = ElementTree.tostring(formula, encoding="unicode")
     if not displayed:
         return marked
-    return f'<div class="formula" style="--width: {width(ElementTree.fromstring(made)):.0f}">{marked}</div>'
+    return f'<div class="formula" style="--width: {width(formula):.0f}">{marked}</div>'
 
 
 def measured(lines: re.Match[str]) -> str:
-    """Return a block of text with the number of characters of its longest line, for narrow screens."""
-    text = unescape(re.sub(r"<[^>]*>", "", lines[2][1:]))
-    return f'{lines[1]} style="--characters: {max(map(len, text.splitlines()), default=1)}"{lines[2]}'
+    """Return a block of code with the number of characters of its longest line, by which it has its size.
+
+    Lines of a terminal that are longer than those of a page are commands, or sentences: they are wrapped.
+    """
+    text = unescape(re.sub(r"<[^>]*>", "", lines[3][1:]))
+    lengths = [len(line) for line in text.splitlines() if lines[2] != "console" or len(line) <= WRAPPED]
+    return f'{lines[1]} style="--characters: {max(lengths, default=1)}"{lines[3]}'
 
 
 def on_page_content(html: str, page: Any, **_: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 
 import numpy as np
 
@@ -86,7 +87,8 @@ def _block() -> Block:
 
 
 def _verdict(block: Block) -> list[str]:
-    return verdict_section(adjust(block).verdict)[1]
+    lines = verdict_section(adjust(block).verdict)[1]
+    return [part for line in lines for part in textwrap.wrap(line, 130, subsequent_indent="  ") or [""]]
 
 
 def accepted() -> list[str]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 BLUE, RED, GREEN, GREY, LIGHT = "#0072b2", "#d55e00", "#009e73", "0.45", "0.75"
+LETTER = 5.0
+"""Points that a letter takes."""
 
 
 class View:
@@ -37,11 +40,30 @@ class View:
         a, b = self.rows @ start, self.rows @ end
         style = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
         self.axes.annotate("", b, a, arrowprops=style)
-        self.text(start + out * (end - start), label, colour)
+        self.text(start + out * (end - start), label, colour, along=b - a)
 
-    def text(self, place: Floats, label: str, colour: str = "black") -> None:
-        """Write at a place in space."""
-        self.axes.text(*(self.rows @ place), label, color=colour, ha="center", va="center", fontsize=9)
+    def text(
+        self,
+        place: Floats,
+        label: str,
+        colour: str = "black",
+        along: Floats | tuple[float, float] = (0.0, 0.0),
+    ) -> None:
+        """Write at a place in space; beside what comes along a direction of the page to this place."""
+        across, up = np.asarray(along) / max(float(np.hypot(*along)), 1e-9)
+        beside = 0.5 * LETTER * (len(label) - 1) * across, 3.0 * up
+        self.axes.annotate(
+            label,
+            self.rows @ place,
+            beside,
+            textcoords="offset points",
+            color=colour,
+            ha="center",
+            va="center",
+            fontsize=9,
+            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            zorder=5,
+        )
 
     def arc(
         self, start: Floats, end: Floats, label: str, colour: str, radius: float, out: float = 1.25
@@ -55,7 +77,7 @@ class View:
         tip, before = self.rows @ points[-1], self.rows @ points[-4]
         style = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.3, "shrinkA": 0, "shrinkB": 0}
         self.axes.annotate("", tip, before, arrowprops=style)
-        self.text(out * points[20], label, colour)
+        self.text(out * points[20], label, colour, along=self.rows @ points[20])
 
 
 def circle(u: Floats, v: Floats) -> Floats:

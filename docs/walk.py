@@ -4,8 +4,9 @@
 
 In blocks `console`, a line after `$` is a command, run in one empty folder beside a link to `examples`; below
 it stands what it prints, `...` standing for any number of lines. A block with a title, `python title="NAME"`,
-is saved under this name before the next command. `<!-- picture: FILE -->` before an image says which file of
-the commands it is. Without --check, lines that have changed and pictures are put into the pages.
+is saved under this name before the next command. `<!-- picture: FILE -->` before an image, which may be a
+link, says which file of the commands it is. Without --check, lines that have changed and pictures are put
+into the pages.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ DOCS = Path(__file__).parent
 TUTORIALS = tuple(f"tutorials/{path.name}" for path in sorted((DOCS / "tutorials").glob("*.md")))
 PAGES = ("index.md", "first-ten-minutes.md", *TUTORIALS, "gallery.md")
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
-PICTURE = re.compile(r"<!-- picture: (\S+) -->\n!\[[^\]]*\]\(([^)]+)\)")
+PICTURE = re.compile(r"<!-- picture: (\S+) -->\n\[?!\[[^\]]*\]\(([^)]+)\)")
 MARKS = re.compile(r"<(path|use|text|image)\b")
 
 
@@ -98,8 +99,10 @@ def pictures(page: str) -> dict[str, Path]:
 
 def rounded(svg: str) -> str:
     """Return a drawing with hundredths of a point, which nobody sees: a third of the size."""
-    text = re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}", svg)
-    return "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
+    marks = re.sub(
+        r"<[^>]*>", lambda mark: re.sub(r"-?\d+\.\d{3,}", lambda each: f"{float(each[0]):.2f}", mark[0]), svg
+    )
+    return "\n".join(line.rstrip() for line in marks.splitlines()) + "\n"
 
 
 def alike(one: str, other: str) -> bool:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+import browser as browsers
 from photogram import Block, simulate
 from photogram.cli import app
 from shared_data import SHARED
@@ -53,3 +54,10 @@ def run(monkeypatch, tmp_path):
     monkeypatch.setenv("NO_COLOR", "1")
     runner = CliRunner()
     return lambda *arguments: runner.invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Start a browser once for the tests of a file."""
+    with browsers.running() as started:
+        yield started

@@ -77,7 +77,7 @@ def page() -> str:
         shown |= {(section, feature): [] for feature in features}
     for mark in marks():
         tests = shown.setdefault((mark.section, mark.feature), [])
-        test = f"`{mark.file}::{mark.test}`"
+        test = f"`{mark.file}::`<wbr>`{mark.test}`"
         if test not in tests:
             tests.append(test)
     order = sorted(shown, key=lambda row: [int(part) for part in row[0].split(".")])

@@ -134,7 +134,7 @@ def target_table(targets: Iterable[Target]) -> str:
         )
         for target in targets
     ]
-    return table(("target", "set", "reached", ""), rows)
+    return table(("target", "set", "reached", "met or missed"), rows)
 
 
 def page(

@@ -14,7 +14,7 @@ import pytest
 DOCS = Path(__file__).parents[2] / "docs"
 
 PAGES = [path.relative_to(DOCS).as_posix() for path in sorted(DOCS.rglob("*.md"))]
-CODE = re.compile(r"<!--.*?-->|```(?!math)\w*\n.*?```|`[^`\n]+`", re.DOTALL)
+CODE = re.compile(r"<!--.*?-->|^ *```(?!math)[^\n]*\n.*?^ *```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
 DISPLAYED = re.compile(r"^ *```math\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"(?<![\\$])\$(?! )([^$\n]+?)(?<! )\$(?!\d)")
 PAGE = SimpleNamespace(file=SimpleNamespace(src_uri="page.md"))
@@ -50,10 +50,27 @@ def test_no_formula_stands_as_code(page):
     assert formulas_as_code == []
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if page != "giant-coverage.md"])
+def test_no_formula_stands_in_plain_letters(page):
+    text = CODE.sub("", DISPLAYED.sub("", (DOCS / page).read_text(encoding="utf-8")))
+    text = INLINE.sub("", re.sub(r"^```.*?^```|\]\([^)]*\)", "", text, flags=re.DOTALL | re.MULTILINE))
+    plain = r"\b[A-Za-z]{1,2}_[A-Za-z0-9]{1,2}\b|\b(?:Omega|sigma|theta)_\w+|\b(?:exp|ln|sqrt)\(|\^-?\d|[⁻ᵀ]"
+    assert re.findall(rf".{{0,30}}(?:{plain}).{{0,20}}", text) == []
+
+
+def test_roots_and_primes_are_as_print_has_them():
+    assert formulas.as_mathml(r"\sqrt{r}", False).count("<mspace") == 1
+    assert "<msup><mi>" not in formulas.as_mathml("x'", False)
+    row = '<mrow><mi>x</mi><mo lspace="0" rspace="0">′</mo></mrow>'
+    assert f"<msup>{row}<mn>4</mn></msup>" in formulas.as_mathml("x'^4", False)
+    below = '<msub><mi>x</mi><mi>i</mi></msub><mo lspace="0" rspace="0">″</mo>'
+    assert below in formulas.as_mathml("x_i''", False)
+
+
 def test_a_formula_becomes_mathml_and_a_sign_of_dollars_does_not():
     html = '<p><span class="arithmatex">\\(w = v / \\sqrt{r} &lt; 3\\)</span></p>'
     made = formulas.on_page_content(html, PAGE)
-    assert "<msqrt><mi>r</mi></msqrt>" in made
+    assert "<msqrt><mi>r</mi><mspace" in made
     assert "data-search-exclude" in made
     assert 'aria-label="w = v / \\sqrt{r} &lt; 3"' in made
     assert formulas.on_page_content("<p>5 $ and 6 $</p>", PAGE) == "<p>5 $ and 6 $</p>"

@@ -268,11 +268,11 @@ def main() -> int:
         "",
         *rows,
         "",
-        "Errors are drawn with the standard deviations that are given: v' P v of a kind, over the sum of its",
-        "redundancy numbers, is 1 but for chance (three standard deviations in the last column). Points on",
-        "lines and priors are drawn without errors: less is left there.",
+        "Errors are drawn with the standard deviations that are given: $v^T P v$ of a kind, over the sum of",
+        "its redundancy numbers, is 1 but for chance (three standard deviations in the last column). Points",
+        "on lines and priors are drawn without errors: less is left there.",
         "",
-        "| observations | networks | redundancy | v' P v over it | 1 within |",
+        "| observations | networks | redundancy | $v^T P v$ over it | 1 within |",
         "|---" + "|---:" * 4 + "|",
     ]
     for name, own in sums.items():

@@ -5,10 +5,10 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
-import browser as browsers
 import numpy as np
 import pytest
 
+import browser as browsers
 import photogram
 from photogram import InnerConstraints, adjust, simulate
 from photogram.adjustment.snooping import snoop

@@ -171,7 +171,8 @@ def _snooped(e: Evidence) -> _Line | None:
     if e.high:
         return None
     names = listed([str(each.get("name", "")) for each in found.removed], NAMED)
-    return _Line("usable-after-removal", f"Usable after removal of {count} observations: {names}")
+    noun = "observation" if count == 1 else "observations"
+    return _Line("usable-after-removal", f"Usable after removal of {count} {noun}: {names}")
 
 
 def _common_factor(e: Evidence) -> _Line | None:

@@ -1,9 +1,10 @@
-"""A browser without a window that opens reports; tests are skipped, visibly, where there is none."""
+"""A browser without a window; tests are skipped, visibly, where there is none."""
 
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import urljoin
 
 import pytest
 
@@ -20,29 +21,40 @@ def executable():
 
 
 class Browser:
-    """Opens reports, and collects what the browser complains about."""
+    """Opens reports and pages, and collects what the browser complains about."""
 
     def __init__(self, chromium):
         self.chromium = chromium
 
     @contextmanager
-    def opened(self, path: Path, width: int = WIDTHS[0], *, script: bool = True) -> Iterator:
-        """Open a report; there must be no complaint, and nothing asked of a network."""
+    def opened(self, place: Path | str, width: int = WIDTHS[0], *, script: bool = True) -> Iterator:
+        """Open a file, or a page of a server; there must be no complaint, and nothing asked of elsewhere."""
+        served = isinstance(place, str)
+        address = place if served else place.resolve().as_uri()
+        own = ("data:", urljoin(address, "/") if served else "file:")
         context = self.chromium.new_context(
-            viewport={"width": width, "height": 1000}, java_script_enabled=script, offline=True
+            viewport={"width": width, "height": 1000}, java_script_enabled=script, offline=not served
         )
         page = context.new_page()
-        complaints, asked = [], []
+        complaints, elsewhere = [], []
         page.on("console", lambda message: complaints.append(message.text))
         page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("request", lambda request: asked.append(request.url))
-        page.goto(path.resolve().as_uri())
+
+        def answer(route):
+            if route.request.url.startswith(own):
+                route.continue_()
+            else:
+                elsewhere.append(route.request.url)
+                route.abort()
+
+        page.route("**/*", answer)
+        page.goto(address)
         try:
             yield page
         finally:
             context.close()
+        assert not elsewhere
         assert not complaints
-        assert all(url.startswith(("file:", "data:")) for url in asked), asked
 
 
 @contextmanager
