@@ -1,5 +1,6 @@
 """What nodes take is what the plan says, and a process gives up what does not fit."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -41,9 +42,7 @@ formed = node.form(node.initial, [], damping=0.0, threads=1)
 print(held() - before)
 outer = len(node.outer)
 found, _ = formed.invert(np.zeros(outer * (outer + 1) // 2), node.initial, threads=1)
-inverted = most() - before
 engine.keep(folder, number, found, 1.0)
-print(inverted)
 print(most() - before)
 """
 
@@ -53,15 +52,26 @@ def test_a_node_takes_what_the_plan_says(tmp_path):
     block = photogram.simulate(strips=32, photos_per_strip=80, seed=3).block
     plan = plan_in_parts(block, Division(parts=2, folder=tmp_path))
     largest = int(np.argmax(plan.of("memory_bytes")))
-    run = [sys.executable, "-c", MEASURE, str(tmp_path), str(largest)]
-    done = subprocess.run(run, capture_output=True, text=True, check=True)
-    node, formed, inverted, most = (int(line) for line in done.stdout.split())
     said = plan.predictions[largest]
+    # What allocators keep for themselves is not that of the node, but a worker has to hold it.
+    plain = {
+        "ARROW_DEFAULT_MEMORY_POOL": "system",
+        "MALLOC_ARENA_MAX": "1",
+        "MALLOC_TRIM_THRESHOLD_": "65536",
+    }
+    node, formed, _ = _measured(tmp_path, largest, plain)
+    _, _, most = _measured(tmp_path, largest, {})
     # A part of it does not grow with the node.
     assert node == pytest.approx(said["node_bytes"], abs=BASE)
     assert formed == pytest.approx(said["node_bytes"] + said["factor_bytes"], rel=0.2)
-    assert formed < inverted < most
     assert most == pytest.approx(said["memory_bytes"], rel=0.2)
+
+
+def _measured(run, number, environment):
+    command = [sys.executable, "-c", MEASURE, str(run), str(number)]
+    everything = {**os.environ, **environment}
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=everything)
+    return [int(line) for line in done.stdout.split()]
 
 
 @pytest.mark.skipif(resident_memory() is None, reason="nothing tells here what a process holds")
