@@ -71,7 +71,15 @@ class Cleaned(Brief):
     def changes(self) -> list[str]:
         """What was done to weights and observations, in sentences."""
         count = len(self.snooped.removed)
-        said = [f"{count} groups of observations are out after {self.rounds} rounds of variance components"]
+        taken = (
+            f"{count} group{'' if count == 1 else 's'} of observations {'is' if count == 1 else 'are'} out"
+        )
+        if self.rounds == 0:
+            said = [f"nothing contradicts the given weights, which stay; {taken}"]
+        else:
+            said = [
+                f"{taken} after {self.rounds} round{'' if self.rounds == 1 else 's'} of variance components"
+            ]
         if not self.settled:
             said.append("weights and gross errors still change: look at both")
         factors = zip(self.groups, self.factors.tolist(), strict=True)

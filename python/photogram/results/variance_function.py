@@ -201,7 +201,8 @@ def _figure(found: VarianceFunction) -> Figure:
     line = np.linspace(0.0, found.largest, 100)
     axes.plot(line, [found.factor(value) for value in line], color=MARKED, label="function")
     axes.axhline(1.0, color=FAINT, linewidth=0.8, label="given variance")
-    axes.set_xlabel(found.name)
+    unit = f", {getattr(found.network, 'image_unit', 'px')}" if found.name == "radius" else ""
+    axes.set_xlabel(f"{found.name}{unit}")
     axes.set_ylabel("factor of the given variance")
     axes.set_ylim(bottom=0.0)
     axes.legend()
