@@ -809,9 +809,9 @@ class Node:
 
         `points`, `interior`, `outer`: unknowns of points, of blocks eliminated here, of outer ones (S);
         `images`, `observations`: image points, equations in all; `reduction`, `factor`, `inverse`:
-        multiply-adds
-        of one formation, one factorisation, one inversion; `factor_bytes`: of the factor that a formed node
-        keeps; `memory_bytes`: at the most, while it is formed or inverted, contributions and the node itself
+        multiply-adds of one formation, one factorisation, one inversion; `node_bytes`: of the node by itself;
+        `factor_bytes`: of a formed node beside, what points have left for the solution counted;
+        `memory_bytes`: at the most, while it is formed or inverted, contributions and the node itself
         counted; `contribution_bytes`: of what it sends up, 8 (S (S + 1) / 2 + 2 S); `cofactor_bytes`: of what
         it receives for the inversion, 8 S (S + 1) / 2; `step_bytes`: of what it receives in each iteration,
         8 S.
@@ -1918,6 +1918,76 @@ def refraction(
     Returns
     -------
     (n,) true minus observed zenith distance, radians.
+    """
+
+def nearest_points(points: _Floats, others: _Floats, limit: float, but: _Indices | None = None) -> _Indices:
+    """Return the nearest of the others for each point of a plane, (n,); -1 where none is near enough.
+
+    Parameters
+    ----------
+    points
+        (n, 2).
+    others
+        (m, 2), sorted into cells as wide as the limit.
+    limit
+        Largest distance, of one unit with the points.
+    but
+        (n,) one of the others for each point that does not count; -1 for none.
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes.
+    """
+
+def star_similarities(
+    images: _Floats,
+    stars: _Floats,
+    candidates: _Indices,
+    *,
+    makers: int,
+    tolerance: float,
+    stretch: float,
+    least: float,
+    axis: tuple[tuple[float, float], float] | None,
+    limit: float,
+    wanted: int,
+) -> tuple[int, _Floats]:
+    """Find similarities between images and stars: pairs of candidates make them, all images vote.
+
+    Parameters
+    ----------
+    images
+        (m, 2), the brightest first; every one votes.
+    stars
+        (n, 2) predicted images.
+    candidates
+        (c, 2) an image, of the first `makers`, and a star that it may show.
+    makers
+        Images that make similarities.
+    tolerance, stretch
+        By how much the separations of two images and of their stars may differ, and the share of that of the
+        images that is added.
+    least
+        Separation that two images have more than.
+    axis
+        x, y of the point about which the camera may be turned, and how far it may move; None for any turn.
+    limit
+        Distance from a star within which an image votes, in cells half as wide.
+    wanted
+        Similarities that are returned at most.
+
+    Returns
+    -------
+    How many pairs agree, and (k, 4) those with the most votes, the best first: an image z, as a complex
+    number, goes to (a + b i) z + (c + d i). All images vote for the 4,096 that the makers choose.
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes.
+    ValueError
+        A candidate is no image and star.
     """
 
 def standard_coordinates(places: _Floats, sidereal_times: _Floats, place: _Station, tau: _Floats) -> _Floats:

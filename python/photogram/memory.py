@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -10,7 +12,7 @@ from pathlib import Path
 
 from photogram.errors import OutOfMemoryError
 
-__all__ = ["available_memory", "gibibytes", "require", "turned"]
+__all__ = ["available_memory", "gibibytes", "give_back", "require", "resident_memory", "turned"]
 
 GROUPS = (
     # Version 2, alone and beside version 1; then version 1.
@@ -44,6 +46,29 @@ def available_memory(root: Path = Path("/")) -> int | None:
     """
     parts = [*_machine(root), *_groups(root), *_limits(root)]
     return min(parts) if parts else None
+
+
+def resident_memory(root: Path = Path("/")) -> int | None:
+    """Return the bytes of memory that this process holds; None where nothing tells.
+
+    Parameters
+    ----------
+    root
+        Where `proc` is.
+    """
+    fields = _text(root / "proc/self/statm").split()
+    return os.sysconf("SC_PAGE_SIZE") * int(fields[1]) if len(fields) > 1 else None
+
+
+def give_back() -> None:
+    """Have what was freed given back to the system, where the library that keeps it can be told to."""
+    if "pyarrow" in sys.modules:
+        sys.modules["pyarrow"].default_memory_pool().release_unused()
+    try:
+        trim = ctypes.CDLL(None).malloc_trim
+    except (AttributeError, OSError, TypeError):
+        return
+    trim(0)
 
 
 def require(needed: float, what: str) -> None:

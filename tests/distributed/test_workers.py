@@ -68,7 +68,9 @@ def test_a_worker_that_dies_costs_its_tasks_alone(client, tmp_path, alone, kill)
 
 
 def test_another_version_is_refused(client, tmp_path, monkeypatch):
-    assert check_workers(client, tmp_path) == (2, 2**30)
+    workers, limit, held = check_workers(client, tmp_path)
+    assert (workers, limit) == (2, 2**30)
+    assert 2**26 < held < 2**30
     monkeypatch.setattr(_photocore, "__version__", "0.0.1")
     with pytest.raises(InputError, match=r"all workers must have photogram 0\.0\.1, as here: tcp://.* has"):
         check_workers(client, tmp_path)

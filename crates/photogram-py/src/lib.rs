@@ -7,6 +7,7 @@ mod commons;
 mod comparator;
 mod distributions;
 mod geometry;
+mod matching;
 mod memory;
 mod network;
 mod observations;
@@ -36,6 +37,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     comparator::register(module)?;
     resection::register(module)?;
     similarity::register(module)?;
+    matching::register(module)?;
     stellar::register(module)?;
     text::register(module)
 }

@@ -22,7 +22,7 @@ from photogram.distributed.files import read_json, write_json
 from photogram.distributed.tasks import (
     Formed,
     Job,
-    LostFactorError,
+    Lost,
     Point,
     about,
     counted,
@@ -30,16 +30,16 @@ from photogram.distributed.tasks import (
     finished,
     formed,
     inverted,
+    lost,
     relocated,
     solved,
     state_path,
 )
-from photogram.errors import AdjustmentError, RankError
+from photogram.errors import AdjustmentError, PhotogramError, RankError
 from photogram.results.iteration import Iteration
 
 __all__ = ["Driver", "Outcome", "Stop"]
 
-# As those of one process: see `adjustment/damped.rs`.
 ROUNDING = 1e-12
 """A step is accepted when the sum of squares does not rise by more than this fraction of it."""
 NEGLIGIBLE = 1e-3
@@ -124,9 +124,22 @@ class _Up:
 
     at: Point
     contributions: dict[int, Handle]
-    places: dict[int, str]
     sum_of_squares: float
     decrease: float
+
+
+class LostFactorError(PhotogramError):
+    """The factor of a node is lost: it has to be formed again.
+
+    Parameters
+    ----------
+    number
+        The node.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"the factor of node {number} is lost")
+        self.number = number
 
 
 class Driver:
@@ -157,6 +170,9 @@ class Driver:
         self.job, self.tree, self.executor, self.stop = job, tree, executor, stop
         self._progress = progress
         self._course = _Course()
+        # Neighbours to one worker: less is sent. Later, where nodes were last: they need not be read again.
+        places, parts = executor.places(), int(tree.spans[:, 1].max())
+        self._places = [places[first * len(places) // parts] for first in tree.spans[:, 0].tolist()]
         self._nodes = range(len(tree))
         heights = np.zeros(len(tree))
         for node in range(tree.root - 1, -1, -1):
@@ -341,10 +357,10 @@ class Driver:
             self.executor.forget([*told, *handles.values()])
             raise
         self._course.formations += 1
+        self._places = [each.place for each in found]
         return _Up(
             at,
             handles,
-            {each.number: each.place for each in found},
             sum(each.sum_of_squares for each in found),
             sum(each.decrease for each in found),
         )
@@ -356,10 +372,10 @@ class Driver:
         wanted: dict[int, Floats] = {self.tree.root: np.zeros(0)}
 
         def task(node: int) -> Handle:
-            return self._do(solved, node, up.at, after, wanted[node], near=up.places[node])
+            return self._do(solved, node, up.at, after, wanted[node])
 
         def then(node: int, handle: Handle) -> None:
-            wanted.update(zip(self.tree.children[node], self.executor.value(handle), strict=True))
+            wanted.update(zip(self.tree.children[node], self._found(handle), strict=True))
             self.executor.forget([handle])
 
         self._down(up, task, then, "solve")
@@ -378,11 +394,11 @@ class Driver:
             parent = int(self.tree.parents[node])
             place = 0 if parent < 0 else self.tree.children[parent].index(node)
             above = None if parent < 0 else done[parent]
-            return self._do(inverted, node, up.at, after, variance, above, place, near=up.places[node])
+            return self._do(inverted, node, up.at, after, variance, above, place)
 
         def then(node: int, handle: Handle) -> None:
             # Cofactors stay where they are: this asks only whether they are there.
-            self.executor.value(self.executor.submit(_nothing, handle))
+            self._found(self.executor.submit(lost, handle))
             if node in done:
                 self.executor.forget([done[node]])
             else:
@@ -422,13 +438,13 @@ class Driver:
             parent = parents[node]
             try:
                 then(node, handle)
-            except LostFactorError as lost:
+            except LostFactorError as missed:
                 failures += 1
                 if failures > ATTEMPTS * len(self.tree):
                     raise AdjustmentError(
                         "workers were lost too often; the run can be taken up again"
                     ) from None
-                if lost.number == node:
+                if missed.number == node:
                     self._form_again(up, node)
                     begin(node)
                 elif parent in again:
@@ -451,7 +467,7 @@ class Driver:
         old = up.contributions[node]
         up.contributions[node] = self._do(formed, node, up.at, below)
         told: Formed = self.executor.value(self.executor.submit(about, up.contributions[node]))
-        up.places[node] = told.place
+        self._places[node] = told.place
         self.executor.forget([old])
 
     def _relocated(self, state: str) -> str:
@@ -463,8 +479,16 @@ class Driver:
         self._remove(state if moved < before else other)
         return other if moved < before else state
 
-    def _do(self, function: Callable[..., Any], node: int, *given: Any, near: str = "") -> Handle:
-        return self.executor.submit(function, self.job, node, *given, near=near, cost=self._costs[node])
+    def _do(self, function: Callable[..., Any], node: int, *given: Any) -> Handle:
+        near, cost = self._places[node], self._costs[node]
+        return self.executor.submit(function, self.job, node, *given, near=near, cost=cost)
+
+    def _found(self, handle: Handle) -> Any:
+        """Return what a task has given that needs a factor; raises LostFactorError."""
+        found = self.executor.value(handle)
+        if isinstance(found, Lost):
+            raise LostFactorError(found.number)
+        return found
 
     def _sums(self, handles: list[Handle], phase: str) -> list[Any]:
         """Return what tasks of all nodes give, in the order of the nodes, however they arrive."""
@@ -487,10 +511,6 @@ class Driver:
     def _tell(self, phase: str, done: int, total: int, iteration: Iteration | None = None) -> None:
         if self._progress is not None:
             self._progress(Progress(phase, done, total, iteration))
-
-
-def _nothing(found: object) -> None:
-    del found
 
 
 def _write_course(job: Job, course: _Course) -> None:

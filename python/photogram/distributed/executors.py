@@ -30,10 +30,13 @@ class Executor(Protocol):
         function, arguments
             The task; handles among the arguments, and in lists among these, are replaced.
         near
-            Where another one was done.
+            Where another one was done; empty for anywhere.
         cost
             The higher, the earlier it is done of those that wait.
         """
+
+    def places(self) -> list[str]:
+        """Return where tasks can be done, as :meth:`submit` takes it."""
 
     def first(self, handles: Collection[Handle]) -> Handle:
         """Wait until one of some tasks is done or has failed, and return it."""
@@ -73,6 +76,10 @@ class Serial:
         except Exception as error:
             self._failed[own] = error
         return _Handle(own)
+
+    def places(self) -> list[str]:
+        """Return the one place that there is."""
+        return [""]
 
     def first(self, handles: Collection[int]) -> int:
         """Return the task that was done first."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ IMAGE = 200.0
 ITERATIONS = 4
 """Formations of an adjustment from usual initial values."""
 SHARE = 0.8
-"""Of the memory of a worker, what nodes may take: the rest is Python, libraries and messages under way."""
+"""Of the memory of a worker, what it may hold: the rest is for messages under way and what lies between."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class PartsPlan:
         Bytes of each; None where nothing bounds them.
     rates
         What a worker does in a second; None where that was not measured.
+    held
+        Bytes that a worker holds before it begins: Python and libraries.
     """
 
     tree: Tree
@@ -51,6 +54,7 @@ class PartsPlan:
     workers: int
     memory: int | None = None
     rates: Rates | None = None
+    held: int = 0
 
     def of(self, name: str) -> Floats:
         """Return (N,) one prediction of all nodes."""
@@ -60,6 +64,11 @@ class PartsPlan:
     def largest(self) -> float:
         """Bytes of the node that takes most, at the most."""
         return float(self.of("memory_bytes").max())
+
+    @property
+    def room(self) -> float:
+        """Bytes that a worker has for nodes."""
+        return math.inf if self.memory is None else SHARE * self.memory - self.held
 
     @property
     def bytes_up(self) -> float:
@@ -99,26 +108,28 @@ class PartsPlan:
         OutOfMemoryError
             A node takes more than a worker has; says how many parts would do, where any number does.
         """
-        if self.memory is None or self.largest <= SHARE * self.memory:
+        if self.memory is None or self.largest <= self.room:
             return
+        taken = f", of which {gibibytes(self.held)} GiB are taken before it begins," if self.held else ""
         raise OutOfMemoryError(
-            f"the largest node takes {gibibytes(self.largest)} GiB, and {SHARE:.0%} of the"
-            f" {gibibytes(self.memory)} GiB of a worker are for nodes: {self._advice()}"
+            f"the largest node takes {gibibytes(self.largest)} GiB, and a worker of"
+            f" {gibibytes(self.memory)} GiB may hold {gibibytes(SHARE * self.memory)}{taken} and no more:"
+            f" {self._advice()}"
         )
 
     def _advice(self) -> str:
         """Say what would do: a part halves with their number, a separator stays as it is."""
-        memory, room = self.of("memory_bytes"), SHARE * (self.memory or 0)
+        memory = self.of("memory_bytes")
         leaf = np.array([not below for below in self.tree.children])
         top = float(memory[~leaf].max(initial=0.0))
-        if top > room:
+        if top > self.room:
             return (
                 f"a separator alone takes {gibibytes(top)} GiB, which more parts do not change; give workers"
-                f" of {gibibytes(top / SHARE)} GiB"
+                f" of {gibibytes((top + self.held) / SHARE)} GiB"
             )
         parts = int(leaf.sum())
         # What a part takes falls with its photos, but for the contributions of its borders.
-        fit = parts * 2 ** int(np.ceil(np.log2(float(memory[leaf].max()) / room)))
+        fit = parts * 2 ** int(np.ceil(np.log2(float(memory[leaf].max()) / self.room)))
         return f"about {fit} parts would fit, in place of {parts}"
 
     def lines(self) -> list[str]:
@@ -155,7 +166,8 @@ class PartsPlan:
             f"in an iteration {self.bytes_up / 2**20:,.1f} MiB go up and {self.bytes_down / 2**20:,.3f} MiB"
             f" down, in the inversion {self.bytes_inverted / 2**20:,.1f} MiB down, where all nodes are on"
             " different workers",
-            f"the largest node takes {self.largest / 2**20:,.0f} MiB",
+            f"the largest node takes {self.largest / 2**20:,.0f} MiB"
+            + (f", a worker holds {self.held / 2**20:,.0f} MiB before it begins" if self.held else ""),
         ]
         times = self.times
         if times is not None:

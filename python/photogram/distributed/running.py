@@ -27,6 +27,7 @@ from photogram.distributed.run import MANIFEST, Manifest, partition, places_of, 
 from photogram.distributed.tasks import Job, predicted, shelf
 from photogram.distributed.workers import Workers, check_workers, connected
 from photogram.errors import InputError
+from photogram.memory import resident_memory
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions
 from photogram.network.unknowns import Drift
@@ -80,6 +81,8 @@ class Run:
         How many do them.
     memory
         Bytes of each; None for any number.
+    held
+        Bytes that a worker holds before it begins.
     """
 
     folder: Path
@@ -88,6 +91,7 @@ class Run:
     job: Job
     workers: int
     memory: int | None
+    held: int
 
     def plan(self, *, measured: bool = True) -> PartsPlan:
         """Return the plan; `measured` has one part formed here, for the time that all will take."""
@@ -100,8 +104,8 @@ class Run:
             leaves = [node for node in nodes if not self.manifest.tree.children[node]]
             largest = max(leaves, key=lambda node: predictions[node]["images"])
             rates = measured_rates(self.job.engine.node(self.folder, largest))
-        photos = self.manifest.photos
-        return PartsPlan(self.manifest.tree, predictions, photos, self.workers, self.memory, rates)
+        photos, tree = self.manifest.photos, self.manifest.tree
+        return PartsPlan(tree, predictions, photos, self.workers, self.memory, rates, self.held)
 
     def adjust(self, stop: Stop, progress: Callable[[Progress], None] | None = None) -> Outcome:
         """Adjust, or go on where a run that died has ended.
@@ -135,7 +139,7 @@ def opened(
     divided
         Writes a number of parts into the folder.
     chosen
-        Gives this number for so many workers with so much memory.
+        Gives this number for so many workers with so much memory for nodes.
     division, threads
         As of :func:`photogram.adjust`.
 
@@ -153,11 +157,12 @@ def opened(
     with ExitStack() as stack:
         executor: Executor
         if division.cluster is None:
-            workers, executor = 1, Serial(folder)
+            # The memory is for the adjustment: what else this process holds is its own affair.
+            workers, executor, held, others = 1, Serial(folder), 0, resident_memory() or 0
         else:
             client = stack.enter_context(connected(division.cluster, division.workers, memory))
-            workers, limit = check_workers(client, folder)
-            executor, memory = Workers(client), memory or limit
+            workers, limit, held = check_workers(client, folder)
+            executor, memory, others = Workers(client), memory or limit, 0
             threads = threads or 1
         stack.callback(executor.stop)
         stack.callback(shelf.clear)
@@ -169,10 +174,11 @@ def opened(
                     file=folder,
                 )
         else:
-            manifest = divided(division.parts or chosen(workers, memory))
-        room = None if memory is None else int(SHARE * memory)
-        job = Job(folder, CoreEngine(), _photocore.__version__, threads or 0, room)
-        yield Run(folder, manifest, executor, job, workers, memory)
+            room = None if memory is None else int(SHARE * memory) - held
+            manifest = divided(division.parts or chosen(workers, room))
+        most = None if memory is None else int(SHARE * memory) + others
+        job = Job(folder, CoreEngine(), _photocore.__version__, threads or 0, most)
+        yield Run(folder, manifest, executor, job, workers, memory, held)
 
 
 def adjusted_in_parts(
@@ -241,8 +247,8 @@ def _run(block: Block, options: CoreOptions, division: Division, threads: int | 
                 folder,
                 source,
                 lambda parts: partition(block, folder, parts, options, source),
-                lambda workers, memory: parts_for(
-                    lambda parts: _counted(block, parts), len(block.photo_ids), workers, memory
+                lambda workers, room: parts_for(
+                    lambda parts: _counted(block, parts), len(block.photo_ids), workers, room
                 ),
                 division,
                 threads,
@@ -250,7 +256,7 @@ def _run(block: Block, options: CoreOptions, division: Division, threads: int | 
         )
 
 
-def parts_for(counted: Callable[[int], Counts], photos: int, workers: int, memory: int | None) -> int:
+def parts_for(counted: Callable[[int], Counts], photos: int, workers: int, room: int | None) -> int:
     """Return how many parts a block is cut into: some for each worker, and small enough for its memory.
 
     Parameters
@@ -259,13 +265,13 @@ def parts_for(counted: Callable[[int], Counts], photos: int, workers: int, memor
         Counts the work of a number of parts.
     photos
         How many the block has.
-    workers, memory
-        How many workers, and the bytes of each.
+    workers, room
+        How many workers, and the bytes that each has for nodes.
     """
     most = max(photos // LEAST_PHOTOS, 1)
     parts = min(PARTS_A_WORKER * workers if workers > 1 else 2, most)
-    while memory is not None and 2 * parts <= most:
-        if counted(parts).memory_bytes.max() <= SHARE * memory:
+    while room is not None and 2 * parts <= most:
+        if counted(parts).memory_bytes.max() <= room:
             break
         parts *= 2
     return parts

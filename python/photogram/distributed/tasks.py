@@ -2,7 +2,7 @@
 
 A worker keeps nodes and factors on a shelf of its own. What is not there any more is made again: a node from
 its part, the state from its file. A factor also takes what the children have left, which only the driver can
-ask for: a task that misses one says so (:class:`LostFactorError`).
+ask for: a task that misses one says so (:class:`Lost`).
 """
 
 from __future__ import annotations
@@ -22,14 +22,15 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.distributed.engine import ContributionRow, Engine, FormedNode, Node
 from photogram.distributed.files import write_file
-from photogram.errors import AdjustmentError, InputError, PhotogramError
+from photogram.errors import AdjustmentError, InputError
+from photogram.memory import give_back, resident_memory
 
 __all__ = [
     "Contribution",
     "Formed",
     "Inverted",
     "Job",
-    "LostFactorError",
+    "Lost",
     "Point",
     "about",
     "counted",
@@ -37,6 +38,7 @@ __all__ = [
     "finished",
     "formed",
     "inverted",
+    "lost",
     "predicted",
     "relocated",
     "shelf",
@@ -48,18 +50,19 @@ GIVEN = "0"
 """The state that the nodes themselves give."""
 
 
-class LostFactorError(PhotogramError):
-    """The factor of a node is not on this worker: it has to be formed again.
+@dataclass(frozen=True)
+class Lost:
+    """What a task gives whose node has lost its factor: it has to be formed again.
 
-    Parameters
+    No error, which Dask would log as a failure.
+
+    Attributes
     ----------
     number
         The node.
     """
 
-    def __init__(self, number: int) -> None:
-        super().__init__(f"the factor of node {number} is not on this worker")
-        self.number = number
+    number: int
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ class Job:
     threads
         Of each task; 0 for all processors.
     memory
-        Bytes that a worker may take for nodes and factors; None for any number.
+        Bytes that a process may hold; None for any number.
     """
 
     folder: Path
@@ -122,7 +125,7 @@ class Inverted:
 
 
 class Shelf:
-    """The nodes and factors that a worker keeps, the ones used last longest."""
+    """The nodes and factors that a process keeps."""
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
@@ -145,12 +148,40 @@ class Shelf:
         return self._kept.pop(key, (None, 0.0))[0]
 
     def make_room(self, needed: float, memory: int | None, spared: tuple[Any, ...]) -> None:
-        """Give up what was used longest ago until so many bytes more fit."""
-        while memory is not None and sum(size for _, size in self._kept.values()) + needed > memory:
-            oldest = next((key for key in self._kept if key != spared), None)
-            if oldest is None:
-                return
-            del self._kept[oldest]
+        """Give up so much that a process which may hold so many bytes can take more.
+
+        What the process holds is asked of the system: messages and what Dask keeps are in it.
+
+        Parameters
+        ----------
+        needed
+            Bytes that it will take.
+        memory
+            Bytes that it may hold; None for any number.
+        spared
+            Run and node that the room is for.
+        """
+        if memory is None:
+            return
+        held = resident_memory()
+        over = (sum(size for _, size in self._kept.values()) if held is None else held) + needed - memory
+        given_up = False
+        for key in self._expendable(spared):
+            if over <= 0:
+                break
+            over -= self._kept.pop(key)[1]
+            given_up = True
+        if given_up:
+            give_back()
+
+    def _expendable(self, spared: tuple[Any, ...]) -> list[tuple[Any, ...]]:
+        """Return what can be given up, in this order: nodes, which are read again, before factors.
+
+        Of each what was used last comes first: walks over the tree come round, so that it is asked for
+        last.
+        """
+        others = [key for key in reversed(self._kept) if key[1:3] != spared]
+        return sorted(others, key=lambda key: key[0] != "node")
 
     def drop(self, of: Callable[[tuple[Any, ...]], bool]) -> None:
         """Give up what some keys stand for."""
@@ -185,10 +216,11 @@ def formed(job: Job, number: int, at: Point, contributions: Sequence[Contributio
         start = time.perf_counter()
         node = _node(job, number)
         prediction = node.prediction
-        own = ("node", job.folder, number)
         # A factor at another state is of no use any more.
         shelf.drop(lambda key: key[0] == "factor" and key[1:3] == (job.folder, number))
-        shelf.make_room(prediction["memory_bytes"], job.memory, own)
+        shelf.make_room(
+            prediction["memory_bytes"] - prediction["node_bytes"], job.memory, (job.folder, number)
+        )
         found = node.form(
             _state(job, node, number, at.state),
             [(_plain(each.row[0]), _plain(each.row[1]), _plain(each.row[2])) for each in contributions],
@@ -208,20 +240,17 @@ def about(contribution: Contribution) -> Formed:
     return contribution.formed
 
 
-def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[Floats]:
+def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[Floats] | Lost:
     """Solve a node for its step, given that of the outer unknowns, and write the state after it.
 
     Returns
     -------
-    The steps of what each child is over.
-
-    Raises
-    ------
-    LostFactorError
-        It has to be formed again.
+    The steps of what each child is over; or that its factor is lost.
     """
     with shelf.lock:
-        factor = _factor(job, number, at)
+        factor: FormedNode | None = shelf.get(_factor_key(job, number, at))
+        if factor is None:
+            return Lost(number)
         node = _node(job, number)
         step = factor.solve(_plain(outer), threads=job.threads)
         state = node.advance(_state(job, node, number, at.state), step)
@@ -253,10 +282,10 @@ def inverted(
     at: Point,
     after: str,
     variance: float | None,
-    above: Inverted | None,
+    above: Inverted | Lost | None,
     place: int,
-) -> Inverted:
-    """Invert a node, and write what has become of its observations and unknowns.
+) -> Inverted | Lost:
+    """Invert a node, and write what has become of its observations and unknowns; or say which factor is lost.
 
     Parameters
     ----------
@@ -268,21 +297,26 @@ def inverted(
         The variance of unit weight of the whole.
     above, place
         What the parent has handed down, and which of its children this one is; None for the root.
-
-    Raises
-    ------
-    LostFactorError
-        It has to be formed again.
     """
+    if isinstance(above, Lost):
+        return above
     with shelf.lock:
-        _factor(job, number, at)
+        if shelf.get(_factor_key(job, number, at)) is None:
+            return Lost(number)
         node = _node(job, number)
-        shelf.make_room(node.prediction["memory_bytes"], job.memory, _factor_key(job, number, at))
+        prediction = node.prediction
+        there = prediction["node_bytes"] + prediction["factor_bytes"]
+        shelf.make_room(prediction["memory_bytes"] - there, job.memory, (job.folder, number))
         factor = shelf.take(_factor_key(job, number, at))
         outer = np.zeros(0) if above is None else _plain(above.children[place])
         solution, children = factor.invert(outer, _state(job, node, number, after), threads=job.threads)
         job.engine.keep(job.folder, number, solution, variance)
         return Inverted(children)
+
+
+def lost(found: object) -> Lost | None:
+    """Return what a task has given where it is a factor that is lost, and nothing of all else."""
+    return found if isinstance(found, Lost) else None
 
 
 def finished(job: Job, number: int, before: str, after: str, variance: float | None) -> None:
@@ -337,21 +371,15 @@ def _node(job: Job, number: int) -> Node:
     found: Node | None = shelf.get(key)
     if found is None:
         found = job.engine.node(job.folder, number)
-        size = found.prediction.get("node_bytes", 0.0)
-        shelf.make_room(size, job.memory, key)
-        shelf.put(key, found, size)
+        # Tables were read for it.
+        give_back()
+        shelf.make_room(0.0, job.memory, (job.folder, number))
+        shelf.put(key, found, found.prediction["node_bytes"])
     return found
 
 
 def _factor_key(job: Job, number: int, at: Point) -> tuple[Any, ...]:
     return "factor", job.folder, number, at
-
-
-def _factor(job: Job, number: int, at: Point) -> FormedNode:
-    found: FormedNode | None = shelf.get(_factor_key(job, number, at))
-    if found is None:
-        raise LostFactorError(number)
-    return found
 
 
 def _state(job: Job, node: Node, number: int, state: str) -> Floats:

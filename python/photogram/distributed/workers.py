@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from typing import Any
 from photogram import _photocore
 from photogram.arguments.arrays import shown
 from photogram.errors import AdjustmentError, InputError
+from photogram.memory import resident_memory
 
 Client = Any
 Future = Any
@@ -60,6 +62,10 @@ class Workers:
         )
         self._futures.add(found)
         return found
+
+    def places(self) -> list[str]:
+        """Return the addresses of the workers."""
+        return sorted(self._client.nthreads())
 
     def first(self, handles: Collection[Future]) -> Future:
         """Wait until one of some tasks is done."""
@@ -130,6 +136,8 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
                 threads_per_worker=1,
                 memory_limit=memory or "auto",
                 dashboard_address=None,
+                # Nodes and factors are memory that Dask does not manage: it warns of them.
+                silence_logs=logging.ERROR,
             ) as own,
             library.Client(own) as client,
         ):
@@ -148,10 +156,13 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
         )
 
 
-def check_workers(client: Client, folder: Path) -> tuple[int, int | None]:
-    """Return how many workers there are, and the least memory of one; refuse what cannot work together.
+def check_workers(client: Client, folder: Path) -> tuple[int, int | None, int]:
+    """Count the workers, and refuse what cannot work together.
 
-    The memory is None where nothing bounds it.
+    Returns
+    -------
+    How many there are; the least memory of one, None where nothing bounds it; the most that one holds
+    before it begins, all that it needs being loaded.
 
     Raises
     ------
@@ -172,7 +183,8 @@ def check_workers(client: Client, folder: Path) -> tuple[int, int | None]:
             " that all workers share"
         )
     limits = [each for each in client.run(_limit).values() if each]
-    return len(versions), min(limits, default=None)
+    held = max(client.run(_held).values())
+    return len(versions), min(limits, default=None), held
 
 
 def _library() -> Any:
@@ -193,6 +205,16 @@ def _limit(dask_worker: Any = None) -> int | None:
     """Return the bytes that Dask lets a worker take; Dask hands it over by this name."""
     limit: int | None = dask_worker.memory_manager.memory_limit
     return limit
+
+
+def _held() -> int:
+    """Return the bytes that a worker holds when it has loaded what tasks use."""
+    # What is imported here is what takes memory; nothing is called.
+    import pyarrow.parquet  # noqa: F401
+
+    import photogram.distributed.core  # noqa: F401
+
+    return resident_memory() or 0
 
 
 def _sees(folder: str) -> bool:

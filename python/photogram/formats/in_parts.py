@@ -124,8 +124,8 @@ def _run(path: Path, wishes: Wishes, folder: Path, division: Division, threads: 
             folder,
             source,
             lambda parts: streamed.divided(folder, parts, options, source),
-            lambda workers, memory: parts_for(
-                lambda parts: streamed.counted(parts)[1], len(streamed.block.photo_ids), workers, memory
+            lambda workers, room: parts_for(
+                lambda parts: streamed.counted(parts)[1], len(streamed.block.photo_ids), workers, room
             ),
             division,
             threads,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Self
 
@@ -119,6 +119,12 @@ class Catalogue:
             _MAS * np.array([[row.number(name) or 0.0 for name in _ERRORS] for row in rows]).reshape(-1, 4),
         )
 
+    @cached_property
+    def directions(self) -> Floats:
+        """(N, 3) unit vectors of the places."""
+        (right, declination), cosine = self.places.T, np.cos(self.places[:, 1])
+        return np.column_stack([cosine * np.cos(right), cosine * np.sin(right), np.sin(declination)])
+
     def mean_errors(self, epoch: float) -> Floats:
         """Return (N, 2) mean errors of the places at another epoch (Julian year), right ascension on the sky.
 
@@ -138,7 +144,7 @@ class Catalogue:
     def take(self, chosen: NDArray[np.int64]) -> Catalogue:
         """Return some of the stars, by index."""
         return Catalogue(
-            ids=tuple(self.ids[i] for i in chosen),
+            ids=tuple(map(self.ids.__getitem__, chosen.tolist())),
             places=self.places[chosen],
             proper_motions=self.proper_motions[chosen],
             parallaxes=self.parallaxes[chosen],

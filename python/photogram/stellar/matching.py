@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.odds import ACCEPTED, CERTAIN, CROWDED, expected_false, star_probabilities
@@ -17,14 +18,11 @@ __all__ = ["STRETCH", "Match", "Search", "match"]
 
 _SEEDS = 25
 """Brightest images that make hypotheses; three times as many vote for them."""
-_RASTER, _BATCH, _EXACT = 2000, 4096, 20
-"""Cells of a raster a side, hypotheses that are counted in it at once, and those that are counted exactly."""
+_EXACT = 20
+"""Hypotheses with the most votes that are counted exactly."""
 _CANDIDATES, _TURNED = 1500, 800
 """Pairs of an image and a star that make hypotheses at most, and where the roll is not known: they are
 compared two by two."""
-_PLANE = np.array([1.0, 1.0j])
-Similarities = tuple[NDArray[np.complex128], NDArray[np.complex128]]
-"""(h,) factors f and shifts s of complex numbers: z goes to f z + s."""
 _DEEPER = 2
 """Stars in the frame for each image: where the catalogue has more, the faint ones only match by chance."""
 STRETCH = 0.01
@@ -175,11 +173,11 @@ def match(
         return none
     seeds = measured[: 3 * _SEEDS]
     bright = _Sky.as_deep(predicted, len(seeds), search)
-    transforms = _hypotheses(measured[:_SEEDS], bright.predicted, search, tolerance)
+    made, promising = _similarities(seeds, bright.predicted, search, tolerance)
     # Both counts take part, and what was tried before.
-    hypotheses = 2.0 * len(transforms[0]) + search.tried
+    hypotheses = 2.0 * made + search.tried
     best, most = None, 2
-    for transform in _promising(transforms, seeds, bright.predicted, 3 * tolerance):
+    for transform in promising:
         found = mutually_nearest(_apply(transform, seeds), bright.predicted, 3 * tolerance)
         matched = int((found >= 0).sum())
         if matched > most:
@@ -241,76 +239,30 @@ def _refined(measured: Floats, predicted: Floats, start: Floats, tolerance: floa
     return moved
 
 
-def _hypotheses(measured: Floats, predicted: Floats, search: Search, tolerance: float) -> Similarities:
-    """Return similarities from pairs of candidates whose separations agree."""
-    i, k = np.nonzero(search.candidates(measured, predicted))
+def _similarities(
+    seeds: Floats, predicted: Floats, search: Search, tolerance: float
+) -> tuple[int, list[Floats]]:
+    """Return how many similarities pairs of candidates make, and (3, 2) those with the most votes."""
+    makers = seeds[:_SEEDS]
+    images, stars = np.nonzero(search.candidates(makers, predicted))
     most = _CANDIDATES if search.axis is None else _TURNED
-    if len(i) > most:
+    if len(images) > most:
         # The brightest images and stars.
-        order = np.argsort(i / len(measured) + k / len(predicted), kind="stable")[:most]
-        i, k = i[order], k[order]
-    images, stars = (measured @ _PLANE)[i], (predicted @ _PLANE)[k]
-    least = min(search.radius, 0.25 * float(np.ptp(measured, axis=0).max()))
-    pairs = []
-    for a in range(len(i) - 1):
-        first, second = np.abs(images[a + 1 :] - images[a]), np.abs(stars[a + 1 :] - stars[a])
-        agree = (np.abs(first - second) < 3 * tolerance + search.stretch * first) & (first > least)
-        # The same image, or the same star, is no pair: the one has no length, the other does not agree.
-        pairs.append(a + 1 + np.flatnonzero(agree & (k[a + 1 :] != k[a])))
-    one = np.repeat(np.arange(len(pairs)), [len(each) for each in pairs])
-    other = np.concatenate(pairs) if pairs else np.zeros(0, np.int64)
-    factor = (stars[other] - stars[one]) / (images[other] - images[one])
-    shift = stars[one] - factor * images[one]
-    if search.axis is not None:
-        axis = complex(*search.axis)
-        near = np.abs(factor * axis + shift - axis) <= search.radius
-        factor, shift = factor[near], shift[near]
-    return factor, shift
-
-
-def _promising(transforms: Similarities, seeds: Floats, predicted: Floats, limit: float) -> list[Floats]:
-    """Return the similarities (3, 2) under which the most images fall near a star, counted in a raster."""
-    corner = predicted.min(axis=0) - 3 * limit
-    size = max(0.5 * limit, float(np.ptp(predicted, axis=0).max()) / _RASTER)
-    shape = np.ceil((predicted.max(axis=0) + 3 * limit - corner) / size).astype(np.int64) + 1
-    near = np.zeros(shape, bool)
-    steps = math.ceil(limit / size)
-    x, y = np.floor((predicted - corner) / size).astype(np.int64).T
-    for dx in range(-steps, steps + 1):
-        for dy in range(-steps, steps + 1):
-            if math.hypot(dx, dy) * size <= limit:
-                near[np.clip(x + dx, 0, shape[0] - 1), np.clip(y + dy, 0, shape[1] - 1)] = True
-    # The rim is far from every star: what falls outside goes there.
-    near[0] = near[-1] = False
-    near[:, 0] = near[:, -1] = False
-    # Of very many the brightest images choose those for which all are counted.
-    images = seeds @ _PLANE
-    if len(transforms[0]) > _BATCH:
-        counts = _counted(transforms, images[:_SEEDS], near, corner, size)
-        best = np.sort(np.argsort(-counts, kind="stable")[:_BATCH])
-        transforms = transforms[0][best], transforms[1][best]
-    counts = _counted(transforms, images, near, corner, size)
-    chosen = np.argsort(-counts, kind="stable")[:_EXACT]
-    return [
-        np.array([[f.real, f.imag], [-f.imag, f.real], [s.real, s.imag]])
-        for f, s in zip(transforms[0][chosen], transforms[1][chosen], strict=True)
-    ]
-
-
-def _counted(
-    transforms: Similarities, images: NDArray[np.complex128], near: Bools, corner: Floats, size: float
-) -> Indices:
-    """Count how many images each similarity brings near a star."""
-    factor, shift = transforms[0] / size, (transforms[1] - complex(*corner)) / size
-    counts = np.empty(len(factor), np.int64)
-    columns, rows = near.shape
-    for first in range(0, len(factor), _BATCH):
-        some = slice(first, first + _BATCH)
-        cells = factor[some, None] * images + shift[some, None]
-        column = np.clip(cells.real.astype(np.int32), 0, columns - 1)
-        row = np.clip(cells.imag.astype(np.int32), 0, rows - 1)
-        counts[some] = near[column, row].sum(axis=1)
-    return counts
+        order = np.argsort(images / len(makers) + stars / len(predicted), kind="stable")[:most]
+        images, stars = images[order], stars[order]
+    made, best = _photocore.star_similarities(
+        seeds,
+        predicted,
+        np.column_stack([images, stars]),
+        makers=_SEEDS,
+        tolerance=3 * tolerance,
+        stretch=search.stretch,
+        least=min(search.radius, 0.25 * float(np.ptp(makers, axis=0).max())),
+        axis=None if search.axis is None else ((search.axis[0], search.axis[1]), search.radius),
+        limit=3 * tolerance,
+        wanted=_EXACT,
+    )
+    return made, [np.array([[a, b], [-b, a], [x, y]]) for a, b, x, y in best]
 
 
 def _apply(transform: Floats, points: Floats) -> Floats:

@@ -153,9 +153,8 @@ def stars_near(
     ((ra, dec),) = site.places(axis, sidereal_time(site, exposure.utc, dut1))
     # Distortion, and precession over the years.
     reach = 1.1 * camera.largest_angle(frame) + margin + _SLACK
-    right, declination = catalogue.places.T
-    cosine = np.sin(dec) * np.sin(declination) + np.cos(dec) * np.cos(declination) * np.cos(right - ra)
-    return np.flatnonzero(cosine >= math.cos(min(reach, math.pi)))
+    centre = np.array([math.cos(dec) * math.cos(ra), math.cos(dec) * math.sin(ra), math.sin(dec)])
+    return np.flatnonzero(catalogue.directions @ centre >= math.cos(min(reach, math.pi)))
 
 
 def calibrate_exposures(

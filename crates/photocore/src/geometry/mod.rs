@@ -11,6 +11,7 @@
 //! * [`sky`]: apparent places of stars, diurnal aberration, refraction, standard coordinates;
 //! * [`mod@pointing`]: the attitude of a camera under the sky;
 //! * [`refraction`]: how air and water displace a point, [`atmosphere`]: the air;
+//! * [`mod@nearest`]: the nearest of many points in a plane;
 //! * [`cramer`]: three linear equations.
 //!
 //! Vectors and matrices in cartesian axes are those of `nalgebra`; three numbers whose units or meanings differ (coordinates of
@@ -37,6 +38,7 @@ pub mod collinearity;
 pub mod cramer;
 pub mod ellipsoid;
 pub mod lens;
+pub mod nearest;
 pub mod orientation;
 pub mod plate_lens;
 pub mod pointing;
@@ -52,6 +54,7 @@ pub use attitude::{AttitudeNumbers, RotationSense};
 pub use camera::{Bal, Brown, Camera, CameraModel, Image, Perspective, Unit};
 pub use ellipsoid::{Ellipsoid, local_vertical};
 pub use lens::{Displacement, Distortion, Undistorted};
+pub use nearest::nearest;
 pub use orientation::{Orientation, PoseNumbers};
 pub use plate_lens::{PlateLens, Plated};
 pub use pointing::{pointing, pointing_angles, pointing_with_partials};

@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 use super::problem::Assembled;
 use super::solution::{observations, sums_of_squares};
 use super::surroundings::Surroundings;
-use super::{Dropped, Network, NetworkError, Options, Solution, SumsOfSquares};
+use super::{Dropped, Image, Network, NetworkError, Options, Point, Solution, SumsOfSquares};
 use crate::adjustment::{Adjustment, Counts, Model, Part, PartError, Watch};
 use crate::normals::{Contribution, Operations, packed};
 
@@ -44,7 +44,9 @@ pub struct NodePrediction {
     pub observations: usize,
     /// Multiply-adds of each phase.
     pub operations: Operations,
-    /// Numbers in the factor of a formed node.
+    /// Bytes that the node keeps by itself.
+    pub node: usize,
+    /// Bytes that it keeps beside while it is formed: the factor, what the points have left, and where that is.
     pub factor: usize,
     /// Bytes that forming or inverting takes at the most, what it is given and the node itself counted.
     pub memory: usize,
@@ -129,9 +131,23 @@ impl Node {
             images: self.assembled.problem.model.images.len(),
             observations: layout.equations(),
             operations: symbolic.operations(layout),
-            factor: symbolic.values() - outer * outer,
+            node: self.bytes(),
+            factor: size_of::<f64>() * (system.numbers_in_factor() - outer * outer + 3 * self.size()),
             memory: system.memory() + size_of::<f64>() * handed,
         }
+    }
+
+    /// Bytes of images and points, as they were given and as they were ordered, and of the pattern.
+    fn bytes(&self) -> usize {
+        let (numbers, indices) = (size_of::<f64>(), size_of::<u32>());
+        let (network, problem) = (&self.network, &self.assembled.problem);
+        let of_image = size_of::<Image>() + size_of::<usize>() + 2 * numbers + 3 * indices;
+        let of_point = size_of::<Point>() + size_of::<usize>() + 2 * indices;
+        size_of::<Image>() * network.images.len()
+            + size_of::<Point>() * network.points.len()
+            + of_image * problem.model.images.len()
+            + of_point * problem.model.points.len()
+            + 3 * numbers * problem.initial.len()
     }
 
     /// The state after a step: attitudes step by rotation vectors.

@@ -23,6 +23,8 @@ pub struct System {
     pub(super) workspace: Workspace,
     /// Whether what the elimination of local blocks leaves is kept for the solution.
     pub(super) keeps: bool,
+    /// Numbers in what is kept of it.
+    kept: usize,
 }
 
 impl System {
@@ -49,6 +51,7 @@ impl System {
             tree,
             workspace: Workspace::default(),
             keeps,
+            kept: if keeps { kept } else { 0 },
         }
     }
 
@@ -60,6 +63,11 @@ impl System {
     /// The order and the pattern.
     pub fn symbolic(&self) -> &Symbolic {
         &self.symbolic
+    }
+
+    /// Numbers that a factor holds at the most: the panels, and what the elimination of local blocks has left for the solution.
+    pub fn numbers_in_factor(&self) -> usize {
+        self.symbolic.values() + self.kept
     }
 
     /// First row of the border in the front of a supernode.

@@ -105,8 +105,17 @@ impl Node {
 
     #[getter]
     fn prediction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let NodePrediction { points, interior, outer, images, observations, operations, factor, memory } =
-            self.node.prediction();
+        let NodePrediction {
+            points,
+            interior,
+            outer,
+            images,
+            observations,
+            operations,
+            node,
+            factor,
+            memory,
+        } = self.node.prediction();
         let bytes = |count: usize| (size_of::<f64>() * count) as f64;
         let dict = PyDict::new(py);
         let facts = [
@@ -118,7 +127,8 @@ impl Node {
             ("reduction", operations.reduction),
             ("factor", operations.factor),
             ("inverse", operations.inverse),
-            ("factor_bytes", bytes(factor)),
+            ("node_bytes", node as f64),
+            ("factor_bytes", factor as f64),
             ("memory_bytes", memory as f64),
             ("contribution_bytes", bytes(packed(outer) + 2 * outer)),
             ("cofactor_bytes", bytes(packed(outer))),

@@ -62,6 +62,7 @@
 
 mod camera;
 mod cycle;
+mod hypotheses;
 mod model;
 mod published;
 mod solution;
@@ -78,6 +79,7 @@ use crate::normals::{Layout, LayoutError, Ordering, System};
 use model::{Partials, StarImages};
 
 pub use camera::{Attitude, Camera, Decentering, Form, INTERIOR, Kind, PlateImage};
+pub use hypotheses::{Agreement, Similarity, best_voted, hypotheses};
 pub use model::{Rows, Tolerances};
 pub use published::{Correction, PublishedRows};
 pub use solution::{Observations, ParameterCofactors, Solution, Tested};
