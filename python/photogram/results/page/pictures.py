@@ -41,7 +41,7 @@ CAPTIONS = {
     ),
     "distortion": (
         "Radial distortion with its standard deviations",
-        "The curve, dashed where no image lies, with one standard deviation on either side where it is estimated.",
+        "The curve, dashed where no image lies; where it is estimated, one standard deviation on either side.",
     ),
 }
 """Title and caption by name."""
