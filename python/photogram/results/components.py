@@ -56,7 +56,7 @@ class VarianceComponents(Shown, Brief):
         return [each for each in self.components if each.worth_changing]
 
     def plot(self, ax: Where = None) -> Axes:
-        """Draw factors of standard deviations with their intervals into axes, or a new figure; return the axes.
+        """Draw factors of standard deviations with intervals into axes, or a new figure; return the axes.
 
         Needs matplotlib (`pip install 'photogram[plots]'`).
         """
