@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -13,8 +14,10 @@ from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads, default_out, out_option
 
-__all__ = ["CheckedOut", "check", "text_files"]
+__all__ = ["EXAMPLE", "CheckedOut", "check", "text_files"]
 
+EXAMPLE = "galveston"
+"""The packaged example, a directory of photogram.examples."""
 TEXT = "report.txt"
 """The report as text, in a directory of results."""
 
@@ -34,10 +37,18 @@ def text_files(out: Path, report: str) -> dict[Path, bytes]:
 def check(
     job: Job,
     directory: Annotated[
-        Path,
+        Path | None,
         Reads.PROJECT,
-        typer.Argument(metavar="DIR", help="Directory of the five files, as for adjusting."),
-    ],
+        typer.Argument(
+            metavar="DIR", help="Directory of the five files, as for adjusting.", show_default=False
+        ),
+    ] = None,
+    example: Annotated[
+        bool,
+        typer.Option(
+            "--example", help="Check the packaged example instead: 20 photographs at Galveston Bay."
+        ),
+    ] = False,
     out: CheckedOut = None,
     json: JsonFile = None,
     html: HtmlFile = None,
@@ -58,10 +69,15 @@ def check(
         from photogram.giant import check as check_project
         from photogram.show.ways import page_of
 
+        if directory is None:
+            directory = job.packaged(EXAMPLE)
+            job.reads(directory)
+            out = out or Path(f"{EXAMPLE}-checked")
         out = out or default_out(directory, "-checked")
         place = html_place(html, no_html, out)
         job.writes(out / TEXT, *([place] if place else []))
         project = read_project(directory)
+        project = replace(project, messages=job.told(project.messages))
         allowed = Limits.parse(limits) if limits else None
         with job.status("checking"):
             found = check_project(project, limits=allowed, threads=threads)

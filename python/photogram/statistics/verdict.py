@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from photogram.messages import listed
+from photogram.messages import counted, listed
 from photogram.statistics.evidence import NAMED, Evidence, Test
 from photogram.statistics.findings import Findings
 from photogram.statistics.limits import NOTABLE_FACTOR
@@ -171,8 +171,7 @@ def _snooped(e: Evidence) -> _Line | None:
     if e.high:
         return None
     names = listed([str(each.get("name", "")) for each in found.removed], NAMED)
-    noun = "observation" if count == 1 else "observations"
-    return _Line("usable-after-removal", f"Usable after removal of {count} {noun}: {names}")
+    return _Line("usable-after-removal", f"Usable after removal of {counted(count, 'observation')}: {names}")
 
 
 def _common_factor(e: Evidence) -> _Line | None:
