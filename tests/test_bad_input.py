@@ -234,9 +234,14 @@ def keep(block: Block, images: Any) -> Block:
 
 
 def test_photo_without_images(small_block):
-    with pytest.raises(RankError, match="6 moving photos 0201, which have no images") as caught:
-        adjust(keep(small_block, small_block.image_photos != 3))
-    assert (caught.value.photos, caught.value.points) == (["0201"], [])
+    """It harms nothing: it is named, and stays where it was given."""
+    result = adjust(keep(small_block, small_block.image_photos != 3))
+    assert result.converged
+    said = "left out, photos without images: 0201; they stay where they were given"
+    assert said in [str(each) for each in result.messages]
+    assert np.isnan(result.photo_sd[3]).all()
+    assert np.isfinite(result.photo_sd[[0, 1, 2, 4, 5]]).all()
+    np.testing.assert_array_equal(result.photo_positions[3], small_block.photo_positions[3])
 
 
 def test_photo_with_two_images(small_block):
@@ -413,13 +418,15 @@ def test_everything_left_out(small_block):
         adjust(keep(small_block.replace(point_sd=np.array(np.inf)), first))
 
 
-def test_point_in_the_plane_of_the_projection_centre(small_block):
+def test_control_at_the_projection_centre(small_block):
+    """No ray leads there: it is left out, and named."""
     sd = small_block.point_sd.copy()
     positions = small_block.point_positions.copy()
     point = int(small_block.image_points[0])
     positions[point], sd[point] = small_block.photo_positions[0], 0.0
-    with pytest.raises(AdjustmentError, match="not finite"):
-        adjust(small_block.replace(point_positions=positions, point_sd=sd))
+    result = adjust(small_block.replace(point_positions=positions, point_sd=sd))
+    assert result.converged
+    assert result.dropped[small_block.point_ids[point]] == "given at the place of a station that sees it"
 
 
 def test_absurd_values_do_not_panic(small_block):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram import Block, adjust, simulate
+from photogram import Block, adjust, simulate, snoop
 from photogram.network.geometry import project
 from photogram.results.weakest import weakest_photos, weakest_points
 
@@ -134,6 +134,130 @@ def test_a_point_at_a_station_is_left_out_or_named(made, metres):
     assert np.isfinite(result.photo_sd).all()
     if result.converged:
         same_as(result, adjust(made.block))
+
+
+@pytest.mark.parametrize("given", [False, True])
+@pytest.mark.parametrize("metres", [1.0, 0.01])
+def test_a_point_whose_rays_part_is_left_out(made, metres, given):
+    """Its place is at infinity: the adjustment creeps there, and turns the photos, until it is left out."""
+    at = made.truth.photo_positions[1] + metres * np.array([0.3, 0.1, -1.0])
+    images = {0: np.array([40.0, 50.0])} | images_of(made.truth, [1], at)
+    result = adjust(with_point(made.block, images, at if given else None))
+    assert result.converged
+    assert result.dropped == {"X": "its rays do not meet: it ran off"}
+    assert "left out, its rays do not meet: it ran off: X" in [str(each) for each in result.messages]
+    assert not result.hints
+    other = adjust(made.block)
+    np.testing.assert_allclose(result.photo_sd, other.photo_sd, rtol=1e-9)
+    same_as(result, other)
+
+
+def test_rays_that_part_a_little_lead_nowhere_and_the_point_is_left_out(made):
+    far = images_of(made.truth, [0, 1], made.truth.photo_positions[0] + 3e7 * np.array([0.1, 0.05, -1.0]))
+    block = with_point(made.block, far | {1: far[1] + [2.0, 0.0]})
+    result = adjust(block)
+    assert result.converged
+    assert list(result.dropped) == ["X"]
+    same_as(result, adjust(made.block))
+    # Nor does it spoil the others where gross errors are looked for.
+    snooped = snoop(block)
+    assert {entry.name.split(" on ")[0] for entry in snooped.removed} <= {"image of point X"}
+    same_as(snooped.result, adjust(made.block))
+
+
+def test_control_given_at_the_place_of_a_station_is_left_out(made):
+    at = made.block.photo_positions[1].copy()
+    block = with_point(made.block, {1: np.array([3.0, 4.0]), 0: np.array([40.0, 50.0])}, at)
+    sd = block.point_sd.copy()
+    sd[-1] = 0.05
+    result = adjust(block.replace(point_sd=sd))
+    assert result.converged
+    assert result.dropped == {"X": "given at the place of a station that sees it"}
+    np.testing.assert_allclose(result.photo_sd, adjust(made.block).photo_sd, rtol=1e-9)
+
+
+def test_one_point_far_off_is_no_matter_of_units(made):
+    """Heights in feet would bring it nearer, and leave the other control where it is."""
+    at = made.truth.photo_positions[1].copy()
+    images = {0: np.array([40.0, 50.0]), 1: np.array([3.0, 4.0])}
+    result = adjust(with_point(made.block, images, at))
+    assert result.hints == ()
+    assert result.verdict.code == "gross-errors"
+    assert result.verdict.headline.startswith("Gross errors likely: 1) image of point X")
+
+
+def test_a_photo_on_points_of_a_line_ends_as_converged_and_is_named():
+    """Only the noise of the points keeps it from turning about the line: no step follows that to its end."""
+    made = simulate(strips=2, photos_per_strip=6, seed=3)
+    block, truth, random = made.block, made.truth, np.random.default_rng(1)
+    others = block.image_photos != 3
+    sd = np.broadcast_to(np.asarray(block.image_sd, dtype=float), block.image_xy.shape)
+    line = block.replace(
+        image_photos=block.image_photos[others],
+        image_points=block.image_points[others],
+        image_xy=block.image_xy[others],
+        image_sd=sd[others],
+    )
+    foot = truth.photo_positions[3] - [0, 0, 4500.0]
+    for k in range(5):
+        images = images_of(truth, [2, 3, 4], foot + np.array([0, (k - 2) * 500.0, 0]))
+        noisy = {photo: xy + 0.01 * random.normal(size=2) for photo, xy in images.items()}
+        line = with_point(line, noisy)
+        line = line.replace(point_ids=[*line.point_ids[:-1], f"L{k}"])
+    result = adjust(line)
+    assert result.converged
+    assert len(result.iterations) < 30
+    name = block.photo_ids[3]
+    assert any("hardly determine" in str(each) and name in str(each) for each in result.messages)
+    assert weakest_photos(result)[0].photo == name
+    alone = adjust(line.replace(**without(line, 3)))
+    own = np.arange(len(block.photo_ids)) != 3
+    np.testing.assert_allclose(result.photo_sd[own], alone.photo_sd[own], rtol=0.05)
+
+
+def without(block: Block, photo: int) -> dict[str, np.ndarray]:
+    """Return the images of a block without those of a photo."""
+    names = ("image_photos", "image_points", "image_xy", "image_sd")
+    return {name: getattr(block, name)[block.image_photos != photo] for name in names}
+
+
+@pytest.mark.parametrize("every", [False, True])
+def test_a_station_that_is_held_at_a_wrong_place_is_named_first(made, every):
+    positions = made.truth.photo_positions.copy()
+    positions[2, 0] += 30.0
+    sd = np.full(made.block.photo_position_sd.shape, 0.0 if every else np.inf)
+    sd[2] = 0.0
+    held = made.block.replace(photo_positions=positions, photo_position_sd=sd)
+    verdict = adjust(held).verdict
+    name = made.block.photo_ids[2]
+    assert verdict.headline.startswith(f"Gross errors likely: 1) position of photo {name}, which is held")
+    assert "give it a standard deviation" in verdict.headline
+    # By so much the sum of squares falls where it is free.
+    [test] = [each for each in verdict.tests if each.name.startswith("held values")]
+    sd[2] = np.inf
+    free = adjust(held.replace(photo_position_sd=sd))
+    fall = adjust(held).sums_of_squares.total - free.sums_of_squares.total
+    assert test.value == pytest.approx(fall, rel=0.01)
+    said = [str(each) for each in snoop(held).result.messages]
+    assert any(f"position of photo {name}, which is held, explains more" in each for each in said)
+
+
+def test_nothing_is_said_of_what_is_held_rightly(made):
+    sd = np.zeros(made.block.photo_position_sd.shape)
+    held = made.block.replace(photo_positions=made.truth.photo_positions, photo_position_sd=sd)
+    verdict = adjust(held).verdict
+    assert verdict.code == "accepted"
+    assert not any(each.name.startswith("held values") for each in verdict.tests)
+
+
+def test_fixed_control_at_a_wrong_place_is_named_first(made):
+    control = np.flatnonzero(np.isfinite(made.block.point_sd).all(axis=1))
+    positions = made.block.point_positions.copy()
+    positions[control[1]] += [0.0, 40.0, 0.0]
+    sd = np.where(np.isfinite(made.block.point_sd), 0.0, np.inf)
+    verdict = adjust(made.block.replace(point_positions=positions, point_sd=sd)).verdict
+    name = made.block.point_ids[control[1]]
+    assert verdict.headline.startswith(f"Gross errors likely: 1) control point {name}, which is held")
 
 
 def test_the_report_and_the_document_have_the_worst(made):

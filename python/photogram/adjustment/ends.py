@@ -46,8 +46,14 @@ def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     near = [(point, distance) for point, _, distance in solution.weak_points if distance < NEAR]
     flat = [(point, ratio) for point, ratio, distance in solution.weak_points if distance >= NEAR]
     messages = []
-    if solution.loose_photos:
-        names = listed([block.photo_ids[photo] for photo in solution.loose_photos])
+    with_images = np.isin(solution.loose_photos, block.image_photos)
+    empty = [photo for photo, has in zip(solution.loose_photos, with_images, strict=True) if not has]
+    loose = [photo for photo, has in zip(solution.loose_photos, with_images, strict=True) if has]
+    if empty:
+        names = listed([block.photo_ids[photo] for photo in empty])
+        messages.append(Message(f"left out, photos without images: {names}; they stay where they were given"))
+    if loose:
+        names = listed([block.photo_ids[photo] for photo in loose])
         messages.append(
             Message(
                 f"left out, photos that their images do not determine: {names}; their points are too few, or"

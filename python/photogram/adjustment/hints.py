@@ -17,6 +17,7 @@ from photogram.adjustment.regression import (
     LEAST,
     MOST,
     control_misfit,
+    control_residuals,
     eligible,
     given_points,
     misfits,
@@ -43,7 +44,7 @@ SUSPICION = 0.35
 PASSES, PASSES_ROUGH, ROUGH = 0.2, 0.3, 0.1
 """What the misfit must fall to in the median, where it is then below ROUGH; else poses are rough starts."""
 EACH = 0.5
-"""What it must fall to on each photo that does not fit as it is."""
+"""What it must fall to on each photo that does not fit as it is, and in the median of images of control."""
 AS_GOOD = 1.5
 """Another hypothesis is as good when its misfit is below so many times the least."""
 SLIGHT = float(np.radians(1.0))
@@ -217,9 +218,15 @@ def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
         meant = hypothesis.change(looked)
         left = control_misfit(meant)
         fits = left < given * (PASSES_ROUGH if left > ROUGH else PASSES) and left < SUSPICION
-        if fits and np.median(misfits(meant, photos)) < SUSPICION:
+        if fits and _most_come_nearer(looked, meant) and np.median(misfits(meant, photos)) < SUSPICION:
             passing.append((left, hypothesis))
     return [Verdict(passing, given)] if passing else []
+
+
+def _most_come_nearer(given: Block, meant: Block) -> bool:
+    """Whether a hypothesis on control brings most images nearer, not only those of a few that are far off."""
+    before, after = (float(np.median(control_residuals(each))) for each in (given, meant))
+    return after < EACH * before
 
 
 def _single(block: Block, photos: Indices) -> Iterator[Verdict]:

@@ -19,6 +19,7 @@ __all__ = [
     "MOST",
     "Regression",
     "control_misfit",
+    "control_residuals",
     "eligible",
     "given_points",
     "misfits",
@@ -115,11 +116,25 @@ def misfits(block: Block, photos: Indices) -> Floats:
 
 def control_misfit(block: Block) -> float:
     """M of all images of given points together; very large where there are too few."""
-    rows = np.flatnonzero(given_points(block)[block.image_points])
+    rows = _control_rows(block)
     if len(rows) < LEAST:
         return _UNKNOWN
     found = _relative(block.image_xy[rows] - predictions(block)[rows], block.image_xy[rows])
     return found if np.isfinite(found) else _UNKNOWN
+
+
+def control_residuals(block: Block) -> Floats:
+    """(k,) how far images of given points are from their places, in their spread; infinite without one."""
+    rows = _control_rows(block)
+    xy = block.image_xy[rows]
+    spread = float(np.sqrt(((xy - xy.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    found = np.linalg.norm(xy - predictions(block)[rows], axis=1) / spread
+    return np.where(np.isfinite(found), found, np.inf)
+
+
+def _control_rows(block: Block) -> Indices:
+    found: Indices = np.flatnonzero(given_points(block)[block.image_points])
+    return found
 
 
 def _misfit(block: Block, predicted: Floats, photo: int) -> float:

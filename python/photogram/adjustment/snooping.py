@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from functools import singledispatch
 from typing import Any, get_args
@@ -13,13 +14,15 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, UnitVariance, adjust, adjusted_from, core_threads
 from photogram.adjustment.consensus import started_by_consensus
 from photogram.arguments.arrays import number, one_of, truth_value, whole_number
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
 from photogram.network.block import Block, checked
 from photogram.network.core import CoreOptions, block_network
 from photogram.network.observations import observation_rows
 from photogram.network.refracted import check_cameras
+from photogram.results.exchanged import Exchange, exchanged_names
+from photogram.results.held import held_remark
 from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,
@@ -35,7 +38,7 @@ from photogram.statistics.distributions import LEVEL
 from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 
-__all__ = ["block_trial", "of_network", "settings_of", "snoop"]
+__all__ = ["block_trial", "of_network", "settings_of", "snoop", "used_images"]
 
 
 def snoop(
@@ -188,9 +191,47 @@ def _snoop_block(
         trial, outcome = _snooped_from(first, settings, threads, parts=parts)
     cleaned, options = _without(block, trial, outcome.out), options_of(unit_variance)
     result = adjusted_from(cleaned, options, threads=threads, progress=progress)
-    remarks = [Message(remark) for remark in outcome.remarks]
-    result = dataclasses.replace(result, messages=[*remarks, *result.messages])
-    return Snooped(result=result, outcome=outcome, suspects=trial.suspects, settings=settings)
+    said = [*outcome.remarks, *_held(block, outcome, adjusted)]
+    result = dataclasses.replace(result, messages=[*map(Message, said), *result.messages])
+    return Snooped(
+        result=result,
+        outcome=outcome,
+        suspects=trial.suspects,
+        settings=settings,
+        exchanged=_exchanged(block, trial, outcome, result),
+    )
+
+
+def _exchanged(block: Block, trial: NetworkTrial, outcome: Outcome, result: Result) -> tuple[Exchange, ...]:
+    """Find exchanged names among what is out."""
+    reached = block.replace(
+        photo_positions=result.photo_positions,
+        photo_attitudes=result.photo_attitudes,
+        cameras=result.block.cameras if not result.cameras else [each.camera for each in result.cameras],
+    )
+    return tuple(exchanged_names(reached, used_images(trial, outcome.out, len(block.image_xy))))
+
+
+def used_images(trial: NetworkTrial, out: Out, count: int) -> Bools:
+    """(m,) images of a network, so many, that are not out."""
+    kinds, subjects = trial.core.subjects
+    group = np.repeat(np.arange(len(kinds)), np.diff(trial.core.row_starts))
+    used = np.ones(count, dtype=bool)
+    used[subjects[group[out.rows & (kinds[group] == IMAGE)]]] = False
+    return used
+
+
+def _held(block: Block, outcome: Outcome, adjusted: Callable[..., Result]) -> list[str]:
+    """Say of what is held that it explains more than what was taken out; see :func:`held_remark`."""
+    largest = max((entry.statistic for entry in outcome.log if entry.is_out), default=math.inf)
+    if math.isinf(largest) or not any(
+        (sd == 0).any() for sd in (block.photo_position_sd, block.photo_attitude_sd, block.point_sd)
+    ):
+        return []
+    try:
+        return held_remark(adjusted(block), largest)
+    except AdjustmentError:
+        return []
 
 
 def _snooped_from(

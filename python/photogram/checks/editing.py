@@ -524,8 +524,13 @@ def _returned(result: Result, whole: Block, section: Section, spread: float, adj
         photo, point = whole.photo_ids.index(finding.photos[0]), whole.point_ids.index(finding.points[0])
         row = int(np.flatnonzero((whole.image_photos == photo) & (whole.image_points == point))[0])
         block = result.block
+        number = block.photo_ids.index(finding.photos[0])
+        if ((block.image_photos == number) & (block.image_points == point)).any():
+            # It has come back already: both its coordinates were named.
+            section.findings.remove(finding)
+            continue
         back = block.replace(
-            image_photos=np.append(block.image_photos, block.photo_ids.index(finding.photos[0])),
+            image_photos=np.append(block.image_photos, number),
             image_points=np.append(block.image_points, point),
             image_xy=np.vstack([block.image_xy, whole.image_xy[[row]]]),
             image_sd=np.vstack([block.image_sd, whole.image_sd[[row]]]),

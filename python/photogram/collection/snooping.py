@@ -10,22 +10,33 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, core_threads
-from photogram.adjustment.snooping import of_network, settings_of
+from photogram.adjustment.robust import Loss, loss_row
+from photogram.adjustment.snooping import of_network, settings_of, used_images
 from photogram.arguments.arrays import one_of, truth_value
-from photogram.arguments.types import Indices
-from photogram.collection.adjust import adjust
+from photogram.arguments.types import Floats, Indices
+from photogram.collection.adjust import adjust, adjusted
 from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.as_block import as_block
 from photogram.collection.collection import Collection
+from photogram.collection.core import CollectionOptions, collection_network
 from photogram.collection.suspects import collection_trial
 from photogram.errors import AdjustmentError
 from photogram.messages import Message
+from photogram.results.exchanged import exchanged_names
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, NetworkTrial
 from photogram.results.snooped import Snooped
 from photogram.statistics.distributions import LEVEL
-from photogram.statistics.snooping.snooping import snooped
-from photogram.statistics.snooping.suspects import LostSupportError, Out
+from photogram.statistics.snooping.snooping import Outcome, snooped
+from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 
 __all__ = ["snoop_collection"]
+
+LOSSES: tuple[Loss, ...] = ("huber", "cauchy")
+FAR = 5.0
+"""Robust standard deviations from which on an image is out at first, after a robust adjustment."""
+BY_LOSSES = "a robust adjustment of the given values (Huber, then Cauchy)"
+MEDIAN_OF_TWO = 1.1774100225154747
+"""Of the length of a vector of two standard normal variables."""
 
 
 @of_network.register
@@ -47,18 +58,73 @@ def snoop_collection(
     one_of("unit_variance", unit_variance, ("constrained",))
     truth_value("parts", parts)
     settings = settings_of(level, fdr, unit_weight, robust, max_rounds)
-    first = adjust(collection, covariance=False, threads=threads, progress=progress, **options)
-    tried = dataclasses.replace(first.options, covariance=True, loss=None)
-    trial = collection_trial(collection, tried, first.state, core_threads(threads), parts=parts)
+
+    def tried(covariance: bool) -> tuple[AdjustedCollection, NetworkTrial, Outcome]:
+        first = adjust(collection, covariance=covariance, threads=threads, progress=progress, **options)
+        own = dataclasses.replace(first.options, covariance=True, loss=None)
+        trial = collection_trial(collection, own, first.state, core_threads(threads), parts=parts)
+
+        def afresh() -> Aside | None:
+            found = started_robustly(collection, first.options, threads=threads)
+            if found is None:
+                return None
+            state, images = found
+            core = collection_network(collection, own).trial(state, threads=core_threads(threads))
+            trial.restart(core)
+            kinds, subjects = core.subjects
+            groups = np.flatnonzero((kinds == IMAGE) & np.isin(subjects, images))
+            return Aside(tuple(groups.tolist()), {}, BY_LOSSES)
+
+        return first, trial, snooped(trial, settings, afresh)
+
     try:
-        outcome = snooped(trial, settings)
-    except (LostSupportError, _photocore.CollectionError) as error:
-        raise AdjustmentError(f"the collection cannot be tested: {error.args[0]}") from error
+        first, trial, outcome = tried(False)
+    except (LostSupportError, _photocore.CollectionError):
+        # Covariances tell what has to leave because nothing determines it.
+        try:
+            first, trial, outcome = tried(True)
+        except (LostSupportError, _photocore.CollectionError) as error:
+            raise AdjustmentError(f"the collection cannot be tested: {error.args[0]}") from error
     cleaned = _without(first, trial, outcome.out)
     result = adjust(cleaned, threads=threads, progress=progress, **options)
     remarks = [Message(remark) for remark in outcome.remarks]
     result = dataclasses.replace(result, messages=[*remarks, *result.messages])
-    return Snooped(result=result, outcome=outcome, suspects=trial.suspects, settings=settings)
+    placed = as_block(collection.replace(photo_parameters=result.photo_parameters))
+    used = used_images(trial, outcome.out, len(collection.image_xy))
+    variance = max(result.variance_of_unit_weight or 1.0, 1.0)
+    return Snooped(
+        result=result,
+        outcome=outcome,
+        suspects=trial.suspects,
+        settings=settings,
+        exchanged=tuple(exchanged_names(placed, used, variance)),
+    )
+
+
+def started_robustly(
+    collection: Collection, options: CollectionOptions, *, threads: int | None
+) -> tuple[_photocore.BlockState, Indices] | None:
+    """Adjust a collection robustly from its given values on, and return the end and the images far from it.
+
+    Cameras are unknown, so that no resection tells a wrong image; but Huber's loss bounds what each can do to
+    the photos, and Cauchy's from there on lets those go that disagree.
+    """
+    state: _photocore.BlockState | None = None
+    sizes: Floats = np.zeros(0)
+    for loss in LOSSES:
+        own = dataclasses.replace(options, covariance=False, loss=loss_row(loss, None))
+        try:
+            found = adjusted(collection, own, threads=threads, start=state)
+        except AdjustmentError:
+            return None
+        state = found.state
+        sizes = np.linalg.norm(found.residuals / collection.image_sd, axis=1)
+        sizes = np.where(found.used_images, sizes, np.nan)
+    if state is None or not np.isfinite(sizes).any():
+        return None
+    far = FAR * max(float(np.nanmedian(sizes)) / MEDIAN_OF_TWO, 1.0)
+    images: Indices = np.flatnonzero(sizes > far)
+    return (state, images) if len(images) else None
 
 
 def _without(first: AdjustedCollection, trial: NetworkTrial, out: Out) -> Collection:

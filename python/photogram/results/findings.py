@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.results.groups_tested import groups_tested
+from photogram.results.held import held_tested
 from photogram.results.kinds import tested_kind
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observed import tested
@@ -27,7 +28,7 @@ def block_findings(result: Result) -> Findings:
     """Return the tests of a block: standard deviations are given, so the unit weight is known."""
     return Findings(
         status=result.status,
-        observations=_tested(result),
+        observations=[*_tested(result), *held_tested(result)],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=None if result.loss else result.global_test,
         untested=ROBUST if result.loss else "no degrees of freedom",

@@ -26,6 +26,7 @@ def snooped_findings(found: Snooped) -> Findings:
             images=found.share_removed("image"),
             control=found.share_removed("control"),
             rivals=found.rivals,
+            exchanged=[each.sentence for each in found.exchanged],
         ),
         remarks=[*rest.remarks, *kept],
     )

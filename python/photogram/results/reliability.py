@@ -214,11 +214,11 @@ class Reliability:
         point.
         """
         effects = self._trial.core.effects(groups)[:, :3]
-        starts = self.suspects.row_starts
+        starts, errors = self.suspects.row_starts, self.detectable / self.sd
         found, first = [], 0
         for group in groups:
             rows = np.arange(starts[group], starts[group + 1])
-            own = effects[first : first + len(rows)] * (self.detectable[rows] / self.sd[rows])[:, np.newaxis]
+            own = effects[first : first + len(rows)] * errors[rows, np.newaxis]
             first += len(rows)
             moved = np.abs(own[:, 2]) if heights else np.sqrt((own**2).sum(axis=1))
             moved = moved[np.isfinite(moved)]
@@ -285,7 +285,15 @@ class Reliability:
 
     def inseparable_on(self, points: list[int], limit: float = 0.9) -> list[Inseparable]:
         """Return the same of some points by their numbers."""
-        return [self._pair(*pair) for pair in self._trial.core.inseparable(points, limit)]
+        return [self.named(pair) for pair in self.pairs_on(points, limit)]
+
+    def pairs_on(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
+        """Return the same by the numbers of the groups, with their correlation: networks have thousands."""
+        return self._trial.core.inseparable(points, limit)
+
+    def named(self, pair: tuple[int, int, float]) -> Inseparable:
+        """Return a pair of :meth:`pairs_on` with its names."""
+        return self._pair(*pair)
 
     def partners(self, group: int, limit: float = 0.3) -> list[Inseparable]:
         """Return all other groups whose tests are correlated with that of a group, the most first.

@@ -207,8 +207,8 @@ def reliability_summary(found: Reliability, *, heights: bool) -> ReliabilitySumm
     suspects, tests = found.suspects, found.tests
     two, points = _points(suspects, tests)
     checked = tests.least > TESTABLE
-    pairs = [each for each in found.inseparable_on(points, LIMIT) if checked[list(each.groups)].all()]
-    pairs.sort(key=lambda pair: -pair.correlation)
+    pairs = [each for each in found.pairs_on(points, LIMIT) if checked[each[0]] and checked[each[1]]]
+    pairs.sort(key=lambda pair: -pair[2])
     return ReliabilitySummary(
         level=found.level,
         power=found.power,
@@ -216,7 +216,7 @@ def reliability_summary(found: Reliability, *, heights: bool) -> ReliabilitySumm
         kinds=tuple(_kinds(found)),
         weakest=tuple(_weakest(found, heights=heights)),
         two_rays=two,
-        pairs=tuple(pairs[:PAIRS]),
+        pairs=tuple(map(found.named, pairs[:PAIRS])),
         pairs_found=len(pairs),
         points_looked_into=len(points),
         suspects=suspects,
@@ -250,23 +250,25 @@ def _weakest(found: Reliability, *, heights: bool) -> list[WeakObservation]:
     suspects, tests = found.suspects, found.tests
     external, detectable = found.group_external, found.group_detectable
     checked = tests.active & (tests.least > TESTABLE)
-    weakest = []
-    for kind, name in enumerate(suspects.kind_names):
-        size = np.where(checked & (suspects.kinds == kind), external, -math.inf)
-        order = np.argsort(-size, kind="stable")[:LISTED]
-        groups = order[np.isfinite(size[order])].tolist()
-        weakest += [
-            WeakObservation(
-                kind=name,
-                name=suspects.name(group),
-                redundancy=float(tests.least[group]),
-                detectable_sd=float(detectable[group]),
-                external_sd=float(external[group]),
-                own_point=moved,
-            )
-            for group, moved in zip(groups, found.own_points(groups, heights=heights), strict=True)
-        ]
-    return weakest
+    groups: list[int] = []
+    for kind in range(len(suspects.kind_names)):
+        own = np.flatnonzero(checked & (suspects.kinds == kind) & np.isfinite(external))
+        if len(own) > LISTED:
+            # Only what may be among the first is sorted.
+            least = np.partition(external[own], -LISTED)[-LISTED]
+            own = own[external[own] >= least]
+        groups += own[np.argsort(-external[own], kind="stable")[:LISTED]].tolist()
+    return [
+        WeakObservation(
+            kind=suspects.kind_names[int(suspects.kinds[group])],
+            name=suspects.name(group),
+            redundancy=float(tests.least[group]),
+            detectable_sd=float(detectable[group]),
+            external_sd=float(external[group]),
+            own_point=moved,
+        )
+        for group, moved in zip(groups, found.own_points(groups, heights=heights), strict=True)
+    ]
 
 
 def _points(suspects: Suspects, tests: Tests) -> tuple[int, list[int]]:

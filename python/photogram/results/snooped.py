@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import orjson
 
 from photogram.io import json
+from photogram.results.exchanged import Exchange
 from photogram.results.network import AdjustedNetwork
 from photogram.show.brief import Brief, Rows, few
 from photogram.show.sections import Section, composed, headline, verdict_section
@@ -39,12 +40,15 @@ class Snooped(Brief, Judged):
         The groups of observations that were tested.
     settings
         How.
+    exchanged
+        Names of points that are exchanged, among the images that are out.
     """
 
     result: AdjustedNetwork
     outcome: Outcome
     suspects: Suspects
     settings: Settings
+    exchanged: tuple[Exchange, ...] = ()
 
     def brief(self) -> tuple[str, Rows]:
         """Return what was taken out of what, in a few lines."""
@@ -110,6 +114,16 @@ class Snooped(Brief, Judged):
                 for each in outcome.rounds
             ],
             "log": [_member(entry) for entry in self.log],
+            "exchanged_names": [
+                {
+                    "photos": list(each.photos),
+                    "points": list(each.points),
+                    "T_as_named": each.as_named,
+                    "T_exchanged": each.exchanged,
+                    "dimension": each.dimension,
+                }
+                for each in self.exchanged
+            ],
             "remarks": outcome.remarks,
         }
 
@@ -151,6 +165,7 @@ class Snooped(Brief, Judged):
             f"{'taken out':<36}{out}, returned {sum(e.returned is not None for e in self.log)},"
             f" suspect but kept {sum(bool(e.kept) for e in self.log)}",
             *outcome.remarks,
+            *(f"{each.sentence}: {each.reason}" for each in self.exchanged),
         ]
         if out:
             lines.append(f"the unit variance holds after removal of {out} groups: it is biased low by little")

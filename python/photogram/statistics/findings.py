@@ -49,6 +49,8 @@ class Tested:
         `dimension`) or `F` (`dimension` and `second`).
     dimension, second
         Degrees of freedom.
+    held
+        Whether these are no observations but held values, which nothing takes out.
     """
 
     kind: str
@@ -57,6 +59,7 @@ class Tested:
     statistic: str
     dimension: ArrayLike = 1.0
     second: ArrayLike = math.inf
+    held: bool = False
 
     def at(self, place: tuple[int, ...]) -> Tested:
         """Return the test of one observation."""
@@ -211,12 +214,15 @@ class Removed:
         Shares of the images and of the control that were taken out.
     rivals
         What cannot be told apart from them, as sentences.
+    exchanged
+        Names that are exchanged among them, as sentences.
     """
 
     removed: Sequence[Mapping[str, Any]]
     images: float = 0.0
     control: float = 0.0
     rivals: Sequence[str] = ()
+    exchanged: Sequence[str] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -183,6 +183,10 @@ def _summed(groups: Indices, values: Floats) -> Floats:
     return np.stack([np.bincount(groups, weights=column, minlength=BINS**2) for column in values.T], axis=1)
 
 
+_UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+"""Elements of a symmetric matrix."""
+
+
 def group_patterns(
     groups: Indices, count: int, xy: Floats, residuals: Floats, redundancy: Floats
 ) -> tuple[Floats, Floats]:
@@ -207,17 +211,17 @@ def group_patterns(
     means = np.stack([np.bincount(groups, weights=each, minlength=count) for each in xy.T], axis=1)
     centred = xy - (means / np.maximum(numbers, 1)[:, np.newaxis])[groups]
     spread = np.sqrt((centred**2).mean()) if len(xy) else 1.0
-    design = np.column_stack([np.ones(len(xy)), centred / (spread or 1.0)])
+    design = np.asfortranarray(np.column_stack([np.ones(len(xy)), centred / (spread or 1.0)]))
     statistics, enough = np.zeros(count), np.ones(count, dtype=bool)
     for axis in (0, 1):
         score = np.stack(
             [np.bincount(groups, weights=each * residuals[:, axis], minlength=count) for each in design.T],
             axis=1,
         )
-        products = np.einsum("mi,mj,m->mij", design, design, redundancy[:, axis]).reshape(-1, 9)
-        matrices = np.stack(
-            [np.bincount(groups, weights=each, minlength=count) for each in products.T], axis=1
-        ).reshape(-1, 3, 3)
+        matrices = np.empty((count, 3, 3))
+        for i, j in _UPPER:
+            weights = design[:, i] * design[:, j] * redundancy[:, axis]
+            matrices[:, i, j] = matrices[:, j, i] = np.bincount(groups, weights=weights, minlength=count)
         enough &= matrices[:, 0, 0] >= FULL
         matrices[~enough] = np.eye(3)
         statistics += np.einsum("gi,gij,gj->g", score, np.linalg.pinv(matrices, hermitian=True), score)

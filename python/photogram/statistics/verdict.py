@@ -151,7 +151,10 @@ def _gross_errors(e: Evidence) -> _Line | None:
     if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
         return None
     text = f"Gross errors likely: {e.named(e.gross)}"
-    if e.found.snoop:
+    _, first, _ = e.gross[0]
+    if first.held:
+        text += "; what is held is no observation: give it a standard deviation"
+    elif e.found.snoop:
         text += f"; {e.found.snoop} takes them out"
     return _Line("gross-errors", text, EXIT_NOT_USABLE)
 
@@ -165,13 +168,16 @@ def _snooped(e: Evidence) -> _Line | None:
         return _Line(
             "too-much-removed",
             f"Too much had to be removed ({count} observations: {100 * found.images:.3g} percent of the"
-            f" images, {100 * found.control:.3g} of the control): model or identification is wrong",
+            f" images, {100 * found.control:.3g} of the control): model or identification is wrong"
+            + "".join(f"; {each}" for each in found.exchanged),
             EXIT_NOT_USABLE,
         )
     if e.high:
         return None
     names = listed([str(each.get("name", "")) for each in found.removed], NAMED)
-    return _Line("usable-after-removal", f"Usable after removal of {counted(count, 'observation')}: {names}")
+    removed = counted(count, "observation")
+    text = "; ".join([f"Usable after removal of {removed}: {names}", *found.exchanged])
+    return _Line("usable-after-removal", text)
 
 
 def _common_factor(e: Evidence) -> _Line | None:

@@ -142,11 +142,13 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 && led
                 && control.in_valley
                 && control.along < MOST_ALONG
+                && !self.is_still(&control.refused, control.best)
                 && let Some((values, sum)) = self.along_valley(&unknowns, &step, change, control.best)?
             {
-                control.best = sum;
+                let before = std::mem::replace(&mut control.best, sum);
                 control.along += 1;
                 self.weak = moved.unwrap_or_default();
+                control.refused = Some((before, self.weak.clone()));
                 self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, &values)?;
                 return self.form(values, 0.0).map(ControlFlow::Continue);
             }
@@ -203,9 +205,16 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// Whether the sum of squares has stood still between two full steps that failed, `refused` at the first and `sum` at the second:
     /// what it still falls by, damped, no unknown is determined well enough to show.
     fn stands_still(&self, refused: &mut Option<(f64, Vec<usize>)>, sum: f64, moved: Vec<usize>) -> bool {
+        let still = self.is_still(refused, sum);
+        *refused = Some((sum, moved));
+        still
+    }
+
+    /// Whether the sum of squares has fallen by next to nothing since a full step failed.
+    fn is_still(&self, refused: &Option<(f64, Vec<usize>)>, sum: f64) -> bool {
         let freedom = self.problem.counts(0).degrees_of_freedom().max(1) as f64;
         let least = STILL * (sum / freedom).max(1.0);
-        refused.replace((sum, moved)).is_some_and(|(before, _)| before - sum <= least)
+        refused.as_ref().is_some_and(|(before, _)| before - sum <= least)
     }
 
     /// Follows a full step that has failed along the valley of the combination that it moves: a part of it, then back to the floor by

@@ -90,7 +90,7 @@ use std::ops::ControlFlow;
 use nalgebra::DMatrix;
 use rayon::ThreadPool;
 
-use crate::adjustment::{self, Adjustment, Event, Method};
+use crate::adjustment::{self, AdjustError, Adjustment, Event, Method};
 use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
 use crate::normals::Ordering;
 
@@ -338,7 +338,7 @@ impl Network {
     ) -> Result<Solution, NetworkError> {
         self.check()?;
         let mut left_out = vec![false; self.points.len()];
-        let mut loose = vec![false; self.photos.len()];
+        let mut loose = self.untouched_photos();
         let mut harmful: Vec<Dropped> = Vec::new();
         for &point in start.iter().flat_map(|state| &state.collapsed) {
             *left_out.get_mut(point).ok_or(NetworkError::State)? = true;
@@ -389,6 +389,17 @@ impl Network {
                     continue;
                 }
             }
+            let astray = match &adjusted {
+                Ok(adjusted) => assembled.run_off(adjusted, &options.adjustment),
+                Err(AdjustError::NotFinite) => assembled.at_stations(),
+                Err(_) => vec![],
+            };
+            if !astray.is_empty() {
+                astray.iter().for_each(|dropped| left_out[dropped.point] = true);
+                harmful.extend(astray);
+                (start, before) = (None, None);
+                continue;
+            }
             let named = |error| self.name(NetworkError::new(error, &assembled), &assembled, pool);
             let mut adjusted = adjusted.map_err(named)?;
             let earlier = before.take();
@@ -426,7 +437,7 @@ impl Network {
         pool: &ThreadPool,
     ) -> Result<problem::Assembled, NetworkError> {
         self.check()?;
-        let screened = self.screen(&vec![false; self.points.len()], &vec![false; self.photos.len()]);
+        let screened = self.screen(&vec![false; self.points.len()], &self.untouched_photos());
         if screened.points.is_empty() {
             return Err(NetworkError::Empty);
         }

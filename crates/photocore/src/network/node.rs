@@ -48,9 +48,12 @@ pub struct NodePrediction {
     pub node: usize,
     /// Bytes that it keeps beside while it is formed: the factor, what the points have left, and where that is.
     pub factor: usize,
-    /// Bytes that forming or inverting takes at the most, what it is given and the node itself counted.
+    /// Bytes that forming, inverting or writing takes at the most, what it is given and the node itself counted.
     pub memory: usize,
 }
+
+/// Bytes of an image point in the tables that are read and written of a node beside.
+const IN_TABLES: usize = 150;
 
 impl Network {
     /// Takes the network as a node of a larger one.
@@ -133,7 +136,7 @@ impl Node {
             operations: symbolic.operations(layout),
             node: self.bytes(),
             factor: size_of::<f64>() * (system.numbers_in_factor() - outer * outer + 3 * self.size()),
-            memory: system.memory() + size_of::<f64>() * handed,
+            memory: system.memory() + size_of::<f64>() * handed + IN_TABLES * self.images(),
         }
     }
 

@@ -9,11 +9,11 @@ use super::commons::PlacedCommon;
 use super::model::Bundle;
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::precision::median;
-use super::screening::{Dropped, Screened};
+use super::screening::{Dropped, Reason, Screened};
 use super::stations::Station;
 use super::surroundings::Surroundings;
 use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start, State};
-use crate::adjustment::{AdjustError, Method, Model, Problem};
+use crate::adjustment::{self, AdjustError, Adjustment, Method, Model, Problem, Status};
 use crate::geometry::{
     Matrix3, ObjectSpace, Orientation, PoseNumbers, Refraction, Vector3, local_vertical, nearest_turns,
 };
@@ -39,6 +39,8 @@ pub(super) struct Reached {
 
 /// Points and photos that are not determined are few where there are so many times as many.
 const FEW: usize = 10;
+/// A point so many times as far from the nearest station as others, or as near, has left the network.
+const ASTRAY: f64 = 1e3;
 
 impl Assembled {
     /// Refuses what takes more memory than it may.
@@ -75,6 +77,47 @@ impl Assembled {
         let is_frame = |photo: usize| model.mounts.iter().flatten().any(|mount| mount.frame == photo);
         let few = FEW * photos.len() <= model.cameras.len() && !photos.iter().any(|&photo| is_frame(photo));
         if few { photos } else { vec![] }
+    }
+
+    /// Free points that iterations which have not converged have led out of the network, or to a station, where they are few.
+    ///
+    /// Rays that part before the cameras fit best at infinity, where least squares creeps to, and photos are turned until they do.
+    pub fn run_off(&self, ended: &Adjustment, options: &adjustment::Options) -> Vec<Dropped> {
+        if ended.status != Status::NotConverged || !matches!(options.method, Method::Damped(_)) {
+            return vec![];
+        }
+        let squares = self.nearest_stations(&ended.unknowns);
+        let Some(middle) = median(squares.clone()) else { return vec![] };
+        let model = &self.problem.model;
+        let is_out = |&local: &usize| {
+            let apart = (squares[local] / middle).sqrt();
+            model.points[local].held() == [false; 3] && !(ASTRAY.recip()..=ASTRAY).contains(&apart)
+        };
+        let out: Vec<usize> = (0..model.locals).filter(is_out).collect();
+        let few = FEW * out.len() <= model.locals;
+        let reason = Reason::RanOff;
+        if few { out.iter().map(|&i| Dropped { point: self.points[i], reason }).collect() } else { vec![] }
+    }
+
+    /// Points whose first values are those of a station that sees them, so that no image can be computed.
+    pub fn at_stations(&self) -> Vec<Dropped> {
+        let squares = self.nearest_stations(&self.problem.initial);
+        let reason = Reason::AtStation;
+        let at_station = self.points.iter().zip(&squares).filter(|(_, square)| **square == 0.0);
+        at_station.map(|(&point, _)| Dropped { point, reason }).collect()
+    }
+
+    /// Squares of the distances of all points from the nearest station that sees them.
+    fn nearest_stations(&self, unknowns: &[f64]) -> Vec<f64> {
+        let model = &self.problem.model;
+        let photos = model.photos(&unknowns[model.of_stations()]);
+        let of_point = |(at, images): (&[f64; 3], &[usize])| {
+            let position = model.space.cartesian(*at);
+            let square =
+                |image: &Image| photos[image.photo].orientation.pose().sight(&position).norm_squared();
+            model.images[images[0]..images[1]].iter().map(square).fold(f64::INFINITY, f64::min)
+        };
+        model.coordinates(unknowns).zip(model.start.windows(2)).map(of_point).collect()
     }
 
     /// Begins where an adjustment has ended.

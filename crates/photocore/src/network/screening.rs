@@ -25,6 +25,10 @@ pub enum Reason {
     RanIntoStation,
     /// Its rays do not determine it: they are parallel, or one and the same.
     NotDetermined,
+    /// Its rays do not meet before the cameras: iterations that have not converged have led it out of the network.
+    RanOff,
+    /// It was given at the place of a station that sees it: no ray leads there.
+    AtStation,
 }
 
 impl Reason {
@@ -36,6 +40,8 @@ impl Reason {
             Reason::ControlPointOnOnePhoto => "control point on one photo",
             Reason::RanIntoStation => "ran into the station of a photo",
             Reason::NotDetermined => "its rays do not determine it",
+            Reason::RanOff => "its rays do not meet: it ran off",
+            Reason::AtStation => "given at the place of a station that sees it",
         }
     }
 }
@@ -98,6 +104,19 @@ impl Network {
             (_, 1) if one_photo => Some(Reason::ControlPointOnOnePhoto),
             _ => None,
         }
+    }
+
+    /// Photos with unknowns that nothing touches, no image and no observation: there is nothing to find of them.
+    pub(super) fn untouched_photos(&self) -> Vec<bool> {
+        let mut untouched: Vec<bool> =
+            self.photos.iter().map(|photo| photo.sd.iter().any(|sd| sd.is_infinite())).collect();
+        self.images.iter().for_each(|image| untouched[image.photo] = false);
+        for mount in &self.mounts {
+            (untouched[mount.frame], untouched[mount.photo]) = (false, false);
+        }
+        let touched = self.observations.iter().flat_map(|each| each.touches().photos);
+        touched.for_each(|photo| untouched[photo] = false);
+        untouched
     }
 
     /// The observations whose points are all among the given ones.

@@ -366,12 +366,12 @@ solution_class! {
 
         #[getter]
         fn collapsed(&self) -> Vec<usize> {
-            left_out(&self.solution, Reason::RanIntoStation)
+            [Reason::RanIntoStation, Reason::AtStation].map(|why| left_out(&self.solution, why)).concat()
         }
 
         #[getter]
         fn not_determined(&self) -> Vec<usize> {
-            left_out(&self.solution, Reason::NotDetermined)
+            [Reason::NotDetermined, Reason::RanOff].map(|why| left_out(&self.solution, why)).concat()
         }
 
         #[getter]

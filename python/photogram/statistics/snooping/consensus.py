@@ -18,7 +18,7 @@ from photogram.statistics.snooping.factors import ENOUGH, robust_factor, values
 from photogram.statistics.snooping.log import Removal
 from photogram.statistics.snooping.returning import log_probability
 from photogram.statistics.snooping.settings import Settings
-from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out, Standing, Trial
+from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out, Standing, Tests, Trial
 from photogram.statistics.snooping.taking_out import TakingOut
 from photogram.statistics.snooping.whole_photos import log_photo, take_photo
 
@@ -106,6 +106,8 @@ def _decide(work: TakingOut, aside: Aside, before: Standing | None) -> None:
     removed = work.apply(entries, []) if entries else []
     if not removed:
         work.adjust(whole)
+    if _runs_off(work):
+        removed += _still_out(work, points, images, tests)
     for photo, said in aside.photos.items():
         removed.append(log_photo(work, photo, 0, before, (said, *consequences[photo])))
     parts = [_counted(len(images), "image")] if len(images) else []
@@ -113,10 +115,26 @@ def _decide(work: TakingOut, aside: Aside, before: Standing | None) -> None:
     why = "runs off" if before is not None else "leads nowhere (before: without what follows)"
     said = f"; {agreeing} of the images agree with it" if agreeing else ""
     work.remarks.append(
-        f"the adjustment of everything {why}: it was started anew from a consensus of resections and"
-        f" intersections, without {' and '.join(parts)}; tests against the rest decided about them{said}"
+        f"the adjustment of everything {why}: it was started anew from {aside.found_by}, without"
+        f" {' and '.join(parts)}; tests against the rest decided about them{said}"
     )
     work.note_round(0, first, removed, [])
+
+
+def _still_out(work: TakingOut, points: list[int], images: Indices, tests: Tests) -> list[int]:
+    """Take out again what tests against the rest have let in, and with which the adjustment runs off.
+
+    Two rays that part before the cameras agree with any photos in a linear model, for they meet behind them.
+    """
+    suspects = work.suspects
+    back = [group for group in images.tolist() if not work.out.rows[suspects.rows(group)].any()]
+    one_of_each = {int(suspects.points[group]): group for group in reversed(back)}
+    entries = [
+        work.as_it_was(group, tests).with_(consequences=("its rays do not meet",))
+        for point, group in sorted(one_of_each.items())
+        if point in points
+    ]
+    return work.apply(entries, []) if entries else []
 
 
 def _put_aside(trial: Trial, out: Out, groups: list[int]) -> list[int]:

@@ -195,7 +195,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Aside:
-    """What a consensus of resections and intersections does without, from which a network was started anew.
+    """What a consensus does without, from which a network was started anew.
 
     Attributes
     ----------
@@ -203,10 +203,13 @@ class Aside:
         The groups, by their numbers, that do not meet where most of their point and photo do.
     photos
         Photos whose images agree with no pose, and why that is said.
+    found_by
+        What the consensus is of.
     """
 
     images: tuple[int, ...]
     photos: dict[int, str]
+    found_by: str = "a consensus of resections and intersections"
 
 
 class LostSupportError(Exception):

@@ -1,0 +1,97 @@
+"""Exchanged names of points are reported as a pair: in the log of snooping, the verdict, the document."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from photogram import Camera, adjust, simulate, snoop
+from photogram.results.exchanged import exchanged_names
+
+
+def block_of(seed, **options):
+    return simulate(
+        strips=3, photos_per_strip=5, points_per_photo=30, control_spacing=2, seed=seed, **options
+    )
+
+
+def exchanged(block, seed):
+    """Exchange two names on a photo; return the block, the names, and the photo."""
+    random = np.random.default_rng(seed)
+    photo = int(random.integers(len(block.photo_ids)))
+    a, b = random.choice(np.flatnonzero(block.image_photos == photo), 2, replace=False).tolist()
+    xy = block.image_xy.copy()
+    xy[[a, b]] = xy[[b, a]]
+    names = {block.point_ids[block.image_points[row]] for row in (a, b)}
+    return block.replace(image_xy=xy), names, block.photo_ids[photo]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_pair_is_named(seed):
+    block, names, photo = exchanged(block_of(seed).block, seed)
+    snooped = snoop(block)
+    [found] = snooped.exchanged
+    assert set(found.points) == names
+    assert photo in found.photos
+    # Only where both points stand on the same two photos do the images not tell on which.
+    assert len(found.photos) <= 2
+    assert found.exchanged < 0.001 * found.as_named
+    assert found.sentence in snooped.verdict.headline
+    assert f"{found.sentence}: {found.reason}" in snooped.report()
+    [member] = json.loads(snooped.to_json())["snooping"]["exchanged_names"]
+    assert set(member["points"]) == names
+
+
+def test_with_lenses_and_pixels():
+    camera = Camera(
+        "opencv",
+        {"fx": 10000.0, "fy": 10000.0, "cx": 7500.0, "cy": 7500.0, "k1": -0.05, "k2": 0.01},
+        unit="px",
+    )
+    made = block_of(3, cameras=[camera])
+    block, names, photo = exchanged(made.block, 5)
+    [found] = snoop(block).exchanged
+    assert set(found.points) == names
+    assert photo in found.photos
+
+
+def test_two_pairs_on_two_photos():
+    block, names, _ = exchanged(block_of(4).block, 1)
+    block, others, _ = exchanged(block, 2)
+    assert not names & others
+    assert {frozenset(each.points) for each in snoop(block).exchanged} == {
+        frozenset(names),
+        frozenset(others),
+    }
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_images_that_are_only_wrong_are_no_pair(seed):
+    """Five percent of the images have errors of 4 to 100 standard deviations, often two on a photo."""
+    block, random = block_of(seed).block, np.random.default_rng(seed)
+    bad = np.flatnonzero(random.random(len(block.image_xy)) < 0.05)
+    xy = block.image_xy.copy()
+    xy[bad] += random.uniform(0.04, 1.0, (len(bad), 1)) * random.choice([-1, 1], (len(bad), 2))
+    snooped = snoop(block.replace(image_xy=xy))
+    assert len(snooped.removed) >= 5
+    assert snooped.exchanged == ()
+    assert json.loads(snooped.to_json())["snooping"]["exchanged_names"] == []
+
+
+def test_three_names_in_a_circle_are_no_pair():
+    block = block_of(6).block
+    rows = np.flatnonzero(block.image_photos == 7)[:3]
+    xy = block.image_xy.copy()
+    xy[rows] = xy[np.roll(rows, 1)]
+    assert snoop(block.replace(image_xy=xy)).exchanged == ()
+
+
+def test_without_anything_out_there_is_nothing_to_ask():
+    made = block_of(1)
+    result = adjust(made.block)
+    placed = made.block.replace(
+        photo_positions=result.photo_positions, photo_attitudes=result.photo_attitudes
+    )
+    assert exchanged_names(placed, np.ones(len(made.block.image_xy), dtype=bool)) == []
