@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
@@ -13,6 +14,9 @@ from photogram.cli.console import output
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads, default_out, out_option
+
+if TYPE_CHECKING:
+    from photogram.checks.findings import Check
 
 __all__ = ["EXAMPLE", "CheckedOut", "check", "text_files"]
 
@@ -31,6 +35,12 @@ CheckedOut = Annotated[
 def text_files(out: Path, report: str) -> dict[Path, bytes]:
     """Return the report as text as a file of a directory of results."""
     return {out / TEXT: report.encode()}
+
+
+def _shorten(found: Check, inside: str, shown: str) -> None:
+    """Write in the findings where a packaged project lies as people are told."""
+    for section in found.sections:
+        section.findings = [replace(each, text=each.text.replace(inside, shown)) for each in section.findings]
 
 
 @with_job
@@ -77,10 +87,10 @@ def check(
         place = html_place(html, no_html, out)
         job.writes(out / TEXT, *([place] if place else []))
         project = read_project(directory)
-        project = replace(project, messages=job.told(project.messages))
         allowed = Limits.parse(limits) if limits else None
         with job.status("checking"):
             found = check_project(project, limits=allowed, threads=threads)
+        _shorten(found, f"{directory}{os.sep}", f"{job.shown(directory)}{os.sep}")
         job.finish(
             text_files(out, found.report()),
             {} if json is None else {json: found.to_json()},
