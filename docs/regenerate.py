@@ -12,6 +12,8 @@ Blocks between these marks and `<!-- end -->` are made anew, of all pages unless
 
 `<!-- measured: COMMAND -->` marks what takes hours or depends on the machine. It is not made anew; that the
 command is there, and that it knows the words of the block, is checked. docs/walk.py walks through tutorials.
+A figure in a sentence that follows from such a block has it behind itself: `1.9<!-- 1.946 -->`, or a sum of
+products, `63<!-- 5 * 12.70 -->`. It must be its rounding, and what it comes from must stand on the page.
 With --check, nothing is written, and the exit code says whether a page is out of date.
 """
 
@@ -54,6 +56,12 @@ MARKED = re.compile(
 )
 FIGURES = re.compile(r"```text\n.*?```|(?:^\|[^\n]*\n){3,}", re.DOTALL | re.MULTILINE)
 """What may hold figures: what was printed, and tables."""
+IN_SENTENCE = re.compile(r"(\d[\d,]*(?:\.\d+)?)<!-- ([-+*/() \d.,]*\d[-+*/() \d.,]*) -->")
+NUMBER = re.compile(r"\d[\d,]*(?:\.\d+)?")
+SHOWN = re.compile(
+    r"<!-- (?:numbers|printed|measured): .*?<!-- end -->|^```console\n.*?^```$", re.DOTALL | re.MULTILINE
+)
+"""Blocks whose figures are checked, those of docs/walk.py among them."""
 LANGUAGES = {".rs": "rust", ".py": "python"}
 
 
@@ -122,6 +130,31 @@ def unmarked_figures(page: str) -> list[str]:
     """Return blocks and tables that consist of figures and of which nothing says where they come from."""
     text = MARKED.sub("", (DOCS / page).read_text(encoding="utf-8"))
     return [block.partition("\n\n")[0] for block in FIGURES.findall(text) if _of_figures(block)]
+
+
+def figures_in_sentences(page: str) -> tuple[int, list[str]]:
+    """Return how many figures in sentences say what they come from, and those that do not follow from it."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    there = set(NUMBER.findall("\n".join(SHOWN.findall(text))))
+    wrong = []
+    marked = IN_SENTENCE.findall(text)
+    for shown, source in marked:
+        wrong += [
+            f"{page}: {shown} comes from {number}, which is not shown"
+            for number in NUMBER.findall(source)
+            if len(number) > 2 and number not in there
+        ]
+        value = float(eval(source.replace(",", ""), {"__builtins__": {}}))  # IN_SENTENCE: figures and signs
+        if not _rounds_to(value, shown):
+            wrong.append(f"{page}: {shown} is not {source}")
+    return len(marked), wrong
+
+
+def _rounds_to(value: float, shown: str) -> bool:
+    """Return whether a figure is a value, rounded to its last digit; thousands may be round."""
+    whole, _, decimals = shown.replace(",", "").partition(".")
+    zeros = len(whole) - len(whole.rstrip("0")) if not decimals and len(whole) > 3 else 0
+    return abs(value - float(shown.replace(",", ""))) <= 0.5000001 * 10.0 ** (zeros - len(decimals))
 
 
 def _of_figures(block: str) -> bool:

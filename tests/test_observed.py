@@ -11,7 +11,7 @@ from photogram.absolute_orientation import Orientation
 from photogram.collection import AdjustedCollection
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
-from photogram.show.ways import Shown, columns_of, picture_of, report_of
+from photogram.show.ways import Shown, axes_of, columns_of, report_of
 
 KINDS = {
     "image": ("residuals", "redundancy", "standardized"),
@@ -144,7 +144,7 @@ def test_a_way_that_nobody_has_defined_says_so():
         Bare().report,
         Bare().to_json,
         lambda: columns_of(Bare(), "photo"),
-        lambda: picture_of(Bare()),
+        lambda: axes_of(Bare()),
     ):
         with pytest.raises(NotImplementedError, match="Bare has no"):
             way()

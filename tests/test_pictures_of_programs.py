@@ -1,5 +1,6 @@
 """Pictures of orientations, plates, nights, comparators, plans: the style of the house, letters, names."""
 
+from functools import partial
 from importlib.resources import files
 from itertools import combinations
 from pathlib import Path
@@ -10,6 +11,7 @@ pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
+from example_scripts import load
 from photogram import orient
 from photogram.absolute_orientation import plot, read_csv
 
@@ -67,3 +69,41 @@ def test_names_of_control_do_not_cover_each_other_in_given_axes(size):
     written = {each.get_text() for each in axes.texts}
     assert {"H101", "V205"} <= written
     assert overlapping(axes) == []
+
+
+def test_what_is_drawn_goes_into_given_axes_or_a_file_or_both(tmp_path):
+    from photogram import adjust, plan, simulate, variance_components, variance_function
+    from photogram.results.calibration_picture import draw_distortion, draw_lens_field
+    from photogram.results.components_picture import draw_components
+    from photogram.results.variance_function import draw_variance_function
+
+    block = simulate(strips=2, photos_per_strip=4, seed=2).block
+    result = adjust(load("self_calibration").measured())
+    components, function = variance_components(block), variance_function(block)
+    draws = {
+        "components": partial(draw_components, components),
+        "function": partial(draw_variance_function, function),
+        "field": partial(draw_lens_field, result, result.cameras[0]),
+    }
+    for name, draw in draws.items():
+        axes = Figure().subplots(1, 2)
+        assert draw(ax=axes[0]) is axes[0]
+        assert axes[0].has_data()
+        assert not axes[1].has_data()
+        assert draw(tmp_path / f"{name}.svg").has_data()
+        assert (tmp_path / f"{name}.svg").read_bytes().startswith(b"<?xml")
+        assert draw(tmp_path / f"{name}.png", axes[1]) is axes[1]
+        assert (tmp_path / f"{name}.png").stat().st_size > 5000
+    three = Figure().subplots(3, 1)
+    assert draw_distortion(result, result.cameras[0], ax=three).tolist() == three.tolist()
+    for found in (components, function):
+        axes = Figure().subplots()
+        assert found.plot(axes) is axes
+        assert axes.has_data()
+    own = Figure()
+    parts = own.subfigures(1, 2)
+    truth = simulate(strips=2, photos_per_strip=4, seed=2).truth
+    predicted = plan({"a": truth, "b": truth})
+    assert predicted.plot(parts[0]) is parts[0]
+    assert predicted.plot(own) is own
+    assert len(parts[0].axes) == 3

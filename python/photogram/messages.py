@@ -47,6 +47,11 @@ def printable(text: str) -> str:
     return "".join(character if character.isprintable() else "\ufffd" for character in text)
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a number with its noun, which has an s where there are several: 1 photo, 2 photos."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 def listed(names: list[str], most: int = MOST_NAMES) -> str:
     """Name all of a few, and some of many: `most` of them."""
     shown = ", ".join(names[:most])

@@ -14,6 +14,7 @@ from photogram.distributed.entrance import plan_in_parts
 from photogram.distributed.run import read_manifest
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.network.observations import Relative
+from photogram.network.simulated_observations import with_rig
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +118,15 @@ def test_memory_decides_whether_there_are_parts(block, whole, monkeypatch):
     found = adjust(block, memory="1GB")
     assert type(found) is not photogram.Result
     agrees(found, whole)
+
+
+def test_a_rig_across_parts():
+    simulated = photogram.simulate(strips=4, photos_per_strip=12, points_per_photo=40, seed=3)
+    block = with_rig(simulated, [[0.3, 0.0, 0.05]], [[0.0, 0.5, 0.02]], seed=1).block
+    found, alone = adjust(block, parts=4), adjust(block)
+    agrees(found, alone)
+    for one, other in zip(found.unknowns, alone.unknowns, strict=True):
+        assert (np.abs(one.values - other.values) <= 1e-9 * one.sd).all()
 
 
 def test_a_plan_is_what_is_needed(block, tmp_path):

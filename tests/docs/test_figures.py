@@ -96,3 +96,39 @@ def test_the_pictures_of_results_are_what_their_command_draws():
     for name, drawn in pictures_figures.pictures().items():
         shown = (ROOT / "docs" / "pictures" / f"{name}.svg").read_text(encoding="utf-8")
         assert walk.alike(shown, drawn), f"{name}: run python docs/pictures_figures.py"
+
+
+SENTENCES = {
+    "absolute-orientation.md": 1,
+    "blunders.md": 1,
+    "giant-check.md": 4,
+    "tutorials/aerial-block.md": 4,
+    "tutorials/drone.md": 3,
+    "tutorials/metrology.md": 5,
+    "tutorials/vision.md": 3,
+}
+"""At the least so many figures of the sentences of a page say from which of its blocks they come."""
+
+
+@pytest.mark.parametrize("page", regenerate.PAGES)
+def test_figures_in_sentences_follow_from_the_blocks_of_their_page(page):
+    count, wrong = regenerate.figures_in_sentences(page)
+    assert wrong == []
+    assert count >= SENTENCES.get(page, 0)
+
+
+def test_a_sentence_that_does_not_follow_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(regenerate, "DOCS", tmp_path)
+    page = "<!-- printed: echo 1.946 200 -->\n```text\n1.946 200\n```\n<!-- end -->\nIt is {}\n"
+    for sentence, right in (
+        ("1.9<!-- 1.946 --> m", True),
+        ("1.8<!-- 1.946 --> m", False),
+        ("2.0<!-- 1.957 --> m", False),
+        ("5.8<!-- 3 * 1.946 -->", True),
+        ("9,000<!-- 200 * 46 -->", True),
+        ("200<!-- 200 -->", True),
+    ):
+        (tmp_path / "a.md").write_text(page.format(sentence))
+        count, wrong = regenerate.figures_in_sentences("a.md")
+        assert count == 1
+        assert (wrong == []) is right, wrong

@@ -38,7 +38,7 @@ COMMANDS = {
         ["Plan of the network", "Side by side", "How much", "New points", "Photos", "Control"],
     ),
     "check --example": ("example-checked", ["Verdict", "Plan of the network", "Reproducibility"]),
-    "giant check EXAMPLES/galveston --out out": ("out", ["Verdict", "Findings", "Key numbers"]),
+    "giant check --example": ("galveston-checked", ["Verdict", "Findings", "Key numbers"]),
     "absolute-orientation --example --out out": (
         "out",
         ["Residuals in plan", "Parameters", "Control", "Tests", "Transformed points", "Iterations"],

@@ -15,12 +15,15 @@ from photogram.arguments.types import Floats
 from photogram.messages import Message, listed
 from photogram.results.iteration import Iteration
 from photogram.show.brief import Brief
-from photogram.show.ways import Shown, picture_of
+from photogram.show.ways import Shown, axes_of
 from photogram.statistics.limits import GlobalTest, normal_limit, studentized_limit
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
+
+    from photogram.plots.panels import Where
 
 __all__ = ["Orientation", "Trace"]
 
@@ -273,9 +276,13 @@ class Orientation(Shown, Brief):
         """Return stations as a data frame: residuals in both units, redundancy numbers, test values."""
         return self._table("control")
 
-    def plot(self) -> bytes:
-        """Return a plan of the residuals of the control as a picture (PNG)."""
-        return picture_of(self)
+    def plot(self, ax: Where = None) -> Axes:
+        """Draw a plan of the residuals of the control into axes, or a new figure; return the axes.
+
+        Needs matplotlib (`pip install 'photogram[plots]'`).
+        """
+        drawn: Axes = axes_of(self, ax)
+        return drawn
 
 
 OrientedModel = Orientation

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
 from photogram.plots.panels import Where, labels, panels, scale_bars
-from photogram.show.pictures import arrows, drawn, new_figure, round_length
+from photogram.show.pictures import arrows, new_figure, round_length
 from photogram.show.style import INK, PURPLE, VERMILION
-from photogram.show.ways import picture_of
+from photogram.show.ways import axes_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,12 +27,6 @@ WIDE = 4.0
 """Inches of axes beyond which the legend has two columns."""
 
 
-@picture_of.register(Orientation)
-def picture(result: Orientation) -> bytes:
-    """Return the plan as a picture (PNG)."""
-    return drawn(figure(result))
-
-
 def figure(result: Orientation) -> Figure:
     """Return the plan of :func:`residuals` as a figure that belongs to no window."""
     made = new_figure(1.0, 1.0)
@@ -40,6 +34,7 @@ def figure(result: Orientation) -> Figure:
     return made
 
 
+@axes_of.register(Orientation)
 def residuals(result: Orientation, ax: Where = None) -> Axes:
     """Draw plan residuals as arrows and those of elevations as bars, given minus transformed.
 

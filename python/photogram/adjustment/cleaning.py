@@ -17,6 +17,7 @@ from photogram.adjustment.components import Settings, of_grouping, scaled
 from photogram.adjustment.snooping import of_network
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
+from photogram.messages import counted
 from photogram.results.components import VarianceComponents, component_lines, statement
 from photogram.results.group_sums import Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
@@ -71,7 +72,12 @@ class Cleaned(Brief):
     def changes(self) -> list[str]:
         """What was done to weights and observations, in sentences."""
         count = len(self.snooped.removed)
-        said = [f"{count} groups of observations are out after {self.rounds} rounds of variance components"]
+        taken = f"{counted(count, 'group')} of observations {'is' if count == 1 else 'are'} out"
+        said = [
+            f"{taken} after {counted(self.rounds, 'round')} of variance components"
+            if self.rounds
+            else f"nothing contradicts the given weights, which stay; {taken}"
+        ]
         if not self.settled:
             said.append("weights and gross errors still change: look at both")
         factors = zip(self.groups, self.factors.tolist(), strict=True)

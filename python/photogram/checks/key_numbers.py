@@ -78,14 +78,21 @@ def _variance(result: Result, section: Section) -> None:
         )
 
 
+def _between(low: str, high: str, unit: str) -> str:
+    return f"{low} {unit}" if low == high else f"{low} to {high} {unit}"
+
+
 def _weights(result: Result, words: Words, section: Section) -> None:
     unit, factor = small_unit(result.block.image_unit)
     low, high = (
         factor * float(value) for value in (result.block.image_sd.min(), result.block.image_sd.max())
     )
-    section.figure("standard deviations of image coordinates", f"{low:g} to {high:g} {unit}")
+    section.figure("standard deviations of image coordinates", _between(f"{low:g}", f"{high:g}", unit))
     spread = mad_sd(result.standardized)
-    section.figure("the same as the residuals have them", f"{low * spread:.3g} to {high * spread:.3g} {unit}")
+    section.figure(
+        "the same as the residuals have them",
+        _between(f"{low * spread:.3g}", f"{high * spread:.3g}", unit),
+    )
     usual = words.usual_um
     if usual is not None and unit == "um" and (low < usual[0] or high > usual[1]):
         text = (

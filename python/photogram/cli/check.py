@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
@@ -13,8 +15,13 @@ from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads, default_out, out_option
 
-__all__ = ["CheckedOut", "check", "text_files"]
+if TYPE_CHECKING:
+    from photogram.checks.findings import Check
 
+__all__ = ["EXAMPLE", "CheckedOut", "check", "text_files"]
+
+EXAMPLE = "galveston"
+"""The packaged example, a directory of photogram.examples."""
 TEXT = "report.txt"
 """The report as text, in a directory of results."""
 
@@ -30,14 +37,28 @@ def text_files(out: Path, report: str) -> dict[Path, bytes]:
     return {out / TEXT: report.encode()}
 
 
+def _shorten(found: Check, inside: str, shown: str) -> None:
+    """Write in the findings where a packaged project lies as people are told."""
+    for section in found.sections:
+        section.findings = [replace(each, text=each.text.replace(inside, shown)) for each in section.findings]
+
+
 @with_job
 def check(
     job: Job,
     directory: Annotated[
-        Path,
+        Path | None,
         Reads.PROJECT,
-        typer.Argument(metavar="DIR", help="Directory of the five files, as for adjusting."),
-    ],
+        typer.Argument(
+            metavar="DIR", help="Directory of the five files, as for adjusting.", show_default=False
+        ),
+    ] = None,
+    example: Annotated[
+        bool,
+        typer.Option(
+            "--example", help="Check the packaged example instead: 20 photographs at Galveston Bay."
+        ),
+    ] = False,
     out: CheckedOut = None,
     json: JsonFile = None,
     html: HtmlFile = None,
@@ -58,6 +79,10 @@ def check(
         from photogram.giant import check as check_project
         from photogram.show.ways import page_of
 
+        if directory is None:
+            directory = job.packaged(EXAMPLE)
+            job.reads(directory)
+            out = out or Path(f"{EXAMPLE}-checked")
         out = out or default_out(directory, "-checked")
         place = html_place(html, no_html, out)
         job.writes(out / TEXT, *([place] if place else []))
@@ -65,6 +90,7 @@ def check(
         allowed = Limits.parse(limits) if limits else None
         with job.status("checking"):
             found = check_project(project, limits=allowed, threads=threads)
+        _shorten(found, f"{directory}{os.sep}", f"{job.shown(directory)}{os.sep}")
         job.finish(
             text_files(out, found.report()),
             {} if json is None else {json: found.to_json()},

@@ -248,7 +248,7 @@ def _pages(
     for number, calibration in enumerate(calibrations, 1):
         place = html_place(html, no_html, _place(folder, number, len(calibrations)))
         mark = f"-{number}" if html is not None and len(calibrations) > 1 else ""
-        make = partial(page_of, calibration)
+        make = partial(page_of, replace(calibration, messages=job.told(calibration.messages)))
         written |= html_files(job, "comparator", place, html is not None, make, mark)
     return written
 

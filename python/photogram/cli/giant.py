@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
+from photogram.cli.check import EXAMPLE
 from photogram.cli.components import (
     COMPONENTS,
     Components,
@@ -56,8 +57,6 @@ __all__ = ["giant"]
 
 RESULTS = ("FRAMES", "GROUND", "RESTART", "report.txt")
 """What goes to the output directory."""
-EXAMPLE = "galveston"
-"""The packaged example, a directory of photogram.examples."""
 
 
 @with_job

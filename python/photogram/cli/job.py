@@ -121,10 +121,10 @@ class Job:
         return found
 
     def shown(self, path: Path) -> Path:
-        """Return a path as people are told: one of a packaged example without where the package lies."""
-        for folder in self._examples:
-            if path == folder or folder in path.parents:
-                return path.relative_to(folder.parent)
+        """Return a path as people are told: one of the package's without where the package lies."""
+        for folder in [each.parent for each in self._examples] + [Path(str(files("photogram")))]:
+            if folder in path.parents:
+                return path.relative_to(folder)
         return path
 
     def told(self, messages: Iterable[Message]) -> list[Message]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from photogram.cli.job import Job, Reads
+from photogram.messages import counted
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Indices
@@ -230,12 +231,12 @@ def described(project: Project) -> list[Section]:
         f" {np.count_nonzero(rays)} points",
         "rays of points: "
         + ", ".join(f"{count} with {k}{' or more' if k == _MANY else ''}" for k, count in _ray_counts(rays)),
-        f"control: {held} points held, {len(project.checks)} check points",
+        f"control: {counted(held, 'point')} held, {counted(len(project.checks), 'check point')}",
     ]
     kinds: dict[str, int] = {}
     for each in block.observations:
         kinds[each.label] = kinds.get(each.label, 0) + 1
-    size += [f"{count} observations of the kind {kind}" for kind, count in kinds.items()]
+    size += [f"{counted(count, 'observation')} of the kind {kind}" for kind, count in kinds.items()]
     if block.mounts:
         size.append(f"{len(block.mounts)} photos on frames with others")
     cameras = []

@@ -20,6 +20,7 @@ from photogram.arguments.arrays import number, one_of, shaped, shown, truth_valu
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.memory import available_memory
+from photogram.messages import counted
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, checked_cameras
@@ -294,7 +295,7 @@ def simulate(
         spheroid=spheroid,
         photo_to_ground=photo_to_ground,
         refraction=refraction,
-        title=f"simulated block, {strips} strips of {photos_per_strip} photographs",
+        title=f"simulated block, {counted(strips, 'strip')} of {counted(photos_per_strip, 'photograph')}",
     )
     faults = _blunders(len(xy), blunders, blunder_size, blunder_random)
     measured = xy + image_sd * image_random.standard_normal(xy.shape)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from photogram.statistics.reliability import TESTABLE, noncentrality
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
 __all__ = ["Plan", "plan"]
 
@@ -70,8 +70,16 @@ class Plan:
         """
         return html_of(self)
 
-    def plot(self) -> Figure:
-        """Return a figure: the patterns in plan, the expected standard deviation in height as colour.
+    @overload
+    def plot(self) -> Figure: ...
+
+    @overload
+    def plot(self, figure: Figure | SubFigure) -> Figure | SubFigure: ...
+
+    def plot(self, figure: Figure | SubFigure | None = None) -> Figure | SubFigure:
+        """Draw the patterns in plan, the expected standard deviation in height as colour; return the figure.
+
+        `figure` is one of your own, or a part of one (SubFigure); None makes one that belongs to no window.
 
         Needs matplotlib (`pip install 'photogram[plots]'`).
 
@@ -80,9 +88,9 @@ class Plan:
         PhotogramError
             There are no new points to be shown.
         """
-        from photogram.planning.plot import figure  # matplotlib takes long to import
+        from photogram.planning import plot  # matplotlib takes long to import
 
-        return figure(self.patterns)
+        return plot.figure(self.patterns, figure)
 
     def to_json(self) -> bytes:
         """Return the figures of the plan as a JSON document (UTF-8); what is not a number is null."""

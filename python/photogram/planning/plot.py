@@ -6,7 +6,7 @@ matplotlib is an extra (`pip install 'photogram[plots]'`) and takes long to impo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.collections import PathCollection
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
     from photogram.planning.pattern import Pattern
 
@@ -33,14 +33,22 @@ _ELONGATED = 2.5
 _KINDS = (("full control", "^"), ("height control", "o"), ("plane control", "s"))
 
 
+@overload
+def figure(patterns: Sequence[Pattern], given: None = None) -> Figure: ...
+
+
+@overload
+def figure(patterns: Sequence[Pattern], given: Figure | SubFigure) -> Figure | SubFigure: ...
+
+
 @in_style
-def figure(patterns: Sequence[Pattern]) -> Figure:
+def figure(patterns: Sequence[Pattern], given: Figure | SubFigure | None = None) -> Figure | SubFigure:
     """Return a figure with a panel for each pattern, in one scale of lengths and one of colours."""
     heights = np.concatenate([pattern.point_sd[pattern.new_points, 2] for pattern in patterns])
     if heights.size == 0:
         raise PhotogramError("there are no new points to be shown")
     plan = np.vstack([pattern.point_plan[pattern.result.used_points] for pattern in patterns])
-    made, axes = _panels(len(patterns), *np.maximum(np.ptp(plan, axis=0), 1e-9))
+    made, axes = _panels(given, len(patterns), *np.maximum(np.ptp(plan, axis=0), 1e-9))
     colours = [_panel(each, pattern, heights) for each, pattern in zip(axes, patterns, strict=True)]
     unit = patterns[0].block.linear_unit
     made.colorbar(colours[0], ax=axes, label=f"expected standard deviation in height, {unit}", aspect=30)
@@ -52,14 +60,16 @@ def figure(patterns: Sequence[Pattern]) -> Figure:
     return made
 
 
-def _panels(count: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
-    """Make an empty figure for blocks of a width and height."""
+def _panels(
+    given: Figure | SubFigure | None, count: int, width: float, height: float
+) -> tuple[Figure | SubFigure, list[Axes]]:
+    """Make panels for blocks of a width and height, in a figure that fits them unless one is given."""
     stacked = width > _ELONGATED * height
     rows, columns = (count, 1) if stacked else (1, count)
     across = max(2 * _PANEL if stacked else min(_PANEL, _PANEL * width / height), 3.5)
     up = min(across * height / width, _PANEL)
     size = (columns * (across + 0.5) + 1.5, rows * (up + 0.8) + 0.6)
-    made = new_figure(*size)
+    made = new_figure(*size) if given is None else given
     axes = made.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for each in axes.ravel():
         each.set_aspect("equal")

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, TypeAlias
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io.writing import write_whole
+from photogram.show.pictures import drawn, new_figure
 from photogram.show.style import FAINT, INK, styled
 
 if TYPE_CHECKING:
@@ -20,13 +23,14 @@ if TYPE_CHECKING:
 
     Where: TypeAlias = Axes | Sequence[Axes] | NDArray[Any] | Figure | SubFigure | None
 
-__all__ = ["NOWHERE", "Where", "handed_out", "labels", "note", "panels", "scale_bars"]
+__all__ = ["NOWHERE", "Where", "handed_out", "labels", "note", "panels", "placed", "scale_bars"]
 
 if not TYPE_CHECKING:
     Where = Any
     """Axes, as many as there are panels, a figure to put them in, or None: a new one of pyplot."""
 
 
+Drawn = TypeVar("Drawn")
 NOWHERE = np.empty((0, 2))
 
 
@@ -83,6 +87,29 @@ def handed_out(axes: list[Axes]) -> Any:
     found = np.empty(len(axes), dtype=object)
     found[:] = axes
     return found
+
+
+def placed(draw: Callable[[Where], Drawn], path: Path | None, ax: Where) -> Drawn:
+    """Return the axes of a picture that is drawn where it is asked for, and written where there is a path.
+
+    Parameters
+    ----------
+    draw
+        Draws into what :func:`panels` takes, and returns axes.
+    path
+        Of the file, which has the figure of the axes, in the format that its suffix names; None: no file.
+    ax
+        As of :func:`panels`; with a path and None, a figure that belongs to no window.
+
+    Raises
+    ------
+    InputError
+        A suffix that names no format; another number of axes.
+    """
+    axes = draw(new_figure(1.0, 1.0) if ax is None and path is not None else ax)
+    if path is not None:
+        write_whole({path: drawn(_figure(np.atleast_1d(np.asarray(axes, dtype=object))[0]), path)})
+    return axes
 
 
 def note(axes: Axes, lines: Sequence[str]) -> None:

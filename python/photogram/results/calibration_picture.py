@@ -2,29 +2,47 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from photogram.io.writing import write_whole
 from photogram.plots.distortion import draw_curves, rows_of
+from photogram.plots.panels import Where, handed_out, panels, placed
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.lens_field import LensField, lens_field
 from photogram.results.pictured import curves_of
 from photogram.results.result import Result
-from photogram.show.pictures import arrows, drawn, new_figure, round_length
-from photogram.show.style import BLUE, INK, in_style
+from photogram.show.pictures import arrows, new_figure, round_length
+from photogram.show.style import BLUE, INK
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["draw_distortion", "draw_lens_field", "figure_of_distortion", "figure_of_lens_field"]
 
 
-def draw_distortion(result: Result, camera: AdjustedCamera, path: Path) -> None:
-    """Write the picture of a camera's distortion curve, in the format that the name of the file asks for.
+def draw_distortion(
+    result: Result, camera: AdjustedCamera, path: Path | None = None, ax: Where = None
+) -> NDArray[Any]:
+    """Draw a camera's distortion: the curve, its balanced form, and the standard deviations of both.
+
+    Parameters
+    ----------
+    result, camera
+        An adjusted block, and one of its cameras.
+    path
+        Of a file for the picture, in the format that its suffix names; None: none is written.
+    ax
+        Axes, one for each panel, or a figure to put them in; a new figure when None.
+
+    Returns
+    -------
+    The axes.
 
     Raises
     ------
@@ -36,11 +54,26 @@ def draw_distortion(result: Result, camera: AdjustedCamera, path: Path) -> None:
     curve = distortion_curve(result, camera)
     if curve is None:
         raise ValueError(f"{camera.name} has no radial distortion to draw")
-    write_whole({path: drawn(figure_of_distortion(camera, curve), path)})
+    return placed(partial(_distortion, camera, curve), path, ax)
 
 
-def draw_lens_field(result: Result, camera: AdjustedCamera, path: Path) -> None:
-    """Write the picture of what the terms beside the radial ones do, in the format that the name asks for.
+def draw_lens_field(
+    result: Result, camera: AdjustedCamera, path: Path | None = None, ax: Where = None
+) -> Axes:
+    """Draw what the terms beside the radial ones do, with their standard ellipses.
+
+    Parameters
+    ----------
+    result, camera
+        An adjusted block, and one of its cameras.
+    path
+        Of a file for the picture, in the format that its suffix names; None: none is written.
+    ax
+        Axes, or a figure to put them in; a new figure when None.
+
+    Returns
+    -------
+    The axes.
 
     Raises
     ------
@@ -52,44 +85,54 @@ def draw_lens_field(result: Result, camera: AdjustedCamera, path: Path) -> None:
     field = lens_field(result, camera)
     if field is None:
         raise ValueError(f"{camera.name} has no terms beside the radial ones to draw")
-    write_whole({path: drawn(figure_of_lens_field(camera, field), path)})
+    return placed(partial(_lens_field, camera, field), path, ax)
 
 
-@in_style
 def figure_of_lens_field(camera: AdjustedCamera, field: LensField) -> Figure:
     """Return vectors on a grid of the image with their standard ellipses, all enlarged alike."""
+    figure = new_figure(1.0, 1.0)
+    _lens_field(camera, field, figure)
+    return figure
+
+
+def figure_of_distortion(camera: AdjustedCamera, curve: DistortionCurve) -> Figure:
+    """Return the curve and its balanced form, one standard deviation on either side, dashed beyond images."""
+    figure = new_figure(1.0, 1.0)
+    _distortion(camera, curve, figure)
+    return figure
+
+
+def _lens_field(camera: AdjustedCamera, field: LensField, ax: Where) -> Axes:
     from matplotlib.patches import Ellipse  # takes long to import
 
     unit = str(camera.camera.unit)
     factor, written = (1000.0, "µm") if unit == "mm" else (1.0, "px")
-    figure = new_figure(7.0, 6.0)
-    axes = figure.subplots()
-    longest = float(np.hypot(*field.vectors.T).max())
-    spacing = float(np.ptp(field.positions[:, 0])) / 8
-    scale = round_length(longest) / spacing if longest > 0 else 1.0
-    arrows(axes, field.positions, field.vectors, scale, color=INK, width=0.003)
-    for end, covariance in zip(
-        field.positions + field.vectors / scale, field.covariances / scale**2, strict=True
-    ):
-        variances, axis = np.linalg.eigh(covariance)
-        width, height = 2 * np.sqrt(np.maximum(variances, 0.0))
-        angle = np.degrees(np.arctan2(axis[1, 0], axis[0, 0]))
-        axes.add_patch(Ellipse(tuple(end), width, height, angle=angle, alpha=0.4, linewidth=0, color=BLUE))
-    axes.set_aspect("equal")
-    axes.set_title(
-        f"{', '.join(field.names)} of {camera.name}: a width of the grid is"
-        f" {factor * scale * spacing:.3g} {written}"
-    )
-    axes.set_xlabel(f"x, {unit}")
-    axes.set_ylabel(f"y, {unit}")
-    return figure
+    with panels(ax, 1, 1, 7.0, 6.0) as [axes]:
+        longest = float(np.hypot(*field.vectors.T).max())
+        spacing = float(np.ptp(field.positions[:, 0])) / 8
+        scale = round_length(longest) / spacing if longest > 0 else 1.0
+        arrows(axes, field.positions, field.vectors, scale, color=INK, width=0.003)
+        for end, covariance in zip(
+            field.positions + field.vectors / scale, field.covariances / scale**2, strict=True
+        ):
+            variances, axis = np.linalg.eigh(covariance)
+            width, height = 2 * np.sqrt(np.maximum(variances, 0.0))
+            angle = np.degrees(np.arctan2(axis[1, 0], axis[0, 0]))
+            axes.add_patch(
+                Ellipse(tuple(end), width, height, angle=angle, alpha=0.4, linewidth=0, color=BLUE)
+            )
+        axes.set_aspect("equal")
+        axes.set_title(
+            f"{', '.join(field.names)} of {camera.name}: a width of the grid is"
+            f" {factor * scale * spacing:.3g} {written}"
+        )
+        axes.set_xlabel(f"x, {unit}")
+        axes.set_ylabel(f"y, {unit}")
+    return axes
 
 
-@in_style
-def figure_of_distortion(camera: AdjustedCamera, curve: DistortionCurve) -> Figure:
-    """Return the curve and its balanced form, one standard deviation on either side, dashed beyond images."""
+def _distortion(camera: AdjustedCamera, curve: DistortionCurve, ax: Where) -> NDArray[Any]:
     curves = curves_of(camera, curve)
-    figure = new_figure(6.4, 7.5)
-    panels = figure.subplots(rows_of(curves), 1, sharex=True)
-    draw_curves(panels.tolist(), curves)
-    return figure
+    with panels(ax, rows_of(curves), 1, 6.4, 7.5, sharex=True) as found:
+        draw_curves(found, curves)
+    return np.atleast_1d(handed_out(found))

@@ -11,12 +11,15 @@ from photogram.io import json
 from photogram.results.network import AdjustedNetwork
 from photogram.show.brief import Brief
 from photogram.show.sections import Section, composed, headline
-from photogram.show.ways import Shown, columns_of, document_of, findings_of, report_of
+from photogram.show.ways import Shown, axes_of, columns_of, document_of, findings_of, report_of
 from photogram.statistics.components import Component, Estimate
 from photogram.statistics.findings import Findings, GroupFactor
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
+
+    from photogram.plots.panels import Where
 
 __all__ = ["VarianceComponents", "component_lines", "statement"]
 
@@ -51,6 +54,14 @@ class VarianceComponents(Shown, Brief):
     def worth_changing(self) -> list[Component]:
         """Those that differ significantly, and by more than 25 percent of the standard deviation, from 1."""
         return [each for each in self.components if each.worth_changing]
+
+    def plot(self, ax: Where = None) -> Axes:
+        """Draw factors of standard deviations with intervals into axes, or a new figure; return the axes.
+
+        Needs matplotlib (`pip install 'photogram[plots]'`).
+        """
+        drawn: Axes = axes_of(self, ax)
+        return drawn
 
     def __getitem__(self, name: str) -> Component:
         """Return the component of a group."""

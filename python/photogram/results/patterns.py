@@ -34,6 +34,8 @@ NOTABLE = 0.3
 """Standard deviations: mean residuals below this harm nobody."""
 CLIPPED = 3.0
 """Larger test values count as this one."""
+SPEAKING = 1e-3
+"""Standardized residuals that are all smaller belong to weights of nothing, and their drift says nothing."""
 VISIBLE = 0.1
 """Redundancy numbers of the coordinates whose distribution is looked at."""
 KURTOSIS = (-0.7, 1.0)
@@ -191,8 +193,9 @@ def _distribution(result: AdjustedNetwork, used: Bools) -> Systematic | None:
 
 
 def _of_stations(result: AdjustedNetwork, names: Sequence[str]) -> list[Systematic | None]:
-    """Test whether observed positions drift along the order of the photos."""
+    """Test whether observed positions that have a weight drift along the order of the photos."""
     w = np.where(result.photo_redundancy > TESTABLE, result.photo_standardized, math.nan)
+    w = np.where(np.abs(np.nan_to_num(w)).max(axis=0) > SPEAKING, w, math.nan)
     order = np.linspace(-1.0, 1.0, len(w))
     design = np.column_stack([np.ones(len(w)), order, order**2])
     return [

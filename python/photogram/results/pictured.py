@@ -124,6 +124,11 @@ class PicturedBlock(Pictured):
         return [curves_of(each, curve) for each, curve in curves if curve is not None]
 
 
+def _bands(**sds: Floats) -> dict[str, Floats]:
+    """Return standard deviations by what they are of, without those that are zero (a camera that is held)."""
+    return {name.replace("_", " "): sd for name, sd in sds.items() if np.any(sd != 0)}
+
+
 def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:
     """Return what is drawn of the distortion of a camera: the curve, and its balanced form."""
     unit = str(camera.camera.unit)
@@ -136,8 +141,8 @@ def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:
         radii=curve.radii,
         observed=curve.observed,
         curves=[
-            Curve("", curve.values, {"mapping": curve.sd_mapping, "curve": curve.sd}),
-            Curve(balanced, curve.balanced, {"balanced curve": curve.sd_balanced}),
+            Curve("", curve.values, _bands(mapping=curve.sd_mapping, curve=curve.sd)),
+            Curve(balanced, curve.balanced, _bands(balanced_curve=curve.sd_balanced)),
         ],
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -11,19 +12,18 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.io import json
-from photogram.io.writing import write_whole
+from photogram.plots.panels import Where, panels, placed
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
 from photogram.show.brief import Brief
-from photogram.show.pictures import drawn, new_figure
 from photogram.show.sections import composed, headline
-from photogram.show.style import FAINT, INK, MARKED, in_style
-from photogram.show.ways import Shown, columns_of, document_of, picture_of, report_of
+from photogram.show.style import FAINT, INK, MARKED
+from photogram.show.ways import Shown, axes_of, columns_of, document_of, report_of
 from photogram.statistics.variance_function import FunctionEstimate
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 __all__ = ["Bin", "VarianceFunction", "draw_variance_function"]
 
@@ -107,6 +107,14 @@ class VarianceFunction(Shown, Brief):
         a, b = self.estimate.coefficients.tolist()
         return float(a + b * (value / self.largest) ** 2)
 
+    def plot(self, ax: Where = None) -> Axes:
+        """Draw quantiles with their intervals, and the function, into axes, or a new figure; return the axes.
+
+        Needs matplotlib (`pip install 'photogram[plots]'`).
+        """
+        drawn: Axes = axes_of(self, ax)
+        return drawn
+
     def table(self) -> pd.DataFrame:
         """Return the bins as a data frame."""
         return self._table("bin")
@@ -172,37 +180,43 @@ def _report(found: VarianceFunction) -> str:
     return composed(headline("variance function"), sections)
 
 
-@picture_of.register(VarianceFunction)
-def _picture(found: VarianceFunction) -> bytes:
-    """Return the picture (PNG)."""
-    return drawn(_figure(found))
+def draw_variance_function(found: VarianceFunction, path: Path | None = None, ax: Where = None) -> Axes:
+    """Draw the factors of ten quantiles with their intervals, and the function.
 
+    Parameters
+    ----------
+    found
+        A variance function.
+    path
+        Of a file for the picture, in the format that its suffix names; None: none is written.
+    ax
+        Axes, or a figure to put them in; a new figure when None.
 
-def draw_variance_function(found: VarianceFunction, path: Path) -> None:
-    """Write the picture of a variance function, in the format that the name of the file asks for.
+    Returns
+    -------
+    The axes.
 
     Raises
     ------
     InputError
         A suffix that names no format.
     """
-    write_whole({path: drawn(_figure(found), path)})
+    return placed(partial(_drawn, found), path, ax)
 
 
-@in_style
-def _figure(found: VarianceFunction) -> Figure:
-    """Draw the bins with their intervals, and the function."""
-    figure = new_figure(6.4, 4.0)
-    axes = figure.add_subplot()
-    x = np.array([each.value for each in found.bins])
-    y = np.array([each.factor for each in found.bins])
-    ends = np.array([each.interval for each in found.bins]).T
-    axes.errorbar(x, y, np.abs(ends - y), fmt="o", color=INK, capsize=3, label="residuals, 95 percent")
-    line = np.linspace(0.0, found.largest, 100)
-    axes.plot(line, [found.factor(value) for value in line], color=MARKED, label="function")
-    axes.axhline(1.0, color=FAINT, linewidth=0.8, label="given variance")
-    axes.set_xlabel(found.name)
-    axes.set_ylabel("factor of the given variance")
-    axes.set_ylim(bottom=0.0)
-    axes.legend()
-    return figure
+@axes_of.register(VarianceFunction)
+def _drawn(found: VarianceFunction, ax: Where = None) -> Axes:
+    with panels(ax, 1, 1, 6.4, 4.0) as [axes]:
+        x = np.array([each.value for each in found.bins])
+        y = np.array([each.factor for each in found.bins])
+        ends = np.array([each.interval for each in found.bins]).T
+        axes.errorbar(x, y, np.abs(ends - y), fmt="o", color=INK, capsize=3, label="residuals, 95 percent")
+        line = np.linspace(0.0, found.largest, 100)
+        axes.plot(line, [found.factor(value) for value in line], color=MARKED, label="function")
+        axes.axhline(1.0, color=FAINT, linewidth=0.8, label="given variance")
+        unit = f", {getattr(found.network, 'image_unit', 'px')}" if found.name == "radius" else ""
+        axes.set_xlabel(f"{found.name}{unit}")
+        axes.set_ylabel("factor of the given variance")
+        axes.set_ylim(bottom=0.0)
+        axes.legend()
+    return axes

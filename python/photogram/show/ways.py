@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 __all__ = [
     "Judged",
     "Shown",
+    "axes_of",
     "columns_of",
     "document_of",
     "files_of",
     "findings_of",
     "html_of",
     "page_of",
-    "picture_of",
     "report_of",
 ]
 
@@ -63,8 +63,8 @@ def files_of(result: object) -> Mapping[str, bytes | Callable[[BinaryIO], None]]
 
 
 @singledispatch
-def picture_of(result: object) -> bytes:
-    """Return the picture of a result (PNG)."""
+def axes_of(result: object, ax: Any = None) -> Any:
+    """Draw a result into axes, or into a new figure; return the axes."""
     _undefined(result, "picture")
 
 

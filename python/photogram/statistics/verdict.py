@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from photogram.messages import listed
+from photogram.messages import counted, listed
 from photogram.statistics.evidence import NAMED, Evidence, Test
 from photogram.statistics.findings import Findings
 from photogram.statistics.limits import NOTABLE_FACTOR
@@ -175,8 +175,8 @@ def _snooped(e: Evidence) -> _Line | None:
     if e.high:
         return None
     names = listed([str(each.get("name", "")) for each in found.removed], NAMED)
-    noun = "observation" if count == 1 else "observations"
-    text = "; ".join([f"Usable after removal of {count} {noun}: {names}", *found.exchanged])
+    removed = counted(count, "observation")
+    text = "; ".join([f"Usable after removal of {removed}: {names}", *found.exchanged])
     return _Line("usable-after-removal", text)
 
 

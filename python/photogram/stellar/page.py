@@ -95,11 +95,14 @@ def _next(result: Result) -> list[str]:
     return found
 
 
+_UNIT = "of a plate coordinate of weight 1"
+
+
 def _highlights(result: Result) -> list[Fact]:
     rms = np.sqrt((result.solved.residuals**2).mean(axis=0)) * 1e6
     known = int(result.problem.known.sum())
     return [
-        Fact("Mean error of unit weight", significant(result.mean_error, 4)),
+        Fact("Mean error of unit weight", significant(1e6 * result.mean_error, 4), "µm", _UNIT),
         Fact(
             "rms of plate residuals, x",
             significant(float(rms[0]), 3),
@@ -140,11 +143,11 @@ def _much(result: Result) -> list[Fact]:
 def _good(result: Result) -> list[Fact]:
     plate, stars, parameters = (float(each) for each in result.solved.sums)
     return [
-        Fact("Mean error of unit weight, computed", significant(result.computed_mean_error, 5)),
-        Fact("Mean error of unit weight, in use", significant(result.mean_error, 5)),
-        Fact("Weighted sum of squares, plate", significant(plate, 6)),
-        Fact("Weighted sum of squares, stars", significant(stars, 6)),
-        Fact("Weighted sum of squares, parameters", significant(parameters, 6)),
+        Fact("Mean error of unit weight, computed", significant(1e6 * result.computed_mean_error, 5), "µm"),
+        Fact("Mean error of unit weight, in use", significant(1e6 * result.mean_error, 5), "µm", _UNIT),
+        Fact("Weighted sum of squares, plate", significant(1e12 * plate, 6), "µm²"),
+        Fact("Weighted sum of squares, stars", significant(1e12 * stars, 6), "µm²"),
+        Fact("Weighted sum of squares, parameters", significant(1e12 * parameters, 6), "µm²"),
     ]
 
 

@@ -8,8 +8,9 @@
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::group_step::GroupStep;
 use super::problem::{Linearized, Model};
-use super::walk::{Buffers, GroupStep};
+use super::walk::Buffers;
 use crate::normals::Equations;
 
 /// The part h of the step at which residuals are compared with those that the linearized equations predict.

@@ -59,6 +59,7 @@ mod damped;
 mod datum;
 mod distributions;
 mod factored;
+mod group_step;
 mod group_test;
 mod loss;
 mod method;

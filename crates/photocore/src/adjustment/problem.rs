@@ -5,8 +5,8 @@ use std::ops::Range;
 use rayon::ThreadPool;
 use smallvec::SmallVec;
 
+use super::group_step::GroupStep;
 use super::loss::Reweighting;
-use super::walk::GroupStep;
 use crate::normals::{Contribution, Equations, GroupRows, Layout, Prior, System, TieRows, dot};
 
 /// How observations follow from unknowns.

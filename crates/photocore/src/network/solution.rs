@@ -358,7 +358,9 @@ fn photos(
             None => model.cameras[index].parameters(),
         };
         if model.mount(index).is_some() {
-            let cofactors = adjustment.cofactors.as_ref().filter(|_| model.images_on[index] > 0);
+            // In a part of a network its images may be at home below.
+            let asked = model.images_on[index] > 0 || !problem.layout().contributions().is_empty();
+            let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
             let (pose, cofactors) = mounted_pose(network, problem, &placed, index, cofactors);
             let redundancy = vec![if cofactors[0].is_nan() { f64::NAN } else { 0.0 }; 6];
             return AdjustedPhoto { pose, camera, cofactors, redundancy, images: model.images_on[index] };

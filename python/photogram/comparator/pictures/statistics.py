@@ -63,8 +63,9 @@ def variance_bars(calibration: Calibration) -> Figure:
     bars = axes.barh(names[::-1], values[::-1], color=MAIN, alpha=0.75, height=0.6)
     for bar, name in zip(bars, names[::-1], strict=True):
         share = 100 * components[name] ** 2 / total if total else 0.0
-        text = f" {components[name]:.3f} µm   {share:.0f} %"
-        axes.text(bar.get_width(), bar.get_y() + bar.get_height() / 2, text, va="center", fontsize=8)
+        text = f"{components[name]:.3f} µm, {share:.0f} %"
+        end = bar.get_width(), bar.get_y() + bar.get_height() / 2
+        axes.annotate(text, end, (4, 0), textcoords="offset points", va="center", fontsize=8)
     axes.set_xlim(0, 1.25 * (max(values) or 1.0))
     axes.set_xlabel("variance, µm²")
     axes.set_title(f"Components of the error: {components['total']:.3f} µm before calibration")

@@ -41,7 +41,7 @@ CAPTIONS = {
     ),
     "distortion": (
         "Radial distortion with its standard deviations",
-        "The curve with one standard deviation on either side, dashed where no image lies.",
+        "The curve, dashed where no image lies; where it is estimated, with one standard deviation beside.",
     ),
 }
 """Title and caption by name."""
