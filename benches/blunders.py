@@ -1,7 +1,8 @@
 """Plant gross errors in simulated blocks and take them out: how many are found, what is lost, what remains.
 
 `--blocks 200` prints the table of docs/blunders.md, with the processor time of a block of each row; `--time
-20x50` the time of snooping beside a plain adjustment of a large block with one percent of gross errors.
+20x50` the time of snooping beside a plain adjustment of a large block with one percent of gross errors;
+`--pairs` how exchanged names are reported.
 """
 
 from __future__ import annotations
@@ -274,6 +275,26 @@ def table(blocks: int, first: int, cases: list[str]) -> list[str]:
     return lines
 
 
+def pairs(blocks: int, first: int) -> None:
+    """Print how often exchanged names are reported as a pair, and how often a pair is that is none."""
+    print("| planted | blocks | reported as the pair | on one photo of two | other pairs reported |")
+    print("|---|---:|---:|---:|---:|")
+    for name in ("names of two points exchanged", "none"):
+        named = doubtful = others = 0
+        for seed in range(first, first + blocks):
+            block, _ = simulated(seed)
+            planted = CASES[name](block, np.random.default_rng([seed, 7]))
+            rows = sorted(planted.images) if name.endswith("exchanged") else []
+            points = {block.point_ids[block.image_points[row]] for row in rows}
+            for each in snoop(planted.block).exchanged:
+                photo = block.photo_ids[block.image_photos[rows[0]]] if rows else ""
+                is_pair = set(each.points) == points and photo in each.photos
+                named, others = named + is_pair, others + (not is_pair)
+                doubtful += is_pair and len(each.photos) > 1
+        counts = (f"{named}", f"{doubtful}") if name.endswith("exchanged") else ("-", "-")
+        print(f"| {name} | {blocks} | {counts[0]} | {counts[1]} | {others} |", flush=True)
+
+
 def interval(part: int, whole: int) -> tuple[float, float]:
     """Return the 95 percent interval of a share (Wilson 1927)."""
     z, share = 1.959963984540054, part / whole
@@ -310,9 +331,13 @@ def main() -> None:
     parser.add_argument("--cases", nargs="*", default=[], help="what to plant; everything when not given")
     parser.add_argument("--time", metavar="STRIPSxPHOTOS", help="time one large block instead")
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--pairs", action="store_true", help="how exchanged names are reported instead")
     arguments = parser.parse_args()
     if arguments.time:
         times(arguments.time, arguments.rounds)
+        return
+    if arguments.pairs:
+        pairs(arguments.blocks, arguments.first)
         return
     table(arguments.blocks, arguments.first, arguments.cases)
 
