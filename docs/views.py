@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -61,7 +60,8 @@ class View:
             ha="center",
             va="center",
             fontsize=9,
-            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            # Lines end at the letters. A stroke around these would do so, too, but make outlines of them.
+            bbox={"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"},
             zorder=5,
         )
 

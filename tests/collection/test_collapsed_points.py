@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from photogram import _photocore
+from photogram import _photocore, snoop
 from photogram.collection import adjust, simulate
 
 # A datum of its own: standard deviations depend on it, and without it on where the iterations end.
@@ -82,3 +82,23 @@ def test_a_point_that_other_photos_tell_from_the_station_stays():
     assert result.converged
     assert result.point_rays[WRONG] == 4
     assert np.linalg.norm(result.point_positions[WRONG] - near) < 0.05
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_a_photo_with_too_few_points_is_left_out(count):
+    """Four points are eight equations for nine unknowns: the others have their covariances without it."""
+    own = np.flatnonzero(SOUND.image_photos == 3)
+    alone, few = SOUND.image_photos != 3, np.isin(np.arange(len(SOUND.image_photos)), own[:count])
+
+    def keep(images):
+        names = ("image_photos", "image_points", "image_xy", "image_sd")
+        return SOUND.replace(**{name: getattr(SOUND, name)[images] for name in names})
+
+    result, expected = adjust(keep(alone | few)), adjust(keep(alone))
+    assert result.converged
+    said = "left as they are, photos that their image points do not determine: 3"
+    assert said in [str(each) for each in result.messages]
+    others = np.arange(8) != 3
+    np.testing.assert_allclose(result.photo_sd[others], expected.photo_sd[others], rtol=1e-5)
+    assert np.isnan(result.photo_sd[3]).all()
+    assert snoop(keep(alone | few), unit_weight="known").removed == []

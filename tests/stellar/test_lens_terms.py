@@ -4,12 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import star_plates as plates
 from nights import MAKER
 
+from photogram.stellar import calibrate
+from photogram.stellar.lens_tests import equal
 from photogram.stellar.lens_tests import test_scale as scale_of
 from photogram.stellar.lens_tests import test_terms as terms_of
+from photogram.stellar.listing import listing
 from photogram.stellar.night import calibrate_night
 from photogram.stellar.night_report import report
+from photogram.stellar.parameters import INDEX
 from photogram.stellar.skies import calibrate_exposures
 
 FRAME = (6000.0, 4000.0)
@@ -80,3 +85,35 @@ def test_effects_are_what_terms_move_in_the_frame(result):
     assert tests["p1, p2"].effect == pytest.approx(f * moved.max(), rel=0.1)
     assert tests["p1, p2"].verdict == "needed"
     assert "k3" in report(result).split("Tests of the lens")[1].split("not shown by the data")[0]
+
+
+def test_the_listing_of_a_plate_tests_its_two_scales(plate):
+    """F is the square of the difference over its mean error; with one scale there is nothing to test."""
+    result = calibrate(plate)
+    pair = [INDEX["cx"], INDEX["cy"]]
+    (xx, xy), (_, yy) = result.covariance[np.ix_(pair, pair)]
+    f = (result.parameters["cx"] - result.parameters["cy"]) ** 2 / (xx + yy - 2 * xy)
+    text = listing(result)
+    assert f > 100
+    assert (
+        f"test of cx = cy                         F = {f:.2f} with 1 and 728 degrees of freedom, prob" in text
+    )
+    assert ": refused at 0.01" in text
+    common = calibrate(replace(plate, options=replace(plate.options, common_scale=True)))
+    assert "test of cx = cy                         not made: they are not estimated both" in listing(common)
+
+
+def test_the_test_of_two_scales_is_the_change_of_the_sum_of_squares(plate):
+    """Of a plate whose scales differ by three mean errors; distortion is not linear in its centre."""
+    solved = calibrate(plate).solved.parameters.copy()
+    solved[INDEX["cy"]] = solved[INDEX["cx"]] + 1.5e-5
+    exact = plates.seen(plates.quiet(plate), solved)
+    noise = 3e-6 * np.random.default_rng(8).standard_normal(exact.image_xy.shape)
+    problem = replace(exact, image_xy=exact.image_xy + noise)
+    result = calibrate(problem)
+    common = calibrate(replace(problem, options=replace(problem.options, common_scale=True)))
+    pair = [INDEX["cx"], INDEX["cy"]]
+    f, _ = equal(result.solved.parameters[pair], result.covariance[np.ix_(pair, pair)], 728)
+    omega = [sum(each.solved.sums) for each in (common, result)]
+    assert 2 < f < 60
+    assert (omega[0] - omega[1]) / result.mean_error**2 == pytest.approx(f, rel=0.25)

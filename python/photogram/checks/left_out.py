@@ -5,17 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from photogram.checks.findings import Finding
+from photogram.results.findings import HARMFUL
 from photogram.results.held import HELD
 from photogram.results.result import Result
 
 __all__ = ["held_values", "points_left_out"]
-
-HARMFUL = {
-    "its rays do not meet: it ran off": "its rays do not meet before the cameras",
-    "ran into the station of a photo": "its rays lead to the station of one of its photos",
-    "given at the place of a station that sees it": "it is given at the place of a station that sees it",
-}
-"""Why a point was left out because of which the others would be wrong, and what that says of its images."""
 
 
 def points_left_out(result: Result, named: Collection[str]) -> list[Finding]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -35,6 +36,26 @@ Out = Annotated[
     Writes.DIRECTORY,
     out_option("Directory for report.html, listing, camera and pictures. Default: INPUT-calibrated, here."),
 ]
+
+
+class Lens(StrEnum):
+    """Lenses of digital cameras; `photogram.stellar.lenses` has them."""
+
+    AUTO = "auto"
+    BROWN = "brown"
+    EQUIDISTANT = "equidistant"
+    EQUISOLID = "equisolid"
+    STEREOGRAPHIC = "stereographic"
+    KANNALA_BRANDT = "kannala_brandt"
+
+
+class Effect(StrEnum):
+    """What places of stars have; the fields of `photogram.stellar.sky.Effects`."""
+
+    ANNUAL_ABERRATION = "annual-aberration"
+    LIGHT_DEFLECTION = "light-deflection"
+    DIURNAL_ABERRATION = "diurnal-aberration"
+    REFRACTION = "refraction"
 
 
 @with_job
@@ -120,6 +141,37 @@ def exposures(
         bool,
         typer.Option("--example", help="Calibrate the packaged example instead: five exposures of a night."),
     ] = False,
+    lens: Annotated[
+        Lens | None,
+        typer.Option(help="Model of the lens; auto: the data choose. Default: what the file says."),
+    ] = None,
+    common_scale: Annotated[
+        bool | None,
+        typer.Option(
+            "--common-scale/--two-scales",
+            help="One principal distance (fx = fy), or two. Default: what the file says.",
+            show_default=False,
+        ),
+    ] = None,
+    without: Annotated[
+        list[Effect] | None,
+        typer.Option(
+            help="Leave an effect out of the places of the stars; may be said more than once.",
+            show_default=False,
+        ),
+    ] = None,
+    any_roll: Annotated[
+        bool, typer.Option("--any-roll", help="The rolls that are given are not to be relied on.")
+    ] = False,
+    blind: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            metavar="LEAST MOST",
+            help="Neither attitudes nor field of view are known: the smallest and largest horizontal field of"
+            " view, degrees (needs tetra3rs).",
+            show_default=False,
+        ),
+    ] = None,
     out: Out = None,
     json: JsonFile = None,
     html: HtmlFile = None,
@@ -132,6 +184,7 @@ def exposures(
 ) -> None:
     """Calibrate a digital camera, also one of the whole sky, by exposures of the stars (needs pyerfa)."""
     with job:
+        from photogram.errors import InputError
         from photogram.show.ways import page_of
         from photogram.stellar.night import calibrate_night
         from photogram.stellar.night_document import to_json
@@ -142,7 +195,11 @@ def exposures(
             night = job.packaged("exposures") / "night.toml"
         job.reads(*inputs(night))
         pictures = plot_format.value if plots else ""
-        result = calibrate_night(read_night(night), threads)
+        said = _said(lens, common_scale, without or [], any_roll, blind)
+        try:
+            result = calibrate_night(read_night(night, said), threads)
+        except InputError as error:
+            raise error if error.file else InputError(error.message, file=night) from None
         target = out or Path(f"{night.stem}-calibrated")
         place = html_place(html, no_html, target)
         written = _night_files(result, target, pictures)
@@ -155,6 +212,25 @@ def exposures(
             summary=lambda: print_sections(summary(result), "the report"),
             code=result.verdict.exit_code(strict=strict),
         )
+
+
+def _said(
+    lens: Lens | None,
+    common_scale: bool | None,
+    without: list[Effect],
+    any_roll: bool,
+    blind: tuple[float, float] | None,
+) -> dict[str, dict[str, Any]]:
+    """Return what options say, by the tables and keys of the file."""
+    said: dict[str, dict[str, Any]] = {
+        "camera": {"lens": lens and lens.value, "common_scale": common_scale},
+        "matching": {"roll_known": False if any_roll else None, "blind_field_deg": blind},
+        "places": {effect.name.lower(): False for effect in without},
+    }
+    return {
+        table: {key: value for key, value in values.items() if value is not None}
+        for table, values in said.items()
+    }
 
 
 def _summarize(results: list[Result]) -> None:

@@ -132,10 +132,14 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
         error = named(*solution.undetermined)
         messages.append(Message(f"there are no covariances: {error}"))
     messages += rounded(solution.redundancy_excess)
-    if (solution.photo_images == 0).any():
-        messages.append(
-            Message(f"left as they are, photos without image points: {_numbers(solution.photo_images == 0)}")
-        )
+    alone = solution.photo_images == 0
+    given = np.bincount(collection.image_photos, minlength=len(alone)) > 0
+    for which, what in (
+        (alone & ~given, "without image points"),
+        (alone & given, "that their image points do not determine"),
+    ):
+        if which.any():
+            messages.append(Message(f"left as they are, photos {what}: {_numbers(which)}"))
     out = solution.point_rays == 0
     if solution.collapsed:
         names = listed([str(point) for point in solution.collapsed])

@@ -17,10 +17,18 @@ from photogram.statistics.findings import Findings, Systematic, Tested, by_w
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["axes", "block_findings", "has_redundancy", "tested_observations", "unseen"]
+__all__ = ["HARMFUL", "axes", "block_findings", "has_redundancy", "tested_observations", "unseen"]
 
 ROBUST = "a robust loss changes the weights"
 """Why there is no global test with one."""
+
+
+HARMFUL = {
+    "its rays do not meet: it ran off": "its rays do not meet before the cameras",
+    "ran into the station of a photo": "its rays lead to the station of one of its photos",
+    "given at the place of a station that sees it": "it is given at the place of a station that sees it",
+}
+"""Why a point was left out because of which the others would be wrong, and what that says of its images."""
 
 
 @findings_of.register(Result)
@@ -34,7 +42,7 @@ def block_findings(result: Result) -> Findings:
         untested=ROBUST if result.loss else "no degrees of freedom",
         computed=has_redundancy(result),
         systematic=_patterns(result),
-        remarks=unseen(result),
+        remarks=[*unseen(result), *_left_out(result)],
         hints=result.hints,
         snoop="--snoop (photogram.snoop)",
     )
@@ -46,6 +54,15 @@ def _tested(result: Result) -> list[Tested]:
     if summary is None:
         return [by_w(each) for each in tested_observations(result)]
     return groups_tested(summary, [each.label for each in observations_of_core(result.block)])
+
+
+def _left_out(result: Result) -> list[str]:
+    """Say which points were left out because one of their images must be wrong."""
+    return [
+        f"point {point} is left out, one of its images must be wrong: {HARMFUL[reason]}"
+        for point, reason in result.dropped.items()
+        if reason in HARMFUL
+    ]
 
 
 def _patterns(result: Result) -> list[Systematic]:

@@ -64,7 +64,7 @@ class Located:
     def reason(self) -> str:
         """Say why there is none."""
         return (
-            "its images are mirrored"
+            "its images are mirrored (x counts right, y down)"
             if self.mirrored
             else "its images are found nowhere in the sky, with no field of view that was tried"
         )

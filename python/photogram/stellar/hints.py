@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -26,6 +27,8 @@ _TRIED = 3
 _SCALES = tuple(1.1**k for k in range(-6, 7) if k)
 """Principal distances that are tried, over the given one; each reaches half way to the next."""
 _WIDE = 0.05
+_HOUR = math.tau / 24 * 1.00273790935
+"""Turn of the Earth against the stars, radians."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +103,7 @@ def find_hint(exposures: Sequence[Exposure], names: Sequence[str], setting: Sett
     """
     order = sorted(range(len(exposures)), key=lambda i: -len(exposures[i].xy))[:_TRIED]
     mistakes = [mistake for mistake in _mistakes() if setting.roll_known or not mistake.of_roll]
+    mistakes += _other_times(setting.site)
     best: tuple[tuple[int, float], Hint] | None = None
     for mistake in mistakes:
         explained, odds, scales = [], 0.0, []
@@ -143,7 +147,13 @@ def _mistakes() -> list[_Mistake]:
         ),
         _Mistake("elevation_deg is the zenith distance", _pointed(lambda a, e, r: (a, math.pi / 2 - e, r))),
         _Mistake("roll_deg counts counterclockwise", _pointed(lambda a, e, r: (a, e, -r)), of_roll=True),
-        _Mistake("the longitude counts to the east, not to the west", _other_longitude),
+        _Mistake(
+            "the longitude counts to the east, not to the west",
+            _moved(lambda site: replace(site, longitude_west=-site.longitude_west)),
+        ),
+        _Mistake(
+            "the latitude has the other sign", _moved(lambda site: replace(site, latitude=-site.latitude))
+        ),
     ]
     found += [
         _Mistake(f"roll_deg has to be changed by {turn:+d} degrees", _rolled(turn), of_roll=True)
@@ -183,8 +193,31 @@ def _rolled(degrees: float) -> Callable[[Exposure, Setting], tuple[Exposure, Set
     return _pointed(lambda a, e, r: (a, e, r + math.radians(degrees)))
 
 
-def _other_longitude(exposure: Exposure, setting: Setting) -> tuple[Exposure, Setting]:
-    return exposure, replace(setting, site=replace(setting.site, longitude_west=-setting.site.longitude_west))
+def _moved(change: Callable[[Site], Site]) -> Callable[[Exposure, Setting], tuple[Exposure, Setting]]:
+    def mend(exposure: Exposure, setting: Setting) -> tuple[Exposure, Setting]:
+        return exposure, replace(setting, site=change(setting.site))
+
+    return mend
+
+
+def _turned(hours: int, site: Site) -> Site:
+    """Return the station that has a sky some hours later.
+
+    That is the sky of a station so many hours of the Earth's turn farther east.
+    """
+    return replace(site, longitude_west=site.longitude_west - hours * _HOUR)
+
+
+def _other_times(site: Site) -> list[_Mistake]:
+    """Return times that are those of a clock: of the zone of the longitude, in summer, and an hour off."""
+    zone = round(-site.longitude_west / _HOUR)
+    return [
+        _Mistake(
+            f"utc has to be changed by {hours:+d} h: it is the time of a clock, not UTC",
+            _moved(partial(_turned, hours)),
+        )
+        for hours in sorted({-1, 1, -zone, -zone - 1} - {0})
+    ]
 
 
 def _scaled(scale: float) -> Callable[[Exposure, Setting], tuple[Exposure, Setting]]:

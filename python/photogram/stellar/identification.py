@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.matching import STRETCH, Match, Search, match
+from photogram.stellar.matching import FEWEST, STRETCH, Match, Search, match
 from photogram.stellar.odds import ACCEPTED, DOUBTFUL, expected_false, log_odds, star_probabilities
 from photogram.stellar.places import Earth, apparent_places, sidereal_time
 from photogram.stellar.skies import Exposure, project_sky, stars_near
@@ -64,8 +64,12 @@ class Sighting:
                 "so many stars of the catalogue are within the tolerance that none can be told from another:"
                 " give a smaller tolerance_px"
             )
+        if len(self.stars) < FEWEST:
+            return f"it has {len(self.stars)} images of the {FEWEST} that are needed"
+        if self.match.stars < FEWEST:
+            return f"the catalogue has {self.match.stars} stars in its field, of the {FEWEST} that are needed"
         if not math.isfinite(self.match.expected):
-            return f"no two of its {len(self.stars)} images are as far apart as two stars of its field"
+            return f"no two of its {len(self.stars)} images lie to each other as two stars of its field do"
         return (
             f"only {self.match.matched} of {self.match.images} images have a star; chance finds as many"
             f" {_times(self.match.expected)} (accepted below {ACCEPTED:g})"

@@ -16,7 +16,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.stellar.sky_cameras import SkyCamera
 
-__all__ = ["LEVEL", "LensTest", "test_scale", "test_terms"]
+__all__ = ["LEVEL", "LensTest", "equal", "test_scale", "test_terms"]
 
 
 LEVEL = 0.01
@@ -83,6 +83,15 @@ def _fisher(change: Floats, covariance: Floats, freedom: int) -> tuple[float, fl
     return found, _photocore.fisher(found, float(len(change)), float(freedom))
 
 
+def equal(values: Floats, covariance: Floats, freedom: int) -> tuple[float, float]:
+    """Return F of the difference of two values with their covariance (2, 2), and its probability.
+
+    F has 1 and `freedom` degrees of freedom, those of the unit weight that scales the covariance.
+    """
+    (xx, xy), (_, yy) = covariance
+    return _fisher(np.array([values[0] - values[1]]), np.array([[xx + yy - 2 * xy]]), freedom)
+
+
 def test_scale(
     camera: SkyCamera, freedom: int, frame: tuple[float, float], pixel_sd: float
 ) -> LensTest | None:
@@ -101,9 +110,8 @@ def test_scale(
     """
     if not (camera.known[:2].all() and freedom > 0):
         return None
-    (xx, xy), (_, yy) = camera.covariance[:2, :2]
+    statistic, probability = equal(camera.values[:2], camera.covariance[:2, :2], freedom)
     difference = camera.values[0] - camera.values[1]
-    statistic, probability = _fisher(np.array([difference]), np.array([[xx + yy - 2 * xy]]), freedom)
     # Half of it goes into each axis.
     reach = 0.5 * max(frame) / float(np.mean(camera.values[:2]))
     effect = 0.5 * abs(float(difference)) * reach

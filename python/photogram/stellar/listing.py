@@ -10,7 +10,8 @@ from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
 from photogram.show.sections import Section, composed, headline, verdict_section
 from photogram.stellar import tables
-from photogram.stellar.parameters import GROUPS
+from photogram.stellar.lens_tests import LEVEL, equal
+from photogram.stellar.parameters import GROUPS, INDEX
 from photogram.stellar.result import SIGNIFICANT, Result, Stage
 
 __all__ = ["listing", "plate_list", "summary"]
@@ -207,6 +208,7 @@ def _adjustment(result: Result) -> list[str]:
             )
             for axis, v in zip("xy", result.solved.residuals.T, strict=True)
         ),
+        ("test of cx = cy", _scale_test(result)),
         (
             "distortion terms over mean errors",
             ", ".join(f"{n} {t:.1f}" for n, t in result.significance().items())
@@ -214,6 +216,21 @@ def _adjustment(result: Result) -> list[str]:
         ),
     ]
     return [f"{name:<40}{value}" for name, value in rows]
+
+
+def _scale_test(result: Result) -> str:
+    """Say whether the data show that the two principal distances differ."""
+    pair, freedom = [INDEX["cx"], INDEX["cy"]], result.degrees_of_freedom
+    if not (result.solved.free[pair].all() and freedom):
+        return "not made: they are not estimated both"
+    statistic, probability = equal(
+        result.solved.parameters[pair], result.covariance[np.ix_(pair, pair)], freedom
+    )
+    verdict = "refused" if probability < LEVEL else "not refused"
+    return (
+        f"F = {statistic:.2f} with 1 and {freedom} degrees of freedom, probability {probability:.2G}:"
+        f" {verdict} at {LEVEL:g}"
+    )
 
 
 def _before(result: Result, weights: Floats, unit: float, name: str) -> str:

@@ -13,7 +13,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.odds import ACCEPTED, CERTAIN, CROWDED, expected_false, star_probabilities
 
-__all__ = ["STRETCH", "Match", "Search", "match"]
+__all__ = ["FEWEST", "STRETCH", "Match", "Search", "match"]
 
 
 _SEEDS = 25
@@ -25,6 +25,8 @@ _CANDIDATES, _TURNED = 1500, 800
 compared two by two."""
 _DEEPER = 2
 """Stars in the frame for each image: where the catalogue has more, the faint ones only match by chance."""
+FEWEST = 3
+"""Images, and stars, that a match needs."""
 STRETCH = 0.01
 """Share by which the scale of the approximate camera may be wrong."""
 
@@ -47,6 +49,8 @@ class Match:
         Of the predicted images over the measured ones.
     hypotheses
         How many were counted.
+    stars
+        Predicted images that there are to be matched.
     """
 
     found: Indices
@@ -56,6 +60,7 @@ class Match:
     crowded: bool = False
     scale: float = 1.0
     hypotheses: float = 0.0
+    stars: int = 0
 
     @property
     def accepted(self) -> bool:
@@ -168,8 +173,8 @@ def match(
     tolerance
         Largest distance that is left after the polynomials.
     """
-    none = Match(np.full(len(measured), -1, np.int64), math.inf, 0, len(measured))
-    if len(measured) < 3 or len(predicted) < 3:
+    none = Match(np.full(len(measured), -1, np.int64), math.inf, 0, len(measured), stars=len(predicted))
+    if min(len(measured), len(predicted)) < FEWEST:
         return none
     seeds = measured[: 3 * _SEEDS]
     bright = _Sky.as_deep(predicted, len(seeds), search)
@@ -207,6 +212,7 @@ def match(
         crowded=crowded and bright.mu(3 * tolerance) > CROWDED,
         scale=math.hypot(best[0, 0], best[0, 1]),
         hypotheses=hypotheses,
+        stars=len(predicted),
     )
 
 

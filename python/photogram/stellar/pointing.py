@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats
 
-__all__ = ["attitude_of", "axis_of", "roll_of"]
+__all__ = ["attitude_of", "axis_of", "roll_of", "turn_between"]
 
 
 def attitude_of(azimuth: float, elevation: float, roll: float = 0.0) -> Floats:
@@ -33,6 +34,17 @@ def attitude_of(azimuth: float, elevation: float, roll: float = 0.0) -> Floats:
     # Up is minus y; a camera turned clockwise shows it turned counterclockwise.
     kappa = -math.pi / 2 - roll - math.atan2(up.imag, up.real)
     return np.array([alpha, omega, math.remainder(kappa, math.tau)])
+
+
+def turn_between(first: Floats, second: Floats, rays: Floats) -> float:
+    """Return the largest angle between rays (n, 3) of a camera under two attitudes, radians.
+
+    Rays have x right, y down and z along the axis; what is not finite does not count.
+    """
+    seen = rays[np.isfinite(rays).all(axis=1)]
+    a, b = (seen @ _photocore.pointing_matrix(np.asarray(each, float)) for each in (first, second))
+    sine, cosine = np.linalg.norm(np.cross(a, b), axis=1), np.sum(a * b, axis=1)
+    return float(np.arctan2(sine, cosine).max(initial=0.0))
 
 
 def axis_of(attitude: Floats) -> tuple[float, float]:

@@ -274,6 +274,14 @@ class Document:
         """Return a table, an empty one where it is not there; errors are those of `table`."""
         return self.table(name) if name in self._tables else Table({}, name, self.file)
 
+    def changed(self, values: Mapping[str, Mapping[str, Any]]) -> Document:
+        """Return the document with other values of keys, by table; errors are those of `table`."""
+        tables = dict(self._tables)
+        for name, others in values.items():
+            if others:
+                tables[name] = [Table({**self.optional(name).values, **others}, name, self.file)]
+        return Document(tables, self.file)
+
     def tables(self, name: str) -> list[Table]:
         """Return all tables of a name.
 

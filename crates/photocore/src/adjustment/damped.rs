@@ -13,6 +13,9 @@ const ROUNDING: f64 = 1e-12;
 /// The sum of squares stands still where three damped steps lower it by less than this multiple of the variance of unit weight: a
 /// hundredth of a standard deviation of the combination of unknowns that they follow.
 const STILL: f64 = 1e-4;
+/// So many full steps, the last of which is longer than this part of the first, do not fall any more.
+const ALIKE: usize = 5;
+const FALLING: f64 = 0.9;
 /// A step that changes the unknowns by more than this multiple of their standard deviations, in the mean, is so long that local
 /// unknowns are better computed afresh than linearized.
 const FAR: f64 = 30.0;
@@ -109,6 +112,10 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 End::after(Status::Converged, unknowns, solved, iteration)
             };
             return Ok(ControlFlow::Break(end));
+        }
+        if damping == 0.0 && self.falls_no_more(solved.change) {
+            self.weak = solved.basis.factor.moved(&self.problem.system, &solved.step);
+            return Ok(ControlFlow::Break(End::after(Status::Converged, unknowns, solved, iteration)));
         }
         self.take(iteration, unknowns, solved, control)
     }
@@ -259,6 +266,16 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let before = self.iterations.last().filter(|iteration| iteration.damping == 0.0);
         let rate = before.map_or(1.0, |iteration| change / iteration.largest_change);
         change <= NEGLIGIBLE && rate < 1.0 && rate / (1.0 - rate) * change <= limit
+    }
+
+    /// Whether full steps are negligible and have long been as long as this one: what still moves, the observations do not determine
+    /// beyond the rounding of its equations.
+    fn falls_no_more(&self, change: f64) -> bool {
+        let last = self.iterations.len().checked_sub(ALIKE).map(|first| &self.iterations[first..]);
+        last.is_some_and(|last| {
+            let negligible = |step: &Iteration| step.damping == 0.0 && step.largest_change <= NEGLIGIBLE;
+            change <= NEGLIGIBLE && last.iter().all(negligible) && change > FALLING * last[0].largest_change
+        })
     }
 
     /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.

@@ -37,8 +37,10 @@ pub(super) struct Reached {
     stations: Vec<f64>,
 }
 
-/// Points and photos that are not determined are few where there are so many times as many.
+/// Points that are not determined are few where there are so many times as many.
 const FEW: usize = 10;
+/// Photos that are not determined, each by itself, are few where there are so many times as many: a network of some photos has few.
+const HALF: usize = 2;
 /// A point so many times as far from the nearest station as others, or as near, has left the network.
 const ASTRAY: f64 = 1e3;
 
@@ -75,7 +77,7 @@ impl Assembled {
         photos.sort_unstable();
         photos.dedup();
         let is_frame = |photo: usize| model.mounts.iter().flatten().any(|mount| mount.frame == photo);
-        let few = FEW * photos.len() <= model.cameras.len() && !photos.iter().any(|&photo| is_frame(photo));
+        let few = HALF * photos.len() <= model.cameras.len() && !photos.iter().any(|&photo| is_frame(photo));
         if few { photos } else { vec![] }
     }
 

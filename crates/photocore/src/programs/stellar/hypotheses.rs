@@ -215,8 +215,15 @@ mod tests {
         (0..count).map(|k| Complex64::new(1000.0 * at(k).fract(), 1000.0 * (97.3 * at(k)).fract())).collect()
     }
 
+    struct Scene {
+        images: Vec<Complex64>,
+        stars: Vec<Complex64>,
+        candidates: Vec<(usize, usize)>,
+        truth: Similarity,
+    }
+
     /// Twenty images of which fourteen are stars that are turned by 0.3, and all candidates.
-    fn turned() -> (Vec<Complex64>, Vec<Complex64>, Vec<(usize, usize)>, Similarity) {
+    fn turned() -> Scene {
         let stars = scattered(40);
         let truth =
             Similarity { factor: Complex64::from_polar(1.02, 0.3), shift: Complex64::new(40.0, -70.0) };
@@ -224,12 +231,12 @@ mod tests {
             stars[..14].iter().map(|star| (star - truth.shift) / truth.factor).collect();
         images.extend(scattered(120)[100..106].iter());
         let candidates = (0..images.len()).flat_map(|i| (0..stars.len()).map(move |k| (i, k))).collect();
-        (images, stars, candidates, truth)
+        Scene { images, stars, candidates, truth }
     }
 
     #[test]
     fn pairs_are_those_whose_separations_agree() {
-        let (images, stars, candidates, _) = turned();
+        let Scene { images, stars, candidates, .. } = turned();
         let rule = Agreement { tolerance: 4.0, stretch: 0.03, least: 200.0, axis: None };
         let mut expected = vec![];
         for (a, &(i, k)) in candidates.iter().enumerate() {
@@ -260,7 +267,7 @@ mod tests {
 
     #[test]
     fn the_true_similarity_has_the_most_votes() {
-        let (images, stars, candidates, truth) = turned();
+        let Scene { images, stars, candidates, truth } = turned();
         let rule = Agreement { tolerance: 4.0, stretch: 0.03, least: 200.0, axis: None };
         let all = hypotheses(&images, &stars, &candidates, &rule);
         assert!(all.len() > VOTED, "all do not vote for each");
