@@ -811,10 +811,10 @@ class Node:
         `images`, `observations`: image points, equations in all; `reduction`, `factor`, `inverse`:
         multiply-adds of one formation, one factorisation, one inversion; `node_bytes`: of the node by itself;
         `factor_bytes`: of a formed node beside, what points have left for the solution counted;
-        `memory_bytes`: at the most, while it is formed, inverted or written, contributions and the node itself
-        counted; `contribution_bytes`: of what it sends up, 8 (S (S + 1) / 2 + 2 S); `cofactor_bytes`: of what
-        it receives for the inversion, 8 S (S + 1) / 2; `step_bytes`: of what it receives in each iteration,
-        8 S.
+        `memory_bytes`: at the most, while it is formed, inverted or written, contributions and the node
+        itself counted; `contribution_bytes`: of what it sends up, 8 (S (S + 1) / 2 + 2 S);
+        `cofactor_bytes`: of what it receives for the inversion, 8 S (S + 1) / 2; `step_bytes`: of what it
+        receives in each iteration, 8 S.
         """
 
     def advance(self, state: _Floats, step: _Floats) -> _Floats:
