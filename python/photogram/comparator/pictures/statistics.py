@@ -37,8 +37,8 @@ def residual_histogram(calibration: Calibration) -> Figure:
         panel.plot(x, curve, color=ACCENT, linewidth=1.8)
         beyond = 100 * float((np.abs(own) > 2 * sigma).mean())
         panel.set_title(
-            f"{'xy'[axis]}: {len(own)} residuals, rms {sigma:.3f} µm,"
-            f" {beyond:.1f} % beyond twice that (normal: 4.6 %)"
+            f"{'xy'[axis]}: {len(own)} residuals, rms {sigma:.3f} µm,\n"
+            f"{beyond:.1f} % beyond twice that (normal: 4.6 %)"
         )
         panel.set_xlabel("residual, µm")
     axes[0].yaxis.set_major_locator(MaxNLocator(integer=True))
