@@ -25,6 +25,8 @@ SETTINGS = {
     "distributed.worker.memory.pause": False,
     # A stolen task would have to form its factor again.
     "distributed.scheduler.work-stealing": False,
+    # Arrow's own pool keeps what tables have taken.
+    "distributed.nanny.environ.ARROW_DEFAULT_MEMORY_POOL": "system",
 }
 """Of clusters that are started here."""
 

@@ -52,8 +52,9 @@ pub struct NodePrediction {
     pub memory: usize,
 }
 
-/// Bytes of an image point in the tables that are read and written of a node beside.
-const IN_TABLES: usize = 150;
+/// Numbers that are found of an equation and its share of the unknowns: residual, redundancy number, test value, as they are found and as
+/// they are written.
+const FOUND: usize = 7;
 
 impl Network {
     /// Takes the network as a node of a larger one.
@@ -136,7 +137,9 @@ impl Node {
             operations: symbolic.operations(layout),
             node: self.bytes(),
             factor: size_of::<f64>() * (system.numbers_in_factor() - outer * outer + 3 * self.size()),
-            memory: system.memory() + size_of::<f64>() * handed + IN_TABLES * self.images(),
+            memory: self.bytes()
+                + system.memory_of_fronts()
+                + size_of::<f64>() * (handed + FOUND * layout.equations()),
         }
     }
 

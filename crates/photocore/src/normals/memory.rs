@@ -15,7 +15,12 @@ impl System {
     /// Bytes that forming, factoring, solving and inverting take at the most, the problem itself and its results counted: the
     /// factor, the fronts that wait for each other, and vectors.
     pub fn memory(&self) -> usize {
-        BASE + BYTES * (capacity(self.symbolic.values()) + self.fronts() + vectors(&self.layout))
+        self.memory_of_fronts() + BYTES * vectors(&self.layout)
+    }
+
+    /// Of these, those of the factor and the fronts, and what does not grow with the problem.
+    pub fn memory_of_fronts(&self) -> usize {
+        BASE + BYTES * (capacity(self.symbolic.values()) + self.fronts())
     }
 
     /// Gives back what is kept for the next formation or inversion: where others need memory before it comes.

@@ -53,14 +53,13 @@ def test_a_node_takes_what_the_plan_says(tmp_path):
     plan = plan_in_parts(block, Division(parts=2, folder=tmp_path))
     largest = int(np.argmax(plan.of("memory_bytes")))
     said = plan.predictions[largest]
-    # What allocators keep for themselves is not that of the node, but a worker has to hold it.
+    # What allocators keep for themselves is not that of the node.
     plain = {
         "ARROW_DEFAULT_MEMORY_POOL": "system",
         "MALLOC_ARENA_MAX": "1",
         "MALLOC_TRIM_THRESHOLD_": "65536",
     }
-    node, formed, _ = _measured(tmp_path, largest, plain)
-    _, _, most = _measured(tmp_path, largest, {})
+    node, formed, most = _measured(tmp_path, largest, plain)
     # A part of it does not grow with the node.
     assert node == pytest.approx(said["node_bytes"], abs=BASE)
     assert formed == pytest.approx(said["node_bytes"] + said["factor_bytes"], rel=0.2)
