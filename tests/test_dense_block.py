@@ -97,6 +97,12 @@ def agrees(block, result):
     total = result.sums_of_squares.total
     # Positions of large coordinates come back rounded.
     np.testing.assert_allclose(float(right @ right), total, rtol=1e-6, atol=1e-2 * len(right))
+    alone = np.isnan(result.photo_sd).all(axis=1)
+    for row in np.flatnonzero(alone):
+        # Nothing is asked of it; what it was observed at, it stands at.
+        said = [str(m) for m in result.messages if "photos that their images do not determine" in str(m)]
+        assert block.photo_ids[row] in said[0]
+    free = free[~np.isin(free // 6, np.flatnonzero(alone))]
     step, sd = solve(a[:, free], right)
     change = np.abs(step / sd).max()
     rounding = (np.spacing(np.abs(values))[free] / sd).max()
@@ -161,6 +167,18 @@ def extreme(seed):
     return changes
 
 
+def steep(block, result):
+    """Return whether an attitude ends far from where it is observed, which is near phi = 90 degrees.
+
+    It is observed as one rotation there, not as three angles; nearby both are the same.
+    """
+    sd = block.photo_attitude_sd
+    reach = np.maximum(3 * sd.max(axis=1), 0.087)
+    near = np.abs(np.cos(block.photo_attitudes_observed[:, 1])) < reach
+    far = np.abs(result.photo_attitudes - block.photo_attitudes_observed).max(axis=1) > 0.1
+    return bool((near & far & np.isfinite(sd).all(axis=1) & (sd > 0).all(axis=1)).any())
+
+
 def end(seed):
     """Return how an extreme block ends; refuses silence."""
     try:
@@ -173,6 +191,8 @@ def end(seed):
         return result.status
     if any("there are no covariances" in str(m) or "stands still" in str(m) for m in result.messages):
         return "remarked"
+    if steep(block, result):
+        return "another model"
     agrees(block, result)
     return "agrees"
 

@@ -200,7 +200,7 @@ def test_what_is_on_one_photo_or_none_is_left_out_and_named():
     result = adjust(collection)
     assert result.converged
     texts = [message.text for message in result.messages]
-    assert "left as they are, photos without image points: 4" in texts
+    assert "left as they are, photos that their image points do not determine: 4" in texts
     assert "left out, points with images on fewer than two photos: 20, 21" in texts
     np.testing.assert_array_equal(result.photo_parameters[4], photos[4])
     assert np.isnan(result.point_positions[20:]).all()

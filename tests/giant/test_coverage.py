@@ -52,8 +52,8 @@ def test_marks_are_found_at_functions_and_at_parameters(tmp_path, monkeypatch):
     assert giant_coverage.untested() == [("1", "c|d"), ("2.1", "**e")]
     assert [mark.section for mark in giant_coverage.unlisted()] == ["2"]
     assert giant_coverage.page().splitlines()[-4:] == [
-        "| 1 | a | `test_x.py::test_section_1_x` |",
+        "| 1 | a | `test_x.py::`<wbr>`test_section_1_x` |",
         "| 1 | c\\|d |  |",
-        "| 2 | b | `test_x.py::test_section_1_x` |",
+        "| 2 | b | `test_x.py::`<wbr>`test_section_1_x` |",
         "| 2.1 | \\*\\*e |  |",
     ]
