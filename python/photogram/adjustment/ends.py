@@ -46,9 +46,10 @@ def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     near = [(point, distance) for point, _, distance in solution.weak_points if distance < NEAR]
     flat = [(point, ratio) for point, ratio, distance in solution.weak_points if distance >= NEAR]
     messages = []
-    with_images = np.isin(solution.loose_photos, block.image_photos)
-    empty = [photo for photo, has in zip(solution.loose_photos, with_images, strict=True) if not has]
-    loose = [photo for photo, has in zip(solution.loose_photos, with_images, strict=True) if has]
+    # Hardly ever is there one: small blocks need not wait for this.
+    seen = set(block.image_photos.tolist()) if solution.loose_photos else set()
+    empty = [photo for photo in solution.loose_photos if photo not in seen]
+    loose = [photo for photo in solution.loose_photos if photo in seen]
     if empty:
         names = listed([block.photo_ids[photo] for photo in empty])
         messages.append(Message(f"left out, photos without images: {names}; they stay where they were given"))
