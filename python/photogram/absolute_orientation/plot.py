@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,8 +10,8 @@ from numpy.typing import NDArray
 
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
-from photogram.plots.panels import Where, labels, panels, scale_bars
-from photogram.show.pictures import arrows, new_figure, round_length
+from photogram.plots.panels import Where, figure_of, labels, panels, scale_bars
+from photogram.show.pictures import arrows, round_length
 from photogram.show.style import INK, PURPLE, VERMILION
 from photogram.show.ways import axes_of
 
@@ -29,9 +30,7 @@ WIDE = 4.0
 
 def figure(result: Orientation) -> Figure:
     """Return the plan of :func:`residuals` as a figure that belongs to no window."""
-    made = new_figure(1.0, 1.0)
-    residuals(result, made)
-    return made
+    return figure_of(partial(residuals, result))
 
 
 @axes_of.register(Orientation)

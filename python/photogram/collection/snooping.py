@@ -26,6 +26,7 @@ from photogram.results.exchanged import exchanged_names
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, NetworkTrial
 from photogram.results.snooped import Snooped
 from photogram.statistics.distributions import LEVEL
+from photogram.statistics.snooping.factors import MEDIAN_OF_TWO
 from photogram.statistics.snooping.snooping import Outcome, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 
@@ -35,8 +36,6 @@ LOSSES: tuple[Loss, ...] = ("huber", "cauchy")
 FAR = 5.0
 """Robust standard deviations from which on an image is out at first, after a robust adjustment."""
 BY_LOSSES = "a robust adjustment of the given values (Huber, then Cauchy)"
-MEDIAN_OF_TWO = 1.1774100225154747
-"""Of the length of a vector of two standard normal variables."""
 
 
 @of_network.register

@@ -149,10 +149,6 @@ def opened(
         Options that cannot be, workers that cannot work together, a folder of another run.
     """
     memory = None if division.memory is None else bytes_of(division.memory)
-    for name in ("workers", "parts"):
-        value = getattr(division, name)
-        if value is not None and whole_number(name, value) < 1:
-            raise InputError(f"{name} must be positive, not {value}")
     folder.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         executor: Executor

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ from photogram.errors import InputError
 from photogram.plots.correlations import correlations
 from photogram.plots.distortion import distortion
 from photogram.plots.network import network
-from photogram.plots.panels import Where
+from photogram.plots.panels import Where, figure_of
 from photogram.plots.redundancy import redundancy
 from photogram.plots.residuals import residuals
 from photogram.plots.tests import tests
@@ -117,18 +118,14 @@ def figures(result: object, names: Sequence[str] = tuple(PICTURES)) -> dict[str,
     TypeError
         A result without photos and points.
     """
-    from photogram.show.pictures import new_figure
-
     if unknown := [name for name in names if name not in PICTURES]:
         raise InputError(f"there is no picture {', '.join(unknown)}, but {', '.join(PICTURES)}")
     found = {}
     for name in names:
-        figure = new_figure(1.0, 1.0)
         try:
-            PICTURES[name](result, figure)
+            found[name] = figure_of(partial(PICTURES[name], result))
         except InputError:
             continue
-        found[name] = figure
     return found
 
 

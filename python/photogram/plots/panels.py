@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Where: TypeAlias = Axes | Sequence[Axes] | NDArray[Any] | Figure | SubFigure | None
 
-__all__ = ["NOWHERE", "Where", "handed_out", "labels", "note", "panels", "placed", "scale_bars"]
+__all__ = ["NOWHERE", "Where", "figure_of", "handed_out", "labels", "note", "panels", "placed", "scale_bars"]
 
 if not TYPE_CHECKING:
     Where = Any
@@ -87,6 +87,13 @@ def handed_out(axes: list[Axes]) -> Any:
     found = np.empty(len(axes), dtype=object)
     found[:] = axes
     return found
+
+
+def figure_of(draw: Callable[[Where], object]) -> Figure:
+    """Return what is drawn as a figure that belongs to no window; `draw` takes what :func:`panels` takes."""
+    figure = new_figure(1.0, 1.0)
+    draw(figure)
+    return figure
 
 
 def placed(draw: Callable[[Where], Drawn], path: Path | None, ax: Where) -> Drawn:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.plots.distortion import draw_curves, rows_of
-from photogram.plots.panels import Where, handed_out, panels, placed
+from photogram.plots.panels import Where, figure_of, handed_out, panels, placed
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.lens_field import LensField, lens_field
 from photogram.results.pictured import curves_of
 from photogram.results.result import Result
-from photogram.show.pictures import arrows, new_figure, round_length
+from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, INK
 
 if TYPE_CHECKING:
@@ -90,16 +90,12 @@ def draw_lens_field(
 
 def figure_of_lens_field(camera: AdjustedCamera, field: LensField) -> Figure:
     """Return vectors on a grid of the image with their standard ellipses, all enlarged alike."""
-    figure = new_figure(1.0, 1.0)
-    _lens_field(camera, field, figure)
-    return figure
+    return figure_of(partial(_lens_field, camera, field))
 
 
 def figure_of_distortion(camera: AdjustedCamera, curve: DistortionCurve) -> Figure:
     """Return the curve and its balanced form, one standard deviation on either side, dashed beyond images."""
-    figure = new_figure(1.0, 1.0)
-    _distortion(camera, curve, figure)
-    return figure
+    return figure_of(partial(_distortion, camera, curve))
 
 
 def _lens_field(camera: AdjustedCamera, field: LensField, ax: Where) -> Axes:

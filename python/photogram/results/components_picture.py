@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.plots.panels import Where, panels, placed
+from photogram.plots.panels import Where, figure_of, panels, placed
 from photogram.results.components import VarianceComponents
-from photogram.show.pictures import new_figure
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.show.ways import axes_of
 
@@ -50,9 +49,7 @@ def draw_components(found: VarianceComponents, path: Path | None = None, ax: Whe
 
 def figure_of_components(found: VarianceComponents) -> Figure:
     """Return the picture as a figure that belongs to no window."""
-    figure = new_figure(1.0, 1.0)
-    _components(found, figure)
-    return figure
+    return figure_of(partial(_components, found))
 
 
 @axes_of.register(VarianceComponents)

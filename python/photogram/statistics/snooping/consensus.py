@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.arguments.types import Indices
+from photogram.messages import counted
 from photogram.statistics.snooping.factors import ENOUGH, robust_factor, values
 from photogram.statistics.snooping.log import Removal
 from photogram.statistics.snooping.returning import log_probability
@@ -110,7 +111,7 @@ def _decide(work: TakingOut, aside: Aside, before: Standing | None) -> None:
         removed += _still_out(work, points, images, tests)
     for photo, said in aside.photos.items():
         removed.append(log_photo(work, photo, 0, before, (said, *consequences[photo])))
-    parts = [_counted(len(images), "image")] if len(images) else []
+    parts = [counted(len(images), "image")] if len(images) else []
     parts += [work.suspects.photo_name(photo) for photo in aside.photos]
     why = "runs off" if before is not None else "leads nowhere (before: without what follows)"
     said = f"; {agreeing} of the images agree with it" if agreeing else ""
@@ -181,7 +182,3 @@ def _predicted(work: TakingOut, groups: Indices) -> tuple[list[Removal], int]:
                 )
             )
     return entries, len(groups) - len(entries)
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"

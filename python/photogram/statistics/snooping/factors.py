@@ -8,10 +8,12 @@ from photogram.arguments.types import Bools, Floats
 from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.snooping.taking_out import TakingOut
 
-__all__ = ["ENOUGH", "OPTIMISTIC", "robust_factor", "scales", "values"]
+__all__ = ["ENOUGH", "MEDIAN_OF_TWO", "OPTIMISTIC", "robust_factor", "scales", "values"]
 
 MEDIAN = 0.6744897501960817
 """Of the absolute value of a standard normal variable."""
+MEDIAN_OF_TWO = 1.1774100225154747
+"""Of the length of a vector of two of them."""
 OPTIMISTIC = 2.0
 """Standard deviations that are too small by more than this are told from gross errors by the median."""
 ENOUGH = 20

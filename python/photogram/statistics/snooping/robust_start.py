@@ -9,7 +9,14 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.statistics.snooping.choosing import Choice
-from photogram.statistics.snooping.factors import ENOUGH, OPTIMISTIC, robust_factor, scales, values
+from photogram.statistics.snooping.factors import (
+    ENOUGH,
+    MEDIAN_OF_TWO,
+    OPTIMISTIC,
+    robust_factor,
+    scales,
+    values,
+)
 from photogram.statistics.snooping.returning import take_back
 from photogram.statistics.snooping.suspects import LostSupportError, Standing, Tests
 from photogram.statistics.snooping.taking_out import TakingOut
@@ -22,8 +29,6 @@ FAR = 5.0
 CANDIDATE = 4.4
 """Robust standard deviations from which on a residual is put aside: Cauchy's loss leaves it a quarter of its
 weight."""
-MEDIAN_OF_TWO = 1.1774100225154747
-"""Of the length of a vector of two standard normal variables."""
 SCALES = 5
 """Robust adjustments at the most until their scale stands."""
 
