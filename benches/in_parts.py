@@ -20,6 +20,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from peak import peak_memory
 from photogram import adjust, simulate
 from photogram.adjustment.elsewhere import Division
 from photogram.distributed.counts import FORMATION, Counts, counted_work
@@ -145,11 +146,11 @@ def carried_out(size: str, workers: int, parts: int, memory: str, *, alone: bool
         division = Division(cluster=client, parts=parts, memory=memory, folder=folder)
         plan = plan_in_parts(block, division)
         print("\n".join(plan.lines()), flush=True)
-        before = client.run(_peak)
+        before = client.run(peak_memory)
         start = time.perf_counter()
         found = adjust(block, cluster=client, memory=memory, folder=folder)
         seconds = time.perf_counter() - start
-        after = client.run(_peak)
+        after = client.run(peak_memory)
     print(f"{found.status} after {len(found.iterations)} iterations, {seconds:.1f} s, results merged")
     for address, peak in sorted(after.items()):
         grown = (peak - before.get(address, 0)) / 2**20
@@ -167,12 +168,6 @@ def carried_out(size: str, workers: int, parts: int, memory: str, *, alone: bool
             f"photos differ by {apart:.0e} standard deviations, their cofactors by {cofactors:.0e},"
             f" redundancy numbers by {redundancy:.0e}"
         )
-
-
-def _peak() -> int:
-    """Return the most bytes that this process has held: what `getrusage` tells begins with its parent's."""
-    lines = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
-    return 1024 * int(lines["VmHWM"].split()[0])
 
 
 def main() -> None:

@@ -10,9 +10,9 @@ import re
 import subprocess
 import sys
 import time
-from pathlib import Path
 from unittest.mock import patch
 
+from peak import forget_peak, peak_memory
 from photogram import adjust, simulate
 from photogram.errors import OutOfMemoryError
 from photogram.memory import give_back, resident_memory
@@ -37,13 +37,11 @@ def row(size: str) -> str:
     needed = predicted(block)
     give_back()
     before = resident_memory() or 0
-    # The peak begins anew.
-    Path("/proc/self/clear_refs").write_text("5")
+    forget_peak()
     start, processor = time.perf_counter(), time.process_time()
     result = adjust(block)
     seconds, processor = time.perf_counter() - start, time.process_time() - processor
-    status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
-    peak = (1024 * int(status["VmHWM"].split()[0]) - before) / 2**30
+    peak = (peak_memory() - before) / 2**30
     return (
         f"| {len(block.photo_ids):,} | {len(block.image_xy):,} | {len(result.iterations)} | {seconds:.1f}"
         f" | {processor:.1f} | {needed:.2f} | {peak:.2f} | {peak / needed:.2f} |"

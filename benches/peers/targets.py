@@ -14,6 +14,11 @@ GIB = 2.0**30
 SMALLEST, LARGEST = 1_000, 50_000
 """Photographs from which on times are compared with those of the peers, and from which on memory counts."""
 
+DISTANCES = {1_000: 5.0, 5_000: 3.0, 50_000: 1.8}
+"""Times the counted operations at the product rate that blocks of so many photographs may take."""
+REST = 0.1
+"""Share of the time that may go into what is no numerical phase."""
+
 
 @dataclass(frozen=True)
 class Target:
@@ -67,6 +72,7 @@ def targets(results: Sequence[Measured], small: Mapping[str, float]) -> Iterator
     for measured in results:
         if measured.photos >= SMALLEST:
             yield from _against_peers(measured)
+            yield from _against_the_limit(measured)
         if measured.photos >= LARGEST and measured.ours:
             peak = measured.ours["peak"]["everything"] / GIB
             yield Target(f"{measured.size}: peak memory", 20.0, peak, unit=" GiB")
@@ -84,12 +90,25 @@ def targets(results: Sequence[Measured], small: Mapping[str, float]) -> Iterator
 def _against_peers(measured: Measured) -> Iterator[Target]:
     ours, size = measured.ours, measured.size
     gtsam, pycolmap = (measured.records.get(side, {}).get("seconds", {}) for side in ("gtsam", "pycolmap"))
-    if ours and gtsam:
-        ratio = ours["seconds"]["everything"] / gtsam["solution"]
-        yield Target(f"{size}: everything / gtsam's bare solution", 0.2, ratio)
+    for peer, seconds in (("gtsam", gtsam), ("pycolmap", pycolmap)):
+        if ours and "solution" in seconds:
+            ratio = ours["seconds"]["everything"] / seconds["solution"]
+            yield Target(f"{size}: everything / {peer}'s bare solution", 0.1, ratio)
     if ours and "covariances" in pycolmap:
         ratio = covariance_seconds(ours) / pycolmap["covariances"]
         yield Target(f"{size}: covariances / pycolmap's covariances", 0.05, ratio)
+
+
+def _against_the_limit(measured: Measured) -> Iterator[Target]:
+    """Judge the whole by the time that its counted operations take at the rate of matrix products."""
+    ours, most = measured.ours, DISTANCES.get(measured.photos)
+    if not ours or most is None or measured.size.strips == 1:
+        return
+    least = sum(phases.operations(ours).values()) / measured.product
+    name = f"{measured.size}: everything, times its operations at the product rate"
+    yield Target(name, most, ours["seconds"]["everything"] / least)
+    *_, rest = phases.phases(ours)
+    yield Target(f"{measured.size}: outside the numerical phases, share of the time", REST, rest.share)
 
 
 def covariance_seconds(record: Record) -> float:

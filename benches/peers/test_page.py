@@ -59,6 +59,12 @@ def test_targets_are_judged_by_the_peers_and_by_the_product_rate() -> None:
     found = {target.name: target for target in targets([measured("20x50", 2.0, **peers)], SMALL)}
     everything = found["20x50: everything / gtsam's bare solution"]
     assert (everything.reached, everything.met) == (0.1, True)
+    assert found["20x50: everything / pycolmap's bare solution"].met
+    # 5 (2e7 + 3e9) + 4e9 + 5.32e7 multiply-adds would take 1.91532 s.
+    limit = found["20x50: everything, times its operations at the product rate"]
+    assert math.isclose(limit.reached, 2.0 / 1.91532)
+    rest = found["20x50: outside the numerical phases, share of the time"]
+    assert (rest.reached, rest.met) == (0.5, False)
     covariances = found["20x50: covariances / pycolmap's covariances"]
     assert (covariances.reached, covariances.met) == (0.02, True)
     # 10^10 multiply-adds in 0.2 s are five times the product rate.

@@ -5,12 +5,12 @@ use super::layout::Layout;
 use super::triangle::Triangle;
 
 /// Numbers for each unknown: values, steps, priors and their copies, cofactors, what is made of them for the caller.
-const PER_UNKNOWN: usize = 40;
+const PER_UNKNOWN: usize = 38;
 /// Numbers for each equation beside its coefficients: observed value, standard deviation, residual, redundancy number and test value,
 /// as given, as ordered for the adjustment and as handed back.
-const PER_EQUATION: usize = 28;
+const PER_EQUATION: usize = 18;
 /// Of these, the part that is made of the results after the last solution: what is kept from the formation to the solution may take it.
-const LATER: f64 = 0.5;
+const LATER: f64 = 0.65;
 
 /// Numbers in vectors, the problem itself and its results counted.
 pub(super) fn vectors(layout: &Layout) -> usize {

@@ -1,0 +1,139 @@
+"""A simulated block on disk, adjusted in parts without ever being in memory as a whole: docs/distributed.md.
+
+python benches/on_disk.py 400x500 --workers 2 --parts 64 --memory 4GiB [--folder DIR]     Linux
+
+The project is written by a process of its own. A folder that is given keeps project and run: a run that was
+ended goes on there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pyarrow
+from pyarrow import parquet
+
+from peak import peak_memory
+from photogram import simulate
+from photogram.adjustment.adjustment import Progress
+from photogram.adjustment.elsewhere import Division
+from photogram.distributed.running import bytes_of
+from photogram.distributed.workers import connected
+from photogram.formats import Wishes, to_files
+from photogram.formats.in_parts import adjusted_on_disk, planned_on_disk
+from photogram.formats.project import Project
+from photogram.network.block import Block
+
+ROWS = 2**20
+"""Of a group of rows in the table of images."""
+
+
+def write_project(size: str, folder: Path) -> None:
+    """Write a simulated block as a plain project whose images lie in Parquet."""
+    strips, photos = (int(number) for number in size.split("x"))
+    block = simulate(strips=strips, photos_per_strip=photos, seed=1).block
+    folder.mkdir(parents=True)
+    for name, content in to_files(_without_images(block, folder), "plain").items():
+        if name != "images.csv":
+            (folder / name).write_bytes(content)
+    columns = {
+        "photo": _named(block.photo_ids, block.image_photos),
+        "point": _named(block.point_ids, block.image_points),
+        "x": block.image_xy[:, 0],
+        "y": block.image_xy[:, 1],
+        "sd": block.image_sd[:, 0],
+    }
+    parquet.write_table(pyarrow.table(columns), folder / "images.parquet", row_group_size=ROWS)
+
+
+def _without_images(block: Block, folder: Path) -> Project:
+    """Return photos, cameras and control alone."""
+    control = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1))
+    rows = np.flatnonzero(np.isin(block.image_points, control))[:1]
+    held = block.replace(
+        point_ids=[block.point_ids[row] for row in control],
+        point_positions=block.point_positions[control],
+        point_sd=block.point_sd[control],
+        image_photos=block.image_photos[rows],
+        image_points=np.searchsorted(control, block.image_points[rows]),
+        image_xy=block.image_xy[rows],
+        image_sd=block.image_sd[rows],
+    )
+    count = max(len(block.cameras), 1)
+    starts = np.full((len(control), 3), np.nan)
+    none = (None,) * count
+    return Project(block=held, path=folder, title="", sizes=none, pixel_mm=none, starts=starts)
+
+
+def _named(names: list[str], rows: np.ndarray) -> pyarrow.Array:
+    """Return names of rows, each kept once."""
+    return pyarrow.DictionaryArray.from_arrays(pyarrow.array(rows, pyarrow.int32()), pyarrow.array(names))
+
+
+def _on_disk(folder: Path) -> float:
+    """Return GiB of all files of a folder."""
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 2**30
+
+
+def _told(start: float) -> Callable[[Progress], None]:
+    """Return what tells of each iteration."""
+
+    def tell(progress: Progress) -> None:
+        if progress.iteration is not None:
+            done = progress.iteration.number, time.perf_counter() - start
+            print(f"iteration {done[0]} after {done[1]:,.0f} s", file=sys.stderr, flush=True)
+
+    return tell
+
+
+def carried_out(project: Path, run: Path, workers: int, parts: int, memory: str) -> None:
+    """Adjust a project; print the plan, what came of it and what it took."""
+    print(f"the project takes {_on_disk(project):.2f} GiB on disk", flush=True)
+    with connected("local", workers, bytes_of(memory)) as client:
+        division = Division(cluster=client, parts=parts, memory=memory)
+        start = time.perf_counter()
+        plan = planned_on_disk(project, Wishes(), run, division)
+        print(f"divided and planned in {time.perf_counter() - start:,.0f} s")
+        print("\n".join(plan.lines()), flush=True)
+        start = time.perf_counter()
+        found = adjusted_on_disk(project, Wishes(), run, division, progress=_told(start))
+        seconds = time.perf_counter() - start
+        peaks = client.run(peak_memory)
+    print("\n".join(found.lines()))
+    print(f"adjusted in {seconds:,.0f} s; parts, states and results take {_on_disk(run):.2f} GiB on disk")
+    for _, peak in sorted(peaks.items()):
+        print(f"peak of a worker {peak / 2**20:,.0f} MiB")
+    print(f"peak of this process {peak_memory() / 2**20:,.0f} MiB")
+
+
+def main() -> None:
+    """Simulate, write, adjust."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("size", metavar="STRIPSxPHOTOS")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--parts", type=int, default=8)
+    parser.add_argument("--memory", default="1GiB")
+    parser.add_argument("--folder", type=Path)
+    parser.add_argument("--project-only", action="store_true", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.project_only:
+        write_project(given.size, given.folder)
+        return
+    with TemporaryDirectory() as temporary:
+        folder = given.folder or Path(temporary)
+        project = folder / "project"
+        if not project.exists():
+            own = [sys.executable, __file__, given.size, "--project-only", "--folder", str(project)]
+            subprocess.run(own, check=True)
+        carried_out(project, folder / "run", given.workers, given.parts, given.memory)
+
+
+if __name__ == "__main__":
+    main()
