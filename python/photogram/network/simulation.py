@@ -9,7 +9,7 @@ that the points a photograph may see are known beforehand.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -38,8 +38,10 @@ _NARROWEST, _WIDEST = 1e-6, 1.4
 """Radians from the vertical: what photos show beyond it is too far away to simulate."""
 _FAR_MORE = 10.0
 """Times as many points as were asked for are too many."""
-_CANDIDATE_BYTES = 300
-"""Memory for a photo and a point that may see each other, at the peak."""
+_AT_ONCE = 2**22
+"""Pairs of photo and point that may see each other, that are looked at together."""
+_CANDIDATE_BYTES, _IMAGE_BYTES = 300, 240
+"""Memory for such a pair, and for an image of the block, at the peak."""
 _JITTER = 0.15  # of a grid cell, either way: small enough to keep the middle of an overlap in the overlap
 
 
@@ -253,7 +255,7 @@ def simulate(
     ground, _ = _into_object_space(terrain, None, origin, spheroid, photo_to_ground)
 
     image_photos, image_points, xy = _photograph(
-        _candidates(plan),
+        plan,
         ground,
         positions,
         attitudes,
@@ -380,8 +382,8 @@ def _check_size(plan: _Plan, footprint: float, points_per_photo: float) -> None:
             "forward_overlap and side_overlap: with a column of points under every photo and a row in every"
             f" side overlap a photo shows about {fewest:.0f} points, not {points_per_photo:g}"
         )
-    photos, (columns, rows) = plan.strips * plan.photos_per_strip, _window(plan)
-    needed, available = _CANDIDATE_BYTES * photos * len(columns) * len(rows), available_memory()
+    photos = plan.strips * plan.photos_per_strip
+    needed, available = _CANDIDATE_BYTES * _AT_ONCE + _IMAGE_BYTES * photos * fewest, available_memory()
     if available is not None and needed > available:
         gib = [f"{size / 2**30:.1f} GiB" for size in (needed, available)]
         raise InputError(f"the simulation takes {gib[0]} of memory, and {gib[1]} are free")
@@ -412,20 +414,23 @@ def _grid(plan: _Plan) -> tuple[Indices, Indices]:
     return np.arange(columns[0], last_column + 1), np.arange(rows[0], last_row + 1)
 
 
-def _candidates(plan: _Plan) -> tuple[Indices, Indices]:
-    """Pairs of photo and grid point that may see each other, sorted by photo, then point."""
+def _candidates(plan: _Plan) -> Iterator[tuple[Indices, Indices]]:
+    """Pairs of photo and grid point that may see each other, by photo, then point: some photos at a time."""
     columns, rows = _window(plan)
     _, all_rows = _grid(plan)
-    strip, number = np.divmod(np.arange(plan.strips * plan.photos_per_strip), plan.photos_per_strip)
-    column = (number * plan.columns_per_base)[:, None, None] + (columns - columns[0])[:, None]
-    row = (strip * plan.rows_per_strip)[:, None, None] + (rows - rows[0])
-    points = column * len(all_rows) + row
-    photos = np.broadcast_to(np.arange(len(strip))[:, None, None], points.shape)
-    return photos.ravel(), points.ravel()
+    step = max(1, _AT_ONCE // (len(columns) * len(rows)))
+    count = plan.strips * plan.photos_per_strip
+    for first in range(0, count, step):
+        some = np.arange(first, min(first + step, count))
+        strip, number = np.divmod(some, plan.photos_per_strip)
+        column = (number * plan.columns_per_base)[:, None, None] + (columns - columns[0])[:, None]
+        row = (strip * plan.rows_per_strip)[:, None, None] + (rows - rows[0])
+        points = column * len(all_rows) + row
+        yield np.broadcast_to(some[:, None, None], points.shape).ravel(), points.ravel()
 
 
 def _photograph(
-    candidates: tuple[Indices, Indices],
+    plan: _Plan,
     ground: Floats,
     positions: Floats,
     attitudes: Floats,
@@ -436,19 +441,21 @@ def _photograph(
     refraction: Refraction | None,
 ) -> tuple[Indices, Indices, Floats]:
     """Photos, points and coordinates of the images in the frame whose points are seen at least twice."""
-    photos, points = candidates
-    xy = geometry.project(
-        ground[points],
-        positions[photos],
-        attitudes[photos],
-        np.full(len(photos), principal_distance),
-        spheroid=spheroid,
-        photo_to_ground=photo_to_ground,
-        refraction=refraction,
-    )
-    seen = np.flatnonzero((np.abs(xy) <= frame_size / 2).all(axis=1))
-    rays = np.bincount(points[seen])
-    seen = seen[rays[points[seen]] >= 2]
+    found = []
+    for photos, points in _candidates(plan):
+        xy = geometry.project(
+            ground[points],
+            positions[photos],
+            attitudes[photos],
+            np.full(len(photos), principal_distance),
+            spheroid=spheroid,
+            photo_to_ground=photo_to_ground,
+            refraction=refraction,
+        )
+        seen = (np.abs(xy) <= frame_size / 2).all(axis=1)
+        found.append((photos[seen], points[seen], xy[seen]))
+    photos, points, xy = (np.concatenate(each) for each in zip(*found, strict=True))
+    seen = np.bincount(points)[points] >= 2
     return photos[seen], points[seen], xy[seen]
 
 
