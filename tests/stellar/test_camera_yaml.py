@@ -1,5 +1,6 @@
 """Cameras as YAML of OpenCV and ROS, written, read, and refused; a library reads the same."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -67,6 +68,34 @@ def test_a_library_of_yaml_reads_the_same(camera):
     assert found["distortion_coefficients"]["data"] == k["data"]
     deviations = found["standard_deviations"]["data"]
     assert deviations[:4] == pytest.approx(np.sqrt(np.diag(camera.covariance))[:4].tolist())
+
+
+@pytest.mark.parametrize("camera", [BROWN, FISHEYE], ids=["brown", "fisheye"])
+def test_opencv_reads_the_same_and_projects_the_same(camera, tmp_path):
+    """It reads our file, its lens is the same, and we read its file."""
+    file = tmp_path / "camera.yaml"
+    file.write_bytes(to_yaml(camera, FRAME, "opencv"))
+    storage = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
+    matrix = storage.getNode("camera_matrix").mat()
+    terms = storage.getNode("distortion_coefficients").mat().ravel()
+    size = [int(storage.getNode(name).real()) for name in ("image_width", "image_height")]
+    assert size == [6000, 4000]
+    directions = np.random.default_rng(5).uniform([-0.3, -0.3, 0.7], [0.3, 0.3, 1.3], (50, 3))
+    project = cv2.projectPoints if camera is BROWN else cv2.fisheye.projectPoints
+    given = directions if camera is BROWN else directions[:, np.newaxis]
+    of_opencv = project(given, np.zeros(3), np.zeros(3), matrix, terms)[0].reshape(-1, 2)
+    np.testing.assert_allclose(camera.images(directions), of_opencv, rtol=0, atol=1e-9)
+
+    own = cv2.FileStorage(str(tmp_path / "own.yaml"), cv2.FILE_STORAGE_WRITE)
+    own.write("image_width", 6000)
+    own.write("image_height", 4000)
+    own.write("fisheye_model", int(camera is FISHEYE))
+    own.write("camera_matrix", matrix)
+    own.write("distortion_coefficients", terms)
+    own.release()
+    again, frame = read_yaml(tmp_path / "own.yaml")
+    assert frame == FRAME
+    np.testing.assert_allclose(again.values, camera.values, rtol=1e-15)
 
 
 def test_a_file_of_opencv(tmp_path):
