@@ -91,14 +91,14 @@ def project_of(
         positions[places[name]] = np.where(used | ~used.any(), position, np.nan)
         if used.any() and "control" in wishes.sd:
             sd[places[name]] = np.where(used, wishes.sd["control"], np.inf)
-    cameras = list(found.cameras)
+    cameras = {camera: row for row, camera in enumerate(found.cameras)}
     return assembled(
         path=path,
         title=title,
         cameras=list(found.cameras.values()),
         sizes=[None] * len(cameras),
         photo_ids=photos,
-        photo_cameras=[cameras.index(camera) for camera in found.photos.values()],
+        photo_cameras=[cameras[camera] for camera in found.photos.values()],
         centres=centres,
         matrices=matrices,
         point_ids=points,

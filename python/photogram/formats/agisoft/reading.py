@@ -66,7 +66,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     points, starts, held, sd, full = _markers(positions, list(markers.values()), wishes)
     rows = {each.attributes["id"]: row for row, each in enumerate(shots)}
     photos, owners, xy = _locations(chunk, rows, {key: row for row, key in enumerate(markers)})
-    order = list(sensors)
+    order = {key: row for row, key in enumerate(sensors)}
     return assembled(
         path=path,
         title=TITLE,
@@ -74,7 +74,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         sizes=[each.size for each in sensors.values()],
         pixel_mm=[each.pixel for each in sensors.values()],
         photo_ids=names,
-        photo_cameras=[order.index(each.attributes["sensor_id"]) for each in shots],
+        photo_cameras=[order[each.attributes["sensor_id"]] for each in shots],
         centres=centres,
         matrices=matrices,
         point_ids=points,

@@ -71,7 +71,7 @@ def _project(model: Model, path: Path) -> Project:
     matrices = (FLIP @ rotations).transpose(0, 2, 1)
     centres = -np.einsum("nji,nj->ni", rotations, translations)
     mounts, stands = mounted(frames, images.names, centres, matrices)
-    camera_names = [each.name for each in cameras]
+    of_names = {each.name: row for row, each in enumerate(cameras)}
     rows, points = _observed(model, messages)
     point_ids = list(map(str, model.points.numbers.tolist()))
     return assembled(
@@ -82,7 +82,7 @@ def _project(model: Model, path: Path) -> Project:
         photo_ids=[*images.names, *(each.name for each in stands)],
         photo_cameras=[
             *(places[number] for number in images.cameras.tolist()),
-            *(camera_names.index(each.camera) for each in stands),
+            *(of_names[each.camera] for each in stands),
         ],
         centres=np.vstack([centres, *(each.centre[np.newaxis] for each in stands)]),
         matrices=np.concatenate([matrices, *(each.matrix[np.newaxis] for each in stands)]),

@@ -181,8 +181,8 @@ def project_of(content: Content, wishes: Wishes) -> Project:
         starts[places[number]] = positions[places[number]] = position
         sd[places[number]] = deviations
     sensors = list(content.sensors.values())
-    names = list(content.sensors)
-    photo_cameras = np.array([names.index(content.cameras[number]) for number in order])
+    sensor_rows = {name: row for row, name in enumerate(content.sensors)}
+    photo_cameras = np.array([sensor_rows[content.cameras[number]] for number in order])
     image_photos = np.array([order[number] for number in content.image_photos], dtype=np.int64)
     of_images = photo_cameras[image_photos]
     xy, image_sd = content.pixels.copy(), content.image_sd.copy()

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import cast, get_args
 
 from photogram import _photocore
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.tables import Tables
@@ -46,41 +47,77 @@ def read_cameras(tables: Tables) -> Cameras:
     if not table.count:
         raise table.head.error("the table names no cameras")
     found = Cameras([], [], [], [])
-    names = table.texts("camera")
     table.names("camera")
-    for row, name in enumerate(names):
-        if name in names[:row]:
-            raise table.error(row, f"the camera {name} is there twice")
-        each = table.texts("for_each", "all")[row].lower()
-        if each not in _EACH:
-            raise table.error(row, f"column for_each: {quoted(each)} is none of {', '.join(_EACH)}")
-        size = _size(table, row)
+    seen = set[str]()
+    for row, own in enumerate(_rows(table)):
+        if own.name in seen:
+            raise table.error(row, f"the camera {own.name} is there twice")
+        seen.add(own.name)
+        if own.each not in _EACH:
+            raise table.error(row, f"column for_each: {quoted(own.each)} is none of {', '.join(_EACH)}")
+        size = _size(table, row, own)
         try:
-            found.cameras.append(_camera(tables, table, row, size))
+            found.cameras.append(_camera(tables, table, row, own, size))
         except InputError as error:
             raise (error if error.file else table.error(row, error.message)) from None
         found.sizes.append(size)
-        pixel = table.numbers("pixel_mm")[row]
-        found.pixel_mm.append(None if math.isnan(pixel) else float(pixel))
-        found.for_each.append(each)
+        found.pixel_mm.append(own.pixel_mm)
+        found.for_each.append(own.each)
     return replace(found, cameras=read_covariances(tables).cameras(found.cameras))
 
 
-def _size(table: ColumnTable, row: int) -> Size | None:
-    width, height = (float(table.numbers(name)[row]) for name in ("width", "height"))
-    if math.isnan(width) or math.isnan(height):
+@dataclass(frozen=True)
+class _Row:
+    """One row of the table; numbers by the names of their columns, those that are missing left out."""
+
+    name: str
+    each: str
+    model: str
+    weights: str
+    width: float | None
+    height: float | None
+    pixel_mm: float | None
+    values: dict[str, float]
+    deviations: dict[str, float]
+
+
+def _rows(table: ColumnTable) -> Iterator[_Row]:
+    """Yield the rows, from columns that are read once: a project may have a camera for each photo."""
+    texts = [table.texts(name) for name in ("camera", "for_each", "model", "weights")]
+    facts = [_present(table.numbers(name)) for name in ("width", "height", "pixel_mm")]
+    values = {name: _present(table.numbers(name)) for name in table.columns if name in _ALL}
+    deviations = {
+        name.removeprefix("sd_"): _present(table.numbers(name, infinite=True))
+        for name in table.columns
+        if name.startswith("sd_")
+    }
+    for row in range(table.count):
+        name, each, model, weights = (column[row] for column in texts)
+        width, height, pixel_mm = (column[row] for column in facts)
+        own, sd = (
+            {key: value for key, column in columns.items() if (value := column[row]) is not None}
+            for columns in (values, deviations)
+        )
+        words = (each or "all").lower(), model.lower(), (weights or "corrected").lower()
+        yield _Row(name, *words, width, height, pixel_mm, own, sd)
+
+
+def _present(values: Floats) -> list[float | None]:
+    return [None if math.isnan(value) else value for value in values.tolist()]
+
+
+def _size(table: ColumnTable, row: int, own: _Row) -> Size | None:
+    if own.width is None or own.height is None:
         return None
-    for name, value in (("width", width), ("height", height)):
+    for name, value in (("width", own.width), ("height", own.height)):
         if not (0 < value < 2**31 and value == int(value)):
             raise table.error(row, f"column {name}: {value:g} is no number of pixels")
-    return int(width), int(height)
+    return int(own.width), int(own.height)
 
 
-def _camera(tables: Tables, table: ColumnTable, row: int, size: Size | None) -> Camera:
-    given = {name: table.numbers(name)[row] for name in table.columns if name in _ALL}
-    known = {name: float(value) for name, value in given.items() if not math.isnan(value)}
-    default = "brown" if "c" in known and not known.keys() & {"f", "fx"} else "pinhole"
-    model = table.texts("model", default)[row].lower()
+def _camera(tables: Tables, table: ColumnTable, row: int, given: _Row, size: Size | None) -> Camera:
+    known = given.values
+    model = given.model or ("brown" if "c" in known and not known.keys() & {"f", "fx"} else "pinhole")
     if model not in _MODELS:
         raise table.error(row, f"column model: there is no {quoted(model)}, but {', '.join(_MODELS)}")
     powers = dict(_MODELS[model][1])
@@ -92,14 +129,7 @@ def _camera(tables: Tables, table: ColumnTable, row: int, size: Size | None) -> 
     if "c" in parameters:
         # In files a principal distance is positive for the positive plane; models have it negative there.
         parameters["c"] = -parameters["c"]
-    deviations = _spread(
-        own,
-        {
-            name: float(value)
-            for name in (each.removeprefix("sd_") for each in table.columns if each.startswith("sd_"))
-            if not math.isnan(value := table.numbers(f"sd_{name}", infinite=True)[row])
-        },
-    )
+    deviations = _spread(own, given.deviations)
     if strange := [name for name in parameters if name not in own and parameters[name] != 0]:
         raise table.error(row, f"the model {model} has no {strange[0]}, but {', '.join(powers)}")
     scale = 1e-3 if image == "um" else 1.0
@@ -120,14 +150,13 @@ def _camera(tables: Tables, table: ColumnTable, row: int, size: Size | None) -> 
             for k, v in deviations.items()
             if k in own and own[k] not in constants
         },
-        name=table.texts("camera")[row],
+        name=given.name,
         unit="px" if image == "px" else "mm",
-        weights=_weights(table, row),
+        weights=_weights(table, row, given.weights),
     )
 
 
-def _weights(table: ColumnTable, row: int) -> Weights:
-    word = table.texts("weights", "corrected")[row].lower()
+def _weights(table: ColumnTable, row: int, word: str) -> Weights:
     if word not in get_args(Weights):
         raise table.error(row, f"column weights: {quoted(word)} is none of {', '.join(get_args(Weights))}")
     return cast("Weights", word)

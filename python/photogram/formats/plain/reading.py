@@ -184,7 +184,8 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     kept = np.flatnonzero(use)
     if len(kept) < table.count:
         tables.messages.append(Message(f"{table.count - len(kept)} photos are not used", table.path))
-    which = _camera_of(table, cameras)
+    which, groups = _camera_of(table, cameras), table.texts("group")
+    unused = frozenset(name for name, used in zip(texts, use.tolist(), strict=True) if not used)
     return Photos(
         [texts[row] for row in kept],
         [which[row] for row in kept],
@@ -193,10 +194,10 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
         matrices[kept],
         sd[kept],
         attitude_sd[kept],
-        [table.texts("group")[row] for row in kept],
+        [groups[row] for row in kept],
         table.numbers("time")[kept],
-        frozenset(name for name, used in zip(texts, use.tolist(), strict=True) if not used),
-        [each for each in observed if texts.index(each.photos[0]) in set(kept.tolist())],
+        unused,
+        [each for each in observed if each.photos[0] not in unused],
     )
 
 
