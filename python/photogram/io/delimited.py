@@ -141,6 +141,21 @@ class ColumnTable:
                     " case alone",
                 )
 
+    def names_once(self, column: str) -> list[str]:
+        """Return a column of names as :meth:`names` has them, none of which may stand in two rows.
+
+        Raises
+        ------
+        InputError
+            As of :meth:`names`; a name that is there twice.
+        """
+        found, texts = self.names(column), self.texts(column)
+        if len(found.names) < self.count:
+            _, first = np.unique(found.rows, return_index=True)
+            row = int(np.setdiff1d(np.arange(self.count), first)[0])
+            raise self.error(row, f"the {column} {quoted(texts[row])} is there twice")
+        return texts
+
     def texts(self, column: str, default: str = "") -> list[str]:
         """Return a column of text, without blanks at both ends; empty cells have the default."""
         found = self.ready.get(column)

@@ -47,12 +47,7 @@ def read_cameras(tables: Tables) -> Cameras:
     if not table.count:
         raise table.head.error("the table names no cameras")
     found = Cameras([], [], [], [])
-    table.names("camera")
-    seen = set[str]()
     for row, own in enumerate(_rows(table)):
-        if own.name in seen:
-            raise table.error(row, f"the camera {own.name} is there twice")
-        seen.add(own.name)
         if own.each not in _EACH:
             raise table.error(row, f"column for_each: {quoted(own.each)} is none of {', '.join(_EACH)}")
         size = _size(table, row, own)
@@ -83,7 +78,8 @@ class _Row:
 
 def _rows(table: ColumnTable) -> Iterator[_Row]:
     """Yield the rows, from columns that are read once: a project may have a camera for each photo."""
-    texts = [table.texts(name) for name in ("camera", "for_each", "model", "weights")]
+    words = [table.texts(name) for name in ("for_each", "model", "weights")]
+    texts = [table.names_once("camera"), *words]
     facts = [_present(table.numbers(name)) for name in ("width", "height", "pixel_mm")]
     values = {name: _present(table.numbers(name)) for name in table.columns if name in _ALL}
     deviations = {
@@ -98,8 +94,8 @@ def _rows(table: ColumnTable) -> Iterator[_Row]:
             {key: value for key, column in columns.items() if (value := column[row]) is not None}
             for columns in (values, deviations)
         )
-        words = (each or "all").lower(), model.lower(), (weights or "corrected").lower()
-        yield _Row(name, *words, width, height, pixel_mm, own, sd)
+        kinds = (each or "all").lower(), model.lower(), (weights or "corrected").lower()
+        yield _Row(name, *kinds, width, height, pixel_mm, own, sd)
 
 
 def _present(values: Floats) -> list[float | None]:

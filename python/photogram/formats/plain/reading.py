@@ -162,11 +162,7 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     table = tables.read("photos")
     if table is None:
         raise InputError("has no table of photos (photos.csv)", file=tables.settings.path)
-    names = table.names("photo")
-    texts = table.texts("photo")
-    if len(names.names) < table.count:
-        row = next(row for row, name in enumerate(texts) if name in texts[:row])
-        raise table.error(row, f"the photo {quoted(texts[row])} is there twice")
+    texts = table.names_once("photo")
     use = table.flags("use")
     centres = np.stack([table.numbers(axis) for axis in AXES], axis=1)
     sd = tables.deviations(table, "photos", _SD, math.inf)
@@ -385,11 +381,7 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     InputError
         A point that is there twice or has no coordinate, a standard deviation that is missing.
     """
-    names = table.texts("point")
-    table.names("point")
-    for row, name in enumerate(names):
-        if name in names[:row]:
-            raise table.error(row, f"the point {quoted(name)} is there twice")
+    names = table.names_once("point")
     values = np.stack([table.numbers(axis) for axis in AXES], axis=1)
     uses = [each.lower() for each in table.texts("use", "control")]
     sd = np.stack([table.numbers(name, infinite=True) for name in _SD], axis=1)
@@ -443,16 +435,12 @@ class _Points:
 
 def _points(tables: Tables, transform: Transform, images: Images, control: _Given | None) -> _Points:
     table = tables.read("points")
-    own = table.texts("point") if table is not None else []
+    own = table.names_once("point") if table is not None else []
     names = list(dict.fromkeys([*images.point_names, *(control.names if control else []), *own]))
     places = {name: row for row, name in enumerate(names)}
     starts = np.full((len(names), 3), np.nan)
     positions, sd = starts.copy(), np.full((len(names), 3), np.inf)
     if table is not None:
-        table.names("point")
-        if len(set(own)) < len(own):
-            row = next(row for row, name in enumerate(own) if name in own[:row])
-            raise table.error(row, f"the point {quoted(own[row])} is there twice")
         rows = np.array([places[name] for name in own], dtype=np.int64)
         given = np.stack([table.numbers(axis) for axis in AXES], axis=1)
         own_sd = tables.deviations(table, "points", _SD, math.inf)
