@@ -32,7 +32,7 @@ from photogram.formats.project import Project
 from photogram.network.block import Block
 
 ROWS = 2**20
-"""Of a group of rows in the table of images."""
+"""Of the table of images, written together."""
 
 
 def write_project(size: str, folder: Path) -> None:
@@ -43,14 +43,20 @@ def write_project(size: str, folder: Path) -> None:
     for name, content in to_files(_without_images(block, folder), "plain").items():
         if name != "images.csv":
             (folder / name).write_bytes(content)
-    columns = {
-        "photo": _named(block.photo_ids, block.image_photos),
-        "point": _named(block.point_ids, block.image_points),
-        "x": block.image_xy[:, 0],
-        "y": block.image_xy[:, 1],
-        "sd": block.image_sd[:, 0],
-    }
-    parquet.write_table(pyarrow.table(columns), folder / "images.parquet", row_group_size=ROWS)
+    photos, points = pyarrow.array(block.photo_ids), pyarrow.array(block.point_ids)
+    text, number = pyarrow.string(), pyarrow.float64()
+    types = {"photo": text, "point": text, "x": number, "y": number, "sd": number}
+    with parquet.ParquetWriter(folder / "images.parquet", pyarrow.schema(types)) as file:
+        for start in range(0, len(block.image_xy), ROWS):
+            own = slice(start, start + ROWS)
+            columns = {
+                "photo": photos.take(pyarrow.array(block.image_photos[own])),
+                "point": points.take(pyarrow.array(block.image_points[own])),
+                "x": block.image_xy[own, 0],
+                "y": block.image_xy[own, 1],
+                "sd": block.image_sd[own, 0],
+            }
+            file.write_table(pyarrow.table(columns))
 
 
 def _without_images(block: Block, folder: Path) -> Project:
@@ -70,11 +76,6 @@ def _without_images(block: Block, folder: Path) -> Project:
     starts = np.full((len(control), 3), np.nan)
     none = (None,) * count
     return Project(block=held, path=folder, title="", sizes=none, pixel_mm=none, starts=starts)
-
-
-def _named(names: list[str], rows: np.ndarray) -> pyarrow.Array:
-    """Return names of rows, each kept once."""
-    return pyarrow.DictionaryArray.from_arrays(pyarrow.array(rows, pyarrow.int32()), pyarrow.array(names))
 
 
 def _on_disk(folder: Path) -> float:

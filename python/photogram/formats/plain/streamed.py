@@ -364,7 +364,8 @@ def _names(column: object) -> tuple[list[str], Indices]:
     import pyarrow.compute
 
     whole = column.combine_chunks()  # type: ignore[attr-defined]
-    if not pyarrow.types.is_dictionary(whole.type):
+    # A batch may come with all names that the file has.
+    if not pyarrow.types.is_dictionary(whole.type) or len(whole.dictionary) > len(whole):
         whole = pyarrow.compute.dictionary_encode(whole.cast(pyarrow.string()))
     return [str(each).strip() for each in whole.dictionary.to_pylist()], whole.indices.to_numpy(
         zero_copy_only=False
