@@ -62,6 +62,22 @@ def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatc
         same(one, other)
 
 
+def test_names_may_come_with_all_that_the_file_has(project, tmp_path, monkeypatch):
+    monkeypatch.setattr(streamed, "BATCH", 100)
+    folder = tmp_path / "categories"
+    folder.mkdir()
+    for each in project.iterdir():
+        (folder / each.name).write_bytes(each.read_bytes())
+    table = pd.read_parquet(project / "images.parquet")
+    names = [*(f"unseen {row}" for row in range(1000)), *sorted(set(table["point"]))]
+    table.assign(point=pd.Categorical(table["point"], names)).to_parquet(folder / "images.parquet")
+    of_names, of_texts = (Streamed(each, Wishes(), tmp_path / each.name) for each in (folder, project))
+    np.testing.assert_array_equal(of_names.images, of_texts.images)
+    found = of_names.divided(tmp_path / "parts", 4, OPTIONS, "")
+    expected = of_texts.divided(tmp_path / "others", 4, OPTIONS, "")
+    assert (found.points, found.images) == (expected.points, expected.images)
+
+
 def same(one, other):
     """Compare two parts: the order of points is free."""
     for name in ("photos", "owners", "observations", "unknowns"):
