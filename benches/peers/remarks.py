@@ -10,7 +10,7 @@ REASONS: dict[str, str] = {
         "products, and a large part of the time goes into the collinearity equations, which are not "
         "products at all. Tried, and kept: points on the same photographs eliminated side by side, "
         "sums of a pair of photographs held in registers, the common sizes compiled for themselves, "
-        "points in the order of the ground, memory of fronts used again. Not tried: several image "
-        "points linearised in one vector, 512-bit vectors."
+        "points in the order of the ground, memory of fronts used again, 512-bit vectors. Not tried: "
+        "several image points linearised in one vector."
     ),
 }

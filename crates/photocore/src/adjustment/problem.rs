@@ -318,7 +318,7 @@ impl<M: Model> Equations for Linearized<'_, M> {
         let layout = self.problem.layout();
         self.problem.model.observe(&self.prepared, local, group, rows);
         let sd = &self.observation_sd[group * layout.rows()..][..layout.rows()];
-        self.weight(sd, rows.constant, &mut [&mut *rows.local, &mut *rows.kept, &mut *rows.common]);
+        self.weight(sd, rows.constant, [&mut *rows.local, &mut *rows.kept, &mut *rows.common]);
         if let Some(fixed) = &self.fixed {
             let of = |unknown: usize| fixed[unknown];
             leave_out(rows.local, sd.len(), layout.local_range(local).map(of));
@@ -332,7 +332,7 @@ impl<M: Model> Equations for Linearized<'_, M> {
         self.problem.model.observe_tie(&self.prepared, tie, rows);
         let first = layout.groups() * layout.rows();
         let sd = &self.observation_sd[first..][layout.tie_rows(tie)];
-        self.weight(sd, rows.constant, &mut [&mut *rows.coefficients]);
+        self.weight(sd, rows.constant, [&mut *rows.coefficients]);
         if let Some(fixed) = &self.fixed {
             leave_out(rows.coefficients, sd.len(), layout.tie_columns(tie).map(|unknown| fixed[unknown]));
         }
@@ -346,17 +346,17 @@ impl<M: Model> Equations for Linearized<'_, M> {
 impl<M: Model> Linearized<'_, M> {
     /// Gives equations unit weight, and less where a loss says so.
     #[inline(always)]
-    fn weight(&self, sd: &[f64], constant: &mut [f64], parts: &mut [&mut [f64]]) {
+    fn weight<const N: usize>(&self, sd: &[f64], constant: &mut [f64], mut parts: [&mut [f64]; N]) {
+        let widths = parts.each_ref().map(|part| part.len() / constant.len());
         for (row, sd) in sd.iter().enumerate() {
             constant[row] /= sd;
             let weight = sd.recip();
-            for part in &mut *parts {
-                let width = part.len() / constant.len();
+            for (part, width) in parts.iter_mut().zip(widths) {
                 part[row * width..][..width].iter_mut().for_each(|value| *value *= weight);
             }
         }
         if let Some(reweighting) = self.reweighting {
-            reweighting.apply(constant, parts);
+            reweighting.apply(constant, &mut parts);
         }
     }
 }

@@ -153,13 +153,13 @@ fn write<C: CameraModel>(
         rows.constant[row] = residual[row];
         rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
         rows.kept[width * row..][..6].copy_from_slice(&projection.photo[row]);
+        // As many as the camera has, which is known where this is compiled.
+        let camera = projection.camera[row].as_ref();
         if width > 6 {
-            rows.kept[width * row + 6..][..width - 6].copy_from_slice(projection.camera[row].as_ref());
+            rows.kept[width * row + 6..][..camera.len()].copy_from_slice(camera);
         }
-    }
-    if shared > 0 {
-        (0..2).for_each(|row| {
-            rows.common[shared * row..][..shared].copy_from_slice(projection.camera[row].as_ref());
-        });
+        if shared > 0 {
+            rows.common[shared * row..][..camera.len()].copy_from_slice(camera);
+        }
     }
 }

@@ -14,7 +14,7 @@ use super::selected::SelectedInverse;
 use super::stack::{Part, Slot, Stack};
 use super::system::System;
 use super::tie_equations::TieEquations;
-use super::vectorised::{Kernel, LANES, Rows, Side, copy_vectors, dot, run, size};
+use super::vectorised::{Kernel, LANES, Rows, Side, copy_vectors, dot, dot_in_lanes, run, size};
 use super::watch::Control;
 use super::workspace::zeros;
 
@@ -297,7 +297,8 @@ impl Others {
                 found.alone.extend_from_slice(&unit);
             }
             for b in 0..=a {
-                let value = unit[b] + dot(&self.hq[a * width..][..width], &self.h[b * width..][..width]);
+                let value =
+                    unit[b] + dot_in_lanes(&self.hq[a * width..][..width], &self.h[b * width..][..width]);
                 (own[a][b], own[b][a]) = (value, value);
             }
         }

@@ -15,7 +15,6 @@ use super::front::Front;
 use super::further::{blocks_of, of_others, subtract_sides};
 use super::layout::Layout;
 use super::panels::{Handover, Panels, lock};
-use super::room::numbers_at;
 use super::stack::Stack;
 use super::symbolic::Supernode;
 use super::system::System;
@@ -236,7 +235,7 @@ impl<E: Equations> Formation<'_, E> {
         let symbolic = &*self.system.symbolic;
         let s = &symbolic.supernodes()[index];
         let start = Instant::now();
-        let update = self.control.allocated(self.system.workspace.zeros(s.below() * s.below()))?;
+        let update = self.control.allocated(self.system.workspace.lower_zeros(s.below()))?;
         let further = blocks_of(&self.system.layout, self.rights);
         let mut front = Front::new(s.width, s.height(), panel, update, further);
         for &child in &s.children {
@@ -296,13 +295,13 @@ impl<E: Equations> Formation<'_, E> {
         if self.keeps {
             sums.kept = kept.take(index).unwrap_or_default();
             sums.kept.clear();
-            let numbers = numbers_at(&system.incidence, layout, index);
+            let numbers = system.kept[index];
             if sums.kept.capacity() < numbers {
                 sums.kept = control.allocated(reserved(numbers))?;
             }
         }
         if stacks.locals() < MANY || rayon::current_num_threads() == 1 {
-            let mut stack = Stack::default();
+            let mut stack = system.workspace.stack();
             for run in stacks.iter() {
                 if !control.stopped() {
                     self.fill(&mut stack, run);
@@ -313,9 +312,10 @@ impl<E: Equations> Formation<'_, E> {
                     }
                 }
             }
+            system.workspace.put_back_stack(stack);
             return Some(sums);
         }
-        let mut filled: Vec<Stack> = (0..WAVE).map(|_| Stack::default()).collect();
+        let mut filled: Vec<Stack> = (0..WAVE).map(|_| system.workspace.stack()).collect();
         let starts = self.shares(index);
         for wave in stacks.parts(WAVE).into_iter().take_while(|_| !control.stopped()) {
             let runs: Vec<&[u32]> = wave.iter().collect();
@@ -333,6 +333,7 @@ impl<E: Equations> Formation<'_, E> {
                 }
             }
         }
+        filled.into_iter().for_each(|stack| system.workspace.put_back_stack(stack));
         Some(sums)
     }
 

@@ -28,7 +28,7 @@ pub(super) struct Front<'a> {
 }
 
 impl<'a> Front<'a> {
-    /// A front of zeros, but for the panel; `update` must hold as many zeros as its square takes.
+    /// A front of zeros, but for the panel; `update` must hold zeros on and below its diagonal.
     pub fn new(width: usize, height: usize, panel: &'a mut [f64], update: Vec<f64>, further: usize) -> Self {
         let (right, diagonal) = (vec![0.0; height], vec![0.0; height]);
         let sides = vec![[0.0; LANES]; height * further];

@@ -1,8 +1,8 @@
 //! Which unknowns there are, and which equations touch which of them.
 
-use std::collections::BTreeSet;
 use std::ops::Range;
 
+use smallvec::SmallVec;
 use thiserror::Error;
 
 /// The unknowns and the equations of a system.
@@ -458,8 +458,13 @@ impl Layout {
     /// The unknowns of kept blocks, a main one counted for each of its groups, that lose products when local block `i` is reduced out.
     pub(super) fn reduced_width(&self, i: usize) -> usize {
         let main: usize = self.groups_of(i).map(|group| self.kept_dim(self.kept_of(group))).sum();
-        let groups = self.groups_of(i).filter(|_| self.has_further());
-        let further: BTreeSet<u32> = groups.flat_map(|group| self.further_of(group)).copied().collect();
+        if !self.has_further() {
+            return main;
+        }
+        let mut further: SmallVec<[u32; 16]> =
+            self.groups_of(i).flat_map(|group| self.further_of(group)).copied().collect();
+        further.sort_unstable();
+        further.dedup();
         main + further.into_iter().map(|block| self.kept_dim(block as usize)).sum::<usize>()
     }
 

@@ -23,8 +23,8 @@ pub struct System {
     pub(super) workspace: Workspace,
     /// Whether what the elimination of local blocks leaves is kept for the solution.
     pub(super) keeps: bool,
-    /// Numbers in what is kept of it.
-    kept: usize,
+    /// Numbers in what is kept of it at each supernode, and last of the local blocks without equations, at the most; none where it is not.
+    pub(super) kept: Vec<usize>,
 }
 
 impl System {
@@ -39,9 +39,9 @@ impl System {
             factored + formation_work(&incidence, &layout, index)
         };
         let tree = Tree::new(&symbolic, symbolic.supernodes().iter().enumerate().map(work).collect());
-        let kept: usize =
-            (0..=symbolic.supernode_count()).map(|index| numbers_at(&incidence, &layout, index)).sum();
-        let keeps = kept <= made_of_results(&layout);
+        let kept: Vec<usize> =
+            (0..=symbolic.supernode_count()).map(|index| numbers_at(&incidence, &layout, index)).collect();
+        let keeps = kept.iter().sum::<usize>() <= made_of_results(&layout);
         Self {
             layout,
             symbolic,
@@ -51,7 +51,7 @@ impl System {
             tree,
             workspace: Workspace::default(),
             keeps,
-            kept: if keeps { kept } else { 0 },
+            kept: if keeps { kept } else { Vec::new() },
         }
     }
 
@@ -67,7 +67,7 @@ impl System {
 
     /// Numbers that a factor holds at the most: the panels, and what the elimination of local blocks has left for the solution.
     pub fn numbers_in_factor(&self) -> usize {
-        self.symbolic.values() + self.kept
+        self.symbolic.values() + self.kept.iter().sum::<usize>()
     }
 
     /// First row of the border in the front of a supernode.

@@ -158,6 +158,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// The product of two vectors, summed in as many parts as there are lanes.
+#[inline(always)]
 pub(super) fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
     let ((a, last), (b, end)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
     let mut sums = [0.0; LANES];
@@ -266,10 +267,14 @@ fn sum<S: Simd, const C: usize>(
     for row in rows {
         let vectors = S::as_simd_f64s(&a.values[row * a.stride + i..][..LANES]).0;
         let factors = &b.values[row * b.stride + j..][..C];
+        let mut signed = [simd.splat_f64s(0.0); LANES];
+        for k in 0..LANES / S::F64_LANES {
+            signed[k] = simd.mul_f64s(vectors[k], simd.splat_f64s(sign));
+        }
         for c in 0..C {
-            let factor = simd.splat_f64s(sign * factors[c]);
+            let factor = simd.splat_f64s(factors[c]);
             for k in 0..LANES / S::F64_LANES {
-                sums[c][k] = simd.mul_add_f64s(vectors[k], factor, sums[c][k]);
+                sums[c][k] = simd.mul_add_f64s(signed[k], factor, sums[c][k]);
             }
         }
     }

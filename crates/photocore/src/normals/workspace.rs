@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use super::panels::lock;
+use super::stack::Stack;
 
 /// For each supernode, and last for the local blocks without equations: V, v and L of every stack at home there, one after
 /// the other; nothing where it is not kept.
@@ -15,6 +16,8 @@ pub(super) type Eliminated = Vec<Vec<f64>>;
 pub(super) struct Workspace {
     spare: Mutex<HashMap<usize, Vec<Vec<f64>>>>,
     eliminated: Mutex<Eliminated>,
+    /// Room for stacks, which differ little in size.
+    stacks: Mutex<Vec<Stack>>,
 }
 
 impl Workspace {
@@ -23,6 +26,13 @@ impl Workspace {
         let mut buffer = self.take(length)?;
         buffer.clear();
         buffer.resize(length, 0.0);
+        Ok(buffer)
+    }
+
+    /// A square matrix, column by column, of zeros on and below the diagonal and anything above it; the bytes that there are not.
+    pub fn lower_zeros(&self, order: usize) -> Result<Vec<f64>, usize> {
+        let mut buffer = self.any(order * order)?;
+        buffer.chunks_exact_mut(order.max(1)).enumerate().for_each(|(j, column)| column[j..].fill(0.0));
         Ok(buffer)
     }
 
@@ -44,6 +54,17 @@ impl Workspace {
     pub fn clear(&self) {
         lock(&self.spare).clear();
         drop(self.take_eliminated());
+        lock(&self.stacks).clear();
+    }
+
+    /// Room for a stack, of anything.
+    pub fn stack(&self) -> Stack {
+        lock(&self.stacks).pop().unwrap_or_default()
+    }
+
+    /// Takes it back.
+    pub fn put_back_stack(&self, stack: Stack) {
+        lock(&self.stacks).push(stack);
     }
 
     /// Room for what is kept of local blocks, as it was given back; nothing where it was not.

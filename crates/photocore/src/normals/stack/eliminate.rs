@@ -67,14 +67,17 @@ impl Stack {
     ) {
         for slot in &self.slots {
             let dim = size::<D>(slot.dim);
-            let coupling = &mut self.coupling[slot.coupling + t * L * dim..][..L * dim];
-            coupling.fill(0.0);
-            for (k, p) in slot.groups.clone().enumerate() {
-                let own = &self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L];
-                let at = slot.kept + (t * slot.groups.len() + k) * rows * dim;
-                add_product::<L>(coupling, dim, own, &self.kept_rows[at..][..rows * dim], dim, 0..dim);
+            let coupling = &mut self.coupling[slot.coupling + t * L * dim..];
+            for first in (0..dim).step_by(LANES) {
+                let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
+                for (k, p) in slot.groups.clone().enumerate() {
+                    let own = &self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L];
+                    let at = slot.kept + (t * slot.groups.len() + k) * rows * dim;
+                    add_rows::<S, L>(simd, &mut sums, own, &self.kept_rows[at + first..], dim);
+                }
+                triangle.forward_vectors::<S, L>(simd, &mut sums);
+                write_sums::<S, L>(&sums, coupling, dim, first);
             }
-            triangle.forward::<L>(coupling, dim);
         }
         for segment in &self.segments {
             if segment.plain {
@@ -153,23 +156,47 @@ fn couple_runs<S: Simd, const L: usize>(
             for p in run.places.clone() {
                 let Place { width: stride, rows: start, .. } = places[p];
                 let own = &local_rows[(t * places.len() + p) * rows * L..][..rows * L];
-                for (row, local) in own.as_chunks::<L>().0.iter().enumerate() {
-                    let at = start + (t * rows + row) * stride + run.column + first;
-                    let vectors = S::as_simd_f64s(&common_rows[at..][..LANES]).0;
-                    for d in 0..L {
-                        let factor = simd.splat_f64s(local[d]);
-                        for k in 0..LANES / S::F64_LANES {
-                            sums[d][k] = simd.mul_add_f64s(vectors[k], factor, sums[d][k]);
-                        }
-                    }
-                }
+                let at = start + t * rows * stride + run.column + first;
+                add_rows::<S, L>(simd, &mut sums, own, &common_rows[at..], stride);
             }
         }
         triangle.forward_vectors::<S, L>(simd, &mut sums);
-        let height = LANES.min(width - first);
+        write_sums::<S, L>(&sums, coupling, width, first);
+    }
+}
+
+/// Adds to row d of the sums, over some equations, their coefficients d of a local block times as many others as there are lanes, whose
+/// rows lie `stride` apart.
+#[inline(always)]
+fn add_rows<S: Simd, const L: usize>(
+    simd: S,
+    sums: &mut [[S::f64s; LANES]; L],
+    local: &[f64],
+    others: &[f64],
+    stride: usize,
+) {
+    for (row, local) in local.as_chunks::<L>().0.iter().enumerate() {
+        let vectors = S::as_simd_f64s(&others[row * stride..][..LANES]).0;
         for d in 0..L {
-            copy_vectors::<S>(&sums[d], &mut coupling[d * width + first..][..height]);
+            let factor = simd.splat_f64s(local[d]);
+            for k in 0..LANES / S::F64_LANES {
+                sums[d][k] = simd.mul_add_f64s(vectors[k], factor, sums[d][k]);
+            }
         }
+    }
+}
+
+/// Writes sums to the columns of a coupling of so many from `first` on.
+#[inline(always)]
+fn write_sums<S: Simd, const L: usize>(
+    sums: &[[S::f64s; LANES]; L],
+    coupling: &mut [f64],
+    width: usize,
+    first: usize,
+) {
+    let height = LANES.min(width - first);
+    for d in 0..L {
+        copy_vectors::<S>(&sums[d], &mut coupling[d * width + first..][..height]);
     }
 }
 

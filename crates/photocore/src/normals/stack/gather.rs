@@ -183,8 +183,10 @@ pub(in crate::normals) fn parts_of<'a>(
     });
     // The border is the last block.
     let border = layout.border_of(group);
-    let column = layout.common_width(group) - border.len();
-    let own = (!border.is_empty()).then(|| (symbolic.blocks() - 1, border, column));
+    let own = (!border.is_empty()).then(|| {
+        let column = layout.common_width(group) - border.len();
+        (symbolic.blocks() - 1, border, column)
+    });
     further.chain(own)
 }
 
@@ -193,9 +195,9 @@ pub(in crate::normals) fn united(
     parts: impl Iterator<Item = (usize, Range<usize>)>,
 ) -> SmallVec<[(usize, Range<usize>); 4]> {
     let mut sorted: SmallVec<[(usize, Range<usize>); 4]> = SmallVec::new();
-    // Most groups have the same in common as the one before.
+    // Most groups have the same in common as one of the few before: the cameras of a flight are few.
     parts.for_each(|part| {
-        if sorted.last() != Some(&part) {
+        if !sorted.iter().rev().take(4).any(|other| *other == part) {
             sorted.push(part);
         }
     });

@@ -44,7 +44,7 @@ pub(super) struct Segment {
     pub row: usize,
     coupling: usize,
     /// The groups that touch all of it, each the only one on its main block.
-    runs: SmallVec<[Run; 2]>,
+    runs: SmallVec<[Run; 4]>,
     /// Whether they are all that touch it.
     plain: bool,
 }
