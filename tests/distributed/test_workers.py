@@ -67,6 +67,27 @@ def test_a_worker_that_dies_costs_its_tasks_alone(client, tmp_path, alone, kill)
     same(tmp_path, tree, expected)
 
 
+def test_what_an_earlier_run_has_left_does_not_count_as_held(client, tmp_path):
+    *_, before = check_workers(client, tmp_path)
+    client.run(_leave, 200 << 20)
+    assert min(client.run(_left).values()) == 1
+    *_, held = check_workers(client, tmp_path)
+    assert max(client.run(_left).values()) == 0
+    assert held < before + (100 << 20)
+
+
+def _leave(size):
+    from photogram.distributed.tasks import shelf
+
+    shelf.put(("node", "elsewhere", 0), b"x" * size, float(size))
+
+
+def _left():
+    from photogram.distributed.tasks import shelf
+
+    return len(shelf._kept)
+
+
 def test_another_version_is_refused(client, tmp_path, monkeypatch):
     workers, limit, held = check_workers(client, tmp_path)
     assert (workers, limit) == (2, 2**30)

@@ -192,6 +192,15 @@ class Shelf:
         """Give up everything."""
         self._kept.clear()
 
+    def clear_unless_used(self) -> None:
+        """Give up what an earlier run has left, unless a task is at work here: it needs what it has."""
+        if self.lock.acquire(blocking=False):
+            try:
+                self.clear()
+                give_back()
+            finally:
+                self.lock.release()
+
 
 shelf = Shelf()
 """Of this process. Its lock lets one task work at a time: memory is planned for that."""

@@ -11,6 +11,7 @@ from typing import Any
 
 from photogram import _photocore
 from photogram.arguments.arrays import shown
+from photogram.distributed.tasks import shelf
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import resident_memory
 
@@ -210,12 +211,13 @@ def _limit(dask_worker: Any = None) -> int | None:
 
 
 def _held() -> int:
-    """Return the bytes that a worker holds when it has loaded what tasks use."""
+    """Return the bytes that a worker holds when it has loaded what tasks use, and nothing of an earlier run."""
     # What is imported here is what takes memory; nothing is called.
     import pyarrow.parquet  # noqa: F401
 
     import photogram.distributed.core  # noqa: F401
 
+    shelf.clear_unless_used()
     return resident_memory() or 0
 
 
