@@ -1220,6 +1220,23 @@ class _NetworkSolution:
         """`converged`, `not converged` or `diverged`."""
 
     @property
+    def weak_points(self) -> list[tuple[int, float, float]]:
+        """Points on nearly parallel rays, or at a station's own place.
+
+        For each its index, the largest of its standard deviations over the smallest (in any directions;
+        infinite where rounding has taken the smallest, NaN without cofactors) and its distance from the
+        nearest station that sees it, in the median of these distances.
+        """
+
+    @property
+    def weak(self) -> list[tuple[int, int]]:
+        """Photos and their unknowns that a combination moves which no step could follow.
+
+        The sum of squares stood still all the same, or the iterations ran out. Empty where the adjustment
+        ended otherwise.
+        """
+
+    @property
     def state(self) -> BlockState:
         """Where the adjustment has ended."""
 
@@ -1344,23 +1361,6 @@ class BlockSolution(_NetworkSolution):
     @property
     def loose_photos(self) -> list[int]:
         """Indices of the photos that stay as they are because their images do not determine them."""
-
-    @property
-    def weak_points(self) -> list[tuple[int, float, float]]:
-        """Points on nearly parallel rays, or at a station's own place.
-
-        For each its index, the largest of its standard deviations over the smallest (in any directions;
-        infinite where rounding has taken the smallest, NaN without cofactors) and its distance from the
-        nearest station that sees it, in the median of these distances.
-        """
-
-    @property
-    def weak(self) -> list[tuple[int, int]]:
-        """Photos and their unknowns (0 to 5) that a combination moves which no full step could follow.
-
-        The sum of squares stood still all the same, or the iterations ran out. Empty where the adjustment
-        ended otherwise.
-        """
 
     @property
     def datum(self) -> list[tuple[int, int]]:

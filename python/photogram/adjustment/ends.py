@@ -12,7 +12,17 @@ from photogram.errors import AdjustmentError
 from photogram.messages import Message, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 
-__all__ = ["behind", "folded", "harmful", "hidden", "rounded", "too_coarse", "undetermined"]
+__all__ = [
+    "behind",
+    "folded",
+    "hardly_determined",
+    "harmful",
+    "harmful_points",
+    "hidden",
+    "rounded",
+    "too_coarse",
+    "undetermined",
+]
 
 NEAR = 1e-3
 """A point nearer to a station than this part of the median of such distances is at its place."""
@@ -29,22 +39,29 @@ def undetermined(
         messages.append(Message(f"there are no covariances: {error}"))
     weak = _unknowns(block, solution.weak, solution.weak_cameras, solution.weak_unknowns)
     if weak:
-        ends = "stands still, but" if solution.status == "converged" else "creeps:"
-        words = weak_in_words(block, solution)
-        messages.append(
-            Message(
-                f"the sum of squares {ends} the observations hardly determine a combination of"
-                f" unknowns that moves {weak}: other values along it fit as well"
-                + (f" ({words})" if words else "")
-            )
-        )
+        messages.append(hardly_determined(solution.status, weak, weak_in_words(block, solution)))
     return messages
+
+
+def hardly_determined(status: str, weak: str, words: str = "") -> Message:
+    """Remark on a combination of unknowns that no step could follow to its end.
+
+    Parameters
+    ----------
+    status
+        Of the adjustment.
+    weak, words
+        The unknowns that it moves, and what that is, if anybody knows.
+    """
+    ends = "stands still, but" if status == "converged" else "creeps:"
+    return Message(
+        f"the sum of squares {ends} the observations hardly determine a combination of"
+        f" unknowns that moves {weak}: other values along it fit as well" + (f" ({words})" if words else "")
+    )
 
 
 def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     """Remark on points and photos that hardly hold, and spoil what hangs on them."""
-    near = [(point, distance) for point, _, distance in solution.weak_points if distance < NEAR]
-    flat = [(point, ratio) for point, ratio, distance in solution.weak_points if distance >= NEAR]
     messages = []
     # Hardly ever is there one: small blocks need not wait for this.
     seen = set(block.image_photos.tolist()) if solution.loose_photos else set()
@@ -61,8 +78,24 @@ def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
                 " lie on a line: they stay where they were given, and their images do not take part"
             )
         )
+    return messages + harmful_points(solution.weak_points, block.point_ids)
+
+
+def harmful_points(weak: Sequence[tuple[int, float, float]], point_ids: Sequence[str]) -> list[Message]:
+    """Remark on points at a station's own place, and on nearly parallel rays.
+
+    Parameters
+    ----------
+    weak
+        Points, how much worse they are along their rays than across, and their distance from a station.
+    point_ids
+        The names of all points.
+    """
+    near = [(point, distance) for point, _, distance in weak if distance < NEAR]
+    flat = [(point, ratio) for point, ratio, distance in weak if distance >= NEAR]
+    messages = []
     if near:
-        names = listed([block.point_ids[point] for point, _ in near])
+        names = listed([point_ids[point] for point, _ in near])
         messages.append(
             Message(
                 f"at a station's own place, {min(distance for _, distance in near):.1g} of the distance of"
@@ -71,7 +104,7 @@ def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
             )
         )
     if flat:
-        names = listed([block.point_ids[point] for point, _ in flat])
+        names = listed([point_ids[point] for point, _ in flat])
         messages.append(
             Message(
                 f"on nearly parallel rays: points {names}; their standard deviations along the rays are up to"

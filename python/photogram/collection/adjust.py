@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Ordering, Progress, core_threads, teller
-from photogram.adjustment.ends import hidden, rounded
+from photogram.adjustment.ends import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
@@ -20,6 +20,9 @@ from photogram.errors import InputError
 from photogram.messages import Message, listed
 
 __all__ = ["adjust", "adjusted"]
+
+WORSE = 100.0
+"""Standard deviations of a photo, in the median of all, beyond which its images hardly determine it."""
 
 
 def adjust(
@@ -39,7 +42,8 @@ def adjust(
     Points with a free coordinate and images on one photo only are left out, and so are points that run into
     the station of a photo, where rays that fit badly meet: they would take all digits from the others. They
     are known by being a hundred times nearer than the other points while every other photo has the images of
-    point and station within three standard deviations, before and after a step.
+    point and station within three standard deviations, before and after a step. So is a point that runs off
+    for infinity, because its rays part or are parallel.
     Photos that have no image then stay as they are. Where nothing weighted or fixed gives a datum, cofactors
     are those of minimum constraints: position and attitude of the first photo and one component of the
     translation of another are held. Residuals, redundancy
@@ -131,7 +135,12 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
     if solution.undetermined is not None:
         error = named(*solution.undetermined)
         messages.append(Message(f"there are no covariances: {error}"))
+    # A point far off on parallel rays creeps alone, and is named itself.
+    if solution.weak and not solution.weak_points:
+        messages.append(hardly_determined(solution.status, _unknowns(solution.weak, collection)))
     messages += rounded(solution.redundancy_excess)
+    numbers = [str(point) for point in range(len(collection.point_positions))] if solution.weak_points else []
+    messages += harmful_points(solution.weak_points, numbers) + _hardly_held(solution)
     alone = solution.photo_images == 0
     given = np.bincount(collection.image_photos, minlength=len(alone)) > 0
     for which, what in (
@@ -158,6 +167,36 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
         held = ", ".join(f"{parameters[parameter]} of photo {photo}" for photo, parameter in solution.datum)
         messages.append(Message(f"nothing gives a datum; covariances hold for fixed {held}"))
     return messages
+
+
+@np.errstate(all="ignore")
+def _hardly_held(solution: _photocore.CollectionSolution) -> list[Message]:
+    """Remark on photos that are far worse determined than the others, as those whose points lie on a line."""
+    variances = np.diagonal(solution.photo_cofactors, axis1=1, axis2=2)
+    sd = np.sqrt(np.where(variances > 0, variances, np.nan))
+    free = np.isfinite(sd).any(axis=0)
+    if not free.any():
+        return []
+    ratio = np.nan_to_num(sd[:, free] / np.nanmedian(sd[:, free], axis=0)).max(axis=1)
+    worse = ratio > WORSE
+    if not worse.any():
+        return []
+    return [
+        Message(
+            f"hardly determined by their images, photos {_numbers(worse)}: standard deviations are up to"
+            f" {ratio.max():.1g} times those of the others; their points are few, or lie near a line"
+        )
+    ]
+
+
+def _unknowns(of_photos: list[tuple[int, int]], collection: Collection) -> str:
+    """Name unknowns and the photos that have them."""
+    names = [
+        f"{collection.parameters[unknown]} of"
+        f" {listed([str(photo) for photo, other in of_photos if other == unknown])}"
+        for unknown in sorted({unknown for _, unknown in of_photos})
+    ]
+    return f"{'; '.join(names)} (photos)"
 
 
 def _numbers(which: NDArray[np.bool_]) -> str:

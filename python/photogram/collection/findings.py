@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.held import collection_held
 from photogram.results.findings import ROBUST, has_redundancy, unseen
 from photogram.results.groups_tested import groups_tested
 from photogram.results.observed import tested
 from photogram.results.patterns import CameraImages, patterns
 from photogram.show.ways import findings_of
-from photogram.statistics.findings import Findings, Systematic, Tested, by_t
+from photogram.statistics.findings import Findings, Systematic, Tested, by_f, by_t
 from photogram.statistics.limits import global_test
 from photogram.statistics.outliers import Observations
 
@@ -26,7 +27,7 @@ def collection_findings(result: AdjustedCollection) -> Findings:
     omega, freedom = result.weighted_sum_of_squares, result.degrees_of_freedom
     return Findings(
         status=result.status,
-        observations=_tested(result),
+        observations=[*_tested(result), *(by_f(each, omega, freedom) for each in collection_held(result))],
         degrees_of_freedom=freedom,
         global_test=None if result.loss else global_test(omega, freedom),
         untested=ROBUST if result.loss else "no degrees of freedom",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,12 @@ from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.as_block import as_block
 from photogram.collection.collection import Collection
 from photogram.collection.core import CollectionOptions, collection_network
+from photogram.collection.held import collection_held
 from photogram.collection.suspects import collection_trial
 from photogram.errors import AdjustmentError
 from photogram.messages import Message
 from photogram.results.exchanged import exchanged_names
+from photogram.results.held import remark_on
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, NetworkTrial
 from photogram.results.snooped import Snooped
 from photogram.statistics.distributions import LEVEL
@@ -86,7 +89,7 @@ def snoop_collection(
             raise AdjustmentError(f"the collection cannot be tested: {error.args[0]}") from error
     cleaned = _without(first, trial, outcome.out)
     result = adjust(cleaned, threads=threads, progress=progress, **options)
-    remarks = [Message(remark) for remark in outcome.remarks]
+    remarks = [Message(remark) for remark in [*outcome.remarks, *_held(collection, outcome, options)]]
     result = dataclasses.replace(result, messages=[*remarks, *result.messages])
     placed = as_block(collection.replace(photo_parameters=result.photo_parameters))
     used = used_images(trial, outcome.out, len(collection.image_xy))
@@ -98,6 +101,19 @@ def snoop_collection(
         settings=settings,
         exchanged=tuple(exchanged_names(placed, used, variance)),
     )
+
+
+def _held(collection: Collection, outcome: Outcome, options: Mapping[str, Any]) -> list[str]:
+    """Say of what is held that it explains more than what was taken out; see `results.held`."""
+    largest = max((entry.statistic for entry in outcome.log if entry.is_out), default=math.inf)
+    constant = (collection.photo_sd == 0).all(axis=0)
+    held = ((collection.photo_sd == 0) & ~constant).any() or (collection.photo_sd[:, :6] == 0).any()
+    if math.isinf(largest) or not (held or (collection.point_sd == 0).any()):
+        return []
+    try:
+        return remark_on(collection_held(adjust(collection, **options)), largest)
+    except AdjustmentError:
+        return []
 
 
 def started_robustly(

@@ -8,19 +8,31 @@ residuals, c = B' ~v and C = B' R B: the weighted sum of squares would fall by T
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.errors import InputError
 from photogram.network.directions import seen_without_lenses
 from photogram.network.rays import Rays
-from photogram.results.model_tests import score_test
+from photogram.results.group_sums import factored
+from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
+from photogram.results.scores import score
 from photogram.statistics.findings import Tested
+from photogram.statistics.limits import GlobalTest
 
-__all__ = ["HELD", "held_remark", "held_tested"]
+__all__ = [
+    "HELD",
+    "SUSPECTED",
+    "Held",
+    "held_remark",
+    "held_tested",
+    "held_tests",
+    "is_suspected",
+    "remark_on",
+]
 
 HELD = "held values"
 """The kind of these tests."""
@@ -33,8 +45,8 @@ LEAST_IMAGES = 3
 
 
 @dataclass(frozen=True, eq=False)
-class _Held:
-    """Something that is held: its name, its images, and which of the six partials concern it."""
+class Held:
+    """Something that is held: its name, its images, and which of the partials concern it."""
 
     name: str
     images: Indices
@@ -46,30 +58,47 @@ def held_tested(result: Result) -> list[Tested]:
 
     None where the adjustment is accepted, has not converged, or has no covariances.
     """
-    test = result.global_test
-    if result.loss or test is None or not test.rejected_high or not result.converged:
-        return []
-    if not np.isfinite(result.redundancy[result.used_images]).all():
+    if result.loss or not is_suspected(result, result.global_test):
         return []
     suspected = _suspected(result)
-    if not suspected:
-        return []
-    partials = _partials(result)
-    names, values, dimensions = [], [], []
+    return held_tests(result, suspected, result.block.image_sd, _partials(result)) if suspected else []
+
+
+def is_suspected(result: AdjustedNetwork, test: GlobalTest | None) -> bool:
+    """Return whether residuals are too large, and covariances there to ask for the reason."""
+    if test is None or not test.rejected_high or not result.converged:
+        return False
+    return bool(np.isfinite(result.redundancy[result.used_images]).all())
+
+
+def held_tests(
+    result: AdjustedNetwork, suspected: Sequence[Held], image_sd: Floats, partials: Floats
+) -> list[Tested]:
+    """Return the tests of what is held, T each.
+
+    Parameters
+    ----------
+    result, suspected
+        The adjusted network, and what is to be tested.
+    image_sd
+        (m, 2) of the images.
+    partials
+        (p, m, 2) of the images by the unknowns of their photos, to which each has its places.
+    """
+    used = result.used_images[:, np.newaxis]
+    residuals = np.where(used, result.residuals / image_sd, 0.0)
+    factor = factored(result)
+    found: list[tuple[str, float, float]] = []
     for each in suspected:
-        columns = np.zeros((len(each.partials), len(result.block.image_xy), 2))
-        columns[:, each.images] = partials[np.ix_(each.partials, each.images)]
-        if not np.isfinite(columns).all():
-            continue
-        try:
-            found = score_test(result, partials=columns)
-        except InputError:
-            continue  # What is free takes it up.
-        names.append(each.name)
-        values.append(found.statistic)
-        dimensions.append(float(found.dimension))
-    if not names:
+        columns = np.zeros((len(each.partials), *residuals.shape))
+        columns[:, each.images] = partials[np.ix_(each.partials, each.images)] / image_sd[each.images]
+        # What is free may take it up.
+        value = score(factor, columns, residuals) if np.isfinite(columns).all() else None
+        if value is not None:
+            found.append((each.name, value, float(len(each.partials))))
+    if not found:
         return []
+    names, values, dimensions = zip(*found, strict=True)
     tested = Tested(
         HELD, np.array(values), lambda place: names[place[0]], "T", np.array(dimensions), held=True
     )
@@ -86,7 +115,11 @@ def held_remark(result: Result, largest: float) -> list[str]:
     largest
         The largest T of what was taken out.
     """
-    found = held_tested(result)
+    return remark_on(held_tested(result), largest)
+
+
+def remark_on(found: Sequence[Tested], largest: float) -> list[str]:
+    """Say the same of tests that were made."""
     place = found[0].largest() if found else None
     if place is None or not found[0].values[place] > largest:
         return []
@@ -97,7 +130,7 @@ def held_remark(result: Result, largest: float) -> list[str]:
     ]
 
 
-def _suspected(result: Result) -> list[_Held]:
+def _suspected(result: Result) -> list[Held]:
     """Return what is held and has the worst images, the worst first."""
     block, used = result.block, result.used_images
     squares = np.where(used[:, np.newaxis], result.residuals / block.image_sd, 0.0) ** 2
@@ -107,7 +140,7 @@ def _suspected(result: Result) -> list[_Held]:
     of_photos = np.bincount(block.image_photos, of_images, photos) / np.maximum(counts, 1)
     of_points = np.bincount(block.image_points, of_images, points)
     mounted = {each.photo for each in block.mounts} | {each.frame for each in block.mounts}
-    rows: list[tuple[float, _Held]] = []
+    rows: list[tuple[float, Held]] = []
     for what, sd, shift in (
         ("position", block.photo_position_sd, 0),
         ("attitude", block.photo_attitude_sd, 3),
@@ -121,13 +154,13 @@ def _suspected(result: Result) -> list[_Held]:
             if name not in mounted:
                 images = np.flatnonzero(used & (block.image_photos == photo))
                 own_partials = shift + np.flatnonzero(held[photo])
-                each = _Held(f"{what} of photo {name}, which is held", images, own_partials)
+                each = Held(f"{what} of photo {name}, which is held", images, own_partials)
                 rows.append((float(of_photos[photo]), each))
     fixed = (block.point_sd == 0).all(axis=1) & (np.bincount(block.image_points[used], minlength=points) > 0)
     own = np.flatnonzero(fixed)
     for point in own[np.argsort(-of_points[own], kind="stable")][:SUSPECTED].tolist():
         images = np.flatnonzero(used & (block.image_points == point))
-        each = _Held(f"control point {block.point_ids[point]}, which is held", images, np.arange(3))
+        each = Held(f"control point {block.point_ids[point]}, which is held", images, np.arange(3))
         rows.append((float(of_points[point] / len(images)), each))
     rows.sort(key=lambda row: -row[0])
     return [each for _, each in rows[:SUSPECTED]]

@@ -31,6 +31,7 @@ from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import INTERIOR
 from photogram.results.group_sums import factored
 from photogram.results.result import Result
+from photogram.results.scores import quadratic, score
 from photogram.show.brief import Brief
 from photogram.show.ways import Shown, columns_of, report_of
 
@@ -209,7 +210,7 @@ def terms_test(result: Result, names: Sequence[str], *, camera: str | None = Non
     q = found.cofactors[np.ix_(rows, rows)]
     if not np.isfinite(q).all():
         raise InputError("the result has no covariances")
-    statistic = _quadratic(q, found.values[rows])
+    statistic = quadratic(q, found.values[rows])
     freedom = _freedom(result)
     scale = result.covariance_scale if math.isfinite(freedom) else 1.0
     effect = _largest_effect(result, found, rows)
@@ -261,14 +262,10 @@ def score_test(
     used = result.used_images
     b = np.where(used[:, np.newaxis], columns / block.image_sd, 0.0)
     v = np.where(used[:, np.newaxis], result.residuals / block.image_sd, 0.0)
-    projected = factored(result).project_images(b, threads=0, progress=None)
     k = len(b)
-    info = b.reshape(k, -1) @ projected.reshape(k, -1).T
-    info = (info + info.T) / 2
-    size = np.einsum("kmi,kmi->k", b, b)
-    if not (np.linalg.eigvalsh(info / np.sqrt(np.outer(size, size))) > 1e-9).all():
+    statistic = score(factored(result), b, v)
+    if statistic is None:
         raise InputError(f"the unknowns of the block take up {', '.join(names)}: nothing can be tested")
-    statistic = _quadratic(info, b.reshape(k, -1) @ v.ravel())
     freedom = _freedom(result) - k
     omega = result.covariance_scale * (freedom + k) - statistic
     scale = max(omega, 1e-12 * statistic) / freedom if 0 < freedom < math.inf else 1.0
@@ -402,13 +399,6 @@ def _rows(camera: AdjustedCamera, names: Sequence[str]) -> list[int]:
         if name not in camera.names:
             raise InputError(f"the camera {camera.name} has no parameter {shown(name)}")
     return [camera.names.index(name) for name in names]
-
-
-def _quadratic(matrix: Floats, vector: Floats) -> float:
-    """Return x' M^-1 x, M scaled to unit diagonal before."""
-    scale = np.sqrt(np.diag(matrix))
-    scaled = vector / scale
-    return float(scaled @ np.linalg.solve(matrix / np.outer(scale, scale), scaled))
 
 
 def _freedom(result: Result) -> float:

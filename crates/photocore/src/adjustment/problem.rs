@@ -54,6 +54,12 @@ pub trait Model: Sync {
         vec![]
     }
 
+    /// Local blocks that nothing keeps from leaving for infinity, and that are on their way there: what little they lower the sum of squares by
+    /// would take all iterations. Asked in a trust region after a short step, with the unknowns before and after it.
+    fn run_off(&self, _before: &[f64], _after: &Self::Prepared) -> Vec<usize> {
+        vec![]
+    }
+
     /// Motions of the whole that observations and weights may leave open at the given values. Which of them they do leave open is found by
     /// trying, and as many unknowns are held; None where it is known that they give a datum, which then costs nothing.
     fn motions(&self, _unknowns: &[f64]) -> Option<Motions> {

@@ -224,7 +224,7 @@ pub(super) struct Run<'a, 'w, M: Model> {
     pub curved: bool,
     /// Unknowns that a combination moves which full steps cannot follow (see [`Adjustment::weak`]).
     pub weak: Vec<usize>,
-    /// Local blocks that harm all others (see [`Adjustment::collapsed`]).
+    /// Local blocks that harm all others, or leave them (see [`Adjustment::collapsed`]).
     pub collapsed: Vec<usize>,
 }
 
@@ -494,6 +494,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// Whether a step has led local blocks to where they harm all others; keeps them.
     pub(super) fn has_collapsed(&mut self, before: &[f64], after: &M::Prepared) -> bool {
         self.collapsed = self.problem.model.collapsed(before, after);
+        !self.collapsed.is_empty()
+    }
+
+    /// Whether a step has led local blocks out of the whole; keeps them.
+    pub(super) fn has_run_off(&mut self, before: &[f64], after: &M::Prepared) -> bool {
+        self.collapsed = self.problem.model.run_off(before, after);
         !self.collapsed.is_empty()
     }
 

@@ -23,6 +23,17 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// the sum stands still, however much they are damped.
 const PATIENCE: usize = 50;
 
+/// So many steps in a row that lower the sum of squares together by less than this multiple of the variance of unit weight, a fifth of a
+/// standard deviation of what they follow,
+const CREEPING: usize = 12;
+const LITTLE: f64 = 0.05;
+/// and of which the last lowers it by no less than this part of what the first did, follow what hardly anything determines, and would go on so.
+const FALLING: f64 = 0.1;
+/// An unknown takes part in it when it moves, in units of what its equations alone determine, by so many times what all observations show.
+const WEAK: f64 = 10.0;
+/// A step is short when no unknown changes by more than this multiple of its standard deviation.
+const SHORT: f64 = 1.0;
+
 /// Steps are accelerated once one has lowered the sum of squares by less than this fraction of what was predicted,
 const BENDS: f64 = 0.75;
 /// until the second-order term, in the metric of the normal equations, is smaller than this part of a step.
@@ -89,6 +100,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let mut damping = Damping { value: state.damping, rise: 2.0, bends: false };
         let (mut mark, mut steps) = (lowest, 0);
         let is_network = self.problem.layout().locals() >= NETWORK;
+        let mut falls: Vec<f64> = vec![];
         while self.iterations.len() < self.options.max_iterations {
             if damping.value > MOST_DAMPING {
                 return self.rest(state.unknowns, Status::Diverged);
@@ -97,7 +109,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 (mark, steps) = (lowest, 0);
             }
             if steps == PATIENCE {
-                return self.rest(state.unknowns, Status::Converged);
+                return self.rest_in_valley(state.unknowns, Status::Converged);
             }
             steps += 1;
             let (unknowns, used) = (state.unknowns.clone(), state.damping);
@@ -119,8 +131,13 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 }
                 lowest = trial.sum_of_squares;
                 damping.fall(gain);
-                if last || whole && stop.at_decrease(decrease, lowest) {
+                falls.push(decrease);
+                let ends = last || whole && stop.at_decrease(decrease, lowest);
+                if ends {
                     return self.rest(trial.unknowns, Status::Converged);
+                }
+                if self.creeps(&falls, lowest) {
+                    return self.rest_in_valley(trial.unknowns, Status::Converged);
                 }
                 state = self.form_at(trial.unknowns, trial.prepared, damping.value)?;
             } else if last || trial.predicted <= (ROUNDING * lowest).max(NEGLIGIBLE * NEGLIGIBLE) {
@@ -130,7 +147,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 state = self.form(unknowns, damping.value)?;
             }
         }
-        self.rest(state.unknowns, Status::NotConverged)
+        self.rest_in_valley(state.unknowns, Status::NotConverged)
     }
 
     /// Where a step leads, and by how much it was predicted to lower the sum of squares.
@@ -182,6 +199,15 @@ impl<'a, M: Model> Run<'a, '_, M> {
         Ok((term, square))
     }
 
+    /// Whether the sum of squares creeps, by less and less and never to an end. With a loss it may: reweighting is no faster.
+    fn creeps(&self, falls: &[f64], lowest: f64) -> bool {
+        let Some(first) = falls.len().checked_sub(CREEPING) else { return false };
+        let freedom = self.problem.counts(0).degrees_of_freedom().max(1) as f64;
+        let (last, least) = (&falls[first..], LITTLE * (lowest / freedom).max(1.0));
+        let is_slow = last[CREEPING - 1] > FALLING * last[0];
+        self.options.loss.is_none() && is_slow && last.iter().sum::<f64>() <= least
+    }
+
     /// Keeps a step; the end where it has led local blocks to where they harm all others.
     fn keep(
         &mut self,
@@ -193,8 +219,32 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let &Trial { sum_of_squares, change: largest_change, .. } = trial;
         let iteration = Iteration { number, sum_of_squares, largest_change, damping };
         self.accept(iteration, before, &trial.unknowns)?;
-        let ends = self.has_collapsed(before, &trial.prepared);
+        let ends = self.has_collapsed(before, &trial.prepared)
+            || largest_change < SHORT && self.has_run_off(before, &trial.prepared);
         Ok(ends.then(|| End::at(Status::NotConverged, trial.unknowns.clone(), None)))
+    }
+
+    /// Ends at the values reached, which steps go on to change, and finds what: a full step, in a datum, moves it by much more than
+    /// observations show. It is none of the unknowns that are not local where local ones alone move so.
+    fn rest_in_valley(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a, M>, AdjustError> {
+        if self.iterations.last().is_none_or(|last| last.largest_change > SHORT) {
+            return self.rest(unknowns, status);
+        }
+        self.curved = false;
+        self.datum = self.problem.to_hold(&unknowns, self.pool);
+        let state = self.form(unknowns.clone(), 0.0)?;
+        let Some(Solved { basis, step, change }) = self.solve_unless_lost(state)? else {
+            return self.rest(unknowns, status);
+        };
+        let system = &self.problem.system;
+        if basis.factor.largest_share(system, &step) > WEAK * change {
+            self.weak = basis.factor.moved(system, &step);
+        }
+        if self.options.covariance {
+            return Ok(End::at(status, unknowns, Some(basis)));
+        }
+        basis.factor.recycle(system);
+        Ok(End::at(status, unknowns, None))
     }
 
     /// Ends at the values reached, with a datum there.

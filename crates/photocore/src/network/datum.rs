@@ -8,6 +8,7 @@ use rayon::ThreadPool;
 use super::commons::Motion;
 use super::model::Bundle;
 use super::parts::{Joined, MOST_PARTS, Part, Parts};
+use super::precision::median;
 use super::problem::Assembled;
 use super::stations::Placed;
 use crate::adjustment::{Datum, Motions};
@@ -35,6 +36,8 @@ pub struct InnerConstraints {
 /// Shifts along, rotations about the axes of cartesian space, and scale.
 const MOTIONS: usize = 7;
 const SCALE: usize = 6;
+/// A photo so many times as far from the central one as the others has left the network.
+const LEFT: f64 = 10.0;
 
 /// How motion `k` moves a place, `from` its origin, by a unit.
 fn displacement(k: usize, from: &Vector3) -> Vector3 {
@@ -151,13 +154,18 @@ impl Bundle {
             let coordinate = asked.and_then(|minimum| minimum.coordinate);
             preferred
                 .extend(coordinate.map(|(photo, number)| self.of_block(self.carrier(photo)).start + number));
-            let shifts = own.iter().filter(|&photo| photo != central).flat_map(|&photo| {
-                let shift = photos[photo].orientation.shifts_along(origin);
-                shift.map(|(number, change)| (change.abs(), self.of_block(photo).start + number))
+            let others = || own.iter().filter(|&photo| photo != central);
+            let away = |&photo: &usize| (photos[photo].orientation.centre() - origin).norm();
+            // A photo that its images hardly hold may have left the network, and is the last to hold it.
+            let limit = median(others().map(away).collect()).map_or(f64::INFINITY, |middle| LEFT * middle);
+            let shifts = others().flat_map(|photo| {
+                let (left, block) = (away(photo) > limit, self.of_block(*photo).start);
+                let shift = photos[*photo].orientation.shifts_along(origin);
+                shift.map(|(number, change)| (left, change.abs(), block + number))
             });
-            let mut shifts: Vec<(f64, usize)> = shifts.collect();
-            shifts.sort_by(|a, b| b.0.total_cmp(&a.0));
-            preferred.extend(shifts.into_iter().map(|(_, unknown)| unknown));
+            let mut shifts: Vec<(bool, f64, usize)> = shifts.collect();
+            shifts.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+            preferred.extend(shifts.into_iter().map(|(_, _, unknown)| unknown));
         }
         Some(Motions { vectors, preferred })
     }

@@ -59,6 +59,7 @@ mod cameras;
 pub mod commons;
 mod covariance;
 mod datum;
+mod departures;
 mod effects;
 mod error;
 mod group_tests;
@@ -420,10 +421,9 @@ impl Network {
                 solution.dropped.sort_unstable_by_key(|dropped| dropped.point);
                 return Ok(solution);
             }
-            for &point in &adjusted.collapsed {
-                let point = assembled.points[point];
-                left_out[point] = true;
-                harmful.push(Dropped { point, reason: Reason::RanIntoStation });
+            for dropped in assembled.collapsed(&adjusted) {
+                left_out[dropped.point] = true;
+                harmful.push(dropped);
             }
             let reached = assembled.reached(&adjusted.unknowns, self.points.len());
             before = Some((adjusted, reached));

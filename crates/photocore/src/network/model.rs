@@ -411,6 +411,10 @@ impl Model for Bundle {
         self.run_into_stations(before, after)
     }
 
+    fn run_off(&self, before: &[f64], after: &Stations) -> Vec<usize> {
+        self.lead_nowhere(before, after)
+    }
+
     /// Straight rays turn and stretch with everything else; what a frame carries may have known lengths.
     fn groups_leave_open(&self) -> bool {
         self.refraction.is_none() && self.mounts.iter().all(Option::is_none)

@@ -38,7 +38,7 @@ pub(super) struct Reached {
 }
 
 /// Points that are not determined are few where there are so many times as many.
-const FEW: usize = 10;
+pub(super) const FEW: usize = 10;
 /// Photos that are not determined, each by itself, are few where there are so many times as many: a network of some photos has few.
 const HALF: usize = 2;
 /// A point so many times as far from the nearest station as others, or as near, has left the network.
@@ -99,6 +99,20 @@ impl Assembled {
         let few = FEW * out.len() <= model.locals;
         let reason = Reason::RanOff;
         if few { out.iter().map(|&i| Dropped { point: self.points[i], reason }).collect() } else { vec![] }
+    }
+
+    /// Points that an adjustment has ended for, so that it can go on without them: they have run into a station, or out of the network.
+    pub fn collapsed(&self, ended: &Adjustment) -> Vec<Dropped> {
+        if ended.collapsed.is_empty() {
+            return vec![];
+        }
+        let squares = self.nearest_stations(&ended.unknowns);
+        let middle = median(squares.clone()).unwrap_or(f64::INFINITY);
+        let dropped = |&local: &usize| Dropped {
+            point: self.points[local],
+            reason: if squares[local] > middle { Reason::RanOff } else { Reason::RanIntoStation },
+        };
+        ended.collapsed.iter().map(dropped).collect()
     }
 
     /// Points whose first values are those of a station that sees them, so that no image can be computed.

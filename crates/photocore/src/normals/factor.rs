@@ -475,6 +475,13 @@ impl Factor {
         self.taking_part(&system.layout, unknowns.collect())
     }
 
+    /// The largest share of an unknown that is not local in a solution of the equations, in units of what its equations alone determine.
+    pub fn largest_share(&self, system: &System, solution: &[f64]) -> f64 {
+        let mut shares: Vec<f64> = self.unknowns(&system.layout).map(|unknown| solution[unknown]).collect();
+        self.scale(&mut shares);
+        shares.iter().fold(0.0, |most, value| value.abs().max(most))
+    }
+
     /// The unknowns that take part in a vector over the unknowns that are not local, in the order of elimination.
     pub(super) fn taking_part(&self, layout: &Layout, mut vector: Vec<f64>) -> Vec<usize> {
         self.scale(&mut vector);

@@ -216,6 +216,16 @@ macro_rules! solution_class {
                 self.solution.datum.clone()
             }
 
+            #[getter]
+            fn weak(&self) -> Vec<(usize, usize)> {
+                self.solution.weak.clone()
+            }
+
+            #[getter]
+            fn weak_points(&self) -> Vec<(usize, f64, f64)> {
+                self.solution.weak_points.iter().map(|weak| (weak.point, weak.ratio, weak.distance)).collect()
+            }
+
             $($own)*
         }
     };
@@ -278,18 +288,8 @@ solution_class! {
         }
 
         #[getter]
-        fn weak(&self) -> Vec<(usize, usize)> {
-            self.solution.weak.clone()
-        }
-
-        #[getter]
         fn loose_photos(&self) -> Vec<usize> {
             self.solution.state.loose.clone()
-        }
-
-        #[getter]
-        fn weak_points(&self) -> Vec<(usize, f64, f64)> {
-            self.solution.weak_points.iter().map(|weak| (weak.point, weak.ratio, weak.distance)).collect()
         }
 
         #[getter]

@@ -1,0 +1,62 @@
+//! Points that leave for infinity while a network is adjusted.
+
+use super::Image;
+use super::model::Bundle;
+use super::precision::median;
+use super::problem::FEW;
+use super::stations::{Station, Stations};
+use crate::adjustment::Model;
+
+/// A point so many times as far from the nearest station as others is on its way out of the network,
+const FAR: f64 = 100.0;
+/// when no photo tells its place from infinity: its images there are closer than a standard deviation,
+const AT_INFINITY: f64 = 1.0;
+/// and the distance still grows, by more than this part of it in a step.
+const GROWS: f64 = 0.003;
+/// Times the distance of a point that stand for infinity.
+const INFINITE: f64 = 1e6;
+
+impl Bundle {
+    /// Free points that rays which part, or are parallel, lead out of the network, where they are few.
+    ///
+    /// Steps are taken in coordinates, and a place at infinity is a limit that they creep to: what images lose on the way goes with the
+    /// reciprocal of the distance.
+    pub fn lead_nowhere(&self, before: &[f64], after: &Stations) -> Vec<usize> {
+        let squares: Vec<f64> = (0..self.locals).map(|point| self.nearest(point, after)).collect();
+        let Some(middle) = median(squares.clone()) else { return vec![] };
+        let is_far =
+            |&point: &usize| squares[point] > FAR * FAR * middle && self.is_at_infinity(point, after);
+        let mut out: Vec<usize> = (0..self.locals).filter(is_far).collect();
+        if out.is_empty() {
+            return out;
+        }
+        let before = self.prepare(before);
+        let grown = (1.0 + GROWS) * (1.0 + GROWS);
+        out.retain(|&point| squares[point] > grown * self.nearest(point, &before));
+        if FEW * out.len() <= self.locals { out } else { vec![] }
+    }
+
+    /// The square of the distance of a point from the nearest station that sees it.
+    fn nearest(&self, point: usize, stations: &Stations) -> f64 {
+        let place = stations.points[point].position();
+        let square =
+            |image: &Image| (place - stations.photos[image.photo].orientation.centre()).norm_squared();
+        self.images_of(point).iter().map(square).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether a free point could as well be at infinity, on the ray on which its first image has it.
+    fn is_at_infinity(&self, point: usize, stations: &Stations) -> bool {
+        let images = self.images_of(point);
+        let Some(first) = images.first().filter(|_| self.points[point].held() == [false; 3]) else {
+            return false;
+        };
+        let place = stations.points[point].position();
+        let station = stations.photos[first.photo].orientation.centre();
+        let places = [place, station + INFINITE * (place - station)];
+        images.iter().all(|image| {
+            let Station { orientation, camera } = &stations.photos[image.photo];
+            let [here, there] = places.map(|place| camera.image(&orientation.pose().sight(&place)));
+            (0..2).all(|k| (here[k] - there[k]).abs() < AT_INFINITY * image.sd[k])
+        })
+    }
+}
