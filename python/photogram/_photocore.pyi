@@ -77,6 +77,9 @@ def chi_square_quantile(probability: float, dof: float, *, upper: bool = True) -
     NaN for arguments outside these ranges.
     """
 
+def normal(z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (n,) the probabilities that a normal variable lies below values."""
+
 def student(t: float, dof: float) -> float:
     """Probability that the absolute value of Student's variable exceeds that of `t`.
 
@@ -687,11 +690,13 @@ class BlockNetwork:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
         start: BlockState | None = None,
+        keep: bool = False,
     ) -> BlockSolution:
         """Adjust it; a free one may be taken to the datum of inner constraints.
 
         Or, without such a datum, adjust it from where an adjustment of it has ended, perhaps with other
         weights: in the order of that, and without the points that had run into a station there.
+        Without either, `keep` has the state keep what tests need (see :meth:`trial`).
         """
 
     def in_datum(
@@ -713,8 +718,12 @@ class BlockNetwork:
     ) -> BlockCovariances:
         """Factor the normal equations where the adjustment has ended, in the datum that it was taken to."""
 
-    def trial(self, state: BlockState | None, *, threads: int) -> NetworkTrial:
-        """Prepare for trials without some observations, from where an adjustment ended, or from the start."""
+    def trial(self, state: BlockState | None, *, threads: int, kept: bool = False) -> NetworkTrial:
+        """Prepare for trials without some observations, from where an adjustment ended, or from the start.
+
+        `kept` says that the state is of this very network: the first time, what its adjustment has kept
+        is taken, and nothing is formed again.
+        """
 
     def resistance(self, state: BlockState, *, threads: int) -> list[tuple[str, float]]:
         """Return what keeps the block from moving as a whole: kinds of observations.

@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(chi_square, module)?)?;
     module.add_function(wrap_pyfunction!(chi_square_quantile, module)?)?;
+    module.add_function(wrap_pyfunction!(normal, module)?)?;
     module.add_function(wrap_pyfunction!(student, module)?)?;
     module.add_function(wrap_pyfunction!(student_limit, module)?)?;
     module.add_function(wrap_pyfunction!(fisher, module)?)?;
@@ -35,6 +36,12 @@ fn chi_square(x: f64, dof: f64, upper: bool) -> f64 {
 #[pyo3(signature = (probability, dof, *, upper = true))]
 fn chi_square_quantile(probability: f64, dof: f64, upper: bool) -> f64 {
     adjustment::chi_square_quantile(probability, dof, tail(upper))
+}
+
+#[pyfunction]
+fn normal<'py>(py: Python<'py>, z: PyReadonlyArrayDyn<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let z = arrays::numbers("z", &z)?;
+    Ok(PyArray1::from_vec(py, py.detach(|| z.iter().map(|&z| adjustment::normal(z)).collect())))
 }
 
 #[pyfunction]

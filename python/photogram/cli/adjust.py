@@ -297,6 +297,7 @@ def _adjusted(
             threads=threads,
             progress=shown(status, "weighted sum of squares", 1.0) if status is not None else None,
             **vars(division),
+            verdict=True,
         )
     if chosen == "control" and result.datum.is_chosen:
         raise InputError(

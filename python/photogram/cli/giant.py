@@ -312,6 +312,7 @@ def _adjust(
             fix_photos=common.intersection_only,
             progress=progress,
             threads=threads,
+            verdict=True,
         )
     return replace(result, messages=[*project.messages, *result.messages]), None, None
 

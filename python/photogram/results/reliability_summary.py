@@ -208,7 +208,8 @@ def reliability_summary(found: Reliability, *, heights: bool) -> ReliabilitySumm
     two, points = _points(suspects, tests)
     checked = tests.least > TESTABLE
     pairs = [each for each in found.pairs_on(points, LIMIT) if checked[each[0]] and checked[each[1]]]
-    pairs.sort(key=lambda pair: -pair[2])
+    # Rounding is no order: those that nothing tells apart stand as they are numbered.
+    pairs.sort(key=lambda pair: (-round(pair[2], 9), pair[:2]))
     return ReliabilitySummary(
         level=found.level,
         power=found.power,

@@ -197,7 +197,7 @@ class Result(AdjustedNetwork):
         )
 
     def _trial(self) -> NetworkTrial:
-        core = block_network(self.block, self.options).trial(self.state, threads=0)
+        core = block_network(self.block, self.options).trial(self.state, threads=0, kept=True)
         return network_trial(self.block, core)
 
     def restarted(self) -> Block:

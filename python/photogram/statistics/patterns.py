@@ -79,8 +79,8 @@ def normality(values: Floats) -> Normality | None:
     if n < 20 or not z.std(ddof=1) > 0:
         return None
     z = (z - z.mean()) / z.std(ddof=1)
-    below = np.clip(_normal(z), 1e-300, 1.0)
-    above = np.clip(_normal(-z), 1e-300, 1.0)
+    below = np.clip(_photocore.normal(z), 1e-300, 1.0)
+    above = np.clip(_photocore.normal(-z), 1e-300, 1.0)
     ranks = 2 * np.arange(1, n + 1) - 1
     squared = -n - float(np.mean(ranks * (np.log(below) + np.log(above[::-1]))))
     corrected = squared * (1 + 0.75 / n + 2.25 / n**2)
@@ -92,10 +92,6 @@ def normality(values: Floats) -> Normality | None:
         statistic=corrected,
         probability=_of_anderson_darling(corrected),
     )
-
-
-def _normal(z: Floats) -> Floats:
-    return np.array([0.5 * math.erfc(-each / math.sqrt(2)) for each in z.tolist()])
 
 
 def _of_anderson_darling(a: float) -> float:

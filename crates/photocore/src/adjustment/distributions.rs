@@ -5,7 +5,10 @@
 //! have logarithms, from the continued fractions of the same functions (Abramowitz and Stegun 1964, 6.5.31 and 26.5.8). Arguments
 //! outside a distribution's range give NaN.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use statrs::function::beta::{checked_beta_reg, ln_beta};
+use statrs::function::erf::erfc;
 use statrs::function::gamma::{checked_gamma_lr, checked_gamma_ur, ln_gamma};
 
 /// Probabilities above it have all their digits; the logarithm of smaller ones comes from a continued fraction.
@@ -45,6 +48,10 @@ pub fn chi_square_quantile(probability: f64, dof: f64, tail: Tail) -> f64 {
 
 /// Natural logarithm of the probability that a chi-square variable of `dof` degrees of freedom exceeds `x`.
 pub fn log_chi_square(x: f64, dof: f64) -> f64 {
+    // Of two degrees of freedom it is exp(-x / 2): most groups that are tested are images.
+    if dof == 2.0 && x >= 0.0 {
+        return -0.5 * x;
+    }
     let probability = chi_square(x, dof, Tail::Upper);
     if probability.is_nan() || probability > SMALL || x.is_infinite() {
         return probability.ln();
@@ -91,6 +98,11 @@ fn continued_fraction(first: f64, term: impl Fn(f64) -> (f64, f64)) -> f64 {
         }
     }
     fraction
+}
+
+/// Probability that a normal variable lies below `z`.
+pub fn normal(z: f64) -> f64 {
+    0.5 * erfc(-z * FRAC_1_SQRT_2)
 }
 
 /// Probability that the absolute value of Student's variable of `dof` degrees of freedom exceeds that of `t`.

@@ -84,7 +84,7 @@ mod walk;
 
 pub use datum::{Adjusted, Datum, DatumError, InDatum};
 pub use distributions::{
-    Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, student,
+    Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, normal, student,
     student_limit,
 };
 pub use factored::{CofactorError, Factored};
@@ -102,7 +102,7 @@ pub use problem::{Model, Motions, Problem, Weighted};
 pub use resistance::Classes;
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};
-pub use run::{Watch, adjust, adjust_in_datum, on_all_processors};
+pub use run::{Watch, adjust, adjust_by_groups, adjust_in_datum, on_all_processors};
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
 pub use traces::{EquationGroups, GroupSquares, Probing};
 pub use tried::{TieCofactors, Tried};

@@ -71,11 +71,13 @@ pub fn adjust_in_datum<M: Model>(
     adjusted(problem, options, Some(Target { datum, reference }), pool, watch, false)
 }
 
-/// Adjusts, and keeps what tests of groups of observations need ([`Cofactors::groups`], [`Adjustment::selected`]).
+/// Adjusts, and keeps what tests of groups of observations need: [`Tried::of`] takes it over.
 ///
 /// # Errors
 /// Those of [`adjust`].
-pub(super) fn adjust_by_groups<M: Model>(
+///
+/// [`Tried::of`]: super::Tried::of
+pub fn adjust_by_groups<M: Model>(
     problem: &Problem<M>,
     options: &Options,
     pool: &ThreadPool,

@@ -7,9 +7,10 @@ use nalgebra::DMatrix;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::method::NEGLIGIBLE;
 use super::options::{Event, Options, Phase, Status};
 use super::problem::{Linearized, Model, Problem};
-use super::result::{AdjustError, unless_stopped};
+use super::result::{AdjustError, Adjustment, unless_stopped};
 use super::run::{Watch, adjust_by_groups};
 use crate::normals::{Cofactors, Equations, LocalCofactors, Prior, SelectedInverse, TieRows};
 
@@ -69,6 +70,29 @@ impl Tried {
             status: found.status,
             iterations: found.iterations.len(),
             collapsed: found.collapsed,
+            selected,
+        })
+    }
+
+    /// Takes over where [`adjust_by_groups`] has converged at given values, without forming anything again: the cofactors of the
+    /// adjustment, which were formed before its last step, and its residuals. None where it has not converged, or this step is so long
+    /// that cofactors after it are others; such a problem is for [`Tried::at`].
+    pub fn of<M: Model>(problem: &Problem<M>, values: &[f64], adjustment: &mut Adjustment) -> Option<Self> {
+        let last = adjustment.iterations.last().map_or(0.0, |iteration| iteration.largest_change);
+        let plain = adjustment.weights.is_none() && adjustment.lost.is_none();
+        let settled = adjustment.status == Status::Converged && last <= NEGLIGIBLE && plain;
+        let selected = adjustment.selected.take().filter(|_| settled)?;
+        let cofactors = adjustment.cofactors.take()?;
+        let residuals = std::mem::take(&mut adjustment.residuals);
+        Some(Self {
+            sum_of_squares: total(problem, &residuals, values),
+            values: values.to_vec(),
+            held: adjustment.datum.clone(),
+            residuals,
+            cofactors,
+            status: Status::Converged,
+            iterations: 0,
+            collapsed: vec![],
             selected,
         })
     }

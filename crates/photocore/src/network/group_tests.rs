@@ -33,6 +33,83 @@ pub struct Tests {
     pub error_sd: Vec<f64>,
 }
 
+/// Suspects that are tested one after the other.
+const TOGETHER: usize = 1024;
+
+/// The tests of some suspects that follow each other: what is not yet written of [`Tests`].
+struct Part<'a> {
+    active: &'a mut [bool],
+    rank: &'a mut [usize],
+    /// Statistic, least and shared.
+    of_suspects: [&'a mut [f64]; 3],
+    /// Residual, error and its standard deviation.
+    of_rows: [&'a mut [f64]; 3],
+    cofactors: &'a mut [f64],
+}
+
+impl Tests {
+    /// Of so many suspects, none of which takes part.
+    fn unknown(count: usize, row_starts: &[usize], block_starts: &[usize]) -> Self {
+        let (rows, blocks) = (row_starts[count], block_starts[count]);
+        let nothing = |count: usize| vec![f64::NAN; count];
+        Self {
+            active: vec![false; count],
+            rank: vec![0; count],
+            statistic: nothing(count),
+            least: nothing(count),
+            shared: nothing(count),
+            residual: nothing(rows),
+            cofactors: vec![0.0; blocks],
+            error: nothing(rows),
+            error_sd: nothing(rows),
+        }
+    }
+
+    /// Parts of [`TOGETHER`] suspects.
+    fn parts<'a>(&'a mut self, row_starts: &[usize], block_starts: &[usize]) -> Vec<Part<'a>> {
+        let Self { active, rank, statistic, least, shared, residual, cofactors, error, error_sd } = self;
+        let of_suspects = [statistic, least, shared].map(|all| all.chunks_mut(TOGETHER));
+        let [mut statistic, mut least, mut shared] = of_suspects;
+        let mut of_rows = [residual, error, error_sd].map(|all| &mut all[..]);
+        let mut cofactors = &mut cofactors[..];
+        let of_part = |(first, (active, rank)): (usize, (&'a mut [bool], &'a mut [usize]))| {
+            let (first, last) = (first * TOGETHER, first * TOGETHER + active.len());
+            let rows = row_starts[last] - row_starts[first];
+            let of_suspects = [&mut statistic, &mut least, &mut shared];
+            Part {
+                of_suspects: of_suspects.map(|chunks| chunks.next().unwrap_or_default()),
+                of_rows: of_rows.each_mut().map(|rest| taken(rest, rows)),
+                cofactors: taken(&mut cofactors, block_starts[last] - block_starts[first]),
+                active,
+                rank,
+            }
+        };
+        active.chunks_mut(TOGETHER).zip(rank.chunks_mut(TOGETHER)).enumerate().map(of_part).collect()
+    }
+}
+
+impl Part<'_> {
+    /// Writes the next suspect, of so many rows, and goes on behind it.
+    fn put(&mut self, size: usize, tested: Option<Tested>) {
+        let (active, rank) = (taken(&mut self.active, 1), taken(&mut self.rank, 1));
+        let own = self.of_suspects.each_mut().map(|rest| taken(rest, 1));
+        let rows = self.of_rows.each_mut().map(|rest| taken(rest, size));
+        let block = taken(&mut self.cofactors, size * size);
+        let Some(Tested { test, residual, cofactors, error, error_sd }) = tested else { return };
+        (active[0], rank[0]) = (true, test.rank);
+        own.into_iter().zip([test.statistic, test.least, test.shared]).for_each(|(to, value)| to[0] = value);
+        rows.into_iter().zip([residual, error, error_sd]).for_each(|(to, own)| to.copy_from_slice(&own));
+        block.copy_from_slice(&cofactors);
+    }
+}
+
+/// The first ones of a slice, which goes on behind them.
+fn taken<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    let (first, others) = std::mem::take(rest).split_at_mut(count);
+    *rest = others;
+    first
+}
+
 /// A test of a suspect, in its units.
 struct Tested {
     test: GroupTest,
@@ -51,40 +128,15 @@ impl Trial {
         let found = self.found()?;
         let groups = found.cofactors.groups.as_ref().ok_or(NetworkError::State)?;
         let weighted = self.weighted(&self.assembled.problem.sd, &found.values);
-        let test = |suspect: &Suspect| self.test(suspect, found, groups, &weighted);
-        let tested: Vec<Option<Tested>> =
-            pool.install(|| self.suspects.par_iter().with_min_len(256).map(test).collect());
-        let mut all = Tests {
-            residual: Vec::with_capacity(self.row_starts[self.suspects.len()]),
-            cofactors: Vec::with_capacity(self.block_starts[self.suspects.len()]),
-            ..Tests::default()
-        };
-        for (suspect, tested) in self.suspects.iter().zip(tested) {
-            let size = suspect.rows.len();
-            all.active.push(tested.is_some());
-            match tested {
-                Some(Tested { test, residual, cofactors, error, error_sd }) => {
-                    all.rank.push(test.rank);
-                    all.statistic.push(test.statistic);
-                    all.least.push(test.least);
-                    all.shared.push(test.shared);
-                    all.residual.extend(residual);
-                    all.cofactors.extend(cofactors);
-                    all.error.extend(error);
-                    all.error_sd.extend(error_sd);
-                }
-                None => {
-                    all.rank.push(0);
-                    [&mut all.statistic, &mut all.least, &mut all.shared]
-                        .into_iter()
-                        .for_each(|to| to.push(f64::NAN));
-                    for to in [&mut all.residual, &mut all.error, &mut all.error_sd] {
-                        to.resize(to.len() + size, f64::NAN);
-                    }
-                    all.cofactors.resize(all.cofactors.len() + size * size, 0.0);
-                }
+        let mut all = Tests::unknown(self.suspects.len(), &self.row_starts, &self.block_starts);
+        let parts = all.parts(&self.row_starts, &self.block_starts);
+        let fill = |(suspects, mut part): (&[Suspect], Part<'_>)| {
+            for suspect in suspects {
+                let size = suspect.rows.len();
+                part.put(size, self.test(suspect, found, groups, &weighted));
             }
-        }
+        };
+        pool.install(|| self.suspects.par_chunks(TOGETHER).zip(parts).for_each(fill));
         Ok(all)
     }
 

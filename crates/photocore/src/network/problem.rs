@@ -54,6 +54,12 @@ impl Assembled {
         }
     }
 
+    /// Whether there is room for what tests of groups need besides.
+    pub fn may_keep(&self, options: &Options) -> bool {
+        let system = &self.problem.system;
+        options.memory.is_none_or(|available| system.memory() + system.memory_of_groups() <= available)
+    }
+
     /// The points that an adjustment has ended with because their rays do not determine them, where they are so few that the others make
     /// up a network without them: indices into it. None where observations beside images touch them.
     pub fn few_points(&self, error: &AdjustError) -> Vec<usize> {

@@ -9,9 +9,9 @@ use super::problem::Assembled;
 use super::stations::{Placed, Station};
 use super::{
     AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options,
-    Point, State, UnitVariance, WeakPoint,
+    Point, Settled, State, UnitVariance, WeakPoint,
 };
-use crate::adjustment::{Adjustment, Observed, Problem, leading_matrix};
+use crate::adjustment::{Adjustment, Observed, Problem, Tried, leading_matrix};
 use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::network::model::Bundle;
 use crate::normals::Cofactors;
@@ -152,6 +152,8 @@ pub struct Solution {
     pub lost_digits: f64,
     /// Whether control and weights of poses are exactly what a datum takes: they check nothing, and another datum may be chosen.
     pub minimal_control: bool,
+    /// Where the adjustment has converged, the problem with its cofactors: tests of it form nothing again.
+    pub settled: Option<Box<Settled>>,
     /// Status, iterations, counts, operations and times.
     pub adjustment: Adjustment,
 }
@@ -162,9 +164,20 @@ impl Solution {
         network: &Network,
         options: &Options,
         assembled: &Assembled,
-        mut adjustment: Adjustment,
+        adjustment: Adjustment,
         collapsed: Vec<usize>,
     ) -> Self {
+        Self::with_tried(network, options, assembled, adjustment, collapsed).0
+    }
+
+    /// The same, with what tests of groups need where the adjustment has kept that.
+    pub(super) fn with_tried(
+        network: &Network,
+        options: &Options,
+        assembled: &Assembled,
+        mut adjustment: Adjustment,
+        collapsed: Vec<usize>,
+    ) -> (Self, Option<Tried>) {
         let Assembled { problem, dropped, .. } = assembled;
         let unknowns = std::mem::take(&mut adjustment.unknowns);
         let observations = observations(network, problem, &adjustment);
@@ -217,6 +230,7 @@ impl Solution {
             },
             lost_digits: 0.0,
             minimal_control: false,
+            settled: None,
             collapsed,
             sums_of_squares,
             redundancies,
@@ -227,10 +241,11 @@ impl Solution {
         let squares = solution.find_behind(assembled, &unknowns);
         let (model, points) = (&problem.model, &assembled.points[..]);
         solution.weak_points = network.weak_points(model, points, &solution.points, &squares);
+        let found = Tried::of(problem, &unknowns, &mut solution.adjustment);
         solution.state.unknowns = unknowns;
         solution.adjustment.cofactors = None;
         solution.adjustment.release_observations();
-        solution
+        (solution, found)
     }
 
     /// Finds the images whose point stands behind the camera, or beyond where its lens ends; returns the squares of the distances of the

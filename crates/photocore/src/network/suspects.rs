@@ -62,7 +62,7 @@ impl Network {
     /// The groups of observations that take part: images in their order, then control, positions, attitudes, observations beside images,
     /// cameras, common unknowns.
     pub(super) fn suspects(&self, assembled: &Assembled) -> Vec<Suspect> {
-        let mut all = images(assembled);
+        let mut all = images(assembled, self.images.len());
         all.extend(of_points(assembled));
         all.extend(self.of_photos(assembled));
         all.extend(observations(assembled));
@@ -107,26 +107,25 @@ impl Network {
     }
 }
 
-fn images(assembled: &Assembled) -> Vec<Suspect> {
+/// Those of so many images that take part, in their order.
+fn images(assembled: &Assembled, count: usize) -> Vec<Suspect> {
     let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
     let groups = layout.groups();
-    let mut all = Vec::with_capacity(model.images.len());
+    let mut of_image = vec![None; count];
     for (point, images) in model.start.windows(2).enumerate() {
-        for place in images[0]..images[1] {
-            let first = layout.rows() * place;
-            let home = match place.checked_sub(groups) {
-                None => Home::Group { group: place, point },
-                Some(tie) => Home::Tie(tie),
-            };
-            let rows = (0..2).map(|k| (Row::Equation(first + k), k)).collect();
-            all.push(Suspect { subject: Subject::Image(model.order[place]), home, rows });
-        }
+        (images[0]..images[1]).for_each(|place| of_image[model.order[place]] = Some((place, point)));
     }
-    all.sort_unstable_by_key(|suspect| match suspect.subject {
-        Subject::Image(image) => image,
-        _ => usize::MAX,
-    });
-    all
+    let suspect = |(image, taken): (usize, Option<(usize, usize)>)| {
+        let (place, point) = taken?;
+        let first = layout.rows() * place;
+        let home = match place.checked_sub(groups) {
+            None => Home::Group { group: place, point },
+            Some(tie) => Home::Tie(tie),
+        };
+        let rows = (0..2).map(|k| (Row::Equation(first + k), k)).collect();
+        Some(Suspect { subject: Subject::Image(image), home, rows })
+    };
+    of_image.into_iter().enumerate().filter_map(suspect).collect()
 }
 
 fn of_points(assembled: &Assembled) -> Vec<Suspect> {

@@ -29,6 +29,8 @@ pub struct Trial {
     /// What was held for a datum where the adjustment has ended.
     held: Vec<usize>,
     found: Option<Tried>,
+    /// Whether that is the network as its adjustment has ended, with everything in it.
+    stands: bool,
 }
 
 /// What is out.
@@ -77,13 +79,27 @@ impl Network {
             }
             None => self.assembled_first(options, pool)?,
         };
-        let suspects = self.suspects(&assembled);
+        let held = state.map_or(vec![], |state| state.held.clone());
+        Ok(Trial::new(self, assembled, &options.adjustment, held, None))
+    }
+}
+
+impl Trial {
+    /// Of an assembled network at its initial values, or as it was found there with everything in it.
+    pub(super) fn new(
+        network: &Network,
+        assembled: Assembled,
+        options: &adjustment::Options,
+        held: Vec<usize>,
+        found: Option<Tried>,
+    ) -> Self {
+        let suspects = network.suspects(&assembled);
         let (mut row_starts, mut block_starts) = (vec![0], vec![0]);
         for suspect in &suspects {
             row_starts.push(row_starts[row_starts.len() - 1] + suspect.rows.len());
             block_starts.push(block_starts[block_starts.len() - 1] + suspect.rows.len().pow(2));
         }
-        let mut place = vec![None; self.points.len()];
+        let mut place = vec![None; network.points.len()];
         assembled.points.iter().enumerate().for_each(|(index, &point)| place[point] = Some(index));
         let locals = assembled.problem.model.locals;
         let mut on_place: Vec<Vec<usize>> = vec![vec![]; locals];
@@ -94,11 +110,11 @@ impl Network {
                 _ => {}
             }
         }
-        let mut own = options.adjustment;
+        let mut own = *options;
         if let Method::Full(_) = own.method {
             own.method = Method::default();
         }
-        Ok(Trial {
+        Self {
             observation_sd: assembled.problem.observation_sd.clone(),
             sd: assembled.problem.sd.clone(),
             options: own,
@@ -108,13 +124,12 @@ impl Network {
             block_starts,
             place,
             on_place,
-            held: state.map_or(vec![], |state| state.held.clone()),
-            found: None,
-        })
+            held,
+            stands: found.is_some(),
+            found,
+        }
     }
-}
 
-impl Trial {
     /// The groups of observations, in the order of all tests.
     pub fn subjects(&self) -> impl Iterator<Item = Subject> {
         self.suspects.iter().map(|suspect| suspect.subject)
@@ -140,6 +155,9 @@ impl Trial {
     /// # Errors
     /// Values that leave unknowns undetermined; an interruption, no memory.
     pub fn stand(&mut self, pool: &ThreadPool, watch: Watch<'_>) -> Result<Standing, NetworkError> {
+        if let Some(found) = self.found.take_if(|_| self.stands) {
+            return self.keep(Ok(found));
+        }
         self.take_out(Out::default());
         let problem = &self.assembled.problem;
         let found = Tried::at(problem, problem.initial.clone(), self.held.clone(), pool, watch);
@@ -159,6 +177,7 @@ impl Trial {
         pool: &ThreadPool,
         watch: Watch<'_>,
     ) -> Result<Standing, NetworkError> {
+        self.stands = false;
         self.take_out(out);
         let options = adjustment::Options { method: self.method(tolerance), ..self.options };
         let found = Tried::adjust(&self.assembled.problem, &options, pool, watch);
@@ -184,6 +203,7 @@ impl Trial {
             max_iterations: iterations,
             ..self.options
         };
+        self.stands = false;
         let problem = &self.assembled.problem;
         let found = adjustment::adjust(problem, &options, pool, watch)
             .map_err(|error| NetworkError::new(error, &self.assembled))?;

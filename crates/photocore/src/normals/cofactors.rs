@@ -317,7 +317,7 @@ impl Others {
                     ));
                 }
                 if self.by_group {
-                    self.group::<R, L, D>(stack, slot, start, (t, k, p), rows, &own, found);
+                    self.group::<S, R, L, D>(simd, stack, slot, start, (t, k, p), rows, &own, found);
                 }
             }
         }
@@ -326,8 +326,9 @@ impl Others {
     /// The blocks of [`GroupCofactors`] of group `k` of a slot, `p` of the pattern, for local block `t` of the stack, whose own equations
     /// were the last that were found.
     #[inline(always)]
-    fn group<const R: usize, const L: usize, const D: usize>(
+    fn group<S: Simd, const R: usize, const L: usize, const D: usize>(
         &self,
+        simd: S,
         stack: &Stack,
         slot: &Slot,
         start: usize,
@@ -352,7 +353,9 @@ impl Others {
             for j in 0..=i {
                 let share = match i == j {
                     true => found.equations[diagonal + i],
-                    false => self.between::<R, L, D>(stack, slot, start, (t, k, p), (i, j), rows, own),
+                    false => {
+                        self.between::<S, R, L, D>(simd, stack, slot, start, (t, k, p), (i, j), rows, own)
+                    }
                 };
                 for at in [first + i * rows + j, first + j * rows + i] {
                     found.by_local[at] = dot(&along[i], &along[j]);
@@ -364,8 +367,9 @@ impl Others {
 
     /// a Q b^T of two rows of a group.
     #[inline(always)]
-    fn between<const R: usize, const L: usize, const D: usize>(
+    fn between<S: Simd, const R: usize, const L: usize, const D: usize>(
         &self,
+        simd: S,
         stack: &Stack,
         slot: &Slot,
         start: usize,
@@ -385,6 +389,9 @@ impl Others {
         let of = |row: usize| std::iter::once(kept(row)).chain(common(row));
         let (a, b) = (&stack.local_rows::<L>(t, p, rows)[pair.0], &stack.local_rows::<L>(t, p, rows)[pair.1]);
         let mut q = (0..L).map(|d| a[d] * dot(&own[d], b)).sum::<f64>();
+        if stack.parts(p).is_empty() {
+            return q + self.tied_pair::<S, L>(simd, (a, kept(pair.0).1), (b, kept(pair.1).1), start);
+        }
         for (from, to, local) in [(pair.0, None, b), (pair.1, Some(pair.0), a)] {
             for (first, values) in of(from) {
                 for d in 0..L {
@@ -462,6 +469,44 @@ impl Others {
             let mut values = [0.0; LANES];
             copy_vectors::<S>(&sums, &mut values);
             q += dot(&values, &x[first..]);
+        }
+        q
+    }
+
+    /// What coefficients x and y of the same other unknowns, from a place on, add to a Q b^T of two equations, a and b those of the local
+    /// block: (x Q - a H Q) y^T - b H Q x^T.
+    #[inline(always)]
+    fn tied_pair<S: Simd, const L: usize>(
+        &self,
+        simd: S,
+        (a, x): (&[f64; L], &[f64]),
+        (b, y): (&[f64; L], &[f64]),
+        start: usize,
+    ) -> f64 {
+        let mut q = 0.0;
+        for first in (0..x.len()).step_by(LANES) {
+            let column = start + first;
+            let mut along = [[simd.splat_f64s(0.0); LANES]; 2];
+            let mut add = |to: usize, from: &[f64], factor: f64| {
+                let vectors = S::as_simd_f64s(&from[..LANES]).0;
+                let factor = simd.splat_f64s(factor);
+                for k in 0..LANES / S::F64_LANES {
+                    along[to][k] = simd.mul_add_f64s(vectors[k], factor, along[to][k]);
+                }
+            };
+            for d in 0..L {
+                let hq = &self.hq[d * self.width + column..];
+                add(0, hq, -a[d]);
+                add(1, hq, -b[d]);
+            }
+            for (i, value) in x.iter().enumerate() {
+                add(0, &self.inverse[(start + i) * self.width + column..], *value);
+            }
+            for (sums, other) in along.iter().zip([y, x]) {
+                let mut values = [0.0; LANES];
+                copy_vectors::<S>(sums, &mut values);
+                q += dot(&values, &other[first..]);
+            }
         }
         q
     }

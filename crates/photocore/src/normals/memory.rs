@@ -25,6 +25,13 @@ impl System {
         BASE + BYTES * (capacity(self.symbolic.values()) + self.fronts())
     }
 
+    /// Bytes that what groups have to do with each other takes besides, as it is found and as it is handed out.
+    pub fn memory_of_groups(&self) -> usize {
+        let (groups, rows) = (self.layout.groups(), self.layout.rows());
+        let alone = self.layout.locals() * self.layout.local_dim().pow(2);
+        2 * BYTES * (2 * groups * rows * rows + alone)
+    }
+
     /// Gives back what is kept for the next formation or inversion: where others need memory before it comes.
     pub fn release(&self) {
         self.workspace.clear();

@@ -26,7 +26,7 @@ pub struct BlockNetwork {
 
 #[pymethods]
 impl BlockNetwork {
-    #[pyo3(signature = (*, datum, threads, progress, start = None))]
+    #[pyo3(signature = (*, datum, threads, progress, start = None, keep = false))]
     fn adjust(
         &self,
         py: Python<'_>,
@@ -34,6 +34,7 @@ impl BlockNetwork {
         threads: usize,
         progress: Option<Py<PyAny>>,
         start: Option<PyRef<'_, BlockState>>,
+        keep: bool,
     ) -> PyResult<BlockSolution> {
         let workers = Workers::of(threads, self.network.images.len());
         let inner = datum.map(datum_of).transpose()?;
@@ -43,9 +44,10 @@ impl BlockNetwork {
                 self.network.adjust_in_datum(&self.options, inner, pool, watch)
             }
             (_, Some(start)) => self.network.adjust_again(&self.options, start, pool, watch),
+            _ if keep => self.network.adjust_and_keep(&self.options, pool, watch),
             _ => self.network.adjust(&self.options, pool, watch),
         })?;
-        solution.map(|solution| BlockSolution { solution, unknowns: 6 }).map_err(|error| refused(&error))
+        solution.map(|solution| BlockSolution::new(solution, 6)).map_err(|error| refused(&error))
     }
 
     #[pyo3(signature = (state, datum, *, threads, progress))]
@@ -62,7 +64,7 @@ impl BlockNetwork {
         let solution = watched(py, workers, progress, |pool, watch| {
             self.network.in_datum(&self.options, &state.state, &datum, pool, watch)
         })?;
-        solution.map(|solution| BlockSolution { solution, unknowns: 6 }).map_err(|error| refused(&error))
+        solution.map(|solution| BlockSolution::new(solution, 6)).map_err(|error| refused(&error))
     }
 
     #[pyo3(signature = (state, *, threads, progress))]
@@ -76,14 +78,15 @@ impl BlockNetwork {
         factored(py, (&self.network, &self.options), refused, state, threads, progress)
     }
 
-    #[pyo3(signature = (state, *, threads))]
+    #[pyo3(signature = (state, *, threads, kept = false))]
     fn trial(
         &self,
         py: Python<'_>,
         state: Option<PyRef<'_, BlockState>>,
         threads: usize,
+        kept: bool,
     ) -> PyResult<NetworkTrial> {
-        tried(py, (&self.network, &self.options), refused, state, threads)
+        tried(py, (&self.network, &self.options), refused, state, threads, kept)
     }
 
     #[pyo3(signature = (state, *, threads))]

@@ -51,7 +51,7 @@ impl CollectionNetwork {
             Some(start) => self.network.adjust_again(&self.options, start, pool, watch),
         })?;
         let unknowns = self.unknowns;
-        solution.map(|solution| CollectionSolution { solution, unknowns }).map_err(|error| refused(&error))
+        solution.map(|solution| CollectionSolution::new(solution, unknowns)).map_err(|error| refused(&error))
     }
 
     #[pyo3(signature = (state, *, threads, progress))]
@@ -72,7 +72,7 @@ impl CollectionNetwork {
         state: Option<PyRef<'_, BlockState>>,
         threads: usize,
     ) -> PyResult<NetworkTrial> {
-        tried(py, (&self.network, &self.options), refused, state, threads)
+        tried(py, (&self.network, &self.options), refused, state, threads, false)
     }
 }
 

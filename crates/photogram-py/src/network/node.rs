@@ -215,7 +215,7 @@ impl Node {
         let (state, before) = (numbers("state", &state)?, numbers("before", &before)?);
         let told =
             watched(py, self.workers(threads), None, |pool, _| self.node.solution(&state, &before, pool))?;
-        told.map(|solution| BlockSolution { solution, unknowns: 6 }).map_err(|error| failed(&error))
+        told.map(|solution| BlockSolution::new(solution, 6)).map_err(|error| failed(&error))
     }
 }
 
@@ -322,6 +322,6 @@ impl FormedNode {
         })?;
         let (solution, below) = found.map_err(|error| failed(&error))?;
         let below = below.into_iter().map(|triangle| PyArray1::from_vec(py, triangle)).collect();
-        Ok((BlockSolution { solution, unknowns: 6 }, below))
+        Ok((BlockSolution::new(solution, 6), below))
     }
 }

@@ -1,11 +1,13 @@
 //! What an adjustment of a network has found, as arrays.
 
+use std::sync::Arc;
+
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use photocore::network::{AdjustedCamera, AdjustedPhoto, Reason, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::state::BlockState;
+use super::state::{BlockState, Kept, kept};
 use super::{FailureRow, failure};
 use crate::arrays::{squares, table};
 use crate::commons::{AdjustedRow as UnknownRow, adjusted_row as unknown_row};
@@ -81,7 +83,16 @@ macro_rules! solution_class {
         pub struct $class {
             pub solution: Solution,
             /// Of a photo: its pose, and its camera where that may be unknown.
-            pub unknowns: usize,
+            unknowns: usize,
+            kept: Kept,
+        }
+
+        impl $class {
+            /// Of so many unknowns of a photo.
+            pub fn new(mut solution: Solution, unknowns: usize) -> Self {
+                let kept = kept(&mut solution);
+                Self { solution, unknowns, kept }
+            }
         }
 
         #[pymethods]
@@ -208,7 +219,7 @@ macro_rules! solution_class {
 
             #[getter]
             fn state(&self) -> BlockState {
-                BlockState { state: self.solution.state.clone() }
+                BlockState { state: self.solution.state.clone(), kept: Arc::clone(&self.kept) }
             }
 
             #[getter]

@@ -1,6 +1,8 @@
 //! Where the adjustment of a block has ended, and the datum that it was taken to.
 
-use photocore::network::{InnerConstraints, NetworkDatum, State};
+use std::sync::{Arc, Mutex};
+
+use photocore::network::{InnerConstraints, NetworkDatum, Settled, Solution, State};
 use pyo3::prelude::*;
 
 use crate::options::{named_ordering, unknown};
@@ -35,10 +37,26 @@ fn row_of(datum: &NetworkDatum) -> DatumRow {
 /// Adjusted unknowns, those held, points and photos left out, ordering, datum, whether control was given up for it.
 type StateRow = (Vec<f64>, Vec<usize>, Vec<usize>, Vec<usize>, String, Option<DatumRow>, bool);
 
+/// A network where its adjustment has converged, until the first that asks takes it: its memory is that of the adjustment.
+pub type Kept = Arc<Mutex<Option<Box<Settled>>>>;
+
+/// Takes what a solution has kept.
+pub fn kept(solution: &mut Solution) -> Kept {
+    Arc::new(Mutex::new(solution.settled.take()))
+}
+
 /// Where an adjustment has ended.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct BlockState {
     pub state: State,
+    pub kept: Kept,
+}
+
+impl BlockState {
+    /// What the adjustment has kept, the first time; none of copies and of what was read.
+    pub fn take_kept(&self) -> Option<Box<Settled>> {
+        self.kept.lock().ok().and_then(|mut kept| kept.take())
+    }
 }
 
 #[pymethods]
@@ -54,7 +72,8 @@ impl BlockState {
         released: bool,
     ) -> PyResult<Self> {
         let (ordering, datum) = (named_ordering(ordering)?, datum.map(datum_of).transpose()?);
-        Ok(Self { state: State { unknowns, held, collapsed, loose, ordering, datum, released } })
+        let state = State { unknowns, held, collapsed, loose, ordering, datum, released };
+        Ok(Self { state, kept: Kept::default() })
     }
 
     /// So that results are copied and sent to other processes.

@@ -61,14 +61,22 @@ fn subject(subject: Subject) -> (u8, i64) {
 type MovedRow = (&'static str, usize, usize, f64, f64);
 
 /// Prepares a network for trials without some of its observations, from where its adjustment has ended or from the start.
+///
+/// * `kept`: whether the state is of this very network, so that what its adjustment has kept may be taken.
 pub fn tried(
     py: Python<'_>,
     (network, options): (&Network, &Options),
     refused: Refused,
     state: Option<PyRef<'_, BlockState>>,
     threads: usize,
+    kept: bool,
 ) -> PyResult<NetworkTrial> {
     let images = network.images.len();
+    let settled = state.as_ref().filter(|_| kept).and_then(|state| state.take_kept());
+    if let Some(settled) = settled {
+        let trial = py.detach(|| settled.trial(network));
+        return Ok(NetworkTrial { trial, images, threads, refused });
+    }
     let state = state.map(|state| state.state.clone());
     let found = watched(py, Workers::of(threads, images), None, |pool, _| {
         network.trial(options, state.as_ref(), pool)

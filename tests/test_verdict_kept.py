@@ -1,0 +1,71 @@
+"""The verdict takes over what the adjustment has kept: the same numbers as from a formation of its own."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import photogram
+from fuzz.networks import random_network
+from photogram import adjust
+
+TESTED = ("active", "rank", "statistic", "least", "shared", "residual", "redundancy", "error", "error_sd")
+SEED = 5
+HIDDEN = 1e-3
+"""Redundancy from which on an error is more than the rounding of what hides it."""
+
+
+def assert_alike(first, second, tolerance):
+    """Compare the tests and effects of two reliabilities, but for what hardly shows."""
+    shown = ~(np.nan_to_num(second.tests.least) < HIDDEN)
+    rows = shown[second.row_groups()]
+    for name in TESTED:
+        own, other = (np.asarray(getattr(each.tests, name), dtype=float) for each in (first, second))
+        used = shown if len(own) == len(shown) else rows
+        np.testing.assert_allclose(own[used], other[used], rtol=tolerance, atol=tolerance, err_msg=name)
+    ends = [each.standing for each in (first, second)]
+    assert ends[0].degrees_of_freedom == ends[1].degrees_of_freedom
+    assert ends[0].weighted_sum_of_squares == pytest.approx(ends[1].weighted_sum_of_squares, rel=1e-12)
+    groups = np.flatnonzero(shown).tolist()
+    moved = [each.own_points(groups) for each in (first, second)]
+    np.testing.assert_allclose(*moved, rtol=100 * tolerance, atol=1e-9)
+
+
+def own_formation(result):
+    """Return a copy of a result, which has kept nothing."""
+    return pickle.loads(pickle.dumps(result))
+
+
+@pytest.mark.parametrize("number", range(20))
+def test_random_networks(number):
+    """Control, observed stations, observations beside images, cameras, rigs, spheroids; free ones too."""
+    block = random_network(SEED, number).block
+    result = adjust(block, tolerance=1e-9, verdict=True)
+    assert_alike(result.reliability(), own_formation(result).reliability(), 1e-6)
+
+
+def test_the_same_words_and_numbers():
+    block = photogram.simulate(strips=3, photos_per_strip=6, points_per_photo=60, seed=4, blunders=2).block
+    result = adjust(block, verdict=True)
+    copied = own_formation(result)
+    assert_alike(result.reliability(), copied.reliability(), 1e-7)
+    # What was kept is taken once: what is asked later forms its own.
+    assert_alike(result.reliability(), copied.reliability(), 1e-14)
+    again = adjust(block, verdict=True)
+    assert again.verdict.headline == copied.verdict.headline
+    assert again.report() == copied.report()
+
+
+@pytest.mark.parametrize("options", [{"loss": "huber"}, {"max_iterations": 2}, {"tolerance": 100.0}])
+def test_what_is_not_kept(options):
+    """Of a loss, of iterations that have not ended, and where the last step was long: all is as without."""
+    block = photogram.simulate(strips=2, photos_per_strip=4, points_per_photo=40, seed=7).block
+    result = adjust(block, verdict=True, **options)
+    assert_alike(result.reliability(), own_formation(result).reliability(), 1e-14)
+
+
+def test_the_adjustment_is_the_same_to_the_last_bit():
+    block = photogram.simulate(strips=2, photos_per_strip=4, points_per_photo=40, seed=7).block
+    plain, kept = adjust(block), adjust(block, verdict=True)
+    for name in ("photo_cofactors", "point_cofactors", "redundancy", "standardized", "photo_positions"):
+        np.testing.assert_array_equal(getattr(plain, name), getattr(kept, name))
