@@ -211,7 +211,7 @@ def _limit(dask_worker: Any = None) -> int | None:
 
 
 def _held() -> int:
-    """Return the bytes that a worker holds when it has loaded what tasks use, and nothing of an earlier run."""
+    """Return the bytes that a worker holds which has loaded what tasks use, and has no earlier run."""
     # What is imported here is what takes memory; nothing is called.
     import pyarrow.parquet  # noqa: F401
 
