@@ -38,9 +38,9 @@ const SHORT: f64 = 1.0;
 const BENDS: f64 = 0.75;
 /// until the second-order term, in the metric of the normal equations, is smaller than this part of a step.
 const STRAIGHT: f64 = 0.1;
-/// Local blocks of a network, at the least, whose steps are accelerated: the valley of a few numbers may lead far away (Eckerle4 of NIST's
-/// problems, from its first start), that of a network ends near where it began.
-const NETWORK: usize = 64;
+/// Local blocks of a network, at the least, whose steps are accelerated, and end where the sum of squares creeps: the valley of a few numbers
+/// may lead far away (Eckerle4 of NIST's problems, from its first start), that of a network ends near where it began.
+const NETWORK: usize = 16;
 
 /// The damping, and by how much the next failure raises it.
 struct Damping {
@@ -99,7 +99,6 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let mut lowest = state.sum_of_squares;
         let mut damping = Damping { value: state.damping, rise: 2.0, bends: false };
         let (mut mark, mut steps) = (lowest, 0);
-        let is_network = self.problem.layout().locals() >= NETWORK;
         let mut falls: Vec<f64> = vec![];
         while self.iterations.len() < self.options.max_iterations {
             if damping.value > MOST_DAMPING {
@@ -123,7 +122,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let last = whole && (stop.at_change(trial.change) || stop.at_decrease(trial.predicted, lowest));
             let gain = trial.gain(lowest);
             damping.bends &= trial.bend.is_none_or(|bend| bend > STRAIGHT);
-            damping.bends |= (gain.is_nan() || gain < BENDS) && self.options.loss.is_none() && is_network;
+            damping.bends |=
+                (gain.is_nan() || gain < BENDS) && self.options.loss.is_none() && self.is_network();
             if gain > LEAST_GAIN && trial.sum_of_squares <= lowest {
                 let decrease = lowest - trial.sum_of_squares;
                 if let Some(end) = self.keep(&unknowns, &trial, used)? {
@@ -199,13 +199,17 @@ impl<'a, M: Model> Run<'a, '_, M> {
         Ok((term, square))
     }
 
+    fn is_network(&self) -> bool {
+        self.problem.layout().locals() >= NETWORK
+    }
+
     /// Whether the sum of squares creeps, by less and less and never to an end. With a loss it may: reweighting is no faster.
     fn creeps(&self, falls: &[f64], lowest: f64) -> bool {
         let Some(first) = falls.len().checked_sub(CREEPING) else { return false };
         let freedom = self.problem.counts(0).degrees_of_freedom().max(1) as f64;
         let (last, least) = (&falls[first..], LITTLE * (lowest / freedom).max(1.0));
         let is_slow = last[CREEPING - 1] > FALLING * last[0];
-        self.options.loss.is_none() && is_slow && last.iter().sum::<f64>() <= least
+        self.options.loss.is_none() && self.is_network() && is_slow && last.iter().sum::<f64>() <= least
     }
 
     /// Keeps a step; the end where it has led local blocks to where they harm all others.
