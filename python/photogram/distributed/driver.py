@@ -19,6 +19,7 @@ from photogram.arguments.types import Floats
 from photogram.distributed.cut import Tree
 from photogram.distributed.executors import Executor, Handle
 from photogram.distributed.files import read_json, write_json
+from photogram.distributed.reforming import Reforming
 from photogram.distributed.tasks import (
     Formed,
     Job,
@@ -424,6 +425,7 @@ class Driver:
         """
         parents = self.tree.parents.tolist()
         waiting: dict[Handle, tuple[int, int]] = {}
+        reforming = Reforming(lambda node: self._form_again(up, node), lambda node: self._places[node])
         rounds = [0] * (len(self.tree) + 1)
         again: dict[int, list[int]] = {}
         failures = 0
@@ -432,10 +434,16 @@ class Driver:
             waiting[task(node)] = node, rounds[parents[node]]
 
         begin(self.tree.root)
-        while waiting:
-            handle = self.executor.first(waiting)
+        while waiting or reforming.handles:
+            handle = self.executor.first([*waiting, *reforming.handles])
+            if handle in reforming.handles:
+                node = reforming.handles.pop(handle)
+                self._places[node] = self.executor.value(handle).place
+                begin(node)
+                continue
             node, since = waiting.pop(handle)
             parent = parents[node]
+            reforming.over(node)
             try:
                 then(node, handle)
             except LostFactorError as missed:
@@ -445,8 +453,7 @@ class Driver:
                         "workers were lost too often; the run can be taken up again"
                     ) from None
                 if missed.number == node:
-                    self._form_again(up, node)
-                    begin(node)
+                    reforming.begin(node)
                 elif parent in again:
                     again[parent].append(node)
                 elif rounds[parent] > since:
@@ -461,14 +468,13 @@ class Driver:
             for each in again.pop(node, []) if rounds[node] > 1 else self.tree.children[node]:
                 begin(each)
 
-    def _form_again(self, up: _Up, node: int) -> None:
-        """Form a node again whose factor was lost."""
+    def _form_again(self, up: _Up, node: int) -> Handle:
+        """Have a node formed again whose factor was lost; return the handle of what tells of it."""
         below = [up.contributions[child] for child in self.tree.children[node]]
         old = up.contributions[node]
         up.contributions[node] = self._do(formed, node, up.at, below)
-        told: Formed = self.executor.value(self.executor.submit(about, up.contributions[node]))
-        self._places[node] = told.place
         self.executor.forget([old])
+        return self.executor.submit(about, up.contributions[node])
 
     def _relocated(self, state: str) -> str:
         """Return the state with points intersected anew, where that lowers the sum of squares."""

@@ -139,6 +139,8 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
                 threads_per_worker=1,
                 memory_limit=memory or "auto",
                 dashboard_address=None,
+                # Any free port: the usual one may be another cluster's.
+                scheduler_kwargs={"dashboard_address": ":0"},
                 # Nodes and factors are memory that Dask does not manage: it warns of them.
                 silence_logs=logging.ERROR,
             ) as own,
