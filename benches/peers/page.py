@@ -162,12 +162,13 @@ def page(
     parts.append("\n".join(grown or ["* not measured: one size only"]) + "\n")
     judged = list(targets(results, small))
     parts += ["## Targets\n", target_table(judged)]
-    missed = [target.name for target in judged if not target.met and target.name in reasons]
+    missed: dict[str, list[str]] = {}
+    for target in judged:
+        if not target.met and target.name in reasons:
+            missed.setdefault(reasons[target.name], []).append(target.name)
     if missed:
-        parts += [
-            "Why, and what was tried:\n",
-            "\n".join(f"* {name}: {reasons[name]}" for name in missed) + "\n",
-        ]
+        lines = [f"* {'; '.join(names)}: {reason}" for reason, names in missed.items()]
+        parts += ["Why, and what was tried:\n", "\n".join(lines) + "\n"]
     return "\n".join(parts)
 
 

@@ -1,6 +1,29 @@
 """Why targets are missed and what was tried, by the names of the targets; printed for those that are."""
 
+_SIZES = ("20x50", "50x100", "200x250")
+_OUTSIDE = (
+    "Ordering, screening, the first intersection of the points, arrays handed over and back, and memory "
+    "that a process touches for the first time. Not tried: ordering on a coarsened graph, arrays handed "
+    "over without copies."
+)
+_LIMIT = (
+    "Factor and inverse are at two thirds of the product rate where fronts are large, at a third where "
+    "they are small; formation is at a twentieth (see below), and what is outside the numerical phases is "
+    "no product at all."
+)
+_PEERS = (
+    "Our numerical phases alone take about a tenth of gtsam's solution: all that is outside them would have "
+    "to go."
+)
+
 REASONS: dict[str, str] = {
+    **{f"{size}: outside the numerical phases, share of the time": _OUTSIDE for size in _SIZES},
+    **{f"{size}: everything, times its operations at the product rate": _LIMIT for size in _SIZES},
+    **{
+        f"{size}: everything / {peer}'s bare solution": _PEERS
+        for size in _SIZES
+        for peer in ("gtsam", "pycolmap")
+    },
     "strips from 1x1000 to 1x50000: exponent of time": (
         "The longest strip takes one iteration more than the shorter ones; the time of one iteration "
         "grows with a smaller exponent than the target."

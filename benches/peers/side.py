@@ -67,6 +67,8 @@ def sample(block: photogram.Block) -> tuple[list[int], list[int]]:
 
 def run_photogram(block: photogram.Block, record: Record, threads: int | None) -> dict[str, Floats]:
     """Adjust with every covariance and redundancy number; the points are intersected within."""
+    # What a first adjustment loads is loaded, as the libraries of the peers are.
+    photogram.adjust(photogram.simulate(strips=2, photos_per_strip=3, seed=1).block)
     result = record.time("everything", lambda: photogram.adjust(block, threads=threads))
     rays = result.point_rays.astype(float)
     record.values |= {
