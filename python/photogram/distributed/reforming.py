@@ -36,13 +36,14 @@ class Reforming:
         if place in self._busy.values():
             self._queues[place].append(node)
         else:
-            self._busy[node] = place
-            self.handles[self._form(node)] = node
+            self._start(node, place)
 
     def over(self, node: int) -> None:
         """Have the next one formed where the task of a node, which was formed again perhaps, is over."""
         place = self._busy.pop(node, None)
         if place is not None and self._queues[place]:
-            following = self._queues[place].popleft()
-            self._busy[following] = place
-            self.handles[self._form(following)] = following
+            self._start(self._queues[place].popleft(), place)
+
+    def _start(self, node: int, place: str) -> None:
+        self._busy[node] = place
+        self.handles[self._form(node)] = node
