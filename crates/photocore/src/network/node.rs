@@ -138,7 +138,7 @@ impl Node {
             node: self.bytes(),
             factor: size_of::<f64>() * (system.numbers_in_factor() - outer * outer + 3 * self.size()),
             memory: self.bytes()
-                + system.memory_of_fronts()
+                + system.memory_of_part()
                 + size_of::<f64>() * (handed + FOUND * layout.equations()),
         }
     }

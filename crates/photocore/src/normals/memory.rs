@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::room::vectors;
 use super::system::System;
-use super::workspace::capacity;
+use super::workspace::Workspace;
 
 /// Of a number.
 const BYTES: usize = size_of::<f64>();
@@ -21,8 +21,20 @@ impl System {
     }
 
     /// Of these, those of the factor and the fronts, and what does not grow with the problem.
-    pub fn memory_of_fronts(&self) -> usize {
-        BASE + BYTES * (capacity(self.symbolic.values()) + self.fronts())
+    fn memory_of_fronts(&self) -> usize {
+        let mut buffers = Buffers::of(&self.workspace);
+        self.walk_up(&mut buffers);
+        self.walk_down(&mut buffers);
+        BASE + BYTES * (self.workspace.capacity(self.symbolic.values()) + buffers.most)
+    }
+
+    /// The same of a part of a larger system, which is released once it is formed.
+    pub fn memory_of_part(&self) -> usize {
+        let mut walks = [Buffers::of(&self.workspace), Buffers::of(&self.workspace)];
+        self.walk_up(&mut walks[0]);
+        self.walk_down(&mut walks[1]);
+        let most = walks[0].most.max(walks[1].most);
+        BASE + BYTES * (self.workspace.capacity(self.symbolic.values()) + most)
     }
 
     /// Bytes that what groups have to do with each other takes besides, as it is found and as it is handed out.
@@ -37,10 +49,9 @@ impl System {
         self.workspace.clear();
     }
 
-    /// Numbers in the buffers of fronts: the walks up and down the elimination tree take and give back what these do.
-    fn fronts(&self) -> usize {
+    /// Takes and gives back the buffers of fronts that the walk up the elimination tree does.
+    fn walk_up(&self, buffers: &mut Buffers<'_>) {
         let supernodes = self.symbolic.supernodes();
-        let mut buffers = Buffers::default();
         for s in supernodes {
             buffers.take(s.below().pow(2));
             s.children.iter().for_each(|&child| buffers.put_back(supernodes[child].below().pow(2)));
@@ -48,6 +59,11 @@ impl System {
         for root in supernodes.iter().filter(|s| s.parent.is_none()) {
             buffers.put_back(root.below().pow(2));
         }
+    }
+
+    /// The same of the walk down.
+    fn walk_down(&self, buffers: &mut Buffers<'_>) {
+        let supernodes = self.symbolic.supernodes();
         for (index, s) in supernodes.iter().enumerate().rev() {
             buffers.take(s.height().pow(2));
             // A front lives until the last child, the first in the order, has taken its part.
@@ -55,35 +71,48 @@ impl System {
             if let Some(parent) = parent.filter(|parent| parent.children.first() == Some(&index)) {
                 buffers.put_back(parent.height().pow(2));
             }
-            let products = [s.below() * s.width, s.width.pow(2)];
-            products.iter().for_each(|&length| buffers.take(length));
-            products.iter().for_each(|&length| buffers.put_back(length));
+            // The inverse over the outer unknowns is given, not computed.
+            if self.symbolic.open() != Some(index) {
+                let products = [s.below() * s.width, s.width.pow(2)];
+                products.iter().for_each(|&length| buffers.take(length));
+                products.iter().for_each(|&length| buffers.put_back(length));
+            }
             if s.children.is_empty() {
                 buffers.put_back(s.height().pow(2));
             }
         }
-        buffers.made
     }
 }
 
 /// The buffers of a workspace, by capacity.
-#[derive(Default)]
-struct Buffers {
+struct Buffers<'a> {
+    workspace: &'a Workspace,
     spare: HashMap<usize, usize>,
-    /// Numbers in all that were ever made: none is given back to the system.
+    /// Numbers in all that there are, and in all that there ever were at once.
     made: usize,
+    most: usize,
 }
 
-impl Buffers {
+impl<'a> Buffers<'a> {
+    fn of(workspace: &'a Workspace) -> Self {
+        Self { workspace, spare: HashMap::new(), made: 0, most: 0 }
+    }
+
     fn take(&mut self, length: usize) {
-        let capacity = capacity(length);
+        let capacity = self.workspace.capacity(length);
         match self.spare.get_mut(&capacity).filter(|spare| **spare > 0) {
             Some(spare) => *spare -= 1,
             None => self.made += capacity,
         }
+        self.most = self.most.max(self.made);
     }
 
     fn put_back(&mut self, length: usize) {
-        *self.spare.entry(capacity(length)).or_default() += 1;
+        let capacity = self.workspace.capacity(length);
+        if self.workspace.gives_back(capacity) {
+            self.made -= capacity;
+        } else {
+            *self.spare.entry(capacity).or_default() += 1;
+        }
     }
 }

@@ -41,6 +41,8 @@ impl System {
         let tree = Tree::new(&symbolic, symbolic.supernodes().iter().enumerate().map(work).collect());
         let kept: Vec<usize> =
             (0..=symbolic.supernode_count()).map(|index| numbers_at(&incidence, &layout, index)).collect();
+        let is_part = symbolic.open().is_some() || !layout.contributions().is_empty();
+        let workspace = if is_part { Workspace::frugal() } else { Workspace::default() };
         let keeps = kept.iter().sum::<usize>() <= made_of_results(&layout);
         Self {
             layout,
@@ -49,7 +51,7 @@ impl System {
             ties,
             contributions,
             tree,
-            workspace: Workspace::default(),
+            workspace,
             keeps,
             kept: if keeps { kept } else { Vec::new() },
         }

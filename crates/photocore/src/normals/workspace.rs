@@ -14,6 +14,8 @@ pub(super) type Eliminated = Vec<Vec<f64>>;
 /// giving them back, would cost more than the arithmetic.
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
+    /// Whether what is huge goes back to the system, and is taken as large as it need be.
+    frugal: bool,
     spare: Mutex<HashMap<usize, Vec<Vec<f64>>>>,
     eliminated: Mutex<Eliminated>,
     /// Room for stacks, which differ little in size.
@@ -21,6 +23,29 @@ pub(super) struct Workspace {
 }
 
 impl Workspace {
+    /// Of a part of a larger system: beside what the parts around it have left, its fronts are few and huge, and each larger than the
+    /// one before. None would ever be used again.
+    pub fn frugal() -> Self {
+        Self { frugal: true, ..Self::default() }
+    }
+
+    /// The capacity of a buffer for so many numbers: the next power of two, for large ones the next eighth of it.
+    pub fn capacity(&self, length: usize) -> usize {
+        let power = length.next_power_of_two();
+        if length < LARGE {
+            power
+        } else if self.gives_back(length) {
+            length
+        } else {
+            length.next_multiple_of(power / 8)
+        }
+    }
+
+    /// Whether a buffer of a capacity goes back to the system.
+    pub fn gives_back(&self, capacity: usize) -> bool {
+        self.frugal && capacity >= HUGE
+    }
+
     /// A buffer of zeros; the bytes that there are not.
     pub fn zeros(&self, length: usize) -> Result<Vec<f64>, usize> {
         let mut buffer = self.take(length)?;
@@ -45,7 +70,7 @@ impl Workspace {
 
     /// Takes a buffer back.
     pub fn put_back(&self, buffer: Vec<f64>) {
-        if buffer.capacity() > 0 {
+        if buffer.capacity() > 0 && !self.gives_back(buffer.capacity()) {
             lock(&self.spare).entry(buffer.capacity()).or_default().push(buffer);
         }
     }
@@ -78,7 +103,7 @@ impl Workspace {
     }
 
     fn take(&self, length: usize) -> Result<Vec<f64>, usize> {
-        let capacity = capacity(length);
+        let capacity = self.capacity(length);
         let found = lock(&self.spare).get_mut(&capacity).and_then(Vec::pop);
         found.map_or_else(|| reserved(capacity), Ok)
     }
@@ -87,11 +112,8 @@ impl Workspace {
 /// Numbers from which on a buffer is not twice as large as it need be.
 const LARGE: usize = 1 << 20;
 
-/// The capacity of a buffer for so many numbers: the next power of two, for large ones the next eighth of it.
-pub(super) fn capacity(length: usize) -> usize {
-    let power = length.next_power_of_two();
-    if length < LARGE { power } else { length.next_multiple_of(power / 8) }
-}
+/// Numbers from which on a part gives a buffer back: 64 MiB, which an allocator takes from the system by itself.
+const HUGE: usize = 1 << 23;
 
 /// An empty vector with room for so many numbers; the bytes that there are not.
 pub(super) fn reserved(capacity: usize) -> Result<Vec<f64>, usize> {
