@@ -1,6 +1,7 @@
 """Unknowns that observations have in common, and rigs: examples, results, coverage, refusals."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from photogram.network.observations import (
     Prior,
 )
 from photogram.network.rigs import Mount
+from photogram.network.simulated_observations import with_gnss
 from photogram.network.unknowns import (
     Boresight,
     Drift,
@@ -182,6 +184,24 @@ def test_a_prior_with_full_covariance_is_what_weights_are(scripts):
     assert result.degrees_of_freedom == weighted.degrees_of_freedom
 
 
+def test_a_drift_counts_from_its_epoch():
+    """What a shift is at the mean time, it is less the drift of the time between at another one."""
+    simulated = simulate(strips=2, photos_per_strip=8, seed=3)
+    block = with_gnss(simulated, shift_sd=0.5, drift_sd=0.01, seed=1).block
+    drifts = {id(each): each for each in block.unknowns if isinstance(each, Drift)}
+    dated = {key: each.replace(epoch=0.0) for key, each in drifts.items()}
+    observations = [replace(each, drift=dated[id(each.drift)]) for each in block.observations]
+    one, other = adjust(block), adjust(block.replace(observations=observations))
+    np.testing.assert_allclose(other.photo_positions, one.photo_positions, atol=1e-6)
+    for drift in drifts.values():
+        mean = np.mean([each.time for each in block.observations if each.drift is drift])
+        assert mean > 1
+        found = [{(u.kind, u.name): u.position for u in r.unknowns} for r in (one, other)]
+        moved = found[0]["shift", drift.name] - mean * found[0]["drift", drift.name]
+        np.testing.assert_allclose(found[1]["shift", drift.name], moved, atol=1e-7)
+        np.testing.assert_allclose(found[1]["drift", drift.name], found[0]["drift", drift.name], atol=1e-9)
+
+
 def test_poses_on_frames_follow_from_these(scripts):
     result = adjust(scripts["stereo_rig"].measured())
     assert any("held at their initial values" in str(message) for message in result.messages)
@@ -322,6 +342,7 @@ def test_unknowns_in_every_space(spheroid):
         (lambda: LeverArm("a", [0, np.nan, 0]), "lever arm a"),
         (lambda: Shift("s", sd=-1.0), "sd of shift s is no standard deviation"),
         (lambda: Drift("d", sd=[1.0, 1.0]), "sd of drift d"),
+        (lambda: Drift("d", epoch=np.nan), "epoch of drift d"),
         (lambda: Boresight("b", 2 * np.eye(3)), "value of boresight b is no rotation matrix"),
         (lambda: Sensor("s", [0, 0, 0], -np.eye(3)), "matrix of sensor s is mirrored"),
         (lambda: Plane("p", [0, 0, 0], [0, 0, 0]), "normal of plane p is no direction"),

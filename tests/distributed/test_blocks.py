@@ -14,7 +14,8 @@ from photogram.distributed.entrance import plan_in_parts
 from photogram.distributed.run import read_manifest
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.network.observations import Relative
-from photogram.network.simulated_observations import with_rig
+from photogram.network.simulated_observations import with_gnss, with_rig
+from photogram.network.unknowns import Drift
 
 
 @pytest.fixture(scope="module")
@@ -127,6 +128,21 @@ def test_a_rig_across_parts():
     agrees(found, alone)
     for one, other in zip(found.unknowns, alone.unknowns, strict=True):
         assert (np.abs(one.values - other.values) <= 1e-9 * one.sd).all()
+
+
+def test_drifts_of_strips_across_parts():
+    simulated = photogram.simulate(strips=4, photos_per_strip=24, points_per_photo=40, seed=3)
+    made = with_gnss(simulated, sd=0.05, shift_sd=0.5, drift_sd=0.01, seed=2)
+    block = made.block
+    drifts = [each for each in block.unknowns if isinstance(each, Drift)]
+    assert len(drifts) == 4
+    assert all(each.epoch is None for each in drifts)
+    found, alone = adjust(block, parts=4), adjust(block)
+    agrees(found, alone)
+    for one, other in zip(found.unknowns, alone.unknowns, strict=True):
+        assert one.name == other.name
+        assert (np.abs(one.values - other.values) <= 1e-9 * one.sd).all()
+        np.testing.assert_allclose(one.cofactors, other.cofactors, rtol=1e-8)
 
 
 def test_a_plan_is_what_is_needed(block, tmp_path):

@@ -172,7 +172,11 @@ def test_every_kind_of_observation_comes_back(tmp_path):
     )
     block = made.block
     photos, points = block.photo_ids, block.point_ids
-    lever, shift, drift = LeverArm("lever", [0.1, 0.0, -0.2], 0.05), Shift("flight"), Drift("flight")
+    lever, shift, drift = (
+        LeverArm("lever", [0.1, 0.0, -0.2], 0.05),
+        Shift("flight"),
+        Drift("flight", epoch=0.0),
+    )
     body = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
     boresight = Boresight("imu", body, np.radians(0.5))
     covariance = np.array([[4.0, 1.0, 0.5], [1.0, 5.0, -0.3], [0.5, -0.3, 9.0]]) * 1e-4

@@ -325,7 +325,9 @@ def names_above(part: Part, below: Names, shared: Indices, *, root: bool) -> Nam
     photos = part.photos[(part.owners != part.node) & free]
     cameras = part.block.photo_cameras
     used = set() if cameras is None else set(cameras.tolist()) & set(shared.tolist())
-    return Names(photos.tolist(), sorted(used | set(below.cameras)), sorted(part.unknowns.tolist()))
+    known = zip(part.unknowns.tolist(), part.common, strict=True)
+    unknowns = sorted(row for row, each in known if not each.is_held)
+    return Names(photos.tolist(), sorted(used | set(below.cameras)), unknowns)
 
 
 def shared_cameras(block: Block) -> Indices:

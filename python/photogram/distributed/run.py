@@ -27,6 +27,7 @@ from photogram.distributed.parts import (
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions
+from photogram.network.observations.position import with_epochs
 from photogram.network.unknowns import Unknown
 
 __all__ = ["Manifest", "divided", "part_folder", "partition", "places_of", "read_manifest", "result_folder"]
@@ -108,6 +109,8 @@ def partition(block: Block, run: Path, parts: int, options: CoreOptions, source:
     AdjustmentError
         The folder cannot be written to.
     """
+    # A node has some of the observations of a drift only.
+    block = block.replace(observations=with_epochs(block.observations))
     incidence, _, _ = incidence_of(block)
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
     found = cut(places_of(block), images.astype(float), lambda: [incidence], parts)

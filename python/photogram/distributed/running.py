@@ -30,7 +30,6 @@ from photogram.errors import InputError
 from photogram.memory import resident_memory
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions
-from photogram.network.unknowns import Drift
 
 __all__ = ["Run", "adjusted_in_parts", "bytes_of", "check", "opened", "parts_for", "planned"]
 
@@ -191,7 +190,7 @@ def adjusted_in_parts(
     RankError, AdjustmentError, OutOfMemoryError, InputError
         As :func:`photogram.adjust`.
     """
-    check(block, options)
+    check(options)
     if division.cluster is None and division.parts is None and division.memory is not None:
         whole = _counted(block, 1)
         if whole.factor_bytes[0] + WHOLE * len(block.image_xy) <= bytes_of(division.memory):
@@ -210,23 +209,21 @@ def planned(block: Block, options: CoreOptions, division: Division) -> PartsPlan
     InputError, AdjustmentError
         As :func:`adjusted_in_parts`.
     """
-    check(block, options)
+    check(options)
     with _run(block, options, division, None) as run:
         return run.plan()
 
 
-def check(block: Block, options: CoreOptions) -> None:
+def check(options: CoreOptions) -> None:
     """Refuse what cannot be adjusted in parts.
 
     Raises
     ------
     InputError
-        A unit variance based on redundancy numbers, drifts.
+        A unit variance based on redundancy numbers.
     """
     if options.unit_variance == "redundancy":
         raise InputError("in parts the unit variance is not based on redundancy numbers")
-    if any(isinstance(each, Drift) for each in block.unknowns):
-        raise InputError("in parts there are no drifts: they count from the mean time of the whole block")
 
 
 @contextmanager

@@ -118,7 +118,7 @@ def _run(path: Path, wishes: Wishes, folder: Path, division: Division, threads: 
     try:
         variance = streamed.project.options.unit_variance
         options = CoreOptions("fraction", TOLERANCE, MAX_ITERATIONS, True, None, "auto", variance, None)
-        check(streamed.block, options)
+        check(options)
         source = streamed.source(options)
         with opened(
             folder,

@@ -180,7 +180,7 @@ class Shift(Unknown):
 
 @dataclass(frozen=True, eq=False)
 class Drift(Unknown):
-    """The vector d by which that grows in a second, from the mean time of its observations on.
+    """The vector d by which that grows in a second.
 
     Parameters
     ----------
@@ -190,12 +190,23 @@ class Drift(Unknown):
         (3,) in the axes of a shift, in the linear unit a second.
     sd
         (3,) standard deviations of the same, or one for all.
+    epoch
+        The time that it counts from, in seconds; None: the mean time of its observations.
     """
 
     KIND = "drift"
 
     value: ArrayLike = 0.0
     sd: ArrayLike = np.inf
+    epoch: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.epoch is not None:
+            epoch = number(f"epoch of {self.title}", self.epoch)
+            if not np.isfinite(epoch):
+                raise InputError(f"epoch of {self.title} is not finite: {epoch}")
+            object.__setattr__(self, "epoch", epoch)
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,6 +128,7 @@ def _gnss_groups(tables: Tables) -> dict[str, _Group]:
         kind: np.stack([table.numbers(f"sd_{kind}_{axis}", default, infinite=True) for axis in AXES], axis=1)
         for kind, default in (("lever", 0.0), ("shift", math.inf), ("drift", math.inf))
     }
+    epochs = [None if math.isnan(each) else float(each) for each in table.numbers("drift_epoch")]
     shared: dict[tuple[type[Unknown], str], Unknown] = {}
 
     where = table
@@ -135,8 +136,11 @@ def _gnss_groups(tables: Tables) -> dict[str, _Group]:
     def one(kind: type[_Shared], what: str, row: int, name: str) -> _Shared:
         """Return what a group has, the same object for all groups that name it."""
         value, deviations = zeros[what][row], sd[what][row]
-        own = shared.setdefault((kind, name), made(where, row, partial(kind, name, value, deviations)))
-        if not (np.array_equal(own.position, value) and np.array_equal(own.deviations, deviations)):
+        further = {"epoch": epochs[row]} if kind is Drift else {}
+        make = partial(kind, name, value, deviations, **further)
+        own = shared.setdefault((kind, name), made(where, row, make))
+        same = not further or getattr(own, "epoch", None) == epochs[row]
+        if not (same and np.array_equal(own.position, value) and np.array_equal(own.deviations, deviations)):
             raise where.error(row, f"column {what}: {name} has other values in a row before")
         assert isinstance(own, kind)
         return own

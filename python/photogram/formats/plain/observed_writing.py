@@ -137,6 +137,9 @@ def _gnss(block: Block) -> Tables:
         unknowns = [key[column] for key in groups]
         own |= _columns([f"{what}_{axis}" for axis in AXES], _of(unknowns, "position", np.nan))
         own |= _columns([f"sd_{what}_{axis}" for axis in AXES], _of(unknowns, "deviations", np.nan))
+    epochs = [None if drift is None else drift.epoch for _, _, drift in groups]
+    if any(each is not None for each in epochs):
+        own["drift_epoch"] = np.array([np.nan if each is None else each for each in epochs])
     return {"gnss": table, "gnss_groups": own}
 
 

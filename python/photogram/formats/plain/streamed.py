@@ -38,6 +38,7 @@ from photogram.formats.plain.transform import Transform
 from photogram.formats.project import ASSUMED_SD, Project
 from photogram.network.block import checked
 from photogram.network.core import CoreOptions
+from photogram.network.observations.position import with_epochs
 
 __all__ = ["Streamed", "streamable"]
 
@@ -101,7 +102,9 @@ class Streamed:
         self._settings, self._wishes = settings, wishes
         held = self._without_images()
         self.project: Project = read_tables(Tables(held, []), wishes)
-        self.block = started(checked(self.project.block))
+        block = started(checked(self.project.block))
+        # A node has some of the observations of a drift only.
+        self.block = block.replace(observations=with_epochs(block.observations))
         tables = Tables(replace(settings, frame=self.project.frame), [])
         self._cameras = read_cameras(tables)
         self._photos = read_photos(tables, Transform(tables.settings, tables.messages), self._cameras)

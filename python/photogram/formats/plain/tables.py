@@ -121,6 +121,7 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
             for sd in ("", "sd_")
             for axis in AXES
         ),
+        "drift_epoch",
         "lever",
         "shift",
         "drift",
@@ -219,6 +220,7 @@ _TEXTS = frozenset(
         "to",
         "use",
         "sensor",
+        "drift_epoch",
         "lever",
         "shift",
         "drift",

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.network.observations.observation import AXES, Observation
-from photogram.network.unknowns import Drift, LeverArm, Shift
+from photogram.network.unknowns import Drift, LeverArm, Shift, Unknown
 
-__all__ = ["Position"]
+__all__ = ["Position", "epochs_of", "with_epochs"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class Position(Observation):
     shift
         s; None without.
     drift
-        d; None without. It counts from the mean time of the observations that it is given to.
+        d; None without. It counts from its epoch, or the mean time of the observations that it is given to.
     time
         Seconds.
 
@@ -63,10 +64,39 @@ class Position(Observation):
 
     @classmethod
     def values_of(cls, observations: Sequence[Observation]) -> Floats:
-        """Return what the core takes; times count from the mean of those of one drift."""
+        """Return what the core takes; times count from the epochs of drifts."""
         values = super().values_of(observations)
-        drifts = [id(each.unknowns[-1]) for each in observations]
-        for drift in set(drifts):
-            own = np.array(drifts) == drift
-            values[own, -1] -= values[own, -1].mean()
+        epochs = epochs_of(observations)
+        drifts = [each.unknowns[-1] for each in observations]
+        values[:, -1] -= [0.0 if each is None else epochs[id(each)] for each in drifts]
         return values
+
+
+def epochs_of(observations: Iterable[Observation]) -> dict[int, float]:
+    """Return the epoch of each drift, by its identity: its own, or the mean time of its observations."""
+    times: dict[int, list[float]] = {}
+    given: dict[int, float] = {}
+    for each in observations:
+        drift = each.drift if isinstance(each, Position) else None
+        if drift is not None:
+            times.setdefault(id(drift), []).append(each.observed[-1])
+            if drift.epoch is not None:
+                given[id(drift)] = drift.epoch
+    return {key: float(np.mean(own)) for key, own in times.items()} | given
+
+
+def with_epochs(observations: Sequence[Observation]) -> list[Observation]:
+    """Return observations whose drifts count from where they do now, whichever of them are left out."""
+    epochs = epochs_of(observations)
+    dated: dict[int, Unknown] = {}
+    for each in (one for own in observations for one in own.unknowns):
+        if isinstance(each, Drift) and each.epoch is None and id(each) in epochs:
+            dated[id(each)] = each.replace(epoch=epochs[id(each)])
+    return [_exchanged(each, dated) for each in observations] if dated else list(observations)
+
+
+def _exchanged(observation: Observation, dated: Mapping[int, Unknown]) -> Observation:
+    """Return an observation of other common unknowns in place of some."""
+    fields = zip(observation.UNKNOWNS, observation.unknowns, strict=True)
+    changes: dict[str, Any] = {name: dated[id(own)] for (name, _), own in fields if id(own) in dated}
+    return replace(observation, **changes) if changes else observation
