@@ -51,6 +51,14 @@ def test_parts_give_what_the_whole_gives(tmp_path, parts):
     agrees(tmp_path, tree, run(tmp_path, tree))
 
 
+def test_steps_that_are_rounding_are_the_end(tmp_path):
+    tree = make(tmp_path, 40, 60, 4)
+    outcome = run(tmp_path, tree, stop=Stop(tolerance=1e-300))
+    assert outcome.status == "converged"
+    assert len(outcome.iterations) < Stop().max_iterations
+    assert all(each.largest_change < 1e-6 for each in outcome.iterations[-5:])
+
+
 def test_factors_that_do_not_fit_are_formed_again(tmp_path):
     tree = make(tmp_path, 40, 60, 4)
     roomy = run(tmp_path, tree)

@@ -50,6 +50,8 @@ FAR = 30.0
 STILL = 1e-4
 """The sum of squares stands still where three damped steps lower it by less than this multiple of the
 variance of unit weight."""
+ALIKE, FALLING = 5, 0.9
+"""So many full steps, the last of which is longer than this part of the first, do not fall any more."""
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-5, 1e9
 ATTEMPTS = 20
 """So often is a node formed again that a worker has taken with it."""
@@ -212,7 +214,7 @@ class Driver:
             course.initial = course.best = up.sum_of_squares
         while len(course.iterations) < self.stop.max_iterations and up.at.damping <= MOST_DAMPING:
             change = math.sqrt(max(up.decrease, 0.0))
-            if up.at.damping == 0.0 and self._is_last(change):
+            if up.at.damping == 0.0 and (self._is_last(change) or self._falls_no_more(change)):
                 return self._end("converged", up, change)
             up, still = self._take(up, change)
             if still:
@@ -226,6 +228,13 @@ class Driver:
         before = self._course.iterations[-1] if self._course.iterations else None
         rate = change / before.largest_change if before is not None and before.damping == 0.0 else 1.0
         return change <= NEGLIGIBLE and rate < 1.0 and rate / (1.0 - rate) * change <= self.stop.tolerance
+
+    def _falls_no_more(self, change: float) -> bool:
+        """Whether full steps are negligible and have long been as long as this one: rounding, no more."""
+        last = self._course.iterations[-ALIKE:]
+        negligible = all(each.damping == 0.0 and each.largest_change <= NEGLIGIBLE for each in last)
+        alike = len(last) == ALIKE and change > FALLING * last[0].largest_change
+        return change <= NEGLIGIBLE and negligible and alike
 
     def _take(self, up: _Up, change: float) -> tuple[_Up, bool]:
         """Take a step, or take it back and go on with more damping.
