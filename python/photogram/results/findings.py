@@ -44,6 +44,7 @@ def block_findings(result: Result) -> Findings:
         systematic=_patterns(result),
         remarks=[*unseen(result), *_left_out(result)],
         hints=result.hints,
+        exchanged=result.exchanged,
         snoop="--snoop (photogram.snoop)",
     )
 

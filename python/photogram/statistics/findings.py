@@ -245,6 +245,8 @@ class Findings:
         Unknowns that no observation determines.
     hints
         Accepted hypotheses of what is wrong with the data, as sentences ("probably ...").
+    exchanged
+        Names that are probably exchanged, as sentences.
     spoiled
         Why gross errors make the result unusable, where the program has found that itself; a sentence.
     doubtful
@@ -268,6 +270,7 @@ class Findings:
     untested: str = "no a-priori unit weight"
     undetermined: Sequence[str] = ()
     hints: Sequence[str] = ()
+    exchanged: Sequence[str] = ()
     spoiled: str = ""
     doubtful: Sequence[str] = ()
     systematic: Sequence[Systematic] = ()
