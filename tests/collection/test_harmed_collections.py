@@ -138,6 +138,17 @@ def test_a_photo_on_points_of_a_line_ends_as_converged(datum, seed, fixed_camera
     assert LINE not in {photo for photo, _ in result.datum}
 
 
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+@pytest.mark.parametrize("seed", range(3))
+def test_it_ends_with_a_robust_loss_too(loss, seed):
+    """Steps creep along the same valley: some took two hundred, and did not end."""
+    for datum, fixed_camera in ((False, True), (True, False), (False, False)):
+        result = adjust(on_a_line(datum, seed, fixed_camera, 6), loss=loss, max_iterations=200)
+        assert result.converged
+        assert len(result.iterations) < 150
+        assert weakest_photos(result)[0].photo == str(LINE)
+
+
 @pytest.mark.parametrize("datum", [True, False])
 def test_nothing_is_said_of_a_clean_collection(datum):
     for tolerance in (None, 1e-12):
