@@ -176,6 +176,46 @@ def test_control_given_at_the_place_of_a_station_is_left_out(made):
     np.testing.assert_allclose(result.photo_sd, adjust(made.block).photo_sd, rtol=1e-9)
 
 
+def beside_station(seed: int, metres: float, wrong: bool) -> tuple[Block, Block]:
+    """Return a block of 2 x 5 photos, and the same with control below a station, on its photo and another."""
+    made, random = simulate(strips=2, photos_per_strip=5, seed=seed), np.random.default_rng(seed)
+    down = random.normal(size=3)
+    down[2] = -abs(down[2]) - 1
+    at = made.truth.photo_positions[2] + metres * down / np.linalg.norm(down)
+    images = images_of(made.truth, [2], at)
+    if wrong:
+        images[3] = random.uniform(-80, 80, 2)
+    block = with_point(made.block, images, at)
+    sd = block.point_sd.copy()
+    sd[-1] = 0.05
+    return made.block, block.replace(point_sd=sd)
+
+
+@pytest.mark.parametrize("metres", [0.01, 0.1, 1.0])
+def test_control_beside_a_station_with_a_wrong_image_is_left_out(metres):
+    """It turns photos as no other point can: these blocks did not converge, or ended bent."""
+    for seed in range(6):
+        without, block = beside_station(seed, metres, wrong=True)
+        result = adjust(block)
+        assert result.converged
+        reason = "given beside a station that sees it, and its images do not fit"
+        assert result.dropped == {"X": reason}
+        assert f"left out, {reason}: X" in [str(each) for each in result.messages]
+        np.testing.assert_allclose(result.photo_positions, adjust(without).photo_positions, atol=1e-3)
+        assert any("point X is left out, one of its images" in each for each in result.verdict.lines)
+
+
+def test_control_beside_a_station_stays_where_another_error_is_the_reason():
+    without, block = beside_station(1, 1.0, wrong=False)
+    assert adjust(block).dropped == {}
+    for given in (without, block):
+        xy = given.image_xy.copy()
+        xy[100] += 40.0
+        result = adjust(given.replace(image_xy=xy))
+        assert result.verdict.code == "gross-errors"
+        assert "X" not in result.dropped
+
+
 def test_one_point_far_off_is_no_matter_of_units(made):
     """Heights in feet would bring it nearer, and leave the other control where it is."""
     at = made.truth.photo_positions[1].copy()

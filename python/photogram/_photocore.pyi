@@ -2383,6 +2383,10 @@ class CollectionSolution(_NetworkSolution):
         """Indices of the points that ran into a station and were left out."""
 
     @property
+    def beside_stations(self) -> list[int]:
+        """Indices of the points that are held beside a station and were left out."""
+
+    @property
     def not_determined(self) -> list[int]:
         """Indices of the points that were left out because their rays do not determine them."""
 

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import json
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
+import photogram
 from photogram import _photocore, snoop
 from photogram.collection import Collection, adjust, simulate
+from photogram.collection.as_block import as_block
+from photogram.results.weakest import weakest_lines, weakest_photos, weakest_points
 
 GIVEN = simulate(photos=8, points=60, coarseness=0.2, seed=4).collection
 FREE = np.full((8, 9), np.inf)
@@ -132,6 +138,17 @@ def test_a_photo_on_points_of_a_line_ends_as_converged(datum, seed, fixed_camera
     assert LINE not in {photo for photo, _ in result.datum}
 
 
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+@pytest.mark.parametrize("seed", range(3))
+def test_it_ends_with_a_robust_loss_too(loss, seed):
+    """Steps creep along the same valley: some took two hundred, and did not end."""
+    for datum, fixed_camera in ((False, True), (True, False), (False, False)):
+        result = adjust(on_a_line(datum, seed, fixed_camera, 6), loss=loss, max_iterations=200)
+        assert result.converged
+        assert len(result.iterations) < 150
+        assert weakest_photos(result)[0].photo == str(LINE)
+
+
 @pytest.mark.parametrize("datum", [True, False])
 def test_nothing_is_said_of_a_clean_collection(datum):
     for tolerance in (None, 1e-12):
@@ -183,3 +200,62 @@ def test_nothing_is_said_of_what_is_held_rightly(what):
     result = adjust(held(what, wrong=False))
     assert result.verdict.code == "accepted"
     assert not any(test.name.startswith("held values") for test in result.verdict.tests)
+
+
+def test_the_report_the_page_and_the_document_have_the_worst():
+    result = adjust(far_point(True, 1e6))
+    points, photos = weakest_points(result), weakest_photos(result)
+    assert points[0].point == "60"
+    assert points[0].ratio > 1e6
+    assert all(a.condition >= b.condition for a, b in pairwise(photos))
+    # The photo whose pose is held has none.
+    assert sorted(int(each.photo) for each in photos) == list(range(1, 8))
+    report = result.report()
+    assert "Weakest points and photos" in report
+    assert f"{photos[0].photo:<16}{photos[0].condition:>12.4g}" in report
+    document = json.loads(result.to_json())["weakest"]
+    assert [each["point"] for each in document["points"]] == [int(each.point) for each in points]
+    assert [each["condition"] for each in document["photos"]] == [each.condition for each in photos]
+    page = result.to_html().decode()
+    assert "Condition of the pose" in page
+    assert "Largest over smallest sd" in page
+    assert weakest_points(adjust(GIVEN, covariance=False)) == []
+    assert weakest_lines(adjust(GIVEN, covariance=False)) == []
+
+
+def test_conditions_are_those_of_the_same_photos_as_a_block():
+    """Stations and attitudes, whatever unknowns they come from and wherever the origin is."""
+    held = GIVEN.point_sd.copy()
+    held[::6] = 0.01
+    fixed = np.full((8, 9), np.inf)
+    fixed[:, 6:] = 0
+    given = ADJUSTED.adjusted().replace(point_sd=held, photo_sd=fixed)
+    result, block = adjust(given, tolerance=1e-12), photogram.adjust(as_block(given))
+    images = {other.photo: other.images for other in weakest_photos(block)}
+    assert {f"photo {found.photo}": found.images for found in weakest_photos(result)} == images
+    for found, other in zip(weakest_points(result), weakest_points(block), strict=True):
+        assert f"point {found.point}" == other.point
+        assert found.ratio == pytest.approx(other.ratio, rel=1e-3)
+        assert found.distance == pytest.approx(other.distance, rel=1e-3)
+    # By hand, from the covariance of the station and of a small turn about the axes of the photo.
+    photo = int(weakest_photos(result)[0].photo)
+    w, t = result.photo_parameters[photo, :3], result.photo_parameters[photo, 3:6]
+    partials, step = np.zeros((6, 6)), 1e-6
+    for k in range(6):
+        ends = []
+        for sign in (-1, 1):
+            moved = np.concatenate([w, t])
+            moved[k] += sign * step
+            turn = rotation(moved[:3]).T
+            between = rotation(w) @ turn
+            small = [
+                between[2, 1] - between[1, 2],
+                between[0, 2] - between[2, 0],
+                between[1, 0] - between[0, 1],
+            ]
+            ends.append(np.concatenate([-turn @ moved[3:], 0.5 * np.array(small)]))
+        partials[:, k] = (ends[1] - ends[0]) / (2 * step)
+    covariance = partials @ result.photo_cofactors[photo, :6, :6] @ partials.T
+    sd = np.sqrt(np.diag(covariance))
+    by_hand = np.linalg.cond(covariance / np.outer(sd, sd))
+    assert weakest_photos(result)[0].condition == pytest.approx(by_hand, rel=1e-6)

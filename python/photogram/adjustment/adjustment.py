@@ -14,6 +14,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.elsewhere import IN_PARTS, Division
 from photogram.adjustment.ends import behind, folded, harmful, rounded, too_coarse, undetermined
+from photogram.adjustment.exchanges import with_exchanges
 from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.started import started
@@ -284,7 +285,8 @@ def _adjusted(
         raise hinted(named(block, *error.args), block) from None
     with turned("the adjusted block"):
         freedom = _freedom(block, network, solution, options)
-        return with_hints(_result(block, solution, options, freedom, inner, as_published))
+        hinted_at = with_hints(_result(block, solution, options, freedom, inner, as_published))
+        return with_exchanges(hinted_at)
 
 
 def adjusted_again(

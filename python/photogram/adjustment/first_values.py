@@ -17,6 +17,7 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
+from photogram.network.chosen import of_photos
 from photogram.network.directions import direction_deviations, image_directions
 from photogram.network.observations import Distance
 from photogram.show.brief import Brief
@@ -85,30 +86,13 @@ class FirstValues(Brief):
             Observations of photos that could not be started.
         """
         block = self.block
-        kept = np.array([photo in self.sources for photo in block.photo_ids])
-        images = kept[block.image_photos] & ~self.set_aside
-        places = np.cumsum(kept) - 1
-        of_photos = {
-            name: None if getattr(block, name) is None else getattr(block, name)[kept]
-            for name in (
-                "photo_positions",
-                "photo_attitudes",
-                "principal_distances",
-                "photo_cameras",
-                "photo_position_sd",
-                "photo_attitude_sd",
-                "photo_positions_observed",
-                "photo_attitudes_observed",
-            )
-        }
-        return block.replace(
-            photo_ids=[photo for photo in block.photo_ids if photo in self.sources],
-            image_photos=places[block.image_photos[images]],
-            image_points=block.image_points[images],
-            image_xy=block.image_xy[images],
-            image_sd=block.image_sd[images],
-            **of_photos,
+        there = block.replace(
+            image_photos=block.image_photos[~self.set_aside],
+            image_points=block.image_points[~self.set_aside],
+            image_xy=block.image_xy[~self.set_aside],
+            image_sd=block.image_sd[~self.set_aside],
         )
+        return of_photos(there, np.array([photo in self.sources for photo in block.photo_ids]))
 
 
 def first_values(block: Block) -> FirstValues:

@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.errors import InputError
 
 __all__ = [
+    "chosen",
+    "finite_rows",
     "frozen",
     "indices",
     "is_covariance",
@@ -285,6 +287,17 @@ def is_covariance(matrix: NDArray[np.float64]) -> bool:
     correlations = matrix / np.sqrt(np.outer(variances, variances))
     symmetric = np.abs(correlations - correlations.T).max() <= _SYMMETRIC
     return bool(symmetric and np.linalg.eigvalsh(correlations).min() > 0)
+
+
+def chosen(which: NDArray[np.bool_]) -> NDArray[np.bool_] | slice:
+    """Return what takes the chosen rows of an array: as it is, without a copy, where that are all."""
+    return slice(None) if which.all() else which
+
+
+def finite_rows(pairs: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which of (m, 2) rows are finite: column by column, which is several times faster."""
+    found: NDArray[np.bool_] = np.isfinite(pairs[:, 0]) & np.isfinite(pairs[:, 1])
+    return found
 
 
 def standard_deviations(covariances: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ from photogram.checks.adjusting import Adjuster
 from photogram.checks.control import control
 from photogram.checks.control_sets import Explained, doubtful, explain, free_model
 from photogram.checks.conventions import conventions, further
-from photogram.checks.editing import _BESIDE, HOPELESS, Edited, blunder_section, edit, without_photos
+from photogram.checks.editing import _BESIDE, HOPELESS, Edited, blunder_section, edit
 from photogram.checks.findings import Check, Finding, Level, Section
 from photogram.checks.gross import Suspects, disproved, gross, without
 from photogram.checks.heights import two_ray_heights
@@ -38,6 +38,7 @@ from photogram.checks.views import View, kept_images
 from photogram.checks.words import Words
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
+from photogram.network.chosen import of_photos
 from photogram.network.observations import Position
 from photogram.network.rays import Rays
 
@@ -219,7 +220,7 @@ def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) 
     changed = False
     for _ in range(MOST_SETS):
         block = view.block
-        good = without_photos(kept_images(block, ~view.images(suspects.images)), suspects.photos)
+        good = of_photos(kept_images(block, ~view.images(suspects.images)), ~suspects.photos)
         kind, found = _set_of(good, adjusted)
         if found is None:
             break

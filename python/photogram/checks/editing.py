@@ -29,6 +29,7 @@ from photogram.checks.views import View, kept_images
 from photogram.checks.words import small_unit
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
+from photogram.network.chosen import of_photos
 from photogram.network.rays import Rays
 from photogram.results.kinds import ObservedKind
 from photogram.results.result import Result
@@ -263,30 +264,6 @@ def blunder_section() -> Section:
     )
 
 
-def without_photos(block: Block, photos: Bools) -> Block:
-    """Return a block without some of its photos and their images."""
-    fewer = kept_images(block, ~photos[block.image_photos])
-    number = np.cumsum(~photos) - 1
-    names = (
-        "photo_positions",
-        "photo_attitudes",
-        "principal_distances",
-        "photo_position_sd",
-        "photo_attitude_sd",
-        "photo_positions_observed",
-        "photo_attitudes_observed",
-        "photo_cameras",
-    )
-    there = {name for name, gone in zip(block.photo_ids, photos.tolist(), strict=True) if not gone}
-    return fewer.replace(
-        photo_ids=[name for name in block.photo_ids if name in there],
-        observations=[each for each in block.observations if there.issuperset(each.photos)],
-        mounts=[each for each in block.mounts if each.photo in there],
-        image_photos=number[fewer.image_photos],
-        **{name: values[~photos] for name in names if (values := getattr(block, name)) is not None},
-    )
-
-
 def _first(block: Block, bad: Bools, adjusted: Adjuster, section: Section) -> tuple[Result, Block]:
     """Adjust with all photos, or without those bad ones with which the block does not fit."""
     error = None
@@ -303,7 +280,7 @@ def _first(block: Block, bad: Bools, adjusted: Adjuster, section: Section) -> tu
                 return result, block
     except AdjustmentError as caught:
         error = caught
-    fewer = without_photos(block, bad)
+    fewer = of_photos(block, ~bad)
     names = [name for name, of in zip(block.photo_ids, bad.tolist(), strict=True) if of]
     section.parts.append(f"adjusted without the photos that do not fit: {', '.join(names)}")
     if error is not None:

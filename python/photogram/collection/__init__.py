@@ -12,6 +12,7 @@ from photogram.collection import (  # noqa: F401  (the ways to show a result, an
     saved,
     snooping,
     tables,
+    weakest,
 )
 from photogram.collection.adjust import adjust
 from photogram.collection.adjusted import AdjustedCollection

@@ -150,14 +150,15 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
         if which.any():
             messages.append(Message(f"left as they are, photos {what}: {_numbers(which)}"))
     out = solution.point_rays == 0
-    if solution.collapsed:
-        names = listed([str(point) for point in solution.collapsed])
-        messages.append(Message(f"left out, points that ran into the station of a photo: {names}"))
-        out[solution.collapsed] = False
-    if solution.not_determined:
-        names = listed([str(point) for point in solution.not_determined])
-        messages.append(Message(f"left out, points that their rays do not determine: {names}"))
-        out[solution.not_determined] = False
+    for points, why in (
+        (solution.collapsed, "that ran into the station of a photo"),
+        (solution.beside_stations, "given beside a station that sees them, and images do not fit"),
+        (solution.not_determined, "that their rays do not determine"),
+    ):
+        if points:
+            names = listed([str(point) for point in points])
+            messages.append(Message(f"left out, points {why}: {names}"))
+            out[points] = False
     if out.any():
         messages.append(Message(f"left out, points with images on fewer than two photos: {_numbers(out)}"))
     behind = solution.point_rays_behind

@@ -10,6 +10,7 @@ from photogram import _photocore
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.io import json
 from photogram.results.network import Observed
+from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show.ways import document_of
 
 __all__ = ["to_json"]
@@ -57,6 +58,10 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
         "covariance_scale": result.covariance_scale,
         "verdict": result.verdict.document(),
         "reliability": summary.document() if (summary := result.reliability_summary) else None,
+        "weakest": {
+            "points": [vars(each) | {"point": int(each.point)} for each in weakest_points(result)],
+            "photos": [vars(each) | {"photo": int(each.photo)} for each in weakest_photos(result)],
+        },
         "datum": [{"photo": photo, "parameter": parameter} for photo, parameter in result.datum],
         "camera": result.collection.camera,
         "parameters": result.collection.parameters,

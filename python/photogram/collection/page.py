@@ -21,7 +21,8 @@ from photogram.results.page.parts import (
     worst_section,
 )
 from photogram.results.page.pictures import drawings
-from photogram.results.page.tables import chosen_rows
+from photogram.results.page.tables import CONDITION_NOTE, RATIO_NOTE, chosen_rows
+from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show.judgement import advice, judged, remarks_section
 from photogram.show.page import (
     Cell,
@@ -217,11 +218,13 @@ def _photos_section(result: AdjustedCollection, named: Iterable[int]) -> Section
         np.bincount(photos, (residuals**2).sum(axis=1), count) / np.bincount(photos, minlength=count) / 2
     )
     order = np.argsort(-np.nan_to_num(rms, nan=-1.0), kind="stable")
-    rows, every = chosen_rows(count, named, [order])
+    weak = {int(each.photo): each.condition for each in weakest_photos(result)}
+    rows, every = chosen_rows(count, [*weak, *named], [order])
     note = (
         ""
         if every
-        else f"{len(rows)} of {count}: those that other tables name, and those of the largest residuals."
+        else f"{len(rows)} of {count}: those that other tables name, those of the largest residuals,"
+        " and the weakest."
     )
     units = [Column(name, unit, figures=6) for name, unit in zip(given.parameters, given.units, strict=True)]
     small = [Column(name, unit, figures=3) for name, unit in zip(given.parameters, given.units, strict=True)]
@@ -230,16 +233,23 @@ def _photos_section(result: AdjustedCollection, named: Iterable[int]) -> Section
         for row in rows.tolist()
     ]
     deviations: list[Row] = [[str(row), *map(float, result.photo_sd[row])] for row in rows.tolist()]
-    fit: list[Row] = [[str(row), int(result.photo_images[row]), float(rms[row])] for row in rows.tolist()]
+    fit: list[Row] = [
+        [str(row), int(result.photo_images[row]), float(rms[row]), weak.get(row)] for row in rows.tolist()
+    ]
     name = Column("Photo", text=True)
     tables = [
         Table("Parameters", [name, *units], values, note),
         Table("Standard deviations", [name, *small], deviations, note),
         Table(
             "Fit of images",
-            [name, Column("Images", decimals=0), Column("rms of residuals", "px", decimals=3)],
+            [
+                name,
+                Column("Images", decimals=0),
+                Column("rms of residuals", "px", decimals=3),
+                Column("Condition of the pose", figures=3),
+            ],
             fit,
-            note,
+            f"{note} {CONDITION_NOTE}".strip(),
         ),
     ]
     return Section("photos", "Photos", [Layers("photos-layers", tables)])
@@ -248,7 +258,8 @@ def _photos_section(result: AdjustedCollection, named: Iterable[int]) -> Section
 def _points_section(result: AdjustedCollection, named: Iterable[int]) -> Section:
     size = np.where(result.used_points, np.linalg.norm(result.point_sd, axis=1), np.nan)
     order = np.argsort(-np.nan_to_num(size, nan=-1.0), kind="stable")
-    rows, every = chosen_rows(len(size), named, [order])
+    weak = {int(each.point): each.ratio for each in weakest_points(result)}
+    rows, every = chosen_rows(len(size), [*weak, *named], [order])
     rows = rows[result.used_points[rows]]
     body: list[Row] = [
         [
@@ -256,6 +267,7 @@ def _points_section(result: AdjustedCollection, named: Iterable[int]) -> Section
             int(result.point_rays[row]),
             *map(float, result.point_positions[row]),
             *map(float, result.point_sd[row]),
+            weak.get(row),
         ]
         for row in rows.tolist()
     ]
@@ -264,11 +276,12 @@ def _points_section(result: AdjustedCollection, named: Iterable[int]) -> Section
         Column("Rays", decimals=0),
         *(Column(axis, figures=7) for axis in "XYZ"),
         *(Column(f"sd {axis}", figures=3) for axis in "XYZ"),
+        Column("Largest over smallest sd", figures=3),
     ]
-    note = (
+    few_of = (
         ""
         if every
-        else f"{len(rows)} of {len(size)}: those that other tables name, and those of the largest"
-        " standard deviations."
+        else f"{len(rows)} of {len(size)}: those that other tables name, those of the largest"
+        " standard deviations, and the weakest. "
     )
-    return Section("points", "Points", [Table("Points", columns, body, note)] if body else [])
+    return Section("points", "Points", [Table("Points", columns, body, few_of + RATIO_NOTE)] if body else [])

@@ -10,6 +10,7 @@ import numpy as np
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.findings import names, tested_observations
 from photogram.results.observed import image_lines, observed_lines
+from photogram.results.weakest import weakest_lines
 from photogram.show.sections import Section, composed, headline, problems, verdict_section
 from photogram.show.ways import report_of
 from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
@@ -42,6 +43,7 @@ def report(result: AdjustedCollection) -> str:
         ),
         ("Photos: values and standard deviations", _photos(result)),
         ("Points: standard deviations", _points(result)),
+        ("Weakest points and photos", weakest_lines(result)),
         ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
         ("Work", _work(result)),
     ]

@@ -12,6 +12,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import remarks_on
+from photogram.adjustment.exchanges import with_exchanges
 from photogram.adjustment.hints import with_hints
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.core import read_outcome
@@ -123,7 +124,7 @@ def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InP
     options = manifest.options
     freedom = outcome.degrees_of_freedom
     found_all = InParts.from_solution(block, solution, options, datum, messages, freedom)
-    return cast("InParts", with_hints(found_all))
+    return cast("InParts", with_exchanges(with_hints(found_all)))
 
 
 def _rest(

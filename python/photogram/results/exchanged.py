@@ -66,6 +66,13 @@ class Exchange:
         return f"the names of {one} and {other} on {where} are exchanged"
 
     @property
+    def probable(self) -> str:
+        """The same of a network that has not been adjusted without it."""
+        one, other = self.points
+        where = " or ".join(self.photos)
+        return f"images of points {one} and {other} on photo {where} have probably each other's names"
+
+    @property
     def reason(self) -> str:
         """Why."""
         named = f"T {self.as_named:.4g} as named" if math.isfinite(self.as_named) else "rays part as named"

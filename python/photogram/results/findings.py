@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from photogram.arguments.arrays import chosen, finite_rows
 from photogram.results.groups_tested import groups_tested
 from photogram.results.held import held_tested
 from photogram.results.kinds import tested_kind
@@ -27,6 +28,7 @@ HARMFUL = {
     "its rays do not meet: it ran off": "its rays do not meet before the cameras",
     "ran into the station of a photo": "its rays lead to the station of one of its photos",
     "given at the place of a station that sees it": "it is given at the place of a station that sees it",
+    "given beside a station that sees it, and its images do not fit": "it is given beside a station",
 }
 """Why a point was left out because of which the others would be wrong, and what that says of its images."""
 
@@ -44,6 +46,7 @@ def block_findings(result: Result) -> Findings:
         systematic=_patterns(result),
         remarks=[*unseen(result), *_left_out(result)],
         hints=result.hints,
+        exchanged=result.exchanged,
         snoop="--snoop (photogram.snoop)",
     )
 
@@ -100,12 +103,12 @@ def axes(result: Result) -> tuple[str, str, str]:
 
 def has_redundancy(result: AdjustedNetwork) -> bool:
     """Return whether redundancy numbers were computed, without which no observation is tested."""
-    return bool(np.isfinite(result.redundancy[result.used_images]).all())
+    return bool(finite_rows(result.redundancy)[chosen(result.used_images)].all())
 
 
 def unseen(result: AdjustedNetwork) -> list[str]:
     """Say how many image coordinates no other observation checks."""
-    redundancy = result.redundancy[result.used_images]
+    redundancy = result.redundancy[chosen(result.used_images)]
     hidden = int(np.count_nonzero(redundancy <= TESTABLE))
     if not hidden:
         return []

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import standard_deviations
+from photogram.arguments.arrays import finite_rows, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.io.writing import write_whole
@@ -236,7 +236,7 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
 
         None where there are no redundancy numbers, or the adjustment has not converged or has a loss.
         """
-        computed = bool(np.isfinite(self.redundancy[self.used_images]).all())
+        computed = bool(finite_rows(self.redundancy)[self.used_images].all())
         if not (computed and self.converged and self.loss is None and self.degrees_of_freedom > 0):
             return None
         try:
@@ -305,12 +305,11 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         """(n,) whether a point took part."""
         return self.point_rays > 0
 
-    @property
+    @cached_property
     def used_images(self) -> NDArray[np.bool_]:
         """(m,) whether an image took part."""
-        taken: NDArray[np.bool_] = (np.asarray(self.used_points[self.image_points])) & np.isfinite(
-            self.residuals
-        ).all(axis=1)
+        taken: NDArray[np.bool_] = self.used_points[self.image_points] & finite_rows(self.residuals)
+        taken.flags.writeable = False
         return taken
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -283,8 +284,6 @@ class NamedSuspects:
         self.kinds, self.subjects = core.subjects
         self.starts, self.components = core.row_starts, core.components
         self.image_points, self.image_photos, self.apart = image_points, image_photos, apart
-        order = np.argsort(image_points, kind="stable")
-        self._points, self._photos = image_points[order], image_photos[order]
 
     def suspects(self) -> Suspects:
         """Return the groups."""
@@ -314,8 +313,15 @@ class NamedSuspects:
 
     def photos_of_point(self, point: int) -> Indices:
         """Return the photos that a point is seen from."""
-        first, last = np.searchsorted(self._points, [point, point + 1])
-        return np.asarray(self._photos[first:last])
+        points, photos = self._by_point
+        first, last = np.searchsorted(points, [point, point + 1])
+        return np.asarray(photos[first:last])
+
+    @cached_property
+    def _by_point(self) -> tuple[Indices, Indices]:
+        """The images' points in their order, and their photos: not every test asks for them."""
+        order = np.argsort(self.image_points, kind="stable")
+        return self.image_points[order], self.image_photos[order]
 
     def loads(self, group: int) -> Indices:
         """Return the photos that a group has to do with."""

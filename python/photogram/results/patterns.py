@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from photogram.arguments.arrays import chosen, finite_rows
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.distributions import LEVEL, bonferroni
@@ -87,7 +88,7 @@ def patterns(
         What the coordinates of stations and points are called, the height last; none where they mean nothing
         on the ground.
     """
-    used = result.used_images & np.isfinite(result.redundancy).all(axis=1)
+    used = chosen(result.used_images & finite_rows(result.redundancy))
     w = np.where(result.redundancy > TESTABLE, result.standardized, math.nan)[used]
     if not np.isfinite(w).any():
         return []
@@ -118,7 +119,7 @@ def _of_camera(
     scale: Floats,
     unit: str,
 ) -> Systematic | None:
-    own = camera.photos[image_photos]
+    own = chosen(camera.photos[image_photos])
     found = frame_pattern(xy[own], residuals[own], redundancy[own], camera.estimated)
     if found is None:
         return None
@@ -161,7 +162,7 @@ def _of_photos(
     )
 
 
-def _distribution(result: AdjustedNetwork, used: Bools) -> Systematic | None:
+def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | None:
     """Test whether residuals are normal, one value of each visible direction.
 
     The coordinates of a point on two photos repeat each other: the one with most redundancy is taken.

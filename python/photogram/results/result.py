@@ -124,6 +124,8 @@ class Result(AdjustedNetwork):
     hints
         Mistakes in conventions (units, axes, signs, angles) that would explain why images do not fit, as
         sentences; see :func:`photogram.hints`. They head the verdict.
+    exchanged
+        Names of points that are probably exchanged on a photo, as sentences, where there are gross errors.
     """
 
     block: Block
@@ -143,6 +145,7 @@ class Result(AdjustedNetwork):
     options: CoreOptions
     state: _photocore.BlockState
     hints: tuple[str, ...] = ()
+    exchanged: tuple[str, ...] = ()
 
     WHOLE: ClassVar[bool] = True
     """Whether the normal equations of all of it may be asked again."""
@@ -166,6 +169,7 @@ class Result(AdjustedNetwork):
             messages=messages,
             loss=options.loss,
             hints=(),
+            exchanged=(),
             options=options,
             datum=datum,
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import singledispatch
 
 import numpy as np
 
+from photogram.arguments.types import Floats, Indices
 from photogram.network.geometry import geographic_to_geocentric, lengths_of_units
+from photogram.results.network import AdjustedNetwork
+from photogram.results.result import Result
 
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.results.result import Result
-
-__all__ = ["WeakestPhoto", "WeakestPoint", "weakest_lines", "weakest_photos", "weakest_points"]
+__all__ = [
+    "Determined",
+    "WeakestPhoto",
+    "WeakestPoint",
+    "determined",
+    "weakest_lines",
+    "weakest_photos",
+    "weakest_points",
+]
 
 WORST = 10
 NEAR = 1e-3
@@ -64,8 +72,61 @@ class WeakestPhoto:
     images: int
 
 
+@dataclass(frozen=True, eq=False)
+class Determined:
+    """Where the points and photos of an adjusted network are, and how well that is known.
+
+    Attributes
+    ----------
+    photo_ids, point_ids
+        What they are called.
+    stations, points
+        (P, 3), (n, 3) places, with axes of equal units.
+    image_photos
+        (m,) the photo of each image.
+    poses
+        (P, 6, 6) cofactors of position and attitude.
+    ranks
+        (P,) how many unknowns of a pose are not fixed.
+    point_cofactors
+        (n, 3, 3) with axes of equal units.
+    """
+
+    photo_ids: Sequence[str]
+    point_ids: Sequence[str]
+    stations: Floats
+    points: Floats
+    image_photos: Indices
+    poses: Floats
+    ranks: Indices
+    point_cofactors: Floats
+
+
+@singledispatch
+def determined(result: AdjustedNetwork) -> Determined:
+    """Return where points and photos are, and how well that is known."""
+    raise NotImplementedError(type(result).__name__)
+
+
+@determined.register
+def _(result: Result) -> Determined:
+    block, points, stations = result.block, result.point_positions, result.photo_positions
+    cofactors = result.point_cofactors
+    if block.spheroid is not None:
+        units = lengths_of_units(points, block.spheroid)
+        cofactors = cofactors * units[:, :, np.newaxis] * units[:, np.newaxis, :]
+        points, stations = (
+            geographic_to_geocentric(np.array(each), block.spheroid) for each in (points, stations)
+        )
+    poses = result.photo_cofactors[:, :6, :6]
+    ranks = (np.diagonal(poses, axis1=1, axis2=2) > 0).sum(axis=1)
+    return Determined(
+        block.photo_ids, block.point_ids, stations, points, block.image_photos, poses, ranks, cofactors
+    )
+
+
 @np.errstate(all="ignore")
-def weakest_points(result: Result, count: int = WORST) -> list[WeakestPoint]:
+def weakest_points(result: AdjustedNetwork, count: int = WORST) -> list[WeakestPoint]:
     """Return the points of the largest ratios, and those nearest to a station, the worst first.
 
     Parameters
@@ -75,50 +136,45 @@ def weakest_points(result: Result, count: int = WORST) -> list[WeakestPoint]:
     count
         How many, at the most.
     """
-    block = result.block
-    cofactors = np.array(result.point_cofactors)
-    if block.spheroid is not None:
-        units = lengths_of_units(result.point_positions, block.spheroid)
-        cofactors *= units[:, :, np.newaxis] * units[:, np.newaxis, :]
-    known = np.isfinite(cofactors).all(axis=(1, 2)) & (result.point_rays > 0)
+    network = determined(result)
+    cofactors = network.point_cofactors
+    known = np.isfinite(cofactors).all(axis=(1, 2)) & result.used_points
     ratio = np.full(len(known), np.nan)
-    free = known & np.isinf(block.point_sd).all(axis=1)
+    free = known & np.isinf(result.point_given_sd).all(axis=1)
     ratio[known] = 1.0
-    ratio[free] = np.sqrt(_condition(cofactors[free]))
-    distance = _distances(result)
+    ratio[free] = np.sqrt(_condition(cofactors[free], 3))
+    distance = _distances(result, network)
     order = np.lexsort((distance, -ratio))
     near = np.flatnonzero(distance < NEAR)
     chosen = [*near[np.argsort(distance[near])], *order[np.isfinite(ratio[order]) | np.isinf(ratio[order])]]
     return [
         WeakestPoint(
-            block.point_ids[row], float(ratio[row]), float(distance[row]), int(result.point_rays[row])
+            network.point_ids[row], float(ratio[row]), float(distance[row]), int(result.point_rays[row])
         )
         for row in list(dict.fromkeys(int(each) for each in chosen))[:count]
     ]
 
 
 @np.errstate(all="ignore")
-def weakest_photos(result: Result, count: int = WORST) -> list[WeakestPhoto]:
+def weakest_photos(result: AdjustedNetwork, count: int = WORST) -> list[WeakestPhoto]:
     """Return the photos of the largest conditions, the worst first.
 
     Fixed unknowns of a photo do not count; those of which all are fixed are left out.
     """
-    cofactors = result.photo_cofactors[:, :6, :6]
-    images = np.bincount(result.block.image_photos[result.used_images], minlength=len(result.block.photo_ids))
-    variances = np.diagonal(cofactors, axis1=1, axis2=2)
-    known = (images > 0) & np.isfinite(cofactors).all(axis=(1, 2)) & (variances > 0).any(axis=1)
-    rows, sd = np.flatnonzero(known), np.sqrt(np.where(variances > 0, variances, 1.0))[known]
-    scaled = cofactors[known] / (sd[:, :, np.newaxis] * sd[:, np.newaxis, :])
-    # The eigenvalue 1 of a fixed unknown lies between the others, whose mean is 1.
-    scaled[:, range(6), range(6)] = 1.0
-    condition = _condition(scaled)
+    network = determined(result)
+    images = np.bincount(network.image_photos[result.used_images], minlength=len(network.photo_ids))
+    known = (images > 0) & np.isfinite(network.poses).all(axis=(1, 2)) & (network.ranks > 0)
+    poses, rows = network.poses[known], np.flatnonzero(known)
+    variances = np.diagonal(poses, axis1=1, axis2=2)
+    sd = np.sqrt(np.where(variances > 0, variances, 1.0))
+    condition = _condition(poses / (sd[:, :, np.newaxis] * sd[:, np.newaxis, :]), network.ranks[known])
     return [
-        WeakestPhoto(result.block.photo_ids[rows[each]], float(condition[each]), int(images[rows[each]]))
+        WeakestPhoto(network.photo_ids[rows[each]], float(condition[each]), int(images[rows[each]]))
         for each in np.argsort(-condition, kind="stable")[:count].tolist()
     ]
 
 
-def weakest_lines(result: Result) -> list[str]:
+def weakest_lines(result: AdjustedNetwork) -> list[str]:
     """Return the lines of a report on the weakest points and photos; none without cofactors."""
     points, photos = weakest_points(result), weakest_photos(result)
     lines = []
@@ -141,24 +197,25 @@ def weakest_lines(result: Result) -> list[str]:
     return lines
 
 
-def _condition(matrices: Floats) -> Floats:
-    """Return largest over smallest eigenvalue of (n, k, k) matrices; infinite where rounding has taken it."""
+def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
+    """Return largest over smallest eigenvalue of (n, k, k) matrices; infinite where rounding has taken it.
+
+    Of the smaller ranks only so many eigenvalues count: the others belong to what is fixed.
+    """
     values = np.linalg.eigvalsh(matrices)
-    smallest, largest = values[:, 0], values[:, -1]
+    largest = values[:, -1]
+    smallest = np.take_along_axis(values, values.shape[1] - np.reshape(ranks, (-1, 1)), axis=1)[:, 0]
     found: Floats = np.where(smallest > np.finfo(float).eps * largest, largest / smallest, np.inf)
     return found
 
 
-def _distances(result: Result) -> Floats:
+def _distances(result: AdjustedNetwork, network: Determined) -> Floats:
     """Return the distances of all points from the nearest station that sees them, in their median."""
-    block = result.block
-    points, photos = np.array(result.point_positions), np.array(result.photo_positions)
-    if block.spheroid is not None:
-        points, photos = (geographic_to_geocentric(each, block.spheroid) for each in (points, photos))
     used = result.used_images
-    of_images = points[block.image_points[used]] - photos[block.image_photos[used]]
-    nearest = np.full(len(points), np.inf)
-    np.minimum.at(nearest, block.image_points[used], np.linalg.norm(of_images, axis=1))
+    own = result.image_points[used]
+    of_images = network.points[own] - network.stations[network.image_photos[used]]
+    nearest = np.full(len(network.points), np.inf)
+    np.minimum.at(nearest, own, np.linalg.norm(of_images, axis=1))
     seen = np.isfinite(nearest)
     found: Floats = np.where(seen, nearest / np.median(nearest[seen]) if seen.any() else np.nan, np.nan)
     return found

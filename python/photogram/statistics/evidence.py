@@ -255,8 +255,10 @@ def _relative(tested: Tested) -> Floats:
     if tested.statistic == "w":
         return np.asarray(np.abs(values) / MEDIAN)
     dimension = np.broadcast_to(np.asarray(tested.dimension), tested.values.shape)[~np.isnan(tested.values)]
-    medians = {each: critical_chi_square(0.5, each) for each in np.unique(dimension).tolist()}
-    return np.asarray(np.sqrt(values / np.array([medians[each] for each in dimension.tolist()])))
+    medians = np.empty_like(values)
+    for each in np.unique(dimension).tolist():
+        medians[dimension == each] = critical_chi_square(0.5, each)
+    return np.asarray(np.sqrt(values / medians))
 
 
 def _studentized(tested: Tested, omega: float, f: float) -> Tested:

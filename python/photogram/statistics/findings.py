@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -108,6 +109,13 @@ class Tested:
 
         The factor takes no part in t and F, which have their unit weight from the residuals.
         """
+        return self._as_given if factor == 1.0 else self._log_probability(factor)
+
+    @cached_property
+    def _as_given(self) -> Floats:
+        return self._log_probability(1.0)
+
+    def _log_probability(self, factor: float) -> Floats:
         squares = np.where(np.isnan(self.values), math.nan, np.abs(self.values))
         if self.statistic in "wt":
             squares = squares**2
@@ -245,6 +253,8 @@ class Findings:
         Unknowns that no observation determines.
     hints
         Accepted hypotheses of what is wrong with the data, as sentences ("probably ...").
+    exchanged
+        Names that are probably exchanged, as sentences.
     spoiled
         Why gross errors make the result unusable, where the program has found that itself; a sentence.
     doubtful
@@ -268,6 +278,7 @@ class Findings:
     untested: str = "no a-priori unit weight"
     undetermined: Sequence[str] = ()
     hints: Sequence[str] = ()
+    exchanged: Sequence[str] = ()
     spoiled: str = ""
     doubtful: Sequence[str] = ()
     systematic: Sequence[Systematic] = ()

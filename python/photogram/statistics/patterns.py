@@ -38,6 +38,9 @@ BINS = 5
 FULL = 10.0
 """Redundancy that a bin of the frame needs."""
 
+SINGULAR = 1e-6
+"""Determinant, in the product of the diagonal, below which a matrix may be singular."""
+
 CELLS = 10
 """Of the frame in each direction: images in one cell are neighbours."""
 
@@ -210,7 +213,7 @@ def group_patterns(
     design = np.asfortranarray(np.column_stack([np.ones(len(xy)), centred / (spread or 1.0)]))
     statistics, enough = np.zeros(count), np.ones(count, dtype=bool)
     for axis in (0, 1):
-        score = np.stack(
+        score: Floats = np.stack(
             [np.bincount(groups, weights=each * residuals[:, axis], minlength=count) for each in design.T],
             axis=1,
         )
@@ -220,9 +223,21 @@ def group_patterns(
             matrices[:, i, j] = matrices[:, j, i] = np.bincount(groups, weights=weights, minlength=count)
         enough &= matrices[:, 0, 0] >= FULL
         matrices[~enough] = np.eye(3)
-        statistics += np.einsum("gi,gij,gj->g", score, np.linalg.pinv(matrices, hermitian=True), score)
+        statistics += _quadratic(matrices, score)
     statistics[~enough] = math.nan
     return statistics, np.array([_photocore.chi_square(each, 6.0) for each in statistics.tolist()])
+
+
+def _quadratic(matrices: Floats, vectors: Floats) -> Floats:
+    """Return c' C^+ c of (n, k, k) and (n, k), by pseudo-inverses where C may be singular."""
+    scale = np.sqrt(np.einsum("gii->gi", matrices))
+    sound = np.linalg.det(matrices) > SINGULAR * scale.prod(axis=1) ** 2
+    found = np.empty(len(vectors))
+    c = vectors[sound]
+    found[sound] = np.einsum("gi,gi->g", c, np.linalg.solve(matrices[sound], c[..., np.newaxis])[..., 0])
+    c = vectors[~sound]
+    found[~sound] = np.einsum("gi,gij,gj->g", c, np.linalg.pinv(matrices[~sound], hermitian=True), c)
+    return found
 
 
 @dataclass(frozen=True)

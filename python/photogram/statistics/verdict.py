@@ -99,12 +99,22 @@ def verdict(found: Findings) -> Verdict:
         headline=first.text,
         exit=first.exit,
         warning=first.warning or any(line.warning or line.exit for line in others),
-        lines=(*(line.text for line in others), *evidence.remarks(), *found.remarks),
+        lines=(
+            *(line.text for line in others),
+            *evidence.remarks(),
+            *found.remarks,
+            *_exchanged(found, fitting),
+        ),
         tests=tuple(evidence.tests()),
         removed=tuple(found.snooped.removed) if found.snooped else (),
         rivals=tuple(found.snooped.rivals) if found.snooped else (),
         hints=tuple(found.hints),
     )
+
+
+def _exchanged(found: Findings, lines: list[_Line]) -> list[str]:
+    """Return names that are probably exchanged, unless a line has them."""
+    return [each for each in found.exchanged if not any(each in line.text for line in lines)]
 
 
 def worst(verdicts: Iterable[Verdict], *, strict: bool = False) -> int:
@@ -115,9 +125,8 @@ def worst(verdicts: Iterable[Verdict], *, strict: bool = False) -> int:
 def _not_converged(e: Evidence) -> _Line | None:
     if e.found.status == "converged":
         return None
-    return _Line(
-        "not-converged", f"Not converged ({e.found.status}): the figures are no results", EXIT_NOT_CONVERGED
-    )
+    text = "; ".join([f"Not converged ({e.found.status}): the figures are no results", *e.found.exchanged])
+    return _Line("not-converged", text, EXIT_NOT_CONVERGED)
 
 
 def _rank_defect(e: Evidence) -> _Line | None:
@@ -150,7 +159,7 @@ def _gross_errors(e: Evidence) -> _Line | None:
     # A few gross errors make s larger than the median says; a wrong model spoils all residuals alike.
     if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
         return None
-    text = f"Gross errors likely: {e.named(e.gross)}"
+    text = f"Gross errors likely: {'; '.join([*e.found.exchanged, e.named(e.gross)])}"
     _, first, _ = e.gross[0]
     if first.held:
         text += "; what is held is no observation: give it a standard deviation"

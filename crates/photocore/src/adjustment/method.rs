@@ -51,7 +51,12 @@ impl Stop {
 
     /// Whether a step is the last one that lowers a sum of squares by `decrease`.
     pub(super) fn at_decrease(self, decrease: f64, sum: f64) -> bool {
-        matches!(self, Self::Decrease(fraction) if decrease <= fraction * sum)
+        self.least_decrease(sum).is_some_and(|least| decrease <= least)
+    }
+
+    /// By how much a step must lower a sum of squares to go on, where that counts.
+    pub(super) fn least_decrease(self, sum: f64) -> Option<f64> {
+        if let Self::Decrease(fraction) = self { Some(fraction * sum) } else { None }
     }
 }
 

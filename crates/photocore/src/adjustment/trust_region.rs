@@ -19,16 +19,14 @@ const ROUNDING: f64 = 1e-14;
 /// and so may be one by which no unknown changes by more than this multiple of its standard deviation.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// So many steps in a row that lower the sum of squares together by less than one of them must, to go on, follow what nothing determines:
-/// the sum stands still, however much they are damped.
-const PATIENCE: usize = 50;
-
-/// So many steps in a row that lower the sum of squares together by less than this multiple of the variance of unit weight, a fifth of a
-/// standard deviation of what they follow,
-const CREEPING: usize = 12;
-const LITTLE: f64 = 0.05;
-/// and of which the last lowers it by no less than this part of what the first did, follow what hardly anything determines, and would go on so.
+/// So many steps in a row that lower the sum of squares together by less than one of them must, to go on, and of which the last lowers it by
+/// no less than this part of what the first did, follow what hardly anything determines, and would go on so, however much they are damped.
+const CREEPING: usize = 50;
 const FALLING: f64 = 0.1;
+/// In a network fewer do, and it is little what is less than this multiple of the variance of unit weight, a fifth of a standard deviation
+/// of what they follow.
+const CREEPING_IN_NETWORKS: usize = 12;
+const LITTLE: f64 = 0.05;
 /// An unknown takes part in it when it moves, in units of what its equations alone determine, by so many times what all observations show.
 const WEAK: f64 = 10.0;
 /// A step is short when no unknown changes by more than this multiple of its standard deviation.
@@ -38,8 +36,8 @@ const SHORT: f64 = 1.0;
 const BENDS: f64 = 0.75;
 /// until the second-order term, in the metric of the normal equations, is smaller than this part of a step.
 const STRAIGHT: f64 = 0.1;
-/// Local blocks of a network, at the least, whose steps are accelerated, and end where the sum of squares creeps: the valley of a few numbers
-/// may lead far away (Eckerle4 of NIST's problems, from its first start), that of a network ends near where it began.
+/// Local blocks of a network, at the least, whose steps are accelerated, and soon end where the sum of squares creeps: the valley of a few
+/// numbers may lead far away (Eckerle4 of NIST's problems, from its first start), that of a network ends near where it began.
 const NETWORK: usize = 16;
 
 /// The damping, and by how much the next failure raises it.
@@ -98,19 +96,11 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let mut state = start;
         let mut lowest = state.sum_of_squares;
         let mut damping = Damping { value: state.damping, rise: 2.0, bends: false };
-        let (mut mark, mut steps) = (lowest, 0);
         let mut falls: Vec<f64> = vec![];
         while self.iterations.len() < self.options.max_iterations {
             if damping.value > MOST_DAMPING {
                 return self.rest(state.unknowns, Status::Diverged);
             }
-            if !stop.at_decrease(mark - lowest, lowest) {
-                (mark, steps) = (lowest, 0);
-            }
-            if steps == PATIENCE {
-                return self.rest_in_valley(state.unknowns, Status::Converged);
-            }
-            steps += 1;
             let (unknowns, used) = (state.unknowns.clone(), state.damping);
             let Some(solved) = self.solve_unless_lost(state)? else {
                 damping.rise();
@@ -132,11 +122,10 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 lowest = trial.sum_of_squares;
                 damping.fall(gain);
                 falls.push(decrease);
-                let ends = last || whole && stop.at_decrease(decrease, lowest);
-                if ends {
+                if last || whole && stop.at_decrease(decrease, lowest) {
                     return self.rest(trial.unknowns, Status::Converged);
                 }
-                if self.creeps(&falls, lowest) {
+                if self.creeps(&falls, lowest, stop) {
                     return self.rest_in_valley(trial.unknowns, Status::Converged);
                 }
                 state = self.form_at(trial.unknowns, trial.prepared, damping.value)?;
@@ -203,13 +192,17 @@ impl<'a, M: Model> Run<'a, '_, M> {
         self.problem.layout().locals() >= NETWORK
     }
 
-    /// Whether the sum of squares creeps, by less and less and never to an end. With a loss it may: reweighting is no faster.
-    fn creeps(&self, falls: &[f64], lowest: f64) -> bool {
-        let Some(first) = falls.len().checked_sub(CREEPING) else { return false };
+    /// Whether the sum of squares, or of losses, creeps: by less and less and never to an end.
+    fn creeps(&self, falls: &[f64], lowest: f64, stop: Stop) -> bool {
+        let least = stop.least_decrease(lowest).unwrap_or(0.0);
         let freedom = self.problem.counts(0).degrees_of_freedom().max(1) as f64;
-        let (last, least) = (&falls[first..], LITTLE * (lowest / freedom).max(1.0));
-        let is_slow = last[CREEPING - 1] > FALLING * last[0];
-        self.options.loss.is_none() && self.is_network() && is_slow && last.iter().sum::<f64>() <= least
+        let (steps, little) = match self.is_network() {
+            true => (CREEPING_IN_NETWORKS, least.max(LITTLE * (lowest / freedom).max(1.0))),
+            false => (CREEPING, least),
+        };
+        let Some(first) = falls.len().checked_sub(steps) else { return false };
+        let last = &falls[first..];
+        last.iter().sum::<f64>() <= little && last[steps - 1] >= FALLING * last[0]
     }
 
     /// Keeps a step; the end where it has led local blocks to where they harm all others.

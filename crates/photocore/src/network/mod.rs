@@ -54,6 +54,7 @@
 //! ```
 
 mod approaches;
+mod beside;
 mod camera_priors;
 mod cameras;
 pub mod commons;
@@ -92,6 +93,7 @@ use std::ops::ControlFlow;
 use nalgebra::DMatrix;
 use rayon::ThreadPool;
 
+use self::beside::{Beside, Leaving};
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Method};
 use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
 use crate::normals::Ordering;
@@ -354,19 +356,19 @@ impl Network {
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, NetworkError> {
         self.check()?;
-        let mut left_out = vec![false; self.points.len()];
-        let mut loose = self.untouched_photos();
-        let mut harmful: Vec<Dropped> = Vec::new();
+        let (points, photos) = (vec![false; self.points.len()], self.untouched_photos());
+        let mut leaving = Leaving { points, photos, harmful: vec![] };
         for &point in start.iter().flat_map(|state| &state.collapsed) {
-            *left_out.get_mut(point).ok_or(NetworkError::State)? = true;
+            *leaving.points.get_mut(point).ok_or(NetworkError::State)? = true;
         }
         for &photo in start.iter().flat_map(|state| &state.loose) {
-            *loose.get_mut(photo).ok_or(NetworkError::State)? = true;
+            *leaving.photos.get_mut(photo).ok_or(NetworkError::State)? = true;
         }
         let mut start = start;
         let mut before: Option<(Adjustment, problem::Reached)> = None;
+        let mut beside = Beside::Untried(leaving.clone());
         loop {
-            let screened = self.screen(&left_out, &loose);
+            let screened = self.screen(&leaving.points, &leaving.photos);
             if screened.points.is_empty() {
                 return Err(NetworkError::Empty);
             }
@@ -400,14 +402,19 @@ impl Network {
                     }
                 }
             };
+            let may_try = own.loss.is_none() && !matches!(own.method, Method::Full(_));
+            if may_try && beside.is_untried() && beside.tries(&adjusted, &assembled, &mut leaving) {
+                (start, before) = (None, None);
+                continue;
+            }
             if let Ok(Adjustment { undetermined: Some(error), .. }) | Err(error) = &adjusted {
                 let (points, photos) = (assembled.few_points(error), assembled.few_photos(error));
                 if !(points.is_empty() && photos.is_empty()) {
                     // They have led the others astray: these begin again.
-                    points.iter().for_each(|&point| left_out[point] = true);
-                    photos.iter().for_each(|&photo| loose[photo] = true);
+                    points.iter().for_each(|&point| leaving.points[point] = true);
+                    photos.iter().for_each(|&photo| leaving.photos[photo] = true);
                     let reason = Reason::NotDetermined;
-                    harmful.extend(points.into_iter().map(|point| Dropped { point, reason }));
+                    leaving.harmful.extend(points.into_iter().map(|point| Dropped { point, reason }));
                     start = None;
                     continue;
                 }
@@ -418,8 +425,12 @@ impl Network {
                 Err(_) => vec![],
             };
             if !astray.is_empty() {
-                astray.iter().for_each(|dropped| left_out[dropped.point] = true);
-                harmful.extend(astray);
+                astray.iter().for_each(|dropped| leaving.points[dropped.point] = true);
+                leaving.harmful.extend(astray);
+                (start, before) = (None, None);
+                continue;
+            }
+            if may_try && !beside.is_untried() && beside.tries(&adjusted, &assembled, &mut leaving) {
                 (start, before) = (None, None);
                 continue;
             }
@@ -433,22 +444,22 @@ impl Network {
                     lost =
                         self.take_to(inner, &options.adjustment, &assembled, &mut adjusted, pool, watch)?;
                 }
-                let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
+                let collapsed = (0..leaving.points.len()).filter(|&point| leaving.points[point]).collect();
                 let minimal = datum.is_none() && assembled.is_minimal(&adjusted.unknowns, pool);
                 let (mut solution, found) =
                     Solution::with_tried(self, options, &assembled, adjusted, collapsed);
                 solution.minimal_control = minimal;
                 solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
                 solution.lost_digits = lost;
-                solution.dropped.extend(harmful);
+                solution.dropped.extend(leaving.harmful);
                 solution.dropped.sort_unstable_by_key(|dropped| dropped.point);
                 solution.settled =
                     found.map(|found| Box::new(Settled::new(assembled, options.adjustment, found)));
                 return Ok(solution);
             }
             for dropped in assembled.collapsed(&adjusted) {
-                left_out[dropped.point] = true;
-                harmful.push(dropped);
+                leaving.points[dropped.point] = true;
+                leaving.harmful.push(dropped);
             }
             let reached = assembled.reached(&adjusted.unknowns, self.points.len());
             before = Some((adjusted, reached));

@@ -129,6 +129,12 @@ impl Assembled {
         at_station.map(|(&point, _)| Dropped { point, reason }).collect()
     }
 
+    /// The same at the first values, and their median.
+    pub fn first_distances(&self) -> Option<(Vec<f64>, f64)> {
+        let squares = self.nearest_stations(&self.problem.initial);
+        median(squares.clone()).map(|middle| (squares, middle))
+    }
+
     /// Squares of the distances of all points from the nearest station that sees them.
     fn nearest_stations(&self, unknowns: &[f64]) -> Vec<f64> {
         let model = &self.problem.model;

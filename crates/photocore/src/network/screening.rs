@@ -29,6 +29,8 @@ pub enum Reason {
     RanOff,
     /// It was given at the place of a station that sees it: no ray leads there.
     AtStation,
+    /// It is held beside a station that sees it, and one of its images is wrong: the adjustment goes wrong with it, and not without.
+    BesideStation,
 }
 
 impl Reason {
@@ -42,6 +44,7 @@ impl Reason {
             Reason::NotDetermined => "its rays do not determine it",
             Reason::RanOff => "its rays do not meet: it ran off",
             Reason::AtStation => "given at the place of a station that sees it",
+            Reason::BesideStation => "given beside a station that sees it, and its images do not fit",
         }
     }
 }

@@ -381,6 +381,11 @@ solution_class! {
         }
 
         #[getter]
+        fn beside_stations(&self) -> Vec<usize> {
+            left_out(&self.solution, Reason::BesideStation)
+        }
+
+        #[getter]
         fn not_determined(&self) -> Vec<usize> {
             [Reason::NotDetermined, Reason::RanOff].map(|why| left_out(&self.solution, why)).concat()
         }

@@ -29,6 +29,13 @@ ALL = 200
 """Photos or points up to which all have a row."""
 SOME = 100
 """Otherwise the rows of the most notable, beside those that other tables name."""
+CONDITION_NOTE = (
+    "The condition, of the covariance matrix of the pose scaled to ones, stands at the weakest ten."
+)
+RATIO_NOTE = (
+    "The ratio of the standard deviations, in any directions, stands at the weakest ten: above 10,000 rays"
+    " are nearly parallel."
+)
 
 
 def control_section(result: Result) -> Section:
@@ -318,8 +325,7 @@ def photos_section(result: Result, named: Iterable[int]) -> Section:
             "Fit of images",
             columns,
             body,
-            f"{note} The condition, of the covariance matrix of the pose scaled to ones, stands at the"
-            " weakest ten.".strip(),
+            f"{note} {CONDITION_NOTE}".strip(),
         )
     )
     return Section("photos", "Photos", [Layers("photos-layers", tables)], _datum(result))
@@ -389,11 +395,7 @@ def points_section(result: Result, named: Iterable[int]) -> Section:
         Column("Largest over smallest sd", figures=3),
     ]
     few_of = f"{len(rows)} of {len(used)}: those that other tables name, those of the largest sd"
-    note = (
-        f"{'' if every else few_of + ', and the weakest. The table of points has all. '}"
-        "The ratio of the standard deviations, in any directions, stands at the weakest ten:"
-        " above 10,000 rays are nearly parallel."
-    )
+    note = f"{'' if every else few_of + ', and the weakest. The table of points has all. '}{RATIO_NOTE}"
     return Section("points", "Points", [Table("Points", columns, body, note)] if body else [], _datum(result))
 
 

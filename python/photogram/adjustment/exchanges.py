@@ -1,0 +1,135 @@
+"""Names that are probably exchanged on a photo, of a block whose adjustment shows gross errors.
+
+Names of two points that are exchanged bend an adjustment by hundreds of standard deviations, if it converges
+at all: where photos have ended tells nothing then. So some photos around the worst images are oriented by
+their images alone, by consensus, which no minority moves; and there the names of what is set aside are
+exchanged on trial (:mod:`photogram.results.exchanged`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from photogram.adjustment.first_values import first_values
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import AdjustmentError, InputError
+from photogram.network.block import Block
+from photogram.network.chosen import of_photos
+from photogram.results.exchanged import Exchange, exchanged_names
+from photogram.results.findings import HARMFUL
+from photogram.results.result import Result
+from photogram.statistics.limits import normal_limit
+
+__all__ = ["with_exchanges"]
+
+CENTRES = 3
+"""Photos around which names are looked at."""
+AROUND, SHARED = 24, 3
+"""Photos around one, at the most; they share so many points with it, at the least."""
+MEDIAN_OF_LARGER = 1.05
+"""Of the larger of two absolute normal variables."""
+
+
+def with_exchanges(result: Result) -> Result:
+    """Return a result, with probable exchanges of names where it shows gross errors and no other mistake."""
+    doubtful = result.loss is None and not result.hints and not result.block.mounts
+    if not doubtful:
+        return result
+    found: dict[tuple[str, str], Exchange] = {}
+    for each in (pair for around in _around_worst(result) for pair in _among(result.block, around)):
+        # Photos around one may leave open what those around another tell.
+        known = found.setdefault(each.points, each)
+        if len(each.photos) < len(known.photos):
+            found[each.points] = each
+    return replace(result, exchanged=tuple(each.probable for each in found.values())) if found else result
+
+
+def _around_worst(result: Result) -> list[Indices]:
+    """Return groups of photos around those that have two images, or more, with gross errors."""
+    block, sizes = result.block, _sizes(result)
+    bad = np.flatnonzero(sizes > 0)
+    bad = bad[np.lexsort((-sizes[bad], block.image_photos[bad]))]
+    photos, first, count = np.unique(block.image_photos[bad], return_index=True, return_counts=True)
+    photos, second = photos[count > 1], sizes[bad[first[count > 1] + 1]]
+    groups: list[Indices] = []
+    for photo in photos[np.argsort(-second, kind="stable")].tolist():
+        if len(groups) == CENTRES:
+            break
+        if not any(photo in group for group in groups):
+            groups.append(_neighbours(block, photo))
+    return groups
+
+
+def _sizes(result: Result) -> Floats:
+    """(m,) how large the errors of images are; zero for those that fit beside a common factor.
+
+    Residuals without redundancy numbers, which an adjustment that has not converged lacks, are less than test
+    values. Images of points that were left out because one of these must be wrong are the worst.
+    """
+    block, test = result.block, result.global_test
+    harmful = [name for name, reason in result.dropped.items() if reason in HARMFUL]
+    sizes = np.zeros(len(block.image_xy))
+    if not result.converged or (test is not None and test.rejected_high):
+        relative = np.where(result.used_images, np.abs(result.residuals / block.image_sd).max(axis=1), 0.0)
+        usual = (
+            max(float(np.median(relative[result.used_images])) / MEDIAN_OF_LARGER, 1.0)
+            if relative.any()
+            else 1.0
+        )
+        sizes = np.where(relative > usual * normal_limit(relative.size), relative, 0.0)
+    if harmful:
+        rows = {name: row for row, name in enumerate(block.point_ids)}
+        sizes[np.isin(block.image_points, [rows[name] for name in harmful])] = np.inf
+    return sizes
+
+
+def _neighbours(block: Block, photo: int) -> Indices:
+    """Return a photo and those that share most points with it."""
+    seen = np.zeros(len(block.point_ids), dtype=bool)
+    seen[block.image_points[block.image_photos == photo]] = True
+    shared = np.bincount(block.image_photos[seen[block.image_points]], minlength=len(block.photo_ids))
+    order = np.argsort(-shared, kind="stable")[: AROUND + 1]
+    chosen: Indices = np.union1d([photo], order[shared[order] >= SHARED])
+    return chosen
+
+
+def _among(block: Block, photos: Indices) -> list[Exchange]:
+    """Return exchanged names on some photos, which are oriented by their images alone."""
+    kept = np.zeros(len(block.photo_ids), dtype=bool)
+    kept[photos] = True
+    try:
+        found = first_values(_images_alone(block, kept))
+    except (AdjustmentError, InputError):
+        return []
+    started = np.array([name in found.sources for name in found.block.photo_ids])
+    images: Bools = started[found.block.image_photos]
+    return exchanged_names(of_photos(found.block, started), ~found.set_aside[images])
+
+
+def _images_alone(block: Block, kept: Bools) -> Block:
+    """Return some photos of a block with their images, and nothing else that is known of them."""
+    own = kept[block.image_photos]
+    rays = np.bincount(block.image_points[own], minlength=len(block.point_ids))
+    points = np.flatnonzero(rays > 1)
+    of_images = np.flatnonzero(own & (rays[block.image_points] > 1))
+    free = block.replace(
+        observations=(),
+        spheroid=None,
+        refraction=None,
+        image_photos=block.image_photos[of_images],
+        image_points=np.searchsorted(points, block.image_points[of_images]),
+        image_xy=block.image_xy[of_images],
+        image_sd=block.image_sd[of_images],
+        point_ids=[block.point_ids[point] for point in points],
+        point_positions=np.full((len(points), 3), np.nan),
+        point_sd=np.full((len(points), 3), np.inf),
+        photo_positions_observed=None,
+        photo_attitudes_observed=None,
+        photo_positions=np.full(block.photo_positions.shape, np.nan),
+        photo_attitudes=np.full(block.photo_attitudes.shape, np.nan),
+        photo_position_sd=np.full(block.photo_positions.shape, np.inf),
+        photo_attitude_sd=np.full(block.photo_positions.shape, np.inf),
+    )
+    return of_photos(free, kept)

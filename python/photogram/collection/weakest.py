@@ -1,0 +1,42 @@
+"""How well an adjusted collection determines its points and photos: stations and attitudes from its poses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.collection import POSE
+from photogram.collection.findings import names
+from photogram.results.weakest import Determined, determined
+
+__all__: list[str] = []
+
+
+@determined.register
+@np.errstate(invalid="ignore")
+def _(result: AdjustedCollection) -> Determined:
+    """Turn w and t of P = R(w) X + t into the station and a turn about the axes of the photo.
+
+    In w and t a photo far from the origin would look badly determined, whatever sees it.
+    """
+    pose = len(POSE)
+    translations, cofactors = result.photo_parameters[:, 3:pose], result.photo_cofactors[:, :pose, :pose]
+    vectors = np.ascontiguousarray(result.photo_parameters[:, :3])
+    matrices, turns = _photocore.attitudes_from_numbers("rotation_vector_to_photo", vectors, np.eye(3))
+    # The station is -A t, and A becomes A (I + [rho]).
+    partials = np.zeros((len(vectors), pose, pose))
+    partials[:, :3, :3] = matrices @ np.cross(translations[:, np.newaxis, :], turns, axisb=1, axisc=1)
+    partials[:, :3, 3:] = -matrices
+    partials[:, 3:, :3] = turns
+    photo_ids, point_ids = names(result)
+    return Determined(
+        photo_ids=photo_ids,
+        point_ids=point_ids,
+        stations=-np.einsum("pij,pj->pi", matrices, translations),
+        points=result.point_positions,
+        image_photos=result.collection.image_photos,
+        poses=partials @ cofactors @ partials.transpose(0, 2, 1),
+        ranks=(np.diagonal(cofactors, axis1=1, axis2=2) > 0).sum(axis=1),
+        point_cofactors=result.point_cofactors,
+    )
