@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 
 use super::layout::Layout;
 use super::panels::skip_ref;
-use super::stack::{Stack, parts_of, united};
+use super::stack::{Stack, parts_of, united, unlike};
 use super::system::System;
 use super::triangle::Triangle;
 use super::vectorised::{Kernel, dot, run, size};
@@ -44,7 +44,8 @@ impl Coupled {
         self.main = self.ranges.len();
         if layout.has_common() {
             let groups = system.incidence.groups_of(layout, first as usize);
-            let parts = groups.iter().flat_map(|&group| parts_of(layout, symbolic, group as usize));
+            let parts =
+                unlike(layout, groups).into_iter().flat_map(|group| parts_of(layout, symbolic, group));
             for (position, unknowns) in united(parts.map(|(position, unknowns, _)| (position, unknowns))) {
                 let start = symbolic.range(position).start;
                 self.ranges.push(start + unknowns.start..start + unknowns.end);

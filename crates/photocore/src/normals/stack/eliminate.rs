@@ -32,7 +32,7 @@ impl Stack {
             for (k, p) in slot.groups.clone().enumerate() {
                 let constants =
                     &self.constants[slot.constants + (t * slot.groups.len() + k) * rows..][..rows];
-                let own = &self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L];
+                let own = &self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L];
                 for (row, constant) in own.as_chunks::<L>().0.iter().zip(constants) {
                     for a in 0..L {
                         right[a] += row[a] * constant;
@@ -71,20 +71,20 @@ impl Stack {
             for first in (0..dim).step_by(LANES) {
                 let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
                 for (k, p) in slot.groups.clone().enumerate() {
-                    let own = &self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L];
+                    let own = &self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L];
                     let at = slot.kept + (t * slot.groups.len() + k) * rows * dim;
                     add_rows::<S, L>(simd, &mut sums, own, &self.kept_rows[at + first..], dim);
                 }
                 triangle.forward_vectors::<S, L>(simd, &mut sums);
-                write_sums::<S, L>(&sums, coupling, dim, first);
+                write_sums::<S, L>(simd, &sums, coupling, dim, first);
             }
         }
         for segment in &self.segments {
             if segment.plain {
                 let stack = (&self.places[..], &self.local_rows[..], &self.common_rows[..]);
-                let width = segment.unknowns.len();
+                let (width, depth) = (segment.unknowns.len(), self.locals.len());
                 let coupling = &mut self.coupling[segment.coupling + t * L * width..];
-                couple_runs::<S, L>(simd, stack, segment, t, rows, triangle, coupling);
+                couple_runs::<S, L>(simd, stack, segment, (t, depth), rows, triangle, coupling);
             }
         }
         if !self.segments.iter().all(|segment| segment.plain) {
@@ -99,7 +99,7 @@ impl Stack {
             self.coupling[segment.coupling + t * L * width..][..L * width].fill(0.0);
         }
         for (p, &Place { ref parts, width, rows: start }) in self.places.iter().enumerate() {
-            let own = &self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L];
+            let own = &self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L];
             let common = &self.common_rows[start + t * rows * width..][..rows * width];
             for part in &self.parts[parts.clone()] {
                 let segment = &self.segments[part.segment];
@@ -137,14 +137,14 @@ impl Kernel for Eliminate<'_> {
     }
 }
 
-/// The coupling V of local block `t` of a stack to a segment that runs are all of: their products summed in registers, L^-1 times them
+/// The coupling V of local block `t` of the `depth` of a stack to a segment that runs are all of: their products summed in registers, L^-1 times them
 /// written. The stack is its places, coefficients of local blocks and those that are in common with others.
 #[inline(always)]
 fn couple_runs<S: Simd, const L: usize>(
     simd: S,
     (places, local_rows, common_rows): (&[Place], &[f64], &[f64]),
     segment: &Segment,
-    t: usize,
+    (t, depth): (usize, usize),
     rows: usize,
     triangle: &Triangle,
     coupling: &mut [f64],
@@ -155,13 +155,13 @@ fn couple_runs<S: Simd, const L: usize>(
         for run in &segment.runs {
             for p in run.places.clone() {
                 let Place { width: stride, rows: start, .. } = places[p];
-                let own = &local_rows[(t * places.len() + p) * rows * L..][..rows * L];
+                let own = &local_rows[(p * depth + t) * rows * L..][..rows * L];
                 let at = start + t * rows * stride + run.column + first;
                 add_rows::<S, L>(simd, &mut sums, own, &common_rows[at..], stride);
             }
         }
         triangle.forward_vectors::<S, L>(simd, &mut sums);
-        write_sums::<S, L>(&sums, coupling, width, first);
+        write_sums::<S, L>(simd, &sums, coupling, width, first);
     }
 }
 
@@ -189,6 +189,7 @@ fn add_rows<S: Simd, const L: usize>(
 /// Writes sums to the columns of a coupling of so many from `first` on.
 #[inline(always)]
 fn write_sums<S: Simd, const L: usize>(
+    simd: S,
     sums: &[[S::f64s; LANES]; L],
     coupling: &mut [f64],
     width: usize,
@@ -196,7 +197,7 @@ fn write_sums<S: Simd, const L: usize>(
 ) {
     let height = LANES.min(width - first);
     for d in 0..L {
-        copy_vectors::<S>(&sums[d], &mut coupling[d * width + first..][..height]);
+        copy_vectors::<S>(simd, &sums[d], &mut coupling[d * width + first..][..height]);
     }
 }
 
