@@ -39,8 +39,9 @@ pub(super) fn write_in_lanes<'s, C: CameraModel>(
         let mut lanes = Input::default();
         for first in (0..count).step_by(LANES) {
             let own = LANES.min(count - first);
-            for t in 0..LANES {
-                lanes.put(t, &sight(first + t.min(own - 1)));
+            // What stands in the lanes beyond is computed too, and not looked at.
+            for t in 0..own {
+                lanes.put(t, &sight(first + t));
             }
             write(pose, camera, &lanes, first..first + own, count, rows);
         }

@@ -168,6 +168,20 @@ pub(super) fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + last.iter().zip(end).map(|(a, b)| a * b).sum::<f64>()
 }
 
+/// The product of two short vectors, summed in four parts that do not wait for each other.
+#[inline(always)]
+pub(super) fn dot_by_fours(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, last), (b, end)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..4 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    let rest: f64 = last.iter().zip(end).map(|(a, b)| a * b).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
 /// target += the sum over rows of a[row][i] b[row].
 #[inline(always)]
 pub(super) fn add_side<S: Simd>(

@@ -18,15 +18,51 @@ impl Stack {
         run(layout, self.kept_dim(), Eliminate { stack: self, layout, prior, damping });
     }
 
+    /// Eliminates some local blocks, from the first on, side by side: at most as many as there are lanes.
     #[inline(always)]
-    fn eliminate_one<S: Simd, const L: usize, const D: usize>(
+    fn eliminate_some<S: Simd, const L: usize, const D: usize>(
         &mut self,
         simd: S,
+        locals: Range<usize>,
+        rows: usize,
+        (layout, prior): (&Layout, &Prior),
+        damping: f64,
+    ) {
+        let (mut normals, mut rights) = ([[[0.0; LANES]; L]; L], [[0.0; L]; LANES]);
+        for (lane, t) in locals.clone().enumerate() {
+            let (mut normal, mut right) = prior.of_local::<L>(layout, self.locals[t] as usize);
+            self.add_equations(t, rows, &mut normal, &mut right);
+            for a in 0..L {
+                normal[a][a] *= 1.0 + damping;
+                for b in 0..a + 1 {
+                    normals[a][b][lane] = normal[a][b];
+                }
+            }
+            rights[lane] = right;
+        }
+        // What lanes without a local block make of their zeros is not looked at.
+        let (triangles, regular) = Triangle::factor_lanes::<S, L>(simd, &normals);
+        for (lane, t) in locals.enumerate() {
+            if regular[lane] == 0.0 {
+                self.deficient.push(self.locals[t] as usize);
+            }
+            let (triangle, right) = (Triangle::in_lane(&triangles, lane), &mut rights[lane]);
+            triangle.forward::<L>(right, 1);
+            self.decrease += right.iter().map(|v| v * v).sum::<f64>();
+            self.reduced[t * L..][..L].copy_from_slice(right);
+            self.couple::<S, L, D>(simd, t, rows, &triangle);
+            self.triangles[t] = triangle;
+        }
+    }
+
+    /// Adds the equations of local block `t` of the stack to its normal equations, and to the sum of squares.
+    #[inline(always)]
+    fn add_equations<const L: usize>(
+        &mut self,
         t: usize,
         rows: usize,
-        mut normal: [[f64; L]; L],
-        mut right: [f64; L],
-        damping: f64,
+        normal: &mut [[f64; L]; L],
+        right: &mut [f64; L],
     ) {
         for slot in &self.slots {
             for (k, p) in slot.groups.clone().enumerate() {
@@ -44,16 +80,6 @@ impl Stack {
                 }
             }
         }
-        (0..L).for_each(|d| normal[d][d] *= 1.0 + damping);
-        let mut triangle = Triangle::default();
-        if !triangle.factor(&normal) {
-            self.deficient.push(self.locals[t] as usize);
-        }
-        triangle.forward::<L>(&mut right, 1);
-        self.decrease += right.iter().map(|v| v * v).sum::<f64>();
-        self.reduced[t * L..][..L].copy_from_slice(&right);
-        self.couple::<S, L, D>(simd, t, rows, &triangle);
-        self.triangles[t] = triangle;
     }
 
     /// Computes the coupling V of local block `t` of the stack to everything else.
@@ -129,10 +155,11 @@ struct Eliminate<'a> {
 impl Kernel for Eliminate<'_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
-        for t in 0..self.stack.locals.len() {
-            let (normal, right) = self.prior.of_local::<L>(self.layout, self.stack.locals[t] as usize);
-            let rows = size::<R>(self.layout.rows());
-            self.stack.eliminate_one::<S, L, D>(simd, t, rows, normal, right, self.damping);
+        let (rows, count) = (size::<R>(self.layout.rows()), self.stack.locals.len());
+        for first in (0..count).step_by(LANES) {
+            let locals = first..count.min(first + LANES);
+            let given = (self.layout, self.prior);
+            self.stack.eliminate_some::<S, L, D>(simd, locals, rows, given, self.damping);
         }
     }
 }
