@@ -21,7 +21,50 @@ pub trait Model: Sync {
     /// block, in the units of observations and unknowns.
     fn observe(&self, prepared: &Self::Prepared, local: usize, group: usize, rows: &mut GroupRows<'_>);
 
-    /// The same for the observations of a tie. Not called where the layout has no ties.
+    /// Writes what [`Model::observe`] does of one group each of several local blocks, one after the other, in unit weight: `groups` says
+    /// which, `sd` are the standard deviations of all observations. All have the same main block, and as much in common with others.
+    #[inline(always)]
+    fn observe_alike(
+        &self,
+        prepared: &Self::Prepared,
+        locals: &[u32],
+        groups: impl Fn(usize) -> usize,
+        sd: &[f64],
+        rows: &mut GroupRows<'_>,
+    ) {
+        self.observe_one_by_one(prepared, locals, groups, sd, rows);
+    }
+
+    /// The same, by [`Model::observe`].
+    #[inline(always)]
+    fn observe_one_by_one(
+        &self,
+        prepared: &Self::Prepared,
+        locals: &[u32],
+        groups: impl Fn(usize) -> usize,
+        sd: &[f64],
+        rows: &mut GroupRows<'_>,
+    ) {
+        for (t, &local) in locals.iter().enumerate() {
+            let (group, mut rows) = (groups(t), rows.part(t, locals.len()));
+            self.observe(prepared, local as usize, group, &mut rows);
+            let count = rows.constant.len();
+            rows.weigh(&sd[group * count..][..count]);
+        }
+    }
+
+    /// Writes observed minus computed alone, as [`Model::observe`] does; false where the model does not know how.
+    fn misclose(
+        &self,
+        _prepared: &Self::Prepared,
+        _local: usize,
+        _group: usize,
+        _constant: &mut [f64],
+    ) -> bool {
+        false
+    }
+
+    /// What [`Model::observe`] writes, of the observations of a tie. Not called where the layout has no ties.
     fn observe_tie(&self, _prepared: &Self::Prepared, _tie: usize, _rows: &mut TieRows<'_>) {}
 
     /// Applies a step to the unknowns. By default it is added; a model whose unknowns are not the numbers that the columns of its partials
@@ -323,13 +366,17 @@ impl<M: Model> Equations for Linearized<'_, M> {
     fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let layout = self.problem.layout();
         self.problem.model.observe(&self.prepared, local, group, rows);
-        let sd = &self.observation_sd[group * layout.rows()..][..layout.rows()];
-        self.weight(sd, rows.constant, [&mut *rows.local, &mut *rows.kept, &mut *rows.common]);
-        if let Some(fixed) = &self.fixed {
-            let of = |unknown: usize| fixed[unknown];
-            leave_out(rows.local, sd.len(), layout.local_range(local).map(of));
-            leave_out(rows.kept, sd.len(), layout.kept_range(layout.kept_of(group)).map(of));
-            leave_out(rows.common, sd.len(), layout.common_columns(group).map(of));
+        rows.weigh(&self.observation_sd[group * layout.rows()..][..layout.rows()]);
+        self.adapt(local, group, rows);
+    }
+
+    #[inline(always)]
+    fn write_alike(&self, locals: &[u32], groups: impl Fn(usize) -> usize, rows: &mut GroupRows<'_>) {
+        self.problem.model.observe_alike(&self.prepared, locals, &groups, self.observation_sd, rows);
+        if self.reweighting.is_some() || self.fixed.is_some() {
+            for (t, &local) in locals.iter().enumerate() {
+                self.adapt(local as usize, groups(t), &mut rows.part(t, locals.len()));
+            }
         }
     }
 
@@ -338,7 +385,10 @@ impl<M: Model> Equations for Linearized<'_, M> {
         self.problem.model.observe_tie(&self.prepared, tie, rows);
         let first = layout.groups() * layout.rows();
         let sd = &self.observation_sd[first..][layout.tie_rows(tie)];
-        self.weight(sd, rows.constant, [&mut *rows.coefficients]);
+        weigh(sd, rows.constant, [&mut *rows.coefficients]);
+        if let Some(reweighting) = self.reweighting {
+            reweighting.apply(rows.constant, &mut [&mut *rows.coefficients]);
+        }
         if let Some(fixed) = &self.fixed {
             leave_out(rows.coefficients, sd.len(), layout.tie_columns(tie).map(|unknown| fixed[unknown]));
         }
@@ -350,19 +400,40 @@ impl<M: Model> Equations for Linearized<'_, M> {
 }
 
 impl<M: Model> Linearized<'_, M> {
-    /// Gives equations unit weight, and less where a loss says so.
+    /// Takes weight off equations of unit weight where a loss says so, and leaves out the columns of fixed unknowns.
     #[inline(always)]
-    fn weight<const N: usize>(&self, sd: &[f64], constant: &mut [f64], mut parts: [&mut [f64]; N]) {
-        let widths = parts.each_ref().map(|part| part.len() / constant.len());
-        for (row, sd) in sd.iter().enumerate() {
-            constant[row] /= sd;
-            let weight = sd.recip();
-            for (part, width) in parts.iter_mut().zip(widths) {
-                part[row * width..][..width].iter_mut().for_each(|value| *value *= weight);
-            }
-        }
+    fn adapt(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let GroupRows { constant, local: own, kept, common } = rows;
         if let Some(reweighting) = self.reweighting {
-            reweighting.apply(constant, &mut parts);
+            reweighting.apply(constant, &mut [&mut **own, &mut **kept, &mut **common]);
+        }
+        if let Some(fixed) = &self.fixed {
+            let (layout, count) = (self.problem.layout(), constant.len());
+            let of = |unknown: usize| fixed[unknown];
+            leave_out(own, count, layout.local_range(local).map(of));
+            leave_out(kept, count, layout.kept_range(layout.kept_of(group)).map(of));
+            leave_out(common, count, layout.common_columns(group).map(of));
+        }
+    }
+}
+
+impl GroupRows<'_> {
+    /// Gives the equations of a group unit weight.
+    #[inline(always)]
+    fn weigh(&mut self, sd: &[f64]) {
+        weigh(sd, self.constant, [&mut *self.local, &mut *self.kept, &mut *self.common]);
+    }
+}
+
+/// Gives equations unit weight.
+#[inline(always)]
+fn weigh<const N: usize>(sd: &[f64], constant: &mut [f64], mut parts: [&mut [f64]; N]) {
+    let widths = parts.each_ref().map(|part| part.len() / constant.len());
+    for (row, sd) in sd.iter().enumerate() {
+        constant[row] /= sd;
+        let weight = sd.recip();
+        for (part, width) in parts.iter_mut().zip(widths) {
+            part[row * width..][..width].iter_mut().for_each(|value| *value *= weight);
         }
     }
 }

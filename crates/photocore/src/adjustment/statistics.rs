@@ -134,12 +134,19 @@ impl<M: Model> Problem<M> {
     /// The same at values that are prepared already.
     pub(super) fn residuals_at(&self, pool: &ThreadPool, prepared: &M::Prepared) -> Vec<f64> {
         let layout = self.layout();
-        let by_local = self.for_locals(pool, |buffers, local| {
-            let mut residuals = Vec::with_capacity(layout.groups_of(local).len() * layout.rows());
-            for group in layout.groups_of(local) {
-                let mut rows = buffers.rows(layout, group);
-                self.model.observe(prepared, local, group, &mut rows);
-                residuals.extend_from_slice(rows.constant);
+        let rows = layout.rows();
+        let by_stretch = self.for_stretches(pool, |buffers, locals| {
+            let groups = layout.groups_of(locals.start).start..layout.groups_of(locals.end - 1).end;
+            let mut residuals = vec![0.0; groups.len() * rows];
+            let mut own = residuals.chunks_exact_mut(rows.max(1));
+            for local in locals {
+                for (group, own) in layout.groups_of(local).zip(&mut own) {
+                    if !self.model.misclose(prepared, local, group, own) {
+                        let mut rows = buffers.rows(layout, group);
+                        self.model.observe(prepared, local, group, &mut rows);
+                        own.copy_from_slice(rows.constant);
+                    }
+                }
             }
             residuals
         });
@@ -147,7 +154,7 @@ impl<M: Model> Problem<M> {
             self.model.observe_tie(prepared, tie, rows);
             rows.constant.to_vec()
         });
-        let mut residuals = by_local.concat();
+        let mut residuals = by_stretch.concat();
         by_tie.iter().for_each(|of_tie| residuals.extend_from_slice(of_tie));
         residuals
     }

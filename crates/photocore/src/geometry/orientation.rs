@@ -105,6 +105,13 @@ impl Orientation {
         &self.pose
     }
 
+    /// The pose, where its unknowns are those of a step of it ([`Pose::step`]) with cartesian coordinates.
+    #[inline(always)]
+    pub fn stepping_pose(&self) -> Option<&Pose> {
+        let plain = matches!(self.unknowns, Unknowns::Position { shifts: None, turns: None, rates: None });
+        plain.then_some(&self.pose)
+    }
+
     /// The cartesian position of the projection centre.
     #[inline]
     pub fn centre(&self) -> Vector3 {

@@ -30,6 +30,18 @@ impl Pose {
         Vector3::from_fn(|k, _| self.attitude.column(k).dot(&d))
     }
 
+    /// Partials of one image coordinate with respect to a step, dC and rho, and to the position of the point, given its gradient g with
+    /// respect to u.
+    #[inline(always)]
+    pub fn chain(&self, u: &Vector3, g: &Vector3) -> ([f64; 6], [f64; 3]) {
+        // A g row by row, for the reason given above.
+        let row = |i: usize| {
+            self.attitude[(i, 0)] * g.x + self.attitude[(i, 1)] * g.y + self.attitude[(i, 2)] * g.z
+        };
+        let ([x, y, z], moment) = ([row(0), row(1), row(2)], u.cross(g));
+        ([-x, -y, -z, -moment.x, -moment.y, -moment.z], [x, y, z])
+    }
+
     /// Distance of a point from the projection centre along the optical axis: negative behind the camera.
     pub fn depth(&self, point: &Vector3) -> f64 {
         -self.attitude.column(2).dot(&(point - self.position))

@@ -65,6 +65,7 @@ mod effects;
 mod error;
 mod group_tests;
 mod groups;
+mod in_lanes;
 mod model;
 mod mounts;
 mod naming;

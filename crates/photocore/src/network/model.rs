@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
+use super::in_lanes::{FEWEST, Sight, write_in_lanes};
 use super::mounts::{Mount, mounted};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::parts::Parts;
@@ -14,7 +15,7 @@ use super::stations::{Bent, Placed, Refracted, Station, Stations, write_in_its_p
 use super::{Image, Minimum, Point};
 use crate::adjustment::{Model, Motions, Weighted};
 use crate::geometry::angle_axis::rotation_angle_axis;
-use crate::geometry::camera::each_camera;
+use crate::geometry::camera::{CameraModel, each_camera};
 use crate::geometry::{
     self, AttitudeNumbers, Camera, ObjectSpace, Orientation, PoseNumbers, Refraction, RotationSense, Vector3,
     Vertical,
@@ -374,6 +375,41 @@ impl Model for Bundle {
             }
             Some(bent) => bent.write(stations, image, local, rows),
         }
+    }
+
+    #[inline(always)]
+    fn observe_alike(
+        &self,
+        stations: &Stations,
+        locals: &[u32],
+        groups: impl Fn(usize) -> usize,
+        sd: &[f64],
+        rows: &mut GroupRows<'_>,
+    ) {
+        let sight = |t: usize| {
+            let group = groups(t);
+            let (image, sd) = (&self.images[group], [sd[2 * group], sd[2 * group + 1]]);
+            Sight { point: &stations.points[locals[t] as usize], image, sd }
+        };
+        // The main block of an image that is not mounted is its photo.
+        let written = stations.bent.is_none() && locals.len() >= FEWEST && {
+            let Station { orientation, camera } = &stations.photos[self.images[groups(0)].photo];
+            each_camera!(camera, camera => write_in_lanes(orientation, camera, locals.len(), &sight, rows))
+        };
+        if !written {
+            self.observe_one_by_one(stations, locals, groups, sd, rows);
+        }
+    }
+
+    fn misclose(&self, stations: &Stations, local: usize, group: usize, constant: &mut [f64]) -> bool {
+        if stations.bent.is_some() {
+            return false;
+        }
+        let image = &self.images[group];
+        let Station { orientation, camera } = &stations.photos[image.photo];
+        let u = orientation.sight(&stations.points[local]);
+        constant.copy_from_slice(&each_camera!(camera, camera => camera.compare(&u, image.xy).0));
+        true
     }
 
     fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut TieRows<'_>) {

@@ -467,7 +467,7 @@ impl Others {
                 add(&self.inverse[(start + i) * self.width + column..], *value);
             }
             let mut values = [0.0; LANES];
-            copy_vectors::<S>(&sums, &mut values);
+            copy_vectors::<S>(simd, &sums, &mut values);
             q += dot(&values, &x[first..]);
         }
         q
@@ -504,7 +504,7 @@ impl Others {
             }
             for (sums, other) in along.iter().zip([y, x]) {
                 let mut values = [0.0; LANES];
-                copy_vectors::<S>(sums, &mut values);
+                copy_vectors::<S>(simd, sums, &mut values);
                 q += dot(&values, &other[first..]);
             }
         }
@@ -555,7 +555,7 @@ impl Others {
             }
             let count = LANES.min(width - first);
             for d in 0..L {
-                copy_vectors::<S>(&sums[d], &mut self.hq[d * width + first..][..count]);
+                copy_vectors::<S>(simd, &sums[d], &mut self.hq[d * width + first..][..count]);
             }
         }
     }

@@ -7,10 +7,10 @@ use smallvec::SmallVec;
 
 use super::layout::Layout;
 use super::panels::skip_ref;
-use super::stack::{Stack, parts_of, united};
+use super::stack::{Stack, parts_of, united, unlike};
 use super::system::System;
 use super::triangle::Triangle;
-use super::vectorised::{Kernel, dot, run, size};
+use super::vectorised::{Kernel, dot, dot_by_fours, run, size};
 
 impl Stack {
     /// Appends what the elimination has left.
@@ -44,7 +44,8 @@ impl Coupled {
         self.main = self.ranges.len();
         if layout.has_common() {
             let groups = system.incidence.groups_of(layout, first as usize);
-            let parts = groups.iter().flat_map(|&group| parts_of(layout, symbolic, group as usize));
+            let parts =
+                unlike(layout, groups).into_iter().flat_map(|group| parts_of(layout, symbolic, group));
             for (position, unknowns) in united(parts.map(|(position, unknowns, _)| (position, unknowns))) {
                 let start = symbolic.range(position).start;
                 self.ranges.push(start + unknowns.start..start + unknowns.end);
@@ -177,8 +178,12 @@ impl Kernel for Solve<'_, '_> {
         for (index, range) in self.coupled.ranges.iter().enumerate() {
             let width = if index < self.coupled.main { size::<D>(range.len()) } else { range.len() };
             let x = &self.others[range.start..][..width];
-            for (value, row) in own.iter_mut().zip(coupling[at..].chunks_exact(width.max(1))) {
-                *value -= dot(row, x);
+            let rows = own.iter_mut().zip(coupling[at..].chunks_exact(width.max(1)));
+            // The width of a main block is known where this is compiled: its sum needs no loop.
+            if index < self.coupled.main {
+                rows.for_each(|(value, row)| *value -= dot(row, x));
+            } else {
+                rows.for_each(|(value, row)| *value -= dot_by_fours(row, x));
             }
             at += count * width;
         }

@@ -10,6 +10,15 @@ pub trait Equations: Sync {
     /// Writes the equations of one group of a local block, every element of `rows`.
     fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>);
 
+    /// Writes those of one group each of several local blocks, one after the other: `groups` says which. All are alike: they have the same
+    /// main block, and as much in common with others.
+    #[inline(always)]
+    fn write_alike(&self, locals: &[u32], groups: impl Fn(usize) -> usize, rows: &mut GroupRows<'_>) {
+        for (t, &local) in locals.iter().enumerate() {
+            self.write(local as usize, groups(t), &mut rows.part(t, locals.len()));
+        }
+    }
+
     /// Writes the equations of one tie, every element of `rows`. Not called where the layout has no ties.
     fn write_tie(&self, _tie: usize, _rows: &mut TieRows<'_>) {}
 
@@ -40,6 +49,26 @@ pub struct GroupRows<'a> {
     /// Coefficients of what the group has in common with others (rows x [`Layout::common_width`]): those of its further kept blocks in
     /// their order, then those of its range of the border.
     pub common: &'a mut [f64],
+}
+
+impl GroupRows<'_> {
+    /// Those of one of so many groups that are alike.
+    #[inline(always)]
+    pub(crate) fn part(&mut self, t: usize, count: usize) -> GroupRows<'_> {
+        GroupRows {
+            constant: part(self.constant, t, count),
+            local: part(self.local, t, count),
+            kept: part(self.kept, t, count),
+            common: part(self.common, t, count),
+        }
+    }
+}
+
+/// One of so many equal parts.
+#[inline(always)]
+fn part(all: &mut [f64], t: usize, count: usize) -> &mut [f64] {
+    let width = all.len() / count;
+    &mut all[t * width..][..width]
 }
 
 /// Weights of the unknowns themselves: equations `x_i = constant_i` of the given weight. The first two have the length of the

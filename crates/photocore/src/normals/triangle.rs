@@ -1,7 +1,5 @@
 //! The Cholesky factor of a local block.
 
-use std::cmp::Ordering::Greater;
-
 use pulp::Simd;
 
 use super::vectorised::LANES;
@@ -54,11 +52,9 @@ impl Triangle {
             for k in 0..j {
                 pivot -= l[j][k] * l[j][k];
             }
-            if !matches!(pivot.partial_cmp(&(PIVOT_TOLERANCE * matrix[j][j])), Some(Greater)) {
-                regular = false;
-                pivot = 1.0;
-            }
-            l[j][j] = pivot.sqrt().recip();
+            let kept = pivot > PIVOT_TOLERANCE * matrix[j][j];
+            regular &= kept;
+            l[j][j] = if kept { pivot } else { 1.0 }.sqrt().recip();
             for i in j + 1..N {
                 let mut value = matrix[i][j];
                 for k in 0..j {
@@ -68,6 +64,58 @@ impl Triangle {
             }
         }
         regular
+    }
+
+    /// Factors as many matrices as there are lanes, in these, as [`Triangle::factor`] does: the triangles, and one for each that is regular,
+    /// zero for the others.
+    #[inline(always)]
+    pub fn factor_lanes<S: Simd, const N: usize>(
+        simd: S,
+        matrices: &[[[f64; LANES]; N]; N],
+    ) -> ([[[f64; LANES]; N]; N], [f64; LANES]) {
+        let (mut found, mut regular) = ([[[0.0; LANES]; N]; N], [1.0; LANES]);
+        let (zero, one) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0));
+        for v in 0..LANES / S::F64_LANES {
+            let mut l = [[zero; N]; N];
+            let mut sound = one;
+            for j in 0..N {
+                let diagonal = S::as_simd_f64s(&matrices[j][j]).0[v];
+                let mut pivot = diagonal;
+                for k in 0..j {
+                    pivot = simd.sub_f64s(pivot, simd.mul_f64s(l[j][k], l[j][k]));
+                }
+                let least = simd.mul_f64s(simd.splat_f64s(PIVOT_TOLERANCE), diagonal);
+                let kept = simd.greater_than_f64s(pivot, least);
+                sound = simd.select_f64s(kept, sound, zero);
+                l[j][j] = simd.div_f64s(one, simd.sqrt_f64s(simd.select_f64s(kept, pivot, one)));
+                for i in j + 1..N {
+                    let mut value = S::as_simd_f64s(&matrices[i][j]).0[v];
+                    for k in 0..j {
+                        value = simd.sub_f64s(value, simd.mul_f64s(l[i][k], l[j][k]));
+                    }
+                    l[i][j] = simd.mul_f64s(value, l[j][j]);
+                }
+            }
+            for a in 0..N {
+                for b in 0..a + 1 {
+                    S::as_mut_simd_f64s(&mut found[a][b]).0[v] = l[a][b];
+                }
+            }
+            S::as_mut_simd_f64s(&mut regular).0[v] = sound;
+        }
+        (found, regular)
+    }
+
+    /// The triangle in one lane.
+    #[inline(always)]
+    pub fn in_lane<const N: usize>(lanes: &[[[f64; LANES]; N]; N], t: usize) -> Self {
+        let mut found = Self::default();
+        for a in 0..N {
+            for b in 0..a + 1 {
+                found.values[a][b] = lanes[a][b][t];
+            }
+        }
+        found
     }
 
     /// Replaces a matrix of N rows of the given width by L^-1 times it.
@@ -115,5 +163,45 @@ impl Triangle {
 fn subtract_row(row: &mut [f64], factor: f64, other: &[f64]) {
     for (value, other) in row.iter_mut().zip(other) {
         *value -= factor * other;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pulp::{Arch, WithSimd};
+
+    use super::*;
+
+    type Matrices = [[[f64; LANES]; 3]; 3];
+
+    struct Factor<'a>(&'a Matrices);
+
+    impl WithSimd for Factor<'_> {
+        type Output = (Matrices, [f64; LANES]);
+
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            Triangle::factor_lanes(simd, self.0)
+        }
+    }
+
+    /// The last lane holds a singular matrix, the others positive definite ones.
+    fn matrix(t: usize) -> [[f64; 3]; 3] {
+        let x = t as f64;
+        let weight = if t + 1 < LANES { 2.0 + x } else { 0.0 };
+        [[4.0 + x, 0.0, 0.0], [1.0 - x, 5.0 + x * x, 0.0], [0.0, 0.0, weight]]
+    }
+
+    #[test]
+    fn lanes_are_factored_as_single_matrices_are() {
+        let mut lanes = Matrices::default();
+        for (t, a, b) in (0..LANES).flat_map(|t| (0..9).map(move |k| (t, k / 3, k % 3))) {
+            lanes[a][b][t] = matrix(t)[a][b];
+        }
+        let (triangles, regular) = Arch::new().dispatch(Factor(&lanes));
+        for t in 0..LANES {
+            let mut expected = Triangle::default();
+            assert_eq!(expected.factor(&matrix(t)), regular[t] == 1.0);
+            assert_eq!(Triangle::in_lane(&triangles, t).values, expected.values);
+        }
     }
 }

@@ -144,9 +144,9 @@ pub(super) fn add_right<S: Simd>(
                 sums[1][k] = simd.mul_add_f64s(vectors[k], vectors[k], sums[1][k]);
             }
         }
-        add_sums::<S, 1>(&mut right[i..], 0, sign, &[sums[0]], height);
+        add_sums::<S, 1>(simd, &mut right[i..], 0, sign, &[sums[0]], height);
         if let Some(diagonal) = &mut diagonal {
-            add_sums::<S, 1>(&mut diagonal[i..], 0, 1.0, &[sums[1]], height);
+            add_sums::<S, 1>(simd, &mut diagonal[i..], 0, 1.0, &[sums[1]], height);
         }
     }
 }
@@ -168,6 +168,20 @@ pub(super) fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + last.iter().zip(end).map(|(a, b)| a * b).sum::<f64>()
 }
 
+/// The product of two short vectors, summed in four parts that do not wait for each other.
+#[inline(always)]
+pub(super) fn dot_by_fours(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, last), (b, end)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..4 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    let rest: f64 = last.iter().zip(end).map(|(a, b)| a * b).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
 /// target += the sum over rows of a[row][i] b[row].
 #[inline(always)]
 pub(super) fn add_side<S: Simd>(
@@ -185,7 +199,7 @@ pub(super) fn add_side<S: Simd>(
             sums[k] = simd.mul_add_f64s(vectors[k], factor, sums[k]);
         }
     }
-    add_sums::<S, 1>(target, 0, 1.0, &[sums], LANES);
+    add_sums::<S, 1>(simd, target, 0, 1.0, &[sums], LANES);
 }
 
 /// target += the sum over `parts` equal parts of a and v of a^T a - v^T v. Both are summed together, part by part: where the
@@ -227,7 +241,7 @@ fn add_columns<S: Simd, const N: usize, const C: usize>(
     for &(sign, a, b) in products {
         sum::<S, C>(simd, &mut sums, sign, a, i, b, j, 0..a.count);
     }
-    add_sums::<S, C>(target, stride, 1.0, &sums, LANES.min(products[0].1.width - i));
+    add_sums::<S, C>(simd, target, stride, 1.0, &sums, LANES.min(products[0].1.width - i));
     C
 }
 
@@ -248,7 +262,7 @@ fn add_difference_columns<S: Simd, const C: usize>(
         sum::<S, C>(simd, &mut sums, 1.0, a, i, a, j, part * of_a..(part + 1) * of_a);
         sum::<S, C>(simd, &mut sums, -1.0, v, i, v, j, part * of_v..(part + 1) * of_v);
     }
-    add_sums::<S, C>(target, stride, 1.0, &sums, LANES.min(a.width - i));
+    add_sums::<S, C>(simd, target, stride, 1.0, &sums, LANES.min(a.width - i));
 }
 
 /// Adds `sign` times the products of elements i and on of the rows of a with elements j and on of those of b to the sums: as many
@@ -283,26 +297,36 @@ fn sum<S: Simd, const C: usize>(
 /// Adds `sign` times the first `height` elements of the sums to columns of the target.
 #[inline(always)]
 fn add_sums<S: Simd, const C: usize>(
+    simd: S,
     target: &mut [f64],
     stride: usize,
     sign: f64,
     sums: &[[S::f64s; LANES]; C],
     height: usize,
 ) {
+    let sign = simd.splat_f64s(sign);
     for c in 0..C {
-        let mut values = [0.0; LANES];
-        copy_vectors::<S>(&sums[c], &mut values);
         let column = &mut target[c * stride..][..height];
-        for k in 0..height {
-            column[k] += sign * values[k];
+        for k in 0..LANES / S::F64_LANES {
+            let part = part_in_vector::<S>(column, k);
+            let sum = simd.mul_add_f64s(sums[c][k], sign, simd.partial_load_f64s(part));
+            simd.partial_store_f64s(part, sum);
         }
     }
 }
 
+/// The elements of at most [`LANES`] ones that vector `k` holds.
+#[inline(always)]
+fn part_in_vector<S: Simd>(all: &mut [f64], k: usize) -> &mut [f64] {
+    let (first, end) = (k * S::F64_LANES, (k + 1) * S::F64_LANES);
+    let count = all.len();
+    &mut all[first.min(count)..end.min(count)]
+}
+
 /// Copies the first elements of [`LANES`] ones in vectors.
 #[inline(always)]
-pub(super) fn copy_vectors<S: Simd>(vectors: &[S::f64s; LANES], target: &mut [f64]) {
-    let mut values = [0.0; LANES];
-    S::as_mut_simd_f64s(&mut values).0.copy_from_slice(&vectors[..LANES / S::F64_LANES]);
-    target.copy_from_slice(&values[..target.len()]);
+pub(super) fn copy_vectors<S: Simd>(simd: S, vectors: &[S::f64s; LANES], target: &mut [f64]) {
+    for k in 0..LANES / S::F64_LANES {
+        simd.partial_store_f64s(part_in_vector::<S>(target, k), vectors[k]);
+    }
 }

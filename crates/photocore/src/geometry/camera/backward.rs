@@ -34,6 +34,8 @@ pub trait BackwardModel: Copy {
     const CONSTANTS: usize;
     /// See [`CameraModel::FORMULA`].
     const FORMULA: &'static str;
+    /// See [`CameraModel::IN_LANES`].
+    const IN_LANES: bool = false;
 
     /// See [`CameraModel::with_parameters`].
     fn with_parameters(parameters: Self::Parameters) -> Self;
@@ -68,6 +70,7 @@ impl<T: BackwardModel> CameraModel for T {
     const CONSTANTS: usize = <T as BackwardModel>::CONSTANTS;
     const FORMULA: &'static str = <T as BackwardModel>::FORMULA;
     const LENS: LensDirection = LensDirection::Backward;
+    const IN_LANES: bool = <T as BackwardModel>::IN_LANES;
 
     fn with_parameters(parameters: <T as BackwardModel>::Parameters) -> Self {
         BackwardModel::with_parameters(parameters)

@@ -3,7 +3,7 @@
 use super::Unit;
 use super::backward::{BackwardModel, Corrected};
 use super::inverse::{RadialFactor, RadialLimit, from_radial};
-use super::radial_tangential::{Bent, RadialTangential};
+use super::radial_tangential::{Bent, RadialTangential, Terms, power_of};
 
 /// Radial and tangential corrections, affinity and shear, backward: functions of measured coordinates, which they are added to.
 ///
@@ -62,6 +62,9 @@ pub struct BrownTerms {
 }
 
 impl BrownTerms {
+    /// What its lens has.
+    const TERMS: Terms = Terms { powers: [3, 0], prism: false };
+
     /// The lens that they are: 1 + R is its radial factor.
     #[inline(always)]
     pub(super) fn lens(&self) -> RadialTangential {
@@ -76,12 +79,12 @@ impl BrownTerms {
     #[inline(always)]
     pub(super) fn partials(&self, bent: &Bent, place: [f64; 2]) -> [[f64; 2]; 5] {
         let square = self.balance * self.balance;
-        let [k1, k2, k3] = [1, 2, 3].map(|power| {
-            let (free, whole) = (square.powi(power), bent.by_numerator(power));
+        let radial = |power: i32| {
+            let (free, whole) = (power_of(square, power), bent.by_numerator(power));
             [whole[0] - free * place[0], whole[1] - free * place[1]]
-        });
+        };
         let [p1, p2] = bent.by_tangential();
-        [k1, k2, k3, p1, p2]
+        [radial(1), radial(2), radial(3), p1, p2]
     }
 }
 
@@ -103,6 +106,7 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
         ("r0", Unit::Image),
     ];
     const CONSTANTS: usize = 1;
+    const IN_LANES: bool = !AFTER;
     const FORMULA: &'static str = if AFTER {
         "X = x - xp, Y = y - yp, R = K1 (r^2 - r0^2) + K2 (r^4 - r0^4) + K3 (r^6 - r0^6), corrected = (X + X R + P1 (r^2 + 2 X^2) + \
          2 P2 X Y + b1 X + b2 Y, Y + Y R + P2 (r^2 + 2 Y^2) + 2 P1 X Y), residual = corrected - image, image = c (u1, u2) / u3"
@@ -134,16 +138,16 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
     fn correct(&self, measured: [f64; 2]) -> Corrected<[f64; 11]> {
         let ([dx, dy], place) = self.place(measured);
         let ([a1, a2], [b1, b2]) = self.affine();
-        let bent = self.terms.lens().bend(place);
+        let bent = self.terms.lens().bend_by(place, BrownTerms::TERMS);
         let [[xx, xy], [yx, yy]] = bent.by_place;
         let by_measured = [[xx * (1.0 + a1) + b1, xx * a2 + xy + b2], [yx * (1.0 + a1), yx * a2 + yy]];
         let by_affinity = |along: [f64; 2]| along.map(|d| if AFTER { [d, 0.0] } else { [xx * d, yx * d] });
         let [by_b1, by_b2] = by_affinity([dx, dy]);
-        let by_terms = self.terms.partials(&bent, place);
+        let [k1, k2, k3, p1, p2] = self.terms.partials(&bent, place);
         // r0 is never free.
         let row = |k: usize| {
-            let ([to_x, to_y], [k1, k2, k3, p1, p2]) = (by_measured[k], by_terms.map(|by| by[k]));
-            [0.0, -to_x, -to_y, k1, k2, k3, p1, p2, by_b1[k], by_b2[k], 0.0]
+            let [to_x, to_y] = by_measured[k];
+            [0.0, -to_x, -to_y, k1[k], k2[k], k3[k], p1[k], p2[k], by_b1[k], by_b2[k], 0.0]
         };
         Corrected {
             xy: [bent.xy[0] + b1 * dx + b2 * dy, bent.xy[1]],

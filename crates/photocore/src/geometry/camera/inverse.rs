@@ -32,6 +32,13 @@ pub struct RadialFactor {
 }
 
 impl RadialFactor {
+    /// 1.
+    pub const NONE: Self = {
+        let (mut numerator, mut denominator) = ([0.0; 7], [0.0; 4]);
+        (numerator[0], denominator[0]) = (1.0, 1.0);
+        Self { numerator, denominator }
+    };
+
     /// 1 + k1 q + k2 q^2 + ...; terms beyond the sixth do not count.
     pub fn polynomial(terms: &[f64]) -> Self {
         let numerator = std::array::from_fn(|i| match i.checked_sub(1) {
@@ -202,8 +209,8 @@ pub fn inverted([[a, b], [c, d]]: Matrix2) -> Matrix2 {
 
 /// A matrix times a vector.
 #[inline(always)]
-pub fn times(m: &Matrix2, v: [f64; 2]) -> [f64; 2] {
-    m.map(|row| row[0] * v[0] + row[1] * v[1])
+pub fn times([x, y]: &Matrix2, v: [f64; 2]) -> [f64; 2] {
+    [x[0] * v[0] + x[1] * v[1], y[0] * v[0] + y[1] * v[1]]
 }
 
 /// The place that a map (its value and partials) takes to `target`, by Newton's method from `start`; None where there is none near, or

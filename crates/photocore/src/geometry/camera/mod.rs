@@ -40,6 +40,8 @@ pub trait CameraModel: Copy {
     const DOWN: bool = false;
     /// Whether the adjustment compiles its equations in line: for cameras of a few operations, where a call would show.
     const IN_LINE: bool = false;
+    /// Whether the adjustment computes several images side by side: for cameras without branches.
+    const IN_LANES: bool = false;
 
     /// The camera with the given parameters.
     fn with_parameters(parameters: Self::Parameters) -> Self;

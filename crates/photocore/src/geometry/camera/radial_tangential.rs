@@ -117,12 +117,22 @@ impl RadialTangential {
     }
 }
 
+/// A positive power as products: what is called for it could not be part of a vector.
+#[inline(always)]
+pub fn power_of(x: f64, power: i32) -> f64 {
+    let mut product = x;
+    for _ in 1..power {
+        product *= x;
+    }
+    product
+}
+
 impl Bent {
     /// By the coefficient of q^i in N.
     #[inline(always)]
     pub fn by_numerator(&self, power: i32) -> [f64; 2] {
-        let scale = self.square.powi(power) * self.reciprocal;
-        self.place.map(|value| scale * value)
+        let (scale, [a, b]) = (power_of(self.square, power) * self.reciprocal, self.place);
+        [scale * a, scale * b]
     }
 
     /// By the coefficient of q^i in D.
@@ -135,8 +145,8 @@ impl Bent {
     #[inline(always)]
     pub fn by_tangential(&self) -> [[f64; 2]; 2] {
         let ([a, b], q) = (self.place, self.square);
-        let whole = [[q + 2.0 * a * a, 2.0 * a * b], [2.0 * a * b, q + 2.0 * b * b]];
-        whole.map(|by| by.map(|value| self.profile * value))
+        let (profile, cross) = (self.profile, self.profile * (2.0 * a * b));
+        [[profile * (q + 2.0 * a * a), cross], [cross, profile * (q + 2.0 * b * b)]]
     }
 
     /// By p3, p4 of the profile.

@@ -93,36 +93,35 @@ struct Parts {
 }
 
 impl Parts {
+    /// Nothing but a lens that bends nothing.
     #[inline(always)]
-    fn new<const N: usize>(roles: &[Role; N], values: &[f64; N]) -> Self {
-        let lens = RadialTangential {
-            radial: RadialFactor::polynomial(&[]),
-            tangential: [0.0; 2],
-            prism: [[0.0; 2]; 2],
-        };
+    fn none() -> Self {
+        let lens =
+            RadialTangential { radial: RadialFactor::NONE, tangential: [0.0; 2], prism: [[0.0; 2]; 2] };
         let (origin, own) = ([0.0; 2], [0.0; 2]);
-        let mut parts = Self { focal: [0.0; 2], shear: 0.0, skew: 0.0, origin, own, lens, profile: [0.0; 2] };
-        for (role, &value) in roles.iter().zip(values) {
-            match *role {
-                Role::F => parts.focal = parts.focal.map(|focal| focal + value),
-                Role::Fx | Role::B1 => parts.focal[0] += value,
-                Role::Fy => parts.focal[1] += value,
-                Role::Cx => parts.origin[0] += value,
-                Role::Cy => parts.origin[1] += value,
-                Role::W => parts.origin[0] += 0.5 * value,
-                Role::H => parts.origin[1] += 0.5 * value,
-                Role::B2 => parts.shear += value,
-                Role::Skew => parts.skew = value,
-                Role::Own(k) => parts.own[k] = value,
-                Role::N(power) => parts.lens.radial.numerator[power] = value,
-                Role::D(power) => parts.lens.radial.denominator[power] = value,
-                Role::T(k) => parts.lens.tangential[k] = value,
-                Role::S(k) => parts.lens.prism[k / 2][k % 2] = value,
-                Role::P(k) => parts.profile[k] = value,
-            }
+        Self { focal: [0.0; 2], shear: 0.0, skew: 0.0, origin, own, lens, profile: [0.0; 2] }
+    }
+
+    /// Takes the value of a parameter.
+    #[inline(always)]
+    fn take(&mut self, role: Role, value: f64) {
+        match role {
+            Role::F => (self.focal[0], self.focal[1]) = (self.focal[0] + value, self.focal[1] + value),
+            Role::Fx | Role::B1 => self.focal[0] += value,
+            Role::Fy => self.focal[1] += value,
+            Role::Cx => self.origin[0] += value,
+            Role::Cy => self.origin[1] += value,
+            Role::W => self.origin[0] += 0.5 * value,
+            Role::H => self.origin[1] += 0.5 * value,
+            Role::B2 => self.shear += value,
+            Role::Skew => self.skew = value,
+            Role::Own(k) => self.own[k] = value,
+            Role::N(power) => self.lens.radial.numerator[power] = value,
+            Role::D(power) => self.lens.radial.denominator[power] = value,
+            Role::T(k) => self.lens.tangential[k] = value,
+            Role::S(k) => self.lens.prism[k / 2][k % 2] = value,
+            Role::P(k) => self.profile[k] = value,
         }
-        parts.shear += parts.skew * parts.focal[0];
-        parts
     }
 
     /// The place that a lens bends, and what it is then.
@@ -140,7 +139,7 @@ impl Parts {
                 by_place: bent.by_place,
             };
         }
-        let straight = RadialFactor::polynomial(&[]);
+        let straight = RadialFactor::NONE;
         let first = RadialTangential { tangential: [0.0; 2], prism: [[0.0; 2]; 2], ..self.lens };
         let first = first.bend_by(ab, Terms { prism: false, ..terms });
         let last = RadialTangential { radial: straight, ..self.lens };
@@ -206,12 +205,10 @@ trait Table<const N: usize>: Copy {
     const ROLES: [Role; N];
     const TERMS: Terms = terms(&Self::ROLES);
 
-    fn values(&self) -> &[f64; N];
+    fn parts(&self) -> Parts;
 
-    #[inline(always)]
-    fn parts(&self) -> Parts {
-        Parts::new(&Self::ROLES, self.values())
-    }
+    /// The partials of x and y by the parameters.
+    fn by_parameters(parts: &Parts, seen: &Seen, bending: &Bending) -> [[f64; N]; 2];
 
     #[inline(always)]
     fn place(&self, u: &Vector3) -> [f64; 2] {
@@ -225,12 +222,12 @@ trait Table<const N: usize>: Copy {
         let parts = self.parts();
         let seen = Self::Projection::project([u.x, -u.y, -u.z], parts.own);
         let bending = parts.bend(seen.ab, Self::ACTION, Self::TERMS);
-        let by_ray = [0, 1, 2]
-            .map(|k| parts.moved(super::inverse::times(&bending.by_place, seen.by_ray.map(|row| row[k]))));
-        let by_u = |row: usize| Vector3::new(by_ray[0][row], -by_ray[1][row], -by_ray[2][row]);
-        let columns = Self::ROLES.map(|role| parts.by(role, &seen, &bending));
-        let by = |row: usize| std::array::from_fn(|k| columns[k][row]);
-        Image { xy: parts.image(bending.last.xy), by_u: [by_u(0), by_u(1)], by_parameters: [by(0), by(1)] }
+        let [a, b] = &seen.by_ray;
+        let by_ray = |k: usize| parts.moved(super::inverse::times(&bending.by_place, [a[k], b[k]]));
+        let [x, y, z] = [by_ray(0), by_ray(1), by_ray(2)];
+        let by_u = |row: usize| Vector3::new(x[row], -y[row], -z[row]);
+        let by_parameters = Self::by_parameters(&parts, &seen, &bending);
+        Image { xy: parts.image(bending.last.xy), by_u: [by_u(0), by_u(1)], by_parameters }
     }
 
     fn sight(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
@@ -268,7 +265,7 @@ trait Table<const N: usize>: Copy {
 /// last `constants` of them are never unknowns.
 macro_rules! cameras_of_vision {
     ($($(#[$doc:meta])* $name:ident[$count:literal] = $said:literal, $projection:ident, $action:ident, $constants:literal,
-       $formula:expr, [$($parameter:literal: $role:expr),* $(,)?];)*) => {$(
+       $formula:expr, [$($parameter:literal: $role:expr),* $(,)?] $(, $lanes:ident)?;)*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct $name {
@@ -281,9 +278,24 @@ macro_rules! cameras_of_vision {
             const ACTION: Action = Action::$action;
             const ROLES: [Role; $count] = [$($role),*];
 
+            // Parameter by parameter, not in a loop: so the numbers are in registers, and lanes can be made of them.
             #[inline(always)]
-            fn values(&self) -> &[f64; $count] {
-                &self.parameters
+            #[allow(unused_assignments)]
+            fn parts(&self) -> Parts {
+                let (mut parts, mut at) = (Parts::none(), 0);
+                $(parts.take($role, self.parameters[at]);
+                at += 1;)*
+                parts.shear += parts.skew * parts.focal[0];
+                parts
+            }
+
+            #[inline(always)]
+            #[allow(unused_assignments)]
+            fn by_parameters(parts: &Parts, seen: &Seen, bending: &Bending) -> [[f64; $count]; 2] {
+                let (mut by, mut at) = ([[0.0; $count]; 2], 0);
+                $([by[0][at], by[1][at]] = parts.by($role, seen, bending);
+                at += 1;)*
+                by
             }
         }
 
@@ -294,6 +306,7 @@ macro_rules! cameras_of_vision {
             const PARAMETERS: &'static [(&'static str, Unit)] = &[$(($parameter, $role.unit())),*];
             const CONSTANTS: usize = $constants;
             const DOWN: bool = true;
+            $(const $lanes: bool = true;)?
             const FORMULA: &'static str = $formula;
 
             fn with_parameters(parameters: [f64; $count]) -> Self {
@@ -312,6 +325,7 @@ macro_rules! cameras_of_vision {
                 self.place(u)
             }
 
+            #[inline(always)]
             fn linearize(&self, u: &Vector3) -> Image<[f64; $count]> {
                 self.with_partials(u)
             }
@@ -372,12 +386,12 @@ cameras_of_vision! {
     /// SIMPLE_RADIAL of COLMAP: one radial term.
     SimpleRadial[4] = "simple_radial", Central, Whole, 0,
         central!("(f A + cx, f B + cy)", "(A, B) = (a, b) (1 + k r^2)"),
-        ["f": F, "cx": Cx, "cy": Cy, "k": N(1)];
+        ["f": F, "cx": Cx, "cy": Cy, "k": N(1)], IN_LANES;
     /// OPENCV of COLMAP: two radial and two tangential terms; p1, p2 are P2, P1 of photogrammetry.
     Opencv[8] = "opencv", Central, Whole, 0,
         central!("(fx A + cx, fy B + cy)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4) + (2 p1 a b + p2 (r^2 + 2 a^2), p1 (r^2 + 2 b^2) + 2 p2 a b)"),
-        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0)];
+        ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0)], IN_LANES;
     /// FULL_OPENCV of COLMAP: a rational radial factor; k3 stands behind p2.
     FullOpencv[12] = "full_opencv", Central, Whole, 0,
         central!("(fx A + cx, fy B + cy)",

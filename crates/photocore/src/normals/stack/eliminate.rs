@@ -18,21 +18,57 @@ impl Stack {
         run(layout, self.kept_dim(), Eliminate { stack: self, layout, prior, damping });
     }
 
+    /// Eliminates some local blocks, from the first on, side by side: at most as many as there are lanes.
     #[inline(always)]
-    fn eliminate_one<S: Simd, const L: usize, const D: usize>(
+    fn eliminate_some<S: Simd, const L: usize, const D: usize>(
         &mut self,
         simd: S,
+        locals: Range<usize>,
+        rows: usize,
+        (layout, prior): (&Layout, &Prior),
+        damping: f64,
+    ) {
+        let (mut normals, mut rights) = ([[[0.0; LANES]; L]; L], [[0.0; L]; LANES]);
+        for (lane, t) in locals.clone().enumerate() {
+            let (mut normal, mut right) = prior.of_local::<L>(layout, self.locals[t] as usize);
+            self.add_equations(t, rows, &mut normal, &mut right);
+            for a in 0..L {
+                normal[a][a] *= 1.0 + damping;
+                for b in 0..a + 1 {
+                    normals[a][b][lane] = normal[a][b];
+                }
+            }
+            rights[lane] = right;
+        }
+        // What lanes without a local block make of their zeros is not looked at.
+        let (triangles, regular) = Triangle::factor_lanes::<S, L>(simd, &normals);
+        for (lane, t) in locals.enumerate() {
+            if regular[lane] == 0.0 {
+                self.deficient.push(self.locals[t] as usize);
+            }
+            let (triangle, right) = (Triangle::in_lane(&triangles, lane), &mut rights[lane]);
+            triangle.forward::<L>(right, 1);
+            self.decrease += right.iter().map(|v| v * v).sum::<f64>();
+            self.reduced[t * L..][..L].copy_from_slice(right);
+            self.couple::<S, L, D>(simd, t, rows, &triangle);
+            self.triangles[t] = triangle;
+        }
+    }
+
+    /// Adds the equations of local block `t` of the stack to its normal equations, and to the sum of squares.
+    #[inline(always)]
+    fn add_equations<const L: usize>(
+        &mut self,
         t: usize,
         rows: usize,
-        mut normal: [[f64; L]; L],
-        mut right: [f64; L],
-        damping: f64,
+        normal: &mut [[f64; L]; L],
+        right: &mut [f64; L],
     ) {
         for slot in &self.slots {
             for (k, p) in slot.groups.clone().enumerate() {
                 let constants =
                     &self.constants[slot.constants + (t * slot.groups.len() + k) * rows..][..rows];
-                let own = &self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L];
+                let own = &self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L];
                 for (row, constant) in own.as_chunks::<L>().0.iter().zip(constants) {
                     for a in 0..L {
                         right[a] += row[a] * constant;
@@ -44,16 +80,6 @@ impl Stack {
                 }
             }
         }
-        (0..L).for_each(|d| normal[d][d] *= 1.0 + damping);
-        let mut triangle = Triangle::default();
-        if !triangle.factor(&normal) {
-            self.deficient.push(self.locals[t] as usize);
-        }
-        triangle.forward::<L>(&mut right, 1);
-        self.decrease += right.iter().map(|v| v * v).sum::<f64>();
-        self.reduced[t * L..][..L].copy_from_slice(&right);
-        self.couple::<S, L, D>(simd, t, rows, &triangle);
-        self.triangles[t] = triangle;
     }
 
     /// Computes the coupling V of local block `t` of the stack to everything else.
@@ -71,20 +97,20 @@ impl Stack {
             for first in (0..dim).step_by(LANES) {
                 let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
                 for (k, p) in slot.groups.clone().enumerate() {
-                    let own = &self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L];
+                    let own = &self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L];
                     let at = slot.kept + (t * slot.groups.len() + k) * rows * dim;
                     add_rows::<S, L>(simd, &mut sums, own, &self.kept_rows[at + first..], dim);
                 }
                 triangle.forward_vectors::<S, L>(simd, &mut sums);
-                write_sums::<S, L>(&sums, coupling, dim, first);
+                write_sums::<S, L>(simd, &sums, coupling, dim, first);
             }
         }
         for segment in &self.segments {
             if segment.plain {
                 let stack = (&self.places[..], &self.local_rows[..], &self.common_rows[..]);
-                let width = segment.unknowns.len();
+                let (width, depth) = (segment.unknowns.len(), self.locals.len());
                 let coupling = &mut self.coupling[segment.coupling + t * L * width..];
-                couple_runs::<S, L>(simd, stack, segment, t, rows, triangle, coupling);
+                couple_runs::<S, L>(simd, stack, segment, (t, depth), rows, triangle, coupling);
             }
         }
         if !self.segments.iter().all(|segment| segment.plain) {
@@ -99,7 +125,7 @@ impl Stack {
             self.coupling[segment.coupling + t * L * width..][..L * width].fill(0.0);
         }
         for (p, &Place { ref parts, width, rows: start }) in self.places.iter().enumerate() {
-            let own = &self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L];
+            let own = &self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L];
             let common = &self.common_rows[start + t * rows * width..][..rows * width];
             for part in &self.parts[parts.clone()] {
                 let segment = &self.segments[part.segment];
@@ -129,22 +155,23 @@ struct Eliminate<'a> {
 impl Kernel for Eliminate<'_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
-        for t in 0..self.stack.locals.len() {
-            let (normal, right) = self.prior.of_local::<L>(self.layout, self.stack.locals[t] as usize);
-            let rows = size::<R>(self.layout.rows());
-            self.stack.eliminate_one::<S, L, D>(simd, t, rows, normal, right, self.damping);
+        let (rows, count) = (size::<R>(self.layout.rows()), self.stack.locals.len());
+        for first in (0..count).step_by(LANES) {
+            let locals = first..count.min(first + LANES);
+            let given = (self.layout, self.prior);
+            self.stack.eliminate_some::<S, L, D>(simd, locals, rows, given, self.damping);
         }
     }
 }
 
-/// The coupling V of local block `t` of a stack to a segment that runs are all of: their products summed in registers, L^-1 times them
+/// The coupling V of local block `t` of the `depth` of a stack to a segment that runs are all of: their products summed in registers, L^-1 times them
 /// written. The stack is its places, coefficients of local blocks and those that are in common with others.
 #[inline(always)]
 fn couple_runs<S: Simd, const L: usize>(
     simd: S,
     (places, local_rows, common_rows): (&[Place], &[f64], &[f64]),
     segment: &Segment,
-    t: usize,
+    (t, depth): (usize, usize),
     rows: usize,
     triangle: &Triangle,
     coupling: &mut [f64],
@@ -155,13 +182,13 @@ fn couple_runs<S: Simd, const L: usize>(
         for run in &segment.runs {
             for p in run.places.clone() {
                 let Place { width: stride, rows: start, .. } = places[p];
-                let own = &local_rows[(t * places.len() + p) * rows * L..][..rows * L];
+                let own = &local_rows[(p * depth + t) * rows * L..][..rows * L];
                 let at = start + t * rows * stride + run.column + first;
                 add_rows::<S, L>(simd, &mut sums, own, &common_rows[at..], stride);
             }
         }
         triangle.forward_vectors::<S, L>(simd, &mut sums);
-        write_sums::<S, L>(&sums, coupling, width, first);
+        write_sums::<S, L>(simd, &sums, coupling, width, first);
     }
 }
 
@@ -189,6 +216,7 @@ fn add_rows<S: Simd, const L: usize>(
 /// Writes sums to the columns of a coupling of so many from `first` on.
 #[inline(always)]
 fn write_sums<S: Simd, const L: usize>(
+    simd: S,
     sums: &[[S::f64s; LANES]; L],
     coupling: &mut [f64],
     width: usize,
@@ -196,7 +224,7 @@ fn write_sums<S: Simd, const L: usize>(
 ) {
     let height = LANES.min(width - first);
     for d in 0..L {
-        copy_vectors::<S>(&sums[d], &mut coupling[d * width + first..][..height]);
+        copy_vectors::<S>(simd, &sums[d], &mut coupling[d * width + first..][..height]);
     }
 }
 

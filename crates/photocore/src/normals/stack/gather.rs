@@ -23,19 +23,25 @@ impl Stack {
     #[inline(always)]
     fn write(&mut self, system: &System, equations: &impl Equations) {
         let (rows, l) = (system.layout.rows(), system.layout.local_dim());
-        for (t, &local) in self.locals.iter().enumerate() {
-            let groups = system.incidence.groups_of(&system.layout, local as usize);
-            for slot in &self.slots {
-                for (k, p) in slot.groups.clone().enumerate() {
-                    let at = t * slot.groups.len() + k;
-                    let Place { width, rows: common, .. } = self.places[p];
+        let (depth, incidence) = (self.locals.len(), &system.incidence);
+        for slot in &self.slots {
+            // Where each local block has one group on the main block, all of them stand one after the other.
+            let together = if slot.groups.len() == 1 { depth } else { 1 };
+            let count = together * rows;
+            for (k, p) in slot.groups.clone().enumerate() {
+                let Place { width, rows: common, .. } = self.places[p];
+                for t in (0..depth).step_by(together) {
+                    let at = (t * slot.groups.len() + k) * rows;
                     let mut part = GroupRows {
-                        constant: &mut self.constants[slot.constants + at * rows..][..rows],
-                        local: &mut self.local_rows[(t * groups.len() + p) * rows * l..][..rows * l],
-                        kept: &mut self.kept_rows[slot.kept + at * rows * slot.dim..][..rows * slot.dim],
-                        common: &mut self.common_rows[common + t * rows * width..][..rows * width],
+                        constant: &mut self.constants[slot.constants + at..][..count],
+                        local: &mut self.local_rows[(p * depth + t) * rows * l..][..count * l],
+                        kept: &mut self.kept_rows[slot.kept + at * slot.dim..][..count * slot.dim],
+                        common: &mut self.common_rows[common + t * rows * width..][..count * width],
                     };
-                    equations.write(local as usize, groups[p] as usize, &mut part);
+                    let locals = &self.locals[t..t + together];
+                    let group =
+                        |t: usize| incidence.groups_of(&system.layout, locals[t] as usize)[p] as usize;
+                    equations.write_alike(locals, group, &mut part);
                 }
             }
         }
@@ -188,6 +194,18 @@ pub(in crate::normals) fn parts_of<'a>(
         (symbolic.blocks() - 1, border, column)
     });
     further.chain(own)
+}
+
+/// Groups less those that have the same in common with others as one before: the cameras of a flight are few.
+pub(in crate::normals) fn unlike(layout: &Layout, groups: &[u32]) -> SmallVec<[usize; 4]> {
+    let mut found: SmallVec<[usize; 4]> = SmallVec::new();
+    let common = |group: usize| (layout.further_of(group), layout.border_of(group));
+    for group in groups.iter().map(|&group| group as usize) {
+        if !found.iter().take(4).any(|&other| common(other) == common(group)) {
+            found.push(group);
+        }
+    }
+    found
 }
 
 /// Unites ranges of the unknowns of blocks that overlap or meet, in the order of their positions.

@@ -14,7 +14,7 @@ use super::symbolic::Symbolic;
 use super::triangle::Triangle;
 use super::vectorised::{LANES, Rows, Side, size};
 
-pub(super) use gather::{parts_of, united};
+pub(super) use gather::{parts_of, united, unlike};
 
 /// A main kept block that the local blocks are tied to.
 #[derive(Debug, Clone)]
@@ -181,7 +181,7 @@ impl Stack {
     /// The coefficients of local block `t` of the stack in group `p` of the pattern.
     #[inline(always)]
     pub fn local_rows<const L: usize>(&self, t: usize, p: usize, rows: usize) -> &[[f64; L]] {
-        self.local_rows[(t * self.places.len() + p) * rows * L..][..rows * L].as_chunks().0
+        self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L].as_chunks().0
     }
 
     /// The coefficients of a segment in all equations of some groups of one of its runs, group by group and local block by local block.

@@ -1,0 +1,261 @@
+//! The equations of several images of one photo, computed side by side in the lanes of vectors.
+
+use pulp::{Arch, Simd, WithSimd};
+
+use super::Image;
+use crate::geometry::{self, CameraModel, Orientation, Pose, Vector3};
+use crate::normals::GroupRows;
+
+/// Images that are computed side by side.
+const LANES: usize = 8;
+/// So many images at the least are worth it.
+pub(super) const FEWEST: usize = 2;
+/// Parameters that a camera has at the most.
+const PARAMETERS: usize = 16;
+
+/// A number of each of the images.
+type Lanes = [f64; LANES];
+
+/// A point, its image, and the standard deviations of that.
+pub(super) struct Sight<'a> {
+    pub point: &'a geometry::Point,
+    pub image: &'a Image,
+    pub sd: [f64; 2],
+}
+
+/// Writes the equations, in unit weight, of so many images of one photo, one after the other; false where the camera or the pose is not
+/// one for it.
+#[inline(always)]
+pub(super) fn write_in_lanes<'s, C: CameraModel>(
+    orientation: &Orientation,
+    camera: &C,
+    count: usize,
+    sight: &impl Fn(usize) -> Sight<'s>,
+    rows: &mut GroupRows<'_>,
+) -> bool {
+    if C::IN_LANES
+        && let Some(pose) = orientation.stepping_pose()
+    {
+        let mut lanes = Input::default();
+        for first in (0..count).step_by(LANES) {
+            let own = LANES.min(count - first);
+            // What stands in the lanes beyond is computed too, and not looked at.
+            for t in 0..own {
+                lanes.put(t, &sight(first + t));
+            }
+            write(pose, camera, &lanes, first..first + own, count, rows);
+        }
+        return true;
+    }
+    false
+}
+
+/// What the images are computed from.
+#[derive(Default, Clone, Copy)]
+struct Input {
+    point: [Lanes; 3],
+    image: [Lanes; 2],
+    sd: [Lanes; 2],
+}
+
+impl Input {
+    #[inline(always)]
+    fn put(&mut self, t: usize, sight: &Sight<'_>) {
+        let position = sight.point.position();
+        for k in 0..3 {
+            self.point[k][t] = position[k];
+        }
+        for k in 0..2 {
+            (self.image[k][t], self.sd[k][t]) = (sight.image.xy[k], sight.sd[k]);
+        }
+    }
+}
+
+/// The equations of x or of y, column by column.
+struct Columns {
+    constant: Lanes,
+    point: [Lanes; 3],
+    photo: [Lanes; 6],
+    camera: [Lanes; PARAMETERS],
+}
+
+impl Columns {
+    const ZERO: Self = Self {
+        constant: [0.0; LANES],
+        point: [[0.0; LANES]; 3],
+        photo: [[0.0; LANES]; 6],
+        camera: [[0.0; LANES]; PARAMETERS],
+    };
+
+    /// Puts one equation into a lane.
+    #[inline(always)]
+    fn put(
+        &mut self,
+        t: usize,
+        residual: f64,
+        (by_photo, by_point): &([f64; 6], [f64; 3]),
+        by_camera: &[f64],
+        sd: f64,
+    ) {
+        let weight = sd.recip();
+        self.constant[t] = residual / sd;
+        for k in 0..3 {
+            self.point[k][t] = by_point[k] * weight;
+        }
+        for k in 0..6 {
+            self.photo[k][t] = by_photo[k] * weight;
+        }
+        for k in 0..by_camera.len() {
+            self.camera[k][t] = by_camera[k] * weight;
+        }
+    }
+}
+
+/// Computes some images, and writes them to their places among `count`.
+#[inline(never)]
+fn write<C: CameraModel>(
+    pose: &Pose,
+    camera: &C,
+    input: &Input,
+    places: std::ops::Range<usize>,
+    count: usize,
+    rows: &mut GroupRows<'_>,
+) {
+    Arch::new().dispatch(Compute { pose, camera, input, places, count, rows });
+}
+
+struct Compute<'a, 'r, C> {
+    pose: &'a Pose,
+    camera: &'a C,
+    input: &'a Input,
+    places: std::ops::Range<usize>,
+    count: usize,
+    rows: &'a mut GroupRows<'r>,
+}
+
+impl<C: CameraModel> WithSimd for Compute<'_, '_, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { input, places, count, rows, .. } = self;
+        // Copies: nothing that is written can be one of them, so that the compiler makes vectors of the lanes.
+        let (pose, camera) = (*self.pose, *self.camera);
+        let Input { point, image, sd } = *input;
+        let (mut x, mut y) = (Columns::ZERO, Columns::ZERO);
+        for t in 0..LANES {
+            let u = pose.sight(&Vector3::new(point[0][t], point[1][t], point[2][t]));
+            let (residual, computed) = camera.compare(&u, [image[0][t], image[1][t]]);
+            // One after the other, not in a loop, which would keep them in memory.
+            let [by_x, by_y] = &computed.by_parameters;
+            x.put(t, residual[0], &pose.chain(&u, &computed.by_u[0]), by_x.as_ref(), sd[0][t]);
+            y.put(t, residual[1], &pose.chain(&u, &computed.by_u[1]), by_y.as_ref(), sd[1][t]);
+        }
+        let (width, shared) = (rows.kept.len() / (2 * count), rows.common.len() / (2 * count));
+        let parameters = C::PARAMETERS.len();
+        for (t, place) in places.enumerate() {
+            for (row, own) in [&x, &y].into_iter().enumerate() {
+                let at = 2 * place + row;
+                rows.constant[at] = own.constant[t];
+                put(&mut rows.local[3 * at..][..3], &own.point, t);
+                put(&mut rows.kept[width * at..][..6], &own.photo, t);
+                if width > 6 {
+                    put(&mut rows.kept[width * at + 6..][..parameters], &own.camera, t);
+                }
+                if shared > 0 {
+                    put(&mut rows.common[shared * at..][..parameters], &own.camera, t);
+                }
+            }
+        }
+    }
+}
+
+/// Takes one lane of some columns.
+#[inline(always)]
+fn put(target: &mut [f64], columns: &[Lanes], t: usize) {
+    for (value, column) in target.iter_mut().zip(columns) {
+        *value = column[t];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Camera, Matrix3, ObjectSpace, Point, rotation};
+
+    /// The rows of so many images that have their camera in common with others.
+    fn rows_of(count: usize, parameters: usize, fill: impl FnOnce(&mut GroupRows<'_>)) -> Vec<f64> {
+        let mut parts = [1, 3, 6, parameters].map(|width| vec![0.0; 2 * count * width]);
+        let [constant, local, kept, common] = &mut parts;
+        fill(&mut GroupRows { constant, local, kept, common });
+        parts.concat()
+    }
+
+    fn compare(camera: &Camera, orientation: &Orientation) {
+        let count = LANES + 3;
+        let points: Vec<Point> = (0..count)
+            .map(|t| {
+                let t = t as f64;
+                Point::new(ObjectSpace::Rectangular, [17.0 * t - 80.0, 90.0 - 13.0 * t, (5.0 * t) % 7.0])
+            })
+            .collect();
+        let images: Vec<Image> = points
+            .iter()
+            .map(|point| {
+                let [x, y] = camera.image(&orientation.sight(point));
+                Image { photo: 0, point: 0, xy: [x + 0.01, y - 0.02], sd: [0.004, 0.005] }
+            })
+            .collect();
+        let sight = |t: usize| Sight { point: &points[t], image: &images[t], sd: images[t].sd };
+        let parameters = camera.parameters().len();
+        let found = rows_of(count, parameters, |rows| {
+            let written = crate::geometry::camera::each_camera!(
+                camera, camera => write_in_lanes(orientation, camera, count, &sight, rows)
+            );
+            assert!(written, "{}", camera.name());
+        });
+        let expected = rows_of(count, parameters, |rows| {
+            for t in 0..count {
+                let Sight { point, image, sd } = sight(t);
+                let u = orientation.sight(point);
+                let (residual, computed) = camera.compare(&u, image.xy);
+                let projection = orientation.projection(
+                    &u,
+                    &geometry::camera::Image {
+                        xy: computed.xy,
+                        by_u: computed.by_u,
+                        by_parameters: [[0.0]; 2],
+                    },
+                    point,
+                );
+                for row in 0..2 {
+                    let (at, weight) = (2 * t + row, sd[row].recip());
+                    rows.constant[at] = residual[row] * weight;
+                    (0..3).for_each(|k| rows.local[3 * at + k] = projection.point[row][k] * weight);
+                    (0..6).for_each(|k| rows.kept[6 * at + k] = projection.photo[row][k] * weight);
+                    let own = &computed.by_parameters[row];
+                    (0..parameters).for_each(|k| rows.common[parameters * at + k] = own[k] * weight);
+                }
+            }
+        });
+        for (found, expected) in found.iter().zip(&expected) {
+            let size = expected.abs().max(1e-6);
+            assert!((found - expected).abs() < 1e-12 * size, "{}: {found} {expected}", camera.name());
+        }
+    }
+
+    #[test]
+    fn lanes_write_what_single_images_do() {
+        let attitude: Matrix3 = rotation([0.02, -0.03, 1.1]).transpose();
+        let orientation = Orientation::stepping(ObjectSpace::Rectangular, [3.0, -4.0, 150.0], &attitude);
+        let cameras: [(&str, &[f64]); 4] = [
+            ("perspective", &[-152.7]),
+            ("opencv", &[152.7, 152.6, 0.02, -0.015, -6e-4, 2e-4, 2e-5, -3e-5]),
+            ("simple_radial", &[152.7, 0.1, -0.2, -6e-4]),
+            ("brown", &[-152.7, 0.01, -0.02, 1e-8, 1e-12, 0.0, 1e-7, -1e-7, 1e-5, -1e-5, 0.0]),
+        ];
+        for (name, parameters) in cameras {
+            compare(&Camera::named(name, parameters).unwrap(), &orientation);
+        }
+    }
+}
