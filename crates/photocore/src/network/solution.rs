@@ -3,8 +3,10 @@
 use std::ops::Range;
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::model::Owner;
+use super::neighbourhood::TOGETHER;
 use super::problem::Assembled;
 use super::stations::{Placed, Station};
 use super::{
@@ -48,6 +50,8 @@ pub struct AdjustedPoint {
     pub behind: usize,
 }
 
+/// Photos that a thread takes at least.
+const PHOTOS_TOGETHER: usize = 128;
 /// A redundancy of less is rounding.
 const LEAST_REDUNDANCY: f64 = 1e-9;
 
@@ -159,7 +163,7 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Puts the pieces of an adjustment back into the order of the network.
+    /// Puts the pieces of an adjustment back into the order of the network. Called on a thread of the pool.
     pub(super) fn new(
         network: &Network,
         options: &Options,
@@ -194,10 +198,8 @@ impl Solution {
                 .filter(|&own| own > LEAST_REDUNDANCY)
                 .map(|own| sums_of_squares.measured() / own),
         };
-        let mut images = vec![None; network.images.len()];
-        for (group, &image) in problem.model.order.iter().enumerate() {
-            images[image] = Some(adjustment.observed(group, network.images[image].sd));
-        }
+        let observed = |image: usize, group: usize| adjustment.observed(group, network.images[image].sd);
+        let images = in_order(network.images.len(), &problem.model.order, observed);
         let photos_end = problem.model.first[network.photos.len()];
         let of_photo = |&unknown: &usize| of_photo(problem, unknown);
         let photos = photos(network, assembled, &adjustment, &unknowns);
@@ -258,34 +260,53 @@ impl Solution {
             None => station.camera.fold(),
             Some(block) => *of_shared[block].get_or_insert_with(|| station.camera.fold()),
         };
-        let mut squares = Vec::with_capacity(points.len());
         let folds: Vec<f64> = photos.iter().zip(&model.camera_block).map(fold).collect();
-        for ((&point, &at), images) in
-            points.iter().zip(model.coordinates(unknowns)).zip(model.start.windows(2))
-        {
-            let position = model.space.cartesian(at);
-            let before = self.behind.len();
-            let mut nearest = f64::INFINITY;
-            for image in images[0]..images[1] {
+        let (local, tied) = model.all_coordinates(unknowns);
+        let look = |(own, at): (&[usize], &[f64; 3])| {
+            let position = model.space.cartesian(*at);
+            let (mut nearest, mut hidden) = (f64::INFINITY, Hidden::default());
+            for image in own[0]..own[1] {
                 let super::Image { photo, xy, .. } = model.images[image];
                 let Station { orientation, camera } = &photos[photo];
                 let u = orientation.pose().sight(&position);
                 nearest = nearest.min(u.norm_squared());
                 if !camera.faces(&u) {
-                    self.behind.push(model.order[image]);
+                    hidden.behind.push(model.order[image]);
                 }
                 if folds[photo].is_finite() && camera.radius(&u, xy) > folds[photo] {
-                    self.folded.push(model.order[image]);
+                    hidden.folded.push(model.order[image]);
                 }
             }
+            (nearest, hidden.boxed())
+        };
+        let of_points = model.start.par_windows(2).zip(local.par_iter().chain(tied));
+        let (mut squares, mut hidden) = (vec![], vec![]);
+        of_points.with_min_len(TOGETHER).map(look).unzip_into_vecs(&mut squares, &mut hidden);
+        for (&point, hidden) in points.iter().zip(hidden) {
+            let Some(hidden) = hidden else { continue };
             if let Some(point) = &mut self.points[point] {
-                point.behind = self.behind.len() - before;
+                point.behind = hidden.behind.len();
             }
-            squares.push(nearest);
+            self.behind.extend(hidden.behind);
+            self.folded.extend(hidden.folded);
         }
         self.behind.sort_unstable();
         self.folded.sort_unstable();
         squares
+    }
+}
+
+/// The images of a point that have it behind the camera, and those beyond where their lens is one-to-one.
+#[derive(Default)]
+struct Hidden {
+    behind: Vec<usize>,
+    folded: Vec<usize>,
+}
+
+impl Hidden {
+    /// None where there are none, as of nearly all points.
+    fn boxed(self) -> Option<Box<Self>> {
+        (!(self.behind.is_empty() && self.folded.is_empty())).then(|| Box::new(self))
     }
 }
 
@@ -392,7 +413,7 @@ fn photos(
             images: model.images_on[index],
         }
     };
-    network.photos.iter().enumerate().map(photo).collect()
+    network.photos.par_iter().enumerate().with_min_len(PHOTOS_TOGETHER).map(photo).collect()
 }
 
 /// The six numbers of the pose of a photo that is mounted, and their cofactors; NaN where there are none.
@@ -444,11 +465,12 @@ fn adjusted_points(
     adjustment: &Adjustment,
     unknowns: &[f64],
 ) -> Vec<Option<AdjustedPoint>> {
-    let mut adjusted = vec![None; network.points.len()];
     let (model, origin) = (&problem.model, problem.model.origin);
     let cofactors = adjustment.cofactors.as_ref();
     let corrections = last_corrections(adjustment);
-    for (i, (&point, values)) in points.iter().zip(model.coordinates(unknowns)).enumerate() {
+    let (local, tied) = model.all_coordinates(unknowns);
+    in_order(network.points.len(), points, |point, i| {
+        let values = i.checked_sub(model.locals).map_or_else(|| &local[i], |tie| &tied[tie]);
         let Point { coordinates, sd } = network.points[point];
         let absolute = |k: usize| if sd[k] == 0.0 { coordinates[k] } else { values[k] + origin[k] };
         let first = model.of_point(i).start;
@@ -457,16 +479,28 @@ fn adjusted_points(
             // The last kept blocks.
             Some(tied) => &all.kept[all.kept.len() - 9 * (points.len() - model.locals - tied)..],
         });
-        adjusted[point] = Some(AdjustedPoint {
+        AdjustedPoint {
             coordinates: std::array::from_fn(absolute),
             cofactors: leading_matrix(own),
             redundancy: adjustment.prior_redundancy(first),
             last_correction: std::array::from_fn(|k| corrections(first + k)),
             rays: model.images_of(i).len(),
             behind: 0,
-        });
-    }
-    adjusted
+        }
+    })
+}
+
+/// What `each` makes of the things of a network that take part, as the network numbers them; None for all others. `order` are those that
+/// do, as the problem has them; `each` is given both numbers.
+fn in_order<T: Send>(
+    count: usize,
+    order: &[usize],
+    each: impl Fn(usize, usize) -> T + Sync,
+) -> Vec<Option<T>> {
+    let mut place = vec![u32::MAX; count];
+    order.iter().zip(0..).for_each(|(&thing, own)| place[thing] = own);
+    let of = |(thing, &own): (usize, &u32)| (own != u32::MAX).then(|| each(thing, own as usize));
+    place.par_iter().enumerate().with_min_len(TOGETHER).map(of).collect()
 }
 
 /// The correction of each unknown in the last iteration; zero where there was none.
