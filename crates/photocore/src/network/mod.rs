@@ -65,6 +65,7 @@ mod effects;
 mod error;
 mod group_tests;
 mod groups;
+mod hidden;
 mod model;
 mod mounts;
 mod naming;
