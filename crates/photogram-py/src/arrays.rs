@@ -1,5 +1,7 @@
 //! Rows of NumPy arrays: shapes are checked here, and what is wrong is said with the name of the argument.
 
+use std::borrow::Cow;
+
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use photocore::geometry::Matrix3;
 use pyo3::import_exception;
@@ -10,11 +12,19 @@ import_exception!(photogram.errors, InputError);
 
 /// The rows of an (n, N) array.
 pub fn rows<const N: usize>(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<[f64; N]>> {
+    rows_in_place(name, array).map(Cow::into_owned)
+}
+
+/// The same, not copied where they stand one after the other.
+pub fn rows_in_place<'a, const N: usize>(
+    name: &str,
+    array: &'a PyReadonlyArrayDyn<'_, f64>,
+) -> PyResult<Cow<'a, [[f64; N]]>> {
     match array.shape() {
-        [_, columns] if *columns == N => {
-            let view = array.as_array();
-            Ok(view.as_slice().map_or_else(|| chunks(values(array)), |values| values.as_chunks().0.to_vec()))
-        }
+        [_, columns] if *columns == N => Ok(match array.as_array().to_slice() {
+            Some(values) => Cow::Borrowed(values.as_chunks().0),
+            None => Cow::Owned(chunks(values(array))),
+        }),
         shape => Err(wrong_shape(name, &format!("(n, {N})"), shape)),
     }
 }
@@ -48,15 +58,17 @@ pub fn numbers(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<
 
 /// The indices, not negative, of an (n,) array.
 pub fn indices(name: &str, array: &PyReadonlyArrayDyn<'_, i64>) -> PyResult<Vec<usize>> {
-    let negative = |index: i64| InputError::new_err(format!("{name} holds the negative index {index}"));
-    match array.shape() {
-        [_] => {
-            let (view, index) = (array.as_array(), |&i: &i64| usize::try_from(i).map_err(|_| negative(i)));
-            // A slice tells its length: there is room for all at once.
-            view.as_slice()
-                .map_or_else(|| view.iter().map(index).collect(), |all| all.iter().map(index).collect())
-        }
-        shape => Err(wrong_shape(name, "(n,)", shape)),
+    Ok(indices_in_place(name, array)?.iter().map(|&index| index as usize).collect())
+}
+
+/// The same, none of them negative, not copied where they stand one after the other.
+pub fn indices_in_place<'a>(name: &str, array: &'a PyReadonlyArrayDyn<'_, i64>) -> PyResult<Cow<'a, [i64]>> {
+    let [_] = array.shape() else { return Err(wrong_shape(name, "(n,)", array.shape())) };
+    let view = array.as_array();
+    let all = view.to_slice().map_or_else(|| Cow::Owned(view.iter().copied().collect()), Cow::Borrowed);
+    match all.iter().find(|index| **index < 0) {
+        Some(index) => Err(InputError::new_err(format!("{name} holds the negative index {index}"))),
+        None => Ok(all),
     }
 }
 

@@ -1,11 +1,8 @@
 //! What all solutions tell, as Python sees it.
 
-use numpy::{PyArray1, PyArray2};
-use photocore::adjustment::{Adjustment, Iteration, Observed, Status};
+use photocore::adjustment::{Adjustment, Iteration, Status};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-
-use crate::arrays::table;
 
 /// Number, weighted sum of squares, largest change in standard deviations, damping.
 pub type IterationRow = (usize, f64, f64, f64);
@@ -53,20 +50,4 @@ pub fn seconds<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<
     dict.set_item("invert", seconds.invert)?;
     dict.set_item("cofactors", seconds.cofactors)?;
     Ok(dict)
-}
-
-/// Two numbers of every image as an (m, 2) array; NaN for images that were left out.
-pub fn image_table<'py>(
-    py: Python<'py>,
-    images: &[Option<Observed<2>>],
-    part: impl Fn(&Observed<2>) -> [f64; 2],
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let missing = [f64::NAN; 2];
-    table(py, images.iter().map(|image| image.as_ref().map_or(missing, &part)).collect())
-}
-
-/// By how much a loss has changed the weight of every image, (m,); NaN for images that were left out.
-pub fn image_weights<'py>(py: Python<'py>, images: &[Option<Observed<2>>]) -> Bound<'py, PyArray1<f64>> {
-    let weights = images.iter().map(|image| image.map_or(f64::NAN, |image| image.weight));
-    PyArray1::from_vec(py, weights.collect())
 }

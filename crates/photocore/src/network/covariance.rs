@@ -173,7 +173,8 @@ impl Network {
         };
         let lost = found.lost;
         let adjustment = found.into_adjustment(problem, state.held.clone(), adjusted.loss, pool);
-        let mut solution = Solution::new(self, options, &assembled, adjustment, state.collapsed.clone());
+        let left_out = state.collapsed.clone();
+        let mut solution = pool.install(|| Solution::new(self, options, &assembled, adjustment, left_out));
         solution.state.datum = Some(datum.clone());
         solution.lost_digits = lost;
         Ok(solution)
@@ -257,7 +258,7 @@ impl Network {
         for &photo in &state.loose {
             *loose.get_mut(photo).ok_or(NetworkError::State)? = true;
         }
-        let screened = self.screen(&left_out, &loose);
+        let screened = pool.install(|| self.screen(&left_out, &loose));
         let assembled = pool.install(|| self.assemble(&options, screened, None))?;
         let count = assembled.problem.layout().unknowns();
         if state.unknowns.len() != count || state.held.iter().any(|&unknown| unknown >= count) {

@@ -65,6 +65,7 @@ mod effects;
 mod error;
 mod group_tests;
 mod groups;
+mod hidden;
 mod in_lanes;
 mod model;
 mod mounts;
@@ -369,7 +370,7 @@ impl Network {
         let mut before: Option<(Adjustment, problem::Reached)> = None;
         let mut beside = Beside::Untried(leaving.clone());
         loop {
-            let screened = self.screen(&leaving.points, &leaving.photos);
+            let screened = pool.install(|| self.screen(&leaving.points, &leaving.photos));
             if screened.points.is_empty() {
                 return Err(NetworkError::Empty);
             }
@@ -448,7 +449,7 @@ impl Network {
                 let collapsed = (0..leaving.points.len()).filter(|&point| leaving.points[point]).collect();
                 let minimal = datum.is_none() && assembled.is_minimal(&adjusted.unknowns, pool);
                 let (mut solution, found) =
-                    Solution::with_tried(self, options, &assembled, adjusted, collapsed);
+                    pool.install(|| Solution::with_tried(self, options, &assembled, adjusted, collapsed));
                 solution.minimal_control = minimal;
                 solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
                 solution.lost_digits = lost;
@@ -474,7 +475,8 @@ impl Network {
         pool: &ThreadPool,
     ) -> Result<problem::Assembled, NetworkError> {
         self.check()?;
-        let screened = self.screen(&vec![false; self.points.len()], &self.untouched_photos());
+        let untouched = self.untouched_photos();
+        let screened = pool.install(|| self.screen(&vec![false; self.points.len()], &untouched));
         if screened.points.is_empty() {
             return Err(NetworkError::Empty);
         }

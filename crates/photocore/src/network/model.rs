@@ -119,9 +119,14 @@ impl Bundle {
 
     /// The coordinates of all points, counted from the origin, at given values of the unknowns.
     pub fn coordinates<'a>(&self, unknowns: &'a [f64]) -> impl Iterator<Item = &'a [f64; 3]> + use<'a> {
+        let (local, tied) = self.all_coordinates(unknowns);
+        local.iter().chain(tied)
+    }
+
+    /// The same of local points, and of all others.
+    pub fn all_coordinates<'a>(&self, unknowns: &'a [f64]) -> (&'a [[f64; 3]], &'a [[f64; 3]]) {
         let photos = self.of_stations();
-        let (local, tied) = (&unknowns[..photos.start], &unknowns[photos.end..]);
-        local.as_chunks().0.iter().chain(tied.as_chunks().0)
+        (unknowns[..photos.start].as_chunks().0, unknowns[photos.end..].as_chunks().0)
     }
 
     /// The ties: images of points that are not local, then observations.

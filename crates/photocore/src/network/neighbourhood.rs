@@ -2,10 +2,14 @@
 //!
 //! The engine walks through a block region by region; points whose data lie scattered would have to be fetched one by one.
 
+use rayon::prelude::*;
+
 use super::Network;
 use super::screening::PointImages;
 use crate::geometry::Vector3;
 
+/// Points that a thread takes at least.
+pub(super) const TOGETHER: usize = 1024;
 /// Cells of the curve along each axis.
 const CELLS: f64 = (1_u32 << 20) as f64;
 
@@ -23,14 +27,40 @@ impl Network {
             // What is not finite comes first.
             interleaved(std::array::from_fn(|k| ((mean[k] - lowest[k]) / extent * (CELLS - 1.0)) as u32))
         };
-        let mut keyed: Vec<(u64, usize)> = (0..self.points.len()).map(|point| (key(point), point)).collect();
-        keyed.sort_unstable();
+        let points = (0..self.points.len()).into_par_iter().with_min_len(TOGETHER);
+        let mut keyed: Vec<(u64, usize)> = points.map(|point| (key(point), point)).collect();
+        keyed.par_sort_unstable();
         keyed.into_iter().map(|(_, point)| point).collect()
     }
 }
 
 /// The bits of three numbers of twenty bits in turn (Morton 1966).
 fn interleaved(cell: [u32; 3]) -> u64 {
-    let spread = |value: u32| (0..20).fold(0, |bits, i| bits | u64::from(value >> i & 1) << (3 * i));
+    // Halves move apart, then quarters, until each bit stands alone.
+    let steps = [
+        (32, 0x1f_0000_0000_ffff),
+        (16, 0x1f_0000_ff00_00ff),
+        (8, 0x100f_00f0_0f00_f00f),
+        (4, 0x10c3_0c30_c30c_30c3),
+        (2, 0x1249_2492_4924_9249),
+    ];
+    let spread = |value: u32| {
+        let low = u64::from(value & ((1 << 20) - 1));
+        steps.iter().fold(low, |bits, (by, mask)| (bits | bits << by) & mask)
+    };
     spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::interleaved;
+
+    #[test]
+    fn bits_stand_in_turn() {
+        for (cell, bits) in [([1, 0, 0], 1), ([0, 1, 0], 2), ([0, 0, 1], 4), ([2, 3, 0], 0b01_1010)] {
+            assert_eq!(interleaved(cell), bits);
+        }
+        assert_eq!(interleaved([u32::MAX; 3]), (1 << 60) - 1);
+        (0..20).for_each(|k| assert_eq!(interleaved([0, 1 << k, 0]), 2 << (3 * k)));
+    }
 }

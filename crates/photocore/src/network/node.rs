@@ -75,7 +75,7 @@ impl Network {
         let mut network = self.clone();
         network.release(&surroundings.outer);
         let none = (vec![false; self.points.len()], vec![false; self.photos.len()]);
-        let screened = network.screen_within(&none.0, &none.1, surroundings);
+        let screened = pool.install(|| network.screen_within(&none.0, &none.1, surroundings));
         let assembled = pool.install(|| network.assemble(options, screened, None))?;
         assembled.check_memory(options)?;
         let layout = assembled.problem.layout();
@@ -249,7 +249,7 @@ impl Node {
         let problem = &self.assembled.problem;
         let found = formed.part.invert(problem, outer, state.to_vec(), pool, watch);
         let (adjustment, below) = found.map_err(|error| self.named(error))?;
-        Ok((self.told(adjustment), below))
+        Ok((self.told(adjustment, pool), below))
     }
 
     /// What is adjusted here, without cofactors; `before` is the state before the last step.
@@ -263,11 +263,13 @@ impl Node {
         pool: &ThreadPool,
     ) -> Result<Solution, NetworkError> {
         self.check(&[state, before])?;
-        Ok(self.told(Adjustment::between(&self.assembled.problem, before, state.to_vec(), pool)))
+        let adjustment = Adjustment::between(&self.assembled.problem, before, state.to_vec(), pool);
+        Ok(self.told(adjustment, pool))
     }
 
-    fn told(&self, adjustment: Adjustment) -> Solution {
-        Solution::new(&self.network, &self.options, &self.assembled, adjustment, vec![])
+    fn told(&self, adjustment: Adjustment, pool: &ThreadPool) -> Solution {
+        let make = || Solution::new(&self.network, &self.options, &self.assembled, adjustment, vec![]);
+        pool.install(make)
     }
 
     fn check(&self, states: &[&[f64]]) -> Result<(), NetworkError> {

@@ -1,8 +1,10 @@
 //! Values that double precision holds too coarsely.
 
+use rayon::prelude::*;
 use thiserror::Error;
 
 use super::model::Bundle;
+use super::neighbourhood::TOGETHER;
 use super::screening::Screened;
 use super::stations::Station;
 use super::{Network, Start};
@@ -66,6 +68,7 @@ impl Network {
         screened: &Screened,
         uses: impl Fn(usize) -> bool,
     ) -> Result<(), Coarse> {
+        let points = screened.points.par_iter().with_min_len(TOGETHER).copied();
         let coarse =
             |values: &[f64], sd: &[f64]| values.iter().zip(sd).any(|(&value, &sd)| is_coarse(value, sd));
         let photo = |&i: &usize| {
@@ -75,23 +78,24 @@ impl Network {
         };
         let point = |&i: &usize| coarse(&self.points[i].coordinates, &self.points[i].sd);
         let photos = (0..self.photos.len()).filter(|&photo| uses(photo));
-        Coarse::refuse(photos.filter(photo), screened.points.iter().copied().filter(point))
+        let points: Vec<usize> = points.filter(point).collect();
+        Coarse::refuse(photos.filter(photo), points.into_iter())
     }
 
     /// Refuses photos and points whose values rounding has changed by more than image coordinates show: their standard deviation
-    /// as an angle, and that at the distance of the points from the photos.
+    /// as an angle, and that at the distance of the points from the photos. `model` has the images that take part.
     ///
     /// # Errors
     /// There are any.
     pub(super) fn check_resolution(
         &self,
         screened: &Screened,
+        model: &Bundle,
         distance: Option<f64>,
         start: Start,
     ) -> Result<(), Coarse> {
         let mut smallest = vec![f64::INFINITY; self.photos.len()];
-        for &image in &screened.images.order {
-            let image = &self.images[image];
+        for image in &model.images {
             smallest[image.photo] = smallest[image.photo].min(image.sd[0]).min(image.sd[1]);
         }
         // Principal distances may be unknowns, and as wrong as anything: each says of its photo only, the median of the points.

@@ -4,9 +4,12 @@
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
+use rayon::prelude::*;
+
 use super::camera_priors::CameraPrior;
 use super::commons::PlacedCommon;
 use super::model::Bundle;
+use super::neighbourhood::TOGETHER;
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::precision::median;
 use super::screening::{Dropped, Reason, Screened};
@@ -262,11 +265,13 @@ impl Network {
     pub(super) fn assemble(
         &self,
         options: &Options,
-        screened: Screened,
+        mut screened: Screened,
         reached: Option<&Reached>,
     ) -> Result<Assembled, NetworkError> {
+        let order = screened.images.order.par_iter().with_min_len(TOGETHER);
+        let images: Vec<Image> = order.map(|&image| self.images[image]).collect();
         let mut images_on = vec![0; self.photos.len()];
-        screened.images.order.iter().for_each(|&image| images_on[self.images[image].photo] += 1);
+        images.iter().for_each(|image| images_on[image.photo] += 1);
         // A frame is used when a photo on it is.
         let mut used: Vec<bool> = images_on.iter().map(|&images| images > 0).collect();
         self.mounts.iter().for_each(|mount| used[mount.frame] |= images_on[mount.photo] > 0);
@@ -278,7 +283,7 @@ impl Network {
         }
         let middle = screened.surroundings.middle.unwrap_or_else(|| self.middle());
         let origin = self.origin(middle);
-        let mut model = self.bundle(&screened, images_on.clone(), middle)?;
+        let mut model = self.bundle(&mut screened, images, images_on.clone(), middle)?;
         model.minimum = options.minimum;
         // The programs of their time stepped in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
@@ -301,8 +306,8 @@ impl Network {
             Some(reached) => screened.points.iter().map(|&point| reached.points[point]).collect(),
             None => self.start(options.start, &screened, &model, &stations)?,
         };
-        let own: Vec<[f64; 3]> = model.points.iter().map(|point| point.coordinates).collect();
-        let own_sd: Vec<[f64; 3]> = model.points.iter().map(|point| point.sd).collect();
+        let of_points =
+            |each: fn(&Point) -> [f64; 3]| -> Vec<[f64; 3]> { model.points.iter().map(each).collect() };
         let observed = self.station_values(&model, |photo| local(self.observed_pose(photo)));
         let station_sd = self.station_sd(&model, &screened.surroundings, unused);
         // Local points, photos and shared cameras, points that observations touch.
@@ -310,8 +315,15 @@ impl Network {
             let (local, tied) = points.split_at(model.locals);
             [local.as_flattened(), stations, tied.as_flattened()].concat()
         };
-        let (initial, prior, sd) =
-            (unknowns(&start, &values), unknowns(&own, &observed), unknowns(&own_sd, &station_sd));
+        let (initial, (prior, sd)) = rayon::join(
+            || unknowns(&start, &values),
+            || {
+                rayon::join(
+                    || unknowns(&of_points(|point| point.coordinates), &observed),
+                    || unknowns(&of_points(|point| point.sd), &station_sd),
+                )
+            },
+        );
         let tied = start[model.locals..].iter().map(|&at| self.space.cartesian(at));
         let centres: Vec<[f64; 3]> =
             stations.iter().map(|station| station.orientation.centre().into()).collect();
@@ -319,13 +331,14 @@ impl Network {
         let tied: Vec<[f64; 3]> = tied.map(Into::into).collect();
         let commons = model.places_of_commons(&centres, &tied);
         let places = [centres, cameras, commons, tied].concat();
-        let of_images = model.images.iter().flat_map(|image| image.sd);
-        let of_ties = model.observations.iter().flat_map(|tied| vec![1.0; tied.root.nrows()]);
+        let of_images = model.images.par_iter().with_min_len(TOGETHER).map(|image| image.sd);
+        let mut observation_sd = of_images.collect::<Vec<[f64; 2]>>().into_flattened();
+        model.observations.iter().for_each(|tied| observation_sd.extend(vec![1.0; tied.root.nrows()]));
         let held: Vec<bool> = sd.iter().map(|&sd| sd == 0.0).collect();
         let (outer, below) = screened.surroundings.blocks(&model, &screened.points)?;
         let layout = layout(&model, places)?.with_held(&held).as_part(outer, below)?;
         let problem = Problem {
-            observation_sd: of_images.chain(of_ties).collect(),
+            observation_sd,
             system: System::new(layout, options.ordering),
             initial,
             prior,
@@ -359,7 +372,8 @@ impl Network {
 
     fn bundle(
         &self,
-        screened: &Screened,
+        screened: &mut Screened,
+        images: Vec<Image>,
         images_on: Vec<usize>,
         middle: [f64; 3],
     ) -> Result<Bundle, NetworkError> {
@@ -395,15 +409,13 @@ impl Network {
         let block = |photo: &Photo| Some(self.photos.len() + shared.binary_search(&photo.camera).ok()?);
         let mounts = self.mounts_by_photo();
         let mut uses_of_commons = vec![0; self.commons.len()];
-        for image in screened.images.order.iter().filter_map(|&i| mounts.get(self.images[i].photo)?.as_ref())
-        {
-            uses_of_commons[image.sensor] += 1;
+        for mount in images.iter().filter_map(|image| mounts.get(image.photo)?.as_ref()) {
+            uses_of_commons[mount.sensor] += 1;
         }
         let commons_of = |&observation: &usize| self.observations[observation].touches().commons;
         let touched = screened.observations.iter().flat_map(commons_of);
         touched.for_each(|(common, _)| uses_of_commons[common] += 1);
         let (placed, anchor) = self.placed(screened, &mounts);
-        let images: Vec<Image> = screened.images.order.iter().map(|&image| self.images[image]).collect();
         let mut bundle = Bundle {
             space: self.space,
             poses: self.poses,
@@ -423,10 +435,10 @@ impl Network {
             mounts,
             origin,
             locals: screened.locals,
-            points: screened.points.iter().map(local_point).collect(),
+            points: screened.points.par_iter().with_min_len(TOGETHER).map(local_point).collect(),
             images,
-            start: screened.images.start.clone(),
-            order: screened.images.order.clone(),
+            start: std::mem::take(&mut screened.images.start),
+            order: std::mem::take(&mut screened.images.order),
             turning: vec![false; self.photos.len()],
             images_on,
             observations: vec![],
@@ -435,7 +447,10 @@ impl Network {
             minimum: None,
             parts: OnceLock::new(),
         };
-        let prior = |(index, camera)| CameraPrior::of(camera, self.first_parameter(&bundle, index)?);
+        let prior = |(index, camera): (usize, &Camera)| {
+            camera.covariance.as_ref()?;
+            CameraPrior::of(camera, self.first_parameter(&bundle, index)?)
+        };
         bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();
         bundle.observations = self.tied_observations(screened, &bundle)?;
         Ok(bundle)
@@ -515,12 +530,13 @@ impl Network {
         let given = || model.points.iter().map(|point| point.coordinates);
         if start == Start::Given && given().flatten().all(|value| !value.is_nan()) {
             let given: Vec<[f64; 3]> = given().collect();
-            self.check_resolution(screened, model.middle_distance(stations, Some(&given)), start)?;
+            let distance = model.middle_distance(stations, Some(&given));
+            self.check_resolution(screened, model, distance, start)?;
             return Ok(given);
         }
         let met = model.intersect(stations);
         let distance = model.middle_distance(stations, met.as_deref().ok());
-        self.check_resolution(screened, distance, start)?;
+        self.check_resolution(screened, model, distance, start)?;
         let mut met = met.map_err(|point| NetworkError::NoIntersection(screened.points[point]))?;
         if start == Start::Given {
             let known = met.iter_mut().zip(given()).filter(|(_, given)| given.iter().all(|x| !x.is_nan()));

@@ -1,6 +1,9 @@
 //! Which points take part in the adjustment.
 
+use rayon::prelude::*;
+
 use super::Network;
+use super::neighbourhood::TOGETHER;
 use super::surroundings::Surroundings;
 
 /// A point that was left out.
@@ -70,8 +73,11 @@ impl Network {
         let named = surroundings.points();
         let all = self.point_images(loose);
         let (mut points, mut dropped) = (Vec::new(), Vec::new());
-        for point in self.along_curve(&all).into_iter().filter(|&point| !left_out[point]) {
-            match self.reason(point, all.of(point)).filter(|_| !named.contains(&point)) {
+        let along = self.along_curve(&all);
+        let reasons: Vec<Option<Reason>> =
+            along.par_iter().with_min_len(TOGETHER).map(|&point| self.reason(point, all.of(point))).collect();
+        for (point, reason) in along.into_iter().zip(reasons).filter(|&(point, _)| !left_out[point]) {
+            match reason.filter(|_| !named.contains(&point)) {
                 Some(reason) => dropped.push(Dropped { point, reason }),
                 None => points.push(point),
             }

@@ -3,10 +3,12 @@
 use std::ops::Range;
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::model::Owner;
+use super::neighbourhood::TOGETHER;
 use super::problem::Assembled;
-use super::stations::{Placed, Station};
+use super::stations::Placed;
 use super::{
     AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options,
     Point, Settled, State, UnitVariance, WeakPoint,
@@ -48,6 +50,8 @@ pub struct AdjustedPoint {
     pub behind: usize,
 }
 
+/// Photos that a thread takes at least.
+const PHOTOS_TOGETHER: usize = 128;
 /// A redundancy of less is rounding.
 const LEAST_REDUNDANCY: f64 = 1e-9;
 
@@ -159,7 +163,7 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Puts the pieces of an adjustment back into the order of the network.
+    /// Puts the pieces of an adjustment back into the order of the network. Called on a thread of the pool.
     pub(super) fn new(
         network: &Network,
         options: &Options,
@@ -194,10 +198,8 @@ impl Solution {
                 .filter(|&own| own > LEAST_REDUNDANCY)
                 .map(|own| sums_of_squares.measured() / own),
         };
-        let mut images = vec![None; network.images.len()];
-        for (group, &image) in problem.model.order.iter().enumerate() {
-            images[image] = Some(adjustment.observed(group, network.images[image].sd));
-        }
+        let observed = |image: usize, group: usize| adjustment.observed(group, network.images[image].sd);
+        let images = in_order(network.images.len(), &problem.model.order, observed);
         let photos_end = problem.model.first[network.photos.len()];
         let of_photo = |&unknown: &usize| of_photo(problem, unknown);
         let photos = photos(network, assembled, &adjustment, &unknowns);
@@ -246,46 +248,6 @@ impl Solution {
         solution.adjustment.cofactors = None;
         solution.adjustment.release_observations();
         (solution, found)
-    }
-
-    /// Finds the images whose point stands behind the camera, or beyond where its lens ends; returns the squares of the distances of the
-    /// points from the nearest station.
-    fn find_behind(&mut self, Assembled { problem, points, .. }: &Assembled, unknowns: &[f64]) -> Vec<f64> {
-        let model = &problem.model;
-        let photos = model.photos(&unknowns[model.of_stations()]);
-        let mut of_shared = vec![None; model.stations()];
-        let fold = |(station, block): (&Station, &Option<usize>)| match *block {
-            None => station.camera.fold(),
-            Some(block) => *of_shared[block].get_or_insert_with(|| station.camera.fold()),
-        };
-        let mut squares = Vec::with_capacity(points.len());
-        let folds: Vec<f64> = photos.iter().zip(&model.camera_block).map(fold).collect();
-        for ((&point, &at), images) in
-            points.iter().zip(model.coordinates(unknowns)).zip(model.start.windows(2))
-        {
-            let position = model.space.cartesian(at);
-            let before = self.behind.len();
-            let mut nearest = f64::INFINITY;
-            for image in images[0]..images[1] {
-                let super::Image { photo, xy, .. } = model.images[image];
-                let Station { orientation, camera } = &photos[photo];
-                let u = orientation.pose().sight(&position);
-                nearest = nearest.min(u.norm_squared());
-                if !camera.faces(&u) {
-                    self.behind.push(model.order[image]);
-                }
-                if folds[photo].is_finite() && camera.radius(&u, xy) > folds[photo] {
-                    self.folded.push(model.order[image]);
-                }
-            }
-            if let Some(point) = &mut self.points[point] {
-                point.behind = self.behind.len() - before;
-            }
-            squares.push(nearest);
-        }
-        self.behind.sort_unstable();
-        self.folded.sort_unstable();
-        squares
     }
 }
 
@@ -392,7 +354,7 @@ fn photos(
             images: model.images_on[index],
         }
     };
-    network.photos.iter().enumerate().map(photo).collect()
+    network.photos.par_iter().enumerate().with_min_len(PHOTOS_TOGETHER).map(photo).collect()
 }
 
 /// The six numbers of the pose of a photo that is mounted, and their cofactors; NaN where there are none.
@@ -444,11 +406,12 @@ fn adjusted_points(
     adjustment: &Adjustment,
     unknowns: &[f64],
 ) -> Vec<Option<AdjustedPoint>> {
-    let mut adjusted = vec![None; network.points.len()];
     let (model, origin) = (&problem.model, problem.model.origin);
     let cofactors = adjustment.cofactors.as_ref();
     let corrections = last_corrections(adjustment);
-    for (i, (&point, values)) in points.iter().zip(model.coordinates(unknowns)).enumerate() {
+    let (local, tied) = model.all_coordinates(unknowns);
+    in_order(network.points.len(), points, |point, i| {
+        let values = i.checked_sub(model.locals).map_or_else(|| &local[i], |tie| &tied[tie]);
         let Point { coordinates, sd } = network.points[point];
         let absolute = |k: usize| if sd[k] == 0.0 { coordinates[k] } else { values[k] + origin[k] };
         let first = model.of_point(i).start;
@@ -457,16 +420,28 @@ fn adjusted_points(
             // The last kept blocks.
             Some(tied) => &all.kept[all.kept.len() - 9 * (points.len() - model.locals - tied)..],
         });
-        adjusted[point] = Some(AdjustedPoint {
+        AdjustedPoint {
             coordinates: std::array::from_fn(absolute),
             cofactors: leading_matrix(own),
             redundancy: adjustment.prior_redundancy(first),
             last_correction: std::array::from_fn(|k| corrections(first + k)),
             rays: model.images_of(i).len(),
             behind: 0,
-        });
-    }
-    adjusted
+        }
+    })
+}
+
+/// What `each` makes of the things of a network that take part, as the network numbers them; None for all others. `order` are those that
+/// do, as the problem has them; `each` is given both numbers.
+fn in_order<T: Send>(
+    count: usize,
+    order: &[usize],
+    each: impl Fn(usize, usize) -> T + Sync,
+) -> Vec<Option<T>> {
+    let mut place = vec![u32::MAX; count];
+    order.iter().zip(0..).for_each(|(&thing, own)| place[thing] = own);
+    let of = |(thing, &own): (usize, &u32)| (own != u32::MAX).then(|| each(thing, own as usize));
+    place.par_iter().enumerate().with_min_len(TOGETHER).map(of).collect()
 }
 
 /// The correction of each unknown in the last iteration; zero where there was none.

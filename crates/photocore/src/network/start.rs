@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::model::Bundle;
+use super::precision::median;
 use super::stations::Station;
 use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Point, Ray, Vector3};
@@ -21,11 +22,17 @@ impl Bundle {
     /// The point whose rays give it no place.
     pub fn intersect(&self, photos: &[Station]) -> Result<Vec<[f64; 3]>, usize> {
         let points = || (0..self.points.len()).into_par_iter().with_min_len(64);
-        let met: Vec<Option<Vector3>> = points().map(|point| meet(&self.rays(photos, point))).collect();
-        let distance = self.median_distance(photos, &met);
+        let meeting = |rays: &mut Vec<Ray>, point: usize| {
+            rays.clear();
+            rays.extend(self.rays(photos, point));
+            meet(rays)
+        };
+        let met: Vec<Option<Vector3>> = points().map_init(Vec::new, meeting).collect();
+        // Hardly ever is there one that needs it.
+        let distance = if met.contains(&None) { self.median_distance(photos, &met) } else { None };
         let place = |point: usize| {
             let met = met[point];
-            let position = met.or_else(|| Some(along(self.rays(photos, point).first()?, distance?)));
+            let position = met.or_else(|| Some(along(&self.rays(photos, point).next()?, distance?)));
             let start = match position {
                 Some(position) => self.space.coordinates(position),
                 None => self.points[point].coordinates,
@@ -37,8 +44,8 @@ impl Bundle {
         placed.into_iter().collect()
     }
 
-    fn rays(&self, photos: &[Station], point: usize) -> Vec<Ray> {
-        self.images_of(point).iter().filter_map(|image| photos[image.photo].ray(image.xy)).collect()
+    fn rays(&self, photos: &[Station], point: usize) -> impl Iterator<Item = Ray> {
+        self.images_of(point).iter().filter_map(|image| photos[image.photo].ray(image.xy))
     }
 
     /// Median distance of the intersected points from their first photos.
@@ -46,9 +53,7 @@ impl Bundle {
         let distance = |(&first, met): (&usize, &Option<Vector3>)| {
             Some((met.as_ref()? - photos[self.images[first].photo].orientation.centre()).norm())
         };
-        let mut distances: Vec<f64> = self.start.iter().zip(met).filter_map(distance).collect();
-        distances.sort_unstable_by(f64::total_cmp);
-        distances.get(distances.len() / 2).copied()
+        median(self.start.iter().zip(met).filter_map(distance).collect())
     }
 
     /// Puts the held components in place and moves the others to where the rays then pass nearest: least squares of the distances
@@ -65,7 +70,7 @@ impl Bundle {
         if held == [false; 3] || held == [true; 3] {
             return coordinates;
         }
-        let rays = self.rays(photos, point);
+        let rays: Vec<Ray> = self.rays(photos, point).collect();
         for _ in 0..3 {
             let at = Point::new(self.space, coordinates);
             let column = |k: usize| Vector3::from(at.partials().column(k));

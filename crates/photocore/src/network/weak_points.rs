@@ -1,6 +1,9 @@
 //! Points that harm what hangs on them: on rays that are nearly parallel, or much nearer to a station than all others.
 
+use rayon::prelude::*;
+
 use super::model::Bundle;
+use super::neighbourhood::TOGETHER;
 use super::precision::median;
 use super::{AdjustedPoint, Network};
 use crate::geometry::{self, Matrix3};
@@ -43,7 +46,8 @@ impl Network {
                 distance: square.sqrt() / middle,
             })
         };
-        points.iter().zip(squares).enumerate().filter_map(weak).collect()
+        let all = points.par_iter().zip(squares).enumerate();
+        all.with_min_len(TOGETHER).filter_map(weak).collect()
     }
 
     /// The cofactors of a point in the length unit, whatever its coordinates are.

@@ -1,7 +1,7 @@
 //! Nested dissection: a separator cuts the graph in two, the halves are dissected in turn, the separator is eliminated last
 //! (George 1973). The halves do not fill in between each other, and are independent subtrees of the elimination tree.
 
-use super::graph::Graph;
+use super::graph::{Graph, NOWHERE};
 use super::minimum_degree::minimum_degree;
 
 /// Parts of at most so many blocks are ordered by minimum degree.
@@ -12,7 +12,8 @@ const CUTS: [f64; 5] = [0.5, 0.44, 0.56, 0.38, 0.62];
 /// Orders a graph by nested dissection: cut across the positions of the blocks where they are given, else across the levels of
 /// a breadth-first search.
 pub(super) fn nested_dissection(graph: &Graph, places: Option<&[[f64; 3]]>) -> Vec<usize> {
-    let mut dissection = Dissection { graph, places, part: vec![0; graph.len()], parts: 0, order: vec![] };
+    let (part, place) = (vec![0; graph.len()], vec![NOWHERE; graph.len()]);
+    let mut dissection = Dissection { graph, places, part, place, parts: 0, order: vec![] };
     dissection.dissect((0..graph.len()).collect());
     dissection.order
 }
@@ -23,6 +24,8 @@ struct Dissection<'a> {
     /// Number of the part that a block was last put into: numbers are never used again.
     part: Vec<usize>,
     parts: usize,
+    /// Room for the places of blocks in a part.
+    place: Vec<u32>,
     order: Vec<usize>,
 }
 
@@ -51,7 +54,7 @@ impl Dissection<'_> {
                 self.order.extend(separator);
             }
             None => {
-                let part = self.graph.subgraph(&members);
+                let part = self.graph.subgraph(&members, &mut self.place);
                 self.order.extend(minimum_degree(&part).into_iter().map(|block| members[block]));
             }
         }
@@ -108,7 +111,7 @@ impl Dissection<'_> {
 
     /// The blocks of a part by their distance in the graph from one of its ends, component by component.
     fn breadth_first(&mut self, members: &[usize]) -> Vec<usize> {
-        let part = self.graph.subgraph(members);
+        let part = self.graph.subgraph(members, &mut self.place);
         part.breadth_first_line().into_iter().map(|block| members[block]).collect()
     }
 }

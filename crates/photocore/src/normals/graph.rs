@@ -1,8 +1,12 @@
 //! Which kept blocks share a local block, a tie or what a system below leaves.
 
-use std::collections::{HashMap, VecDeque};
+use rayon::prelude::*;
 
 use super::layout::Layout;
+use super::symbolic::MANY;
+
+/// The place of a block that is not in a list.
+pub(crate) const NOWHERE: u32 = u32::MAX;
 
 /// Which kept blocks share a local block, a tie or what a system below leaves: an undirected graph in compressed form, neighbours ascending.
 #[derive(Debug, Clone)]
@@ -21,37 +25,38 @@ impl Graph {
         for (index, tie) in ties.iter().enumerate() {
             tie.iter().for_each(|&block| ties_of[block as usize].push(index));
         }
-        let mut locals_of = vec![Vec::new(); kept];
-        for local in 0..layout.locals() {
-            for block in layout.groups_of(local).flat_map(|group| layout.blocks_of(group)) {
-                let list: &mut Vec<usize> = &mut locals_of[block];
-                if list.last() != Some(&local) {
-                    list.push(local);
-                }
-            }
-        }
-        let mut ptr = vec![0];
-        let mut neighbours = Vec::new();
-        let mut seen_by = vec![usize::MAX; kept];
-        for (block, locals) in locals_of.iter().enumerate() {
-            seen_by[block] = block;
-            let start = neighbours.len();
-            let mut join = |other: usize| {
-                if seen_by[other] != block {
-                    seen_by[other] = block;
-                    neighbours.push(other as u32);
+        let (local_ptr, locals) = locals_by_block(layout);
+        let joined = |seen_by: &mut Vec<u32>, block: usize| {
+            let mut neighbours = Vec::new();
+            seen_by[block] = block as u32;
+            let mut join = |other: u32| {
+                if std::mem::replace(&mut seen_by[other as usize], block as u32) != block as u32 {
+                    neighbours.push(other);
                 }
             };
-            for &local in locals {
-                layout.groups_of(local).flat_map(|group| layout.blocks_of(group)).for_each(&mut join);
+            for &local in &locals[local_ptr[block]..local_ptr[block + 1]] {
+                layout.main_blocks_of(local as usize).iter().copied().for_each(&mut join);
+                layout.all_further_of(local as usize).iter().copied().for_each(&mut join);
             }
             for &tie in &ties_of[block] {
-                ties[tie].iter().for_each(|&other| join(other as usize));
+                ties[tie].iter().copied().for_each(&mut join);
             }
-            neighbours[start..].sort_unstable();
-            ptr.push(neighbours.len());
-        }
-        Self { ptr, neighbours }
+            neighbours.sort_unstable();
+            neighbours
+        };
+        let unseen = || vec![u32::MAX; kept];
+        let all: Vec<Vec<u32>> = if kept < MANY {
+            let mut seen_by = unseen();
+            (0..kept).map(|block| joined(&mut seen_by, block)).collect()
+        } else {
+            (0..kept).into_par_iter().with_min_len(MANY / 4).map_init(unseen, joined).collect()
+        };
+        let mut ptr = vec![0];
+        ptr.extend(all.iter().scan(0, |end, own| {
+            *end += own.len();
+            Some(*end)
+        }));
+        Self { ptr, neighbours: all.concat() }
     }
 
     /// Number of blocks.
@@ -74,52 +79,51 @@ impl Graph {
     }
 
     /// The blocks reachable from `start` among those not yet `done`, breadth first, neighbours by rising degree;
-    /// with the number of levels.
-    pub(crate) fn breadth_first(&self, start: usize, done: &[bool]) -> (Vec<usize>, usize) {
-        let mut level = HashMap::from([(start, 1)]);
+    /// with the number of levels. `level` is room for the level of every block: zeros, and so it is left.
+    fn breadth_first(&self, start: usize, done: &[bool], level: &mut [u32]) -> (Vec<usize>, u32) {
+        level[start] = 1;
         let mut order = vec![start];
-        let mut queue = VecDeque::from([start]);
-        let mut levels = 1;
-        while let Some(block) = queue.pop_front() {
-            let next = level[&block] + 1;
-            let mut fresh: Vec<usize> =
-                self.neighbours(block).filter(|other| !done[*other] && !level.contains_key(other)).collect();
-            fresh.sort_by_key(|&other| (self.degree(other), other));
-            for other in fresh {
-                level.insert(other, next);
-                levels = next;
-                order.push(other);
-                queue.push_back(other);
-            }
+        let mut next = 0;
+        while let Some(&block) = order.get(next) {
+            next += 1;
+            let first = order.len();
+            order.extend(self.neighbours(block).filter(|&other| !done[other] && level[other] == 0));
+            order[first..].iter().for_each(|&other| level[other] = level[block] + 1);
+            order[first..].sort_unstable_by_key(|&other| (self.degree(other), other));
         }
+        let levels = order.last().map_or(0, |&last| level[last]);
+        order.iter().for_each(|&block| level[block] = 0);
         (order, levels)
     }
 
-    /// The graph of some blocks among themselves, counted as in the list.
-    pub(crate) fn subgraph(&self, members: &[usize]) -> Self {
-        let index: HashMap<usize, u32> = members.iter().zip(0..).map(|(&block, new)| (block, new)).collect();
+    /// The graph of some blocks among themselves, counted as in the list. `place` is room for the place of every block in it:
+    /// [`NOWHERE`], and so it is left.
+    pub(crate) fn subgraph(&self, members: &[usize], place: &mut [u32]) -> Self {
+        members.iter().zip(0..).for_each(|(&block, new)| place[block] = new);
         let mut part = Self { ptr: vec![0], neighbours: Vec::new() };
         for &block in members {
             let start = part.neighbours.len();
-            part.neighbours.extend(self.neighbours(block).filter_map(|other| index.get(&other)));
+            let inside = self.neighbours(block).map(|other| place[other]).filter(|&new| new != NOWHERE);
+            part.neighbours.extend(inside);
             part.neighbours[start..].sort_unstable();
             part.ptr.push(part.neighbours.len());
         }
+        members.iter().for_each(|&block| place[block] = NOWHERE);
         part
     }
 
     /// All blocks breadth first from a pseudo-peripheral block of each component (George and Liu 1981, chapter 4).
     pub(crate) fn breadth_first_line(&self) -> Vec<usize> {
-        let mut done = vec![false; self.len()];
+        let (mut done, mut level) = (vec![false; self.len()], vec![0; self.len()]);
         let mut line = Vec::with_capacity(self.len());
         for seed in 0..self.len() {
             if done[seed] {
                 continue;
             }
-            let (mut component, mut levels) = self.breadth_first(seed, &done);
+            let (mut component, mut levels) = self.breadth_first(seed, &done, &mut level);
             // The last block reached lies farthest out: start again there as long as that deepens the structure.
             while let Some(&far) = component.last() {
-                let (deeper, more) = self.breadth_first(far, &done);
+                let (deeper, more) = self.breadth_first(far, &done, &mut level);
                 if more <= levels {
                     break;
                 }
@@ -135,4 +139,28 @@ impl Graph {
     pub(crate) fn compressed(&self) -> (Vec<u32>, &[u32]) {
         (self.ptr.iter().map(|&start| start as u32).collect(), &self.neighbours)
     }
+}
+
+/// Where the local blocks of every kept block start, and these, each once.
+fn locals_by_block(layout: &Layout) -> (Vec<usize>, Vec<u32>) {
+    let mut last = vec![u32::MAX; layout.kept()];
+    let mut each = |take: &mut dyn FnMut(usize, u32)| {
+        last.fill(u32::MAX);
+        for local in 0..layout.locals() {
+            for &block in layout.main_blocks_of(local).iter().chain(layout.all_further_of(local)) {
+                if std::mem::replace(&mut last[block as usize], local as u32) != local as u32 {
+                    take(block as usize, local as u32);
+                }
+            }
+        }
+    };
+    let mut ptr = vec![0; layout.kept() + 1];
+    each(&mut |block, _| ptr[block + 1] += 1);
+    (0..layout.kept()).for_each(|block| ptr[block + 1] += ptr[block]);
+    let (mut next, mut locals) = (ptr.clone(), vec![0; ptr[layout.kept()]]);
+    each(&mut |block, local| {
+        locals[next[block]] = local;
+        next[block] += 1;
+    });
+    (ptr, locals)
 }

@@ -1,8 +1,15 @@
 //! Which front each local block is eliminated into.
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
 use super::layout::Layout;
 use super::symbolic::Symbolic;
 
+/// Local blocks from which on several threads sort them, and how many of them are taken together.
+const MANY: usize = 10_000;
+const TOGETHER: usize = 2048;
 /// Local blocks that are eliminated side by side at the most: their equations stay in the cache.
 const MOST: usize = 16;
 
@@ -23,26 +30,37 @@ pub(super) struct Incidence {
 
 impl Incidence {
     pub fn new(layout: &Layout, symbolic: &Symbolic) -> Self {
-        let mut sorted: Vec<(u32, u32)> = Vec::with_capacity(layout.groups());
-        for local in 0..layout.locals() {
-            let start = sorted.len();
-            let place = |g: usize| (symbolic.position(layout.kept_of(g)) as u32, g as u32);
-            sorted.extend(layout.groups_of(local).map(place));
-            sorted[start..].sort_unstable();
-        }
-        let (positions, groups): (Vec<u32>, Vec<u32>) = sorted.into_iter().unzip();
-        let home = homes(layout, symbolic, &positions);
-        let mut by_home: Vec<u32> = (0..layout.locals() as u32).collect();
+        let starts = (0..layout.locals()).step_by(TOGETHER);
+        let ranges: Vec<Range<usize>> =
+            starts.map(|first| first..(first + TOGETHER).min(layout.locals())).collect();
+        let placed = |range: &Range<usize>| placed(layout, symbolic, range.clone());
+        let is_many = layout.locals() >= MANY;
+        let pieces: Vec<(Vec<[u32; 2]>, Vec<Keyed>)> = if is_many {
+            ranges.par_iter().map(placed).collect()
+        } else {
+            ranges.iter().map(placed).collect()
+        };
+        let sorted = || pieces.iter().flat_map(|(sorted, _)| sorted);
+        let positions: Vec<u32> = sorted().map(|&[position, _]| position).collect();
+        let groups: Vec<u32> = sorted().map(|&[_, group]| group).collect();
+        let mut keyed: Vec<Keyed> = pieces.iter().flat_map(|(_, keyed)| keyed).copied().collect();
         let further = |local: u32| {
             let own = if layout.has_further() { layout.groups_of(local as usize) } else { 0..0 };
             groups[own].iter().map(|&group| layout.further_of(group as usize))
         };
-        let key = |local: u32| (home[local as usize], &positions[layout.groups_of(local as usize)]);
-        by_home.sort_unstable_by(|&a, &b| {
-            key(a).cmp(&key(b)).then_with(|| further(a).cmp(further(b))).then(a.cmp(&b))
-        });
+        let own = |local: u32| &positions[layout.groups_of(local as usize)];
+        let compare = |&(first, a): &Keyed, &(second, b): &Keyed| {
+            let in_full = || own(a).cmp(own(b)).then_with(|| further(a).cmp(further(b)));
+            first.cmp(&second).then_with(in_full).then(a.cmp(&b))
+        };
+        if is_many {
+            keyed.par_sort_unstable_by(compare);
+        } else {
+            keyed.sort_unstable_by(compare);
+        }
+        let by_home = keyed.iter().map(|&(_, local)| local).collect();
         let mut home_ptr = vec![0; symbolic.supernode_count() + 2];
-        by_home.iter().for_each(|&local| home_ptr[home[local as usize] + 1] += 1);
+        keyed.iter().for_each(|&(key, _)| home_ptr[(key >> HOME) as usize + 1] += 1);
         for index in 1..home_ptr.len() {
             home_ptr[index] += home_ptr[index - 1];
         }
@@ -98,16 +116,33 @@ impl Incidence {
     }
 }
 
-/// The home of every local block, from the positions of its main blocks; after the last supernode where it has no equations.
-fn homes(layout: &Layout, symbolic: &Symbolic, positions: &[u32]) -> Vec<usize> {
-    let home = |local: usize| {
-        let groups = layout.groups_of(local);
-        let further = groups.clone().flat_map(|group| layout.further_of(group));
-        let further = further.map(|&block| symbolic.position(block as usize));
-        let main = positions[groups].iter().map(|&position| position as usize);
-        main.chain(further).min().map_or(symbolic.supernode_count(), |first| symbolic.supernode_of(first))
-    };
-    (0..layout.locals()).map(home).collect()
+/// A local block, and what it is sorted by before all else: its home, and the first three of its positions, zero where there are fewer.
+type Keyed = (u128, u32);
+
+/// Bits of a key below the home.
+const HOME: u32 = 96;
+
+/// The positions and groups of some local blocks, by position, and the keys of these blocks.
+fn placed(layout: &Layout, symbolic: &Symbolic, locals: Range<usize>) -> (Vec<[u32; 2]>, Vec<Keyed>) {
+    let (mut sorted, mut keyed) = (Vec::new(), Vec::with_capacity(locals.len()));
+    for local in locals {
+        let start = sorted.len();
+        let place = |g: usize| [symbolic.position(layout.kept_of(g)) as u32, g as u32];
+        sorted.extend(layout.groups_of(local).map(place));
+        let own = &mut sorted[start..];
+        own.sort_unstable();
+        let home = home(layout, symbolic, local, own.first().map(|&[position, _]| position as usize));
+        let first = |key: u128, k: usize| key << 32 | own.get(k).map_or(0, |own| u128::from(own[0]) + 1);
+        keyed.push(((0..3).fold(home as u128, first), local as u32));
+    }
+    (sorted, keyed)
+}
+
+/// The home of a local block, from the first position of its main blocks; after the last supernode where it has no equations.
+fn home(layout: &Layout, symbolic: &Symbolic, local: usize, first: Option<usize>) -> usize {
+    let further = layout.all_further_of(local).iter().map(|&block| symbolic.position(block as usize));
+    let first = further.chain(first).min();
+    first.map_or(symbolic.supernode_count(), |first| symbolic.supernode_of(first))
 }
 
 /// Consecutive stacks.

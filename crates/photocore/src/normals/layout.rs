@@ -418,6 +418,19 @@ impl Layout {
         self.group_kept[group] as usize
     }
 
+    /// The main kept blocks of the groups of local block `i`.
+    pub(super) fn main_blocks_of(&self, i: usize) -> &[u32] {
+        &self.group_kept[self.groups_of(i)]
+    }
+
+    /// The further kept blocks of the groups of local block `i`.
+    pub(super) fn all_further_of(&self, i: usize) -> &[u32] {
+        match self.further_ptr.get(self.group_ptr[i]..=self.group_ptr[i + 1]) {
+            Some(ends) => &self.further[ends[0]..ends[ends.len() - 1]],
+            None => &[],
+        }
+    }
+
     /// Whether any group touches further kept blocks.
     pub fn has_further(&self) -> bool {
         !self.further.is_empty()

@@ -1,7 +1,7 @@
 //! The order in which kept blocks are eliminated.
 
 use super::dissection::nested_dissection;
-use super::graph::Graph;
+use super::graph::{Graph, NOWHERE};
 use super::layout::Layout;
 use super::minimum_degree::minimum_degree;
 
@@ -77,7 +77,8 @@ impl Ordering {
         let others: Vec<usize> = (0..graph.len()).filter(|&block| !is_last[block]).collect();
         let places: Option<Vec<[f64; 3]>> =
             layout.places().map(|places| others.iter().map(|&block| places[block]).collect());
-        let order = self.order_all(&graph.subgraph(&others), places.as_deref());
+        let order =
+            self.order_all(&graph.subgraph(&others, &mut vec![NOWHERE; graph.len()]), places.as_deref());
         order.into_iter().map(|block| others[block]).chain(last).collect()
     }
 

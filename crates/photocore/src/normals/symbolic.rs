@@ -75,8 +75,8 @@ pub struct Operations {
     pub inverse: f64,
 }
 
-/// Kept blocks from which on orderings are tried side by side.
-const MANY: usize = 500;
+/// Kept blocks from which on several threads look for their neighbours and try orderings.
+pub(super) const MANY: usize = 500;
 
 impl Symbolic {
     /// Orders the kept blocks of a layout and finds the pattern of the factor.

@@ -8,6 +8,7 @@ use super::covariances::{BlockCovariances, factored, refused};
 use super::node::{BlockRow, Node};
 use super::solution::BlockSolution;
 use super::state::{BlockState, DatumRow, datum_of};
+use super::tables::Told;
 use super::trial::{NetworkTrial, tried};
 use crate::work::{Workers, watched};
 
@@ -39,15 +40,18 @@ impl BlockNetwork {
         let workers = Workers::of(threads, self.network.images.len());
         let inner = datum.map(datum_of).transpose()?;
         let start = start.map(|start| start.state.clone());
-        let solution = watched(py, workers, progress, |pool, watch| match (&inner, &start) {
-            (Some(NetworkDatum::Inner(inner)), _) => {
-                self.network.adjust_in_datum(&self.options, inner, pool, watch)
-            }
-            (_, Some(start)) => self.network.adjust_again(&self.options, start, pool, watch),
-            _ if keep => self.network.adjust_and_keep(&self.options, pool, watch),
-            _ => self.network.adjust(&self.options, pool, watch),
+        let told = watched(py, workers, progress, |pool, watch| {
+            let solution = match (&inner, &start) {
+                (Some(NetworkDatum::Inner(inner)), _) => {
+                    self.network.adjust_in_datum(&self.options, inner, pool, watch)
+                }
+                (_, Some(start)) => self.network.adjust_again(&self.options, start, pool, watch),
+                _ if keep => self.network.adjust_and_keep(&self.options, pool, watch),
+                _ => self.network.adjust(&self.options, pool, watch),
+            };
+            solution.map(|solution| Told::new(solution, pool))
         })?;
-        solution.map(|solution| BlockSolution::new(solution, 6)).map_err(|error| refused(&error))
+        BlockSolution::new(py, told.map_err(|error| refused(&error))?, 6)
     }
 
     #[pyo3(signature = (state, datum, *, threads, progress))]
@@ -61,10 +65,11 @@ impl BlockNetwork {
     ) -> PyResult<BlockSolution> {
         let workers = Workers::of(threads, self.network.images.len());
         let datum = datum_of(datum)?;
-        let solution = watched(py, workers, progress, |pool, watch| {
-            self.network.in_datum(&self.options, &state.state, &datum, pool, watch)
+        let told = watched(py, workers, progress, |pool, watch| {
+            let solution = self.network.in_datum(&self.options, &state.state, &datum, pool, watch);
+            solution.map(|solution| Told::new(solution, pool))
         })?;
-        solution.map(|solution| BlockSolution::new(solution, 6)).map_err(|error| refused(&error))
+        BlockSolution::new(py, told.map_err(|error| refused(&error))?, 6)
     }
 
     #[pyo3(signature = (state, *, threads, progress))]

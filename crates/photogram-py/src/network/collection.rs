@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use super::covariances::{BlockCovariances, factored};
 use super::solution::CollectionSolution;
 use super::state::BlockState;
+use super::tables::Told;
 use super::trial::{NetworkTrial, tried};
 use super::{CollectionError, failure, images, points, said};
 use crate::arrays::{check_lengths, rows, slices, table};
@@ -46,12 +47,14 @@ impl CollectionNetwork {
     ) -> PyResult<CollectionSolution> {
         let workers = Workers::of(threads, self.network.images.len());
         let start = start.map(|start| start.state.clone());
-        let solution = watched(py, workers, progress, |pool, watch| match &start {
-            None => self.network.adjust(&self.options, pool, watch),
-            Some(start) => self.network.adjust_again(&self.options, start, pool, watch),
+        let told = watched(py, workers, progress, |pool, watch| {
+            let solution = match &start {
+                None => self.network.adjust(&self.options, pool, watch),
+                Some(start) => self.network.adjust_again(&self.options, start, pool, watch),
+            };
+            solution.map(|solution| Told::new(solution, pool))
         })?;
-        let unknowns = self.unknowns;
-        solution.map(|solution| CollectionSolution::new(solution, unknowns)).map_err(|error| refused(&error))
+        CollectionSolution::new(py, told.map_err(|error| refused(&error))?, self.unknowns)
     }
 
     #[pyo3(signature = (state, *, threads, progress))]

@@ -8,6 +8,7 @@ mod first_values;
 mod node;
 mod solution;
 mod state;
+mod tables;
 mod trial;
 
 use numpy::PyReadonlyArrayDyn;
@@ -16,7 +17,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
-use crate::arrays::{check_lengths, indices, rows};
+use crate::arrays::{check_lengths, indices_in_place, rows_in_place};
 
 create_exception!(
     _photocore,
@@ -46,10 +47,10 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 /// Points with their standard deviations.
 fn points(positions: &PyReadonlyArrayDyn<'_, f64>, sd: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<Point>> {
-    let coordinates = rows("point_positions", positions)?;
-    let sd = rows("point_sd", sd)?;
+    let coordinates = rows_in_place("point_positions", positions)?;
+    let sd = rows_in_place("point_sd", sd)?;
     check_lengths(("point_positions", coordinates.len()), &[("point_sd", sd.len())])?;
-    Ok(coordinates.into_iter().zip(sd).map(|(coordinates, sd)| Point { coordinates, sd }).collect())
+    Ok(coordinates.iter().zip(&*sd).map(|(&coordinates, &sd)| Point { coordinates, sd }).collect())
 }
 
 /// Image points: indices of their photos and points, coordinates and standard deviations.
@@ -59,15 +60,16 @@ fn images(
     xy: &PyReadonlyArrayDyn<'_, f64>,
     sd: &PyReadonlyArrayDyn<'_, f64>,
 ) -> PyResult<Vec<Image>> {
-    let photos = indices("image_photos", photos)?;
-    let points = indices("image_points", points)?;
-    let xy = rows("image_xy", xy)?;
-    let sd = rows("image_sd", sd)?;
+    let photos = indices_in_place("image_photos", photos)?;
+    let points = indices_in_place("image_points", points)?;
+    let xy = rows_in_place("image_xy", xy)?;
+    let sd = rows_in_place("image_sd", sd)?;
     check_lengths(
         ("image_xy", xy.len()),
         &[("image_photos", photos.len()), ("image_points", points.len()), ("image_sd", sd.len())],
     )?;
-    let image = |i: usize| Image { photo: photos[i], point: points[i], xy: xy[i], sd: sd[i] };
+    let image =
+        |i: usize| Image { photo: photos[i] as usize, point: points[i] as usize, xy: xy[i], sd: sd[i] };
     Ok((0..xy.len()).map(image).collect())
 }
 

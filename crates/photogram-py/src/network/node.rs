@@ -15,6 +15,7 @@ use pyo3::types::PyDict;
 
 use super::covariances::refused;
 use super::solution::BlockSolution;
+use super::tables::Told;
 use super::{FailureRow, failure};
 use crate::arrays::{InputError, numbers};
 use crate::options::unknown;
@@ -213,9 +214,10 @@ impl Node {
         threads: usize,
     ) -> PyResult<BlockSolution> {
         let (state, before) = (numbers("state", &state)?, numbers("before", &before)?);
-        let told =
-            watched(py, self.workers(threads), None, |pool, _| self.node.solution(&state, &before, pool))?;
-        told.map(|solution| BlockSolution::new(solution, 6)).map_err(|error| failed(&error))
+        let told = watched(py, self.workers(threads), None, |pool, _| {
+            self.node.solution(&state, &before, pool).map(|solution| Told::new(solution, pool))
+        })?;
+        BlockSolution::new(py, told.map_err(|error| failed(&error))?, 6)
     }
 }
 
@@ -318,10 +320,11 @@ impl FormedNode {
         let formed = lock(&self.formed).take().ok_or_else(|| used_up("the factor"))?;
         let workers = Workers::of(threads, self.node.images());
         let found = watched(py, workers, progress, |pool, watch| {
-            self.node.invert(formed, given, &state, pool, watch)
+            let found = self.node.invert(formed, given, &state, pool, watch);
+            found.map(|(solution, below)| (Told::new(solution, pool), below))
         })?;
-        let (solution, below) = found.map_err(|error| failed(&error))?;
+        let (told, below) = found.map_err(|error| failed(&error))?;
         let below = below.into_iter().map(|triangle| PyArray1::from_vec(py, triangle)).collect();
-        Ok((BlockSolution::new(solution, 6), below))
+        Ok((BlockSolution::new(py, told, 6)?, below))
     }
 }

@@ -8,13 +8,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::state::{BlockState, Kept, kept};
+use super::tables::{Tables, Told};
 use super::{FailureRow, failure};
-use crate::arrays::{squares, table};
+use crate::arrays::table;
 use crate::commons::{AdjustedRow as UnknownRow, adjusted_row as unknown_row};
 use crate::observations::{AdjustedRow, adjusted_row};
-use crate::solution::{
-    IterationRow, image_table, image_weights, iteration_row, operations, predictions, seconds, status_name,
-};
+use crate::solution::{IterationRow, iteration_row, operations, predictions, seconds, status_name};
 
 /// Adds the classes to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -85,13 +84,15 @@ macro_rules! solution_class {
             /// Of a photo: its pose, and its camera where that may be unknown.
             unknowns: usize,
             kept: Kept,
+            tables: Tables,
         }
 
         impl $class {
             /// Of so many unknowns of a photo.
-            pub fn new(mut solution: Solution, unknowns: usize) -> Self {
+            pub fn new(py: Python<'_>, told: Told, unknowns: usize) -> PyResult<Self> {
+                let (mut solution, tables) = told.tables(py)?;
                 let kept = kept(&mut solution);
-                Self { solution, unknowns, kept }
+                Ok(Self { solution, unknowns, kept, tables })
             }
         }
 
@@ -123,47 +124,43 @@ macro_rules! solution_class {
             }
 
             #[getter]
-            fn point_positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-                let missing = [f64::NAN; 3];
-                table(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.coordinates)).collect())
+            fn point_positions(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
+                self.tables.point_positions.clone_ref(py)
             }
 
             #[getter]
-            fn point_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-                let missing = [[f64::NAN; 3]; 3];
-                squares(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.cofactors)).collect())
+            fn point_cofactors(&self, py: Python<'_>) -> Py<PyArray3<f64>> {
+                self.tables.point_cofactors.clone_ref(py)
             }
 
             #[getter]
-            fn point_redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-                let missing = [f64::NAN; 3];
-                table(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.redundancy)).collect())
+            fn point_redundancy(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
+                self.tables.point_redundancy.clone_ref(py)
             }
 
             #[getter]
-            fn point_rays<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-                let rays = self.solution.points.iter().map(|p| p.map_or(0, |p| p.rays as i64));
-                PyArray1::from_vec(py, rays.collect())
+            fn point_rays(&self, py: Python<'_>) -> Py<PyArray1<i64>> {
+                self.tables.point_rays.clone_ref(py)
             }
 
             #[getter]
-            fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-                image_table(py, &self.solution.images, |image| image.residual)
+            fn residuals(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
+                self.tables.residuals.clone_ref(py)
             }
 
             #[getter]
-            fn redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-                image_table(py, &self.solution.images, |image| image.redundancy)
+            fn redundancy(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
+                self.tables.redundancy.clone_ref(py)
             }
 
             #[getter]
-            fn standardized<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-                image_table(py, &self.solution.images, |image| image.standardized)
+            fn standardized(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
+                self.tables.standardized.clone_ref(py)
             }
 
             #[getter]
-            fn image_weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-                image_weights(py, &self.solution.images)
+            fn image_weights(&self, py: Python<'_>) -> Py<PyArray1<f64>> {
+                self.tables.image_weights.clone_ref(py)
             }
 
             #[getter]
@@ -283,9 +280,8 @@ solution_class! {
         }
 
         #[getter]
-        fn point_last_corrections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-            let missing = [f64::NAN; 3];
-            table(py, self.solution.points.iter().map(|p| p.map_or(missing, |p| p.last_correction)).collect())
+        fn point_last_corrections(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
+            self.tables.point_last_corrections.clone_ref(py)
         }
 
         #[getter]
@@ -370,9 +366,8 @@ solution_class! {
         }
 
         #[getter]
-        fn point_rays_behind<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-            let behind = self.solution.points.iter().map(|p| p.map_or(0, |p| p.behind as i64));
-            PyArray1::from_vec(py, behind.collect())
+        fn point_rays_behind(&self, py: Python<'_>) -> Py<PyArray1<i64>> {
+            self.tables.point_rays_behind.clone_ref(py)
         }
 
         #[getter]

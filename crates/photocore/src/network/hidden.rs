@@ -1,0 +1,73 @@
+//! Images that no camera can have taken: of points behind it, or beyond where its lens is one-to-one.
+
+use rayon::prelude::*;
+
+use super::neighbourhood::TOGETHER;
+use super::problem::Assembled;
+use super::stations::Station;
+use super::{Image, Solution};
+
+impl Solution {
+    /// Finds the images whose point stands behind the camera, or beyond where its lens ends; returns the squares of the distances of the
+    /// points from the nearest station.
+    pub(super) fn find_behind(
+        &mut self,
+        Assembled { problem, points, .. }: &Assembled,
+        unknowns: &[f64],
+    ) -> Vec<f64> {
+        let model = &problem.model;
+        let photos = model.photos(&unknowns[model.of_stations()]);
+        let mut of_shared = vec![None; model.stations()];
+        let fold = |(station, block): (&Station, &Option<usize>)| match *block {
+            None => station.camera.fold(),
+            Some(block) => *of_shared[block].get_or_insert_with(|| station.camera.fold()),
+        };
+        let folds: Vec<f64> = photos.iter().zip(&model.camera_block).map(fold).collect();
+        let (local, tied) = model.all_coordinates(unknowns);
+        let look = |(own, at): (&[usize], &[f64; 3])| {
+            let position = model.space.cartesian(*at);
+            let (mut nearest, mut hidden) = (f64::INFINITY, Hidden::default());
+            for image in own[0]..own[1] {
+                let Image { photo, xy, .. } = model.images[image];
+                let Station { orientation, camera } = &photos[photo];
+                let u = orientation.pose().sight(&position);
+                nearest = nearest.min(u.norm_squared());
+                if !camera.faces(&u) {
+                    hidden.behind.push(model.order[image]);
+                }
+                if folds[photo].is_finite() && camera.radius(&u, xy) > folds[photo] {
+                    hidden.folded.push(model.order[image]);
+                }
+            }
+            (nearest, hidden.boxed())
+        };
+        let of_points = model.start.par_windows(2).zip(local.par_iter().chain(tied));
+        let (mut squares, mut hidden) = (vec![], vec![]);
+        of_points.with_min_len(TOGETHER).map(look).unzip_into_vecs(&mut squares, &mut hidden);
+        for (&point, hidden) in points.iter().zip(hidden) {
+            let Some(hidden) = hidden else { continue };
+            if let Some(point) = &mut self.points[point] {
+                point.behind = hidden.behind.len();
+            }
+            self.behind.extend(hidden.behind);
+            self.folded.extend(hidden.folded);
+        }
+        self.behind.sort_unstable();
+        self.folded.sort_unstable();
+        squares
+    }
+}
+
+/// The images of a point that have it behind the camera, and those beyond where their lens is one-to-one.
+#[derive(Default)]
+struct Hidden {
+    behind: Vec<usize>,
+    folded: Vec<usize>,
+}
+
+impl Hidden {
+    /// None where there are none, as of nearly all points.
+    fn boxed(self) -> Option<Box<Self>> {
+        (!(self.behind.is_empty() && self.folded.is_empty())).then(|| Box::new(self))
+    }
+}
