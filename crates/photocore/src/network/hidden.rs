@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::neighbourhood::TOGETHER;
 use super::problem::Assembled;
+use super::screening::TOGETHER;
 use super::stations::Station;
 use super::{Image, Solution};
 

@@ -5,11 +5,9 @@
 use rayon::prelude::*;
 
 use super::Network;
-use super::screening::PointImages;
+use super::screening::{PointImages, TOGETHER};
 use crate::geometry::Vector3;
 
-/// Points that a thread takes at least.
-pub(super) const TOGETHER: usize = 1024;
 /// Cells of the curve along each axis.
 const CELLS: f64 = (1_u32 << 20) as f64;
 

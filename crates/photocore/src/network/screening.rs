@@ -3,8 +3,10 @@
 use rayon::prelude::*;
 
 use super::Network;
-use super::neighbourhood::TOGETHER;
 use super::surroundings::Surroundings;
+
+/// Points that a thread takes at least.
+pub(super) const TOGETHER: usize = 1024;
 
 /// A point that was left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,9 @@
 use rayon::prelude::*;
 
 use super::layout::Layout;
-use super::symbolic::MANY;
+
+/// Kept blocks from which on several threads look for their neighbours and try orderings.
+pub(super) const MANY: usize = 500;
 
 /// The place of a block that is not in a list.
 pub(crate) const NOWHERE: u32 = u32::MAX;

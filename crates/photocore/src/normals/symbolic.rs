@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::graph::Graph;
+use super::graph::{Graph, MANY};
 use super::layout::Layout;
 use super::ordering::Ordering;
 
@@ -74,9 +74,6 @@ pub struct Operations {
     /// One selected inversion.
     pub inverse: f64,
 }
-
-/// Kept blocks from which on several threads look for their neighbours and try orderings.
-pub(super) const MANY: usize = 500;
 
 impl Symbolic {
     /// Orders the kept blocks of a layout and finds the pattern of the factor.
