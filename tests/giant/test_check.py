@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from photogram import simulate
-from photogram.checks.editing import kept_images, without_photos
+from photogram.checks.editing import kept_images
 from photogram.checks.heights import neighbours
 from photogram.checks.orientation import MIRRORS
 from photogram.checks.predictions import exchange
@@ -18,6 +18,7 @@ from photogram.checks.robust import critical, fit, mad_sd
 from photogram.checks.structure import parts_of
 from photogram.cli import app
 from photogram.giant import Limits, Project, check, write_project
+from photogram.network.chosen import of_photos
 from photogram.network.geometry import Spheroid
 from photogram.network.rays import Rays
 from photogram.network.strips import strips_of
@@ -566,7 +567,7 @@ def test_no_block_is_too_poor_or_too_bad_for_a_check(seed):
     block = kept_images(block, keep)
     without = np.ones(len(block.photo_ids), dtype=bool)
     without[np.unique(block.image_photos)] = False
-    block = without_photos(block, without)
+    block = of_photos(block, ~without)
     gross = rng.random((len(block.image_xy), 1)) < 0.2 * (seed % 3)
     block = block.replace(image_xy=(block.image_xy + 30 * gross * rng.standard_normal(2)) * (seed % 10 > 0))
     outcome = checked(block)

@@ -6,8 +6,8 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::model::Owner;
-use super::neighbourhood::TOGETHER;
 use super::problem::Assembled;
+use super::screening::TOGETHER;
 use super::stations::Placed;
 use super::{
     AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options,

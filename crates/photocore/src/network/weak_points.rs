@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::model::Bundle;
-use super::neighbourhood::TOGETHER;
 use super::precision::median;
+use super::screening::TOGETHER;
 use super::{AdjustedPoint, Network};
 use crate::geometry::{self, Matrix3};
 
