@@ -230,7 +230,10 @@ class _Fit:
         held = np.isfinite(prior_sd)
         known = held.all(axis=1)
         position[known] = given[known]
-        reach = np.median(np.linalg.norm(position[own] - centres, axis=1)[np.isfinite(position[own, 0])])
+        there = np.isfinite(position[own, 0])
+        if not there.any():
+            return np.full(count, np.inf)
+        reach = np.median(np.linalg.norm(position[own] - centres, axis=1)[there])
         least = HELD * float(np.median(sd)) * reach / float(np.median(np.abs(distances)))
         weight = np.where(held, 1 / np.maximum(np.where(held, prior_sd, 1.0), least) ** 2, 0.0)
         squares = np.full(count, np.nan)
