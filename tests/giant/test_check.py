@@ -10,7 +10,6 @@ import pytest
 from typer.testing import CliRunner
 
 from photogram import simulate
-from photogram.checks.editing import kept_images
 from photogram.checks.heights import neighbours
 from photogram.checks.orientation import MIRRORS
 from photogram.checks.predictions import exchange
@@ -18,7 +17,7 @@ from photogram.checks.robust import critical, fit, mad_sd
 from photogram.checks.structure import parts_of
 from photogram.cli import app
 from photogram.giant import Limits, Project, check, write_project
-from photogram.network.chosen import of_photos
+from photogram.network.chosen import kept_images, of_photos
 from photogram.network.geometry import Spheroid
 from photogram.network.rays import Rays
 from photogram.network.strips import strips_of

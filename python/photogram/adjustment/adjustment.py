@@ -285,8 +285,8 @@ def _adjusted(
         raise hinted(named(block, *error.args), block) from None
     with turned("the adjusted block"):
         freedom = _freedom(block, network, solution, options)
-        hinted_at = with_hints(_result(block, solution, options, freedom, inner, as_published))
-        return with_exchanges(hinted_at)
+        found = _result(block, solution, options, freedom, inner, as_published)
+        return with_exchanges(with_hints(found))
 
 
 def adjusted_again(

@@ -17,7 +17,7 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
-from photogram.network.chosen import of_photos
+from photogram.network.chosen import kept_images, of_photos
 from photogram.network.directions import direction_deviations, image_directions
 from photogram.network.observations import Distance
 from photogram.show.brief import Brief
@@ -85,14 +85,8 @@ class FirstValues(Brief):
         InputError
             Observations of photos that could not be started.
         """
-        block = self.block
-        there = block.replace(
-            image_photos=block.image_photos[~self.set_aside],
-            image_points=block.image_points[~self.set_aside],
-            image_xy=block.image_xy[~self.set_aside],
-            image_sd=block.image_sd[~self.set_aside],
-        )
-        return of_photos(there, np.array([photo in self.sources for photo in block.photo_ids]))
+        started = np.array([photo in self.sources for photo in self.block.photo_ids])
+        return of_photos(kept_images(self.block, ~self.set_aside), started)
 
 
 def first_values(block: Block) -> FirstValues:

@@ -34,11 +34,11 @@ from photogram.checks.positions import Wrong, wrong_positions
 from photogram.checks.residuals import residuals
 from photogram.checks.stations import stations
 from photogram.checks.structure import structure_section
-from photogram.checks.views import View, kept_images
+from photogram.checks.views import View
 from photogram.checks.words import Words
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
-from photogram.network.chosen import of_photos
+from photogram.network.chosen import kept_images, of_photos
 from photogram.network.observations import Position
 from photogram.network.rays import Rays
 

@@ -25,11 +25,11 @@ from photogram.checks.predictions import (
 )
 from photogram.checks.rivals import ODDS, rival_images
 from photogram.checks.robust import critical, mad_sd
-from photogram.checks.views import View, kept_images
+from photogram.checks.views import View
 from photogram.checks.words import small_unit
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
-from photogram.network.chosen import of_photos
+from photogram.network.chosen import kept_images, of_photos
 from photogram.network.rays import Rays
 from photogram.results.kinds import ObservedKind
 from photogram.results.result import Result

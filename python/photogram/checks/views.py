@@ -10,9 +10,10 @@ import numpy as np
 from photogram.adjustment.hypotheses import Change
 from photogram.arguments.types import Bools, Indices
 from photogram.network.block import Block
+from photogram.network.chosen import kept_images
 from photogram.network.directions import seen_without_lenses
 
-__all__ = ["View", "kept_images"]
+__all__ = ["View"]
 
 _SHARED = (
     "photo_positions",
@@ -25,12 +26,6 @@ _SHARED = (
     "point_sd",
 )
 """What a block and its view have in common beside images."""
-
-
-def kept_images(block: Block, kept: Indices | Bools) -> Block:
-    """Return a block with some of its images, by their rows or a mask."""
-    names = ("image_photos", "image_points", "image_xy", "image_sd")
-    return block.replace(**{name: getattr(block, name)[kept] for name in names})
 
 
 @dataclass(frozen=True, eq=False)

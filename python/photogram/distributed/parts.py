@@ -17,6 +17,7 @@ from photogram.io.parquet import Column, Repeated, parquet_content, read_sheet
 from photogram.io.structure import Decoder, Encoder
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.network.chosen import IMAGES, PHOTOS
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation
@@ -41,18 +42,9 @@ __all__ = [
 ]
 
 TABLES: dict[str, tuple[str, ...]] = {
-    "photos": (
-        "photo_positions",
-        "photo_attitudes",
-        "photo_position_sd",
-        "photo_attitude_sd",
-        "photo_positions_observed",
-        "photo_attitudes_observed",
-        "principal_distances",
-        "photo_cameras",
-    ),
+    "photos": PHOTOS,
     "points": ("point_positions", "point_sd"),
-    "images": ("image_photos", "image_points", "image_xy", "image_sd"),
+    "images": IMAGES,
 }
 """The arrays of a block that have a row for each photo, point or image."""
 SETTINGS = "part.json"

@@ -22,35 +22,18 @@ pub trait Model: Sync {
     fn observe(&self, prepared: &Self::Prepared, local: usize, group: usize, rows: &mut GroupRows<'_>);
 
     /// Writes what [`Model::observe`] does of one group each of several local blocks, one after the other, in unit weight: `groups` says
-    /// which, `sd` are the standard deviations of all observations. All have the same main block, and as much in common with others.
+    /// which, `sd` are the standard deviations of all observations. All have the same main block, and as much in common with others. False
+    /// where the model has no way for them together.
     #[inline(always)]
     fn observe_alike(
         &self,
-        prepared: &Self::Prepared,
-        locals: &[u32],
-        groups: impl Fn(usize) -> usize,
-        sd: &[f64],
-        rows: &mut GroupRows<'_>,
-    ) {
-        self.observe_one_by_one(prepared, locals, groups, sd, rows);
-    }
-
-    /// The same, by [`Model::observe`].
-    #[inline(always)]
-    fn observe_one_by_one(
-        &self,
-        prepared: &Self::Prepared,
-        locals: &[u32],
-        groups: impl Fn(usize) -> usize,
-        sd: &[f64],
-        rows: &mut GroupRows<'_>,
-    ) {
-        for (t, &local) in locals.iter().enumerate() {
-            let (group, mut rows) = (groups(t), rows.part(t, locals.len()));
-            self.observe(prepared, local as usize, group, &mut rows);
-            let count = rows.constant.len();
-            rows.weigh(&sd[group * count..][..count]);
-        }
+        _prepared: &Self::Prepared,
+        _locals: &[u32],
+        _groups: impl Fn(usize) -> usize,
+        _sd: &[f64],
+        _rows: &mut GroupRows<'_>,
+    ) -> bool {
+        false
     }
 
     /// Writes observed minus computed alone, as [`Model::observe`] does; false where the model does not know how.
@@ -372,10 +355,14 @@ impl<M: Model> Equations for Linearized<'_, M> {
 
     #[inline(always)]
     fn write_alike(&self, locals: &[u32], groups: impl Fn(usize) -> usize, rows: &mut GroupRows<'_>) {
-        self.problem.model.observe_alike(&self.prepared, locals, &groups, self.observation_sd, rows);
-        if self.reweighting.is_some() || self.fixed.is_some() {
-            for (t, &local) in locals.iter().enumerate() {
-                self.adapt(local as usize, groups(t), &mut rows.part(t, locals.len()));
+        let model = &self.problem.model;
+        let written = model.observe_alike(&self.prepared, locals, &groups, self.observation_sd, rows);
+        for (t, &local) in locals.iter().enumerate() {
+            let mut rows = rows.part(t, locals.len());
+            if !written {
+                self.write(local as usize, groups(t), &mut rows);
+            } else if self.reweighting.is_some() || self.fixed.is_some() {
+                self.adapt(local as usize, groups(t), &mut rows);
             }
         }
     }

@@ -390,19 +390,16 @@ impl Model for Bundle {
         groups: impl Fn(usize) -> usize,
         sd: &[f64],
         rows: &mut GroupRows<'_>,
-    ) {
+    ) -> bool {
         let sight = |t: usize| {
             let group = groups(t);
             let (image, sd) = (&self.images[group], [sd[2 * group], sd[2 * group + 1]]);
             Sight { point: &stations.points[locals[t] as usize], image, sd }
         };
         // The main block of an image that is not mounted is its photo.
-        let written = stations.bent.is_none() && locals.len() >= FEWEST && {
+        stations.bent.is_none() && locals.len() >= FEWEST && {
             let Station { orientation, camera } = &stations.photos[self.images[groups(0)].photo];
             each_camera!(camera, camera => write_in_lanes(orientation, camera, locals.len(), &sight, rows))
-        };
-        if !written {
-            self.observe_one_by_one(stations, locals, groups, sd, rows);
         }
     }
 

@@ -4,8 +4,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::model::Bundle;
-use super::screening::Screened;
-use super::screening::TOGETHER;
+use super::screening::{Screened, TOGETHER};
 use super::stations::Station;
 use super::{Network, Start};
 use crate::geometry::PoseNumbers;

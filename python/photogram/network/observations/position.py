@@ -77,11 +77,10 @@ def epochs_of(observations: Iterable[Observation]) -> dict[int, float]:
     times: dict[int, list[float]] = {}
     given: dict[int, float] = {}
     for each in observations:
-        drift = each.drift if isinstance(each, Position) else None
-        if drift is not None:
-            times.setdefault(id(drift), []).append(each.observed[-1])
-            if drift.epoch is not None:
-                given[id(drift)] = drift.epoch
+        if isinstance(each, Position) and each.drift is not None:
+            times.setdefault(id(each.drift), []).append(each.time)
+            if each.drift.epoch is not None:
+                given[id(each.drift)] = each.drift.epoch
     return {key: float(np.mean(own)) for key, own in times.items()} | given
 
 
