@@ -227,6 +227,18 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
         assert_close(*value, expected[(i, 0)], 1e-9 * expected.norm_max(), "solution");
         assert_close(written[i], *value, 1e-12 * expected.norm_max(), "solution from the equations");
     }
+    let right: Vec<f64> = dense.normal_right().col(0).iter().copied().collect();
+    let again = done(system.solve_again(&pool, &factor, dense, &dense.prior, 0.0, &right, &mut go));
+    for (value, other) in again.iter().zip(&solution) {
+        assert_close(*value, *other, 1e-11 * expected.norm_max(), "solution for its right-hand side");
+    }
+    if factor.has_kept() {
+        let (chord, decrease) = done(system.chord(&pool, &factor, dense, &dense.prior, &mut go));
+        assert_close(decrease, factor.decrease, 1e-11 * factor.decrease, "decrease");
+        for (value, other) in chord.iter().zip(&solution) {
+            assert_close(*value, *other, 1e-11 * expected.norm_max(), "chord from the same values");
+        }
+    }
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
     compare_columns(dense, &system, &factor, &inverse);
     compare_functions(dense, &system, &factor, &inverse);

@@ -129,7 +129,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         control: &mut Control,
     ) -> Next<'a, M> {
         let (damping, Solved { basis, step, change }) = (iteration.damping, solved);
-        let trial = self.problem.advanced(&unknowns, &step);
+        let trial = self.stepped(&unknowns, &basis, &step, &iteration)?;
         let moved = (damping == 0.0).then(|| basis.factor.moved(&self.problem.system, &step));
         basis.factor.recycle(&self.problem.system);
         let far = change > FAR * (unknowns.len() as f64).sqrt();
@@ -260,11 +260,11 @@ impl<'a, M: Model> Run<'a, '_, M> {
         Ok(None)
     }
 
-    /// Whether a step is negligible itself and, the steps falling at the rate of the last two, all further ones together would not
-    /// exceed a limit (Hairer and Wanner 1996, section IV.8).
+    /// Whether a step is negligible itself and, the steps falling at the rate of the last two, chords counted, all further ones together
+    /// would not exceed a limit (Hairer and Wanner 1996, section IV.8).
     fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
         let before = self.iterations.last().filter(|iteration| iteration.damping == 0.0);
-        let rate = before.map_or(1.0, |iteration| change / iteration.largest_change);
+        let rate = before.map_or(1.0, |before| change / self.chord.unwrap_or(before.largest_change));
         change <= NEGLIGIBLE && rate < 1.0 && rate / (1.0 - rate) * change <= limit
     }
 

@@ -11,7 +11,7 @@ pub enum Method {
     /// Full steps (Gauss-Newton) whatever becomes of the sum of squares, in the unknowns of the published programs.
     Full(Published),
     /// Full steps; one that raises the sum of squares is taken back and damped (Levenberg-Marquardt), and so are those after it until they
-    /// do without.
+    /// do without. Where the last steps fall slowly ([`super::Model::ends_slowly`]) one of them is followed by a chord.
     Damped(Stop),
     /// Steps damped from the first one on, by how well the linearized equations predict what they do (Levenberg-Marquardt with the gain
     /// ratio of Nielsen 1999): for far starts. The damping takes the place of a datum where there is none; one is held at the end, for

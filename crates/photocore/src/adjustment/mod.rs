@@ -55,6 +55,7 @@
 
 mod acceleration;
 mod again;
+mod chord;
 mod damped;
 mod datum;
 mod distributions;

@@ -73,6 +73,12 @@ pub trait Model: Sync {
         false
     }
 
+    /// Whether the last steps fall by a constant factor only, because second derivatives times residuals count where unknowns are determined
+    /// weakly: a chord then pays (see [`super::Method::Damped`]).
+    fn ends_slowly(&self) -> bool {
+        false
+    }
+
     /// Local blocks that the iterations have led to where they harm all others: what they say of one kept block is so much more than
     /// all others say together that rounding takes what these say; and those that are on their way there. Asked after every damped
     /// step, with the unknowns before and after it.

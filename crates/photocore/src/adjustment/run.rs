@@ -109,6 +109,7 @@ fn adjusted<M: Model>(
         history: vec![problem.initial[problem.layout().all_locals().end..].to_vec()],
         last_local_corrections: vec![0.0; problem.layout().all_locals().len()],
         datum: vec![],
+        chord: None,
         curved: false,
         weak: vec![],
         collapsed: vec![],
@@ -214,14 +215,16 @@ pub(super) struct Run<'a, 'w, M: Model> {
     /// Whether the network was moved on its way.
     has_moved: bool,
     pub pool: &'a ThreadPool,
-    watch: &'w mut dyn FnMut(Event) -> ControlFlow<()>,
-    seconds: Seconds,
+    pub(super) watch: &'w mut dyn FnMut(Event) -> ControlFlow<()>,
+    pub(super) seconds: Seconds,
     formations: usize,
     pub iterations: Vec<Iteration>,
     history: Vec<Vec<f64>>,
     last_local_corrections: Vec<f64>,
     /// Unknowns held for a datum; in a trust region empty until the iterations are over.
     pub datum: Vec<usize>,
+    /// The length of the chord that followed the last step, where one did.
+    pub chord: Option<f64>,
     /// Whether to take in the second-order term of the loss from now on: once the steps are short.
     pub curved: bool,
     /// Unknowns that a combination moves which full steps cannot follow (see [`Adjustment::weak`]).

@@ -369,6 +369,11 @@ impl Model for Bundle {
         true
     }
 
+    /// Cameras are determined together with what they are correlated with: attitudes, positions, heights.
+    fn ends_slowly(&self) -> bool {
+        !self.shared.is_empty()
+    }
+
     #[inline(always)]
     fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let image = &self.images[group];

@@ -554,7 +554,8 @@ fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, NetworkError>
     let photo_of = images.iter().map(|image| model.carrier(image.photo) as u32).collect();
     let mut layout = Layout::new(2, 3, &widths, model.start[..=model.locals].to_vec(), photo_of)?;
     if !(model.shared.is_empty() && model.mounts.is_empty()) {
-        let (mut further_ptr, mut further) = (vec![0], Vec::new());
+        let (mut further_ptr, mut further) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
+        further_ptr.push(0);
         for image in images {
             further.extend(model.further(image).map(|block| block as u32));
             further_ptr.push(further.len());

@@ -13,12 +13,34 @@ use super::triangle::Triangle;
 use super::vectorised::{Kernel, dot, dot_by_fours, run, size};
 
 impl Stack {
-    /// Appends what the elimination has left.
+    /// Appends what the elimination has left: V, v and L.
     pub fn keep(&self, layout: &Layout, kept: &mut Vec<f64>) {
         kept.extend_from_slice(self.coupling());
-        kept.extend_from_slice(&self.reduced);
+        let end = kept.len();
+        kept.resize(end + self.numbers_beside(layout), 0.0);
+        self.write_beside(layout, &mut kept[end..]);
+    }
+
+    /// Leaves V in its buffer and writes v and L behind it; the V of the next stack goes behind these.
+    pub fn keep_in_place(&mut self, layout: &Layout) {
+        let mut kept = std::mem::take(&mut self.coupling);
+        self.write_beside(layout, &mut kept[self.end..]);
+        self.start = self.end + self.numbers_beside(layout);
+        self.coupling = kept;
+    }
+
+    /// Numbers in v and L.
+    pub(super) fn numbers_beside(&self, layout: &Layout) -> usize {
         let l = layout.local_dim();
-        self.triangles.iter().for_each(|triangle| triangle.append_to(l, kept));
+        self.locals.len() * (l + Triangle::numbers(l))
+    }
+
+    fn write_beside(&self, layout: &Layout, kept: &mut [f64]) {
+        let (own, rest) = kept.split_at_mut(self.reduced.len());
+        own.copy_from_slice(&self.reduced);
+        let l = layout.local_dim();
+        let triangles = rest.chunks_exact_mut(Triangle::numbers(l));
+        self.triangles.iter().zip(triangles).for_each(|(triangle, numbers)| triangle.write_to(l, numbers));
     }
 }
 
@@ -28,6 +50,9 @@ pub(super) struct Coupled {
     ranges: SmallVec<[Range<usize>; 16]>,
     /// How many of them are main blocks, the first.
     main: usize,
+    /// What the groups of the last stack had in common with others, by its numbers, and where that stands.
+    numbers: SmallVec<[u32; 4]>,
+    common: SmallVec<[Range<usize>; 4]>,
 }
 
 impl Coupled {
@@ -42,15 +67,25 @@ impl Coupled {
             }
         }
         self.main = self.ranges.len();
-        if layout.has_common() {
-            let groups = system.incidence.groups_of(layout, first as usize);
-            let parts =
-                unlike(layout, groups).into_iter().flat_map(|group| parts_of(layout, symbolic, group));
-            for (position, unknowns) in united(parts.map(|(position, unknowns, _)| (position, unknowns))) {
-                let start = symbolic.range(position).start;
-                self.ranges.push(start + unknowns.start..start + unknowns.end);
-            }
+        let numbers = unlike(system.incidence.commons_of(layout, first as usize));
+        if numbers != self.numbers {
+            self.find_common(system, numbers);
         }
+        self.ranges.extend(self.common.iter().cloned());
+    }
+
+    /// Of what some groups have in common with others.
+    fn find_common(&mut self, system: &System, numbers: SmallVec<[u32; 4]>) {
+        let (layout, symbolic) = (&system.layout, &*system.symbolic);
+        let groups = numbers.iter().map(|&number| system.incidence.group_with(number));
+        let parts = groups.flat_map(|group| parts_of(layout, symbolic, group));
+        let all = united(parts.map(|(position, unknowns, _)| (position, unknowns))).into_iter();
+        let place = |(position, unknowns): (usize, Range<usize>)| {
+            let start = symbolic.range(position).start;
+            start + unknowns.start..start + unknowns.end
+        };
+        self.common = all.map(place).collect();
+        self.numbers = numbers;
     }
 
     /// Unknowns of every main block, where all have the same number.
@@ -78,78 +113,77 @@ pub(super) fn solve<'k>(
     run(&system.layout, dim, Solve { coupled, depth: locals.len(), kept, own, others, found });
 }
 
-/// What local blocks take off another right-hand side of the others.
+/// Parts of a right-hand side that the local blocks of one home make.
 #[derive(Default)]
-pub(super) struct Taken {
-    /// L^-1 r, local block by local block.
+pub(super) struct OfHome {
+    /// Local block by local block.
     pub own: Vec<f64>,
-    /// V^T L^-1 r where unknowns are coupled, which stand in `ranges`, stack by stack.
-    values: Vec<f64>,
+    /// Of other unknowns, which stand in `ranges`, stack by stack.
+    pub values: Vec<f64>,
     ranges: Vec<Range<usize>>,
 }
 
-impl Taken {
-    /// Takes it off.
-    pub fn subtract_from(&self, others: &mut [f64]) {
+impl OfHome {
+    /// Appends zeros for coupled unknowns; returns where their values start.
+    pub fn room(&mut self, range: Range<usize>) -> usize {
+        let start = self.values.len();
+        self.values.resize(start + range.len(), 0.0);
+        self.ranges.push(range);
+        start
+    }
+
+    /// Adds the part of the others to a right-hand side in the order of elimination.
+    pub fn add_to(&self, others: &mut [f64]) {
         let mut values = &self.values[..];
         for range in &self.ranges {
             let own = skip_ref(&mut values, range.len());
-            others[range.clone()].iter_mut().zip(own).for_each(|(right, value)| *right -= value);
+            others[range.clone()].iter_mut().zip(own).for_each(|(right, value)| *right += value);
         }
     }
 }
 
-/// Reduces another right-hand side, over all unknowns, by a stack; what is kept of it is taken off the front of `kept`.
+/// Reduces another right-hand side by a stack, whose local blocks have the last of `found`: they become L^-1 r, and -V^T L^-1 r of the others is
+/// appended. What is kept of the stack is taken off the front of `kept`.
 pub(super) fn reduce(
     system: &System,
     locals: &[u32],
     coupled: &mut Coupled,
     kept: &mut &[f64],
-    right: &[f64],
-    found: &mut Taken,
+    found: &mut OfHome,
 ) {
     let Some(&first) = locals.first() else { return };
     coupled.find(system, first);
-    run(
-        &system.layout,
-        coupled.main_dim(),
-        Reduce { layout: &system.layout, locals, coupled, kept, right, found },
-    );
+    run(&system.layout, coupled.main_dim(), Reduce { depth: locals.len(), coupled, kept, found });
 }
 
 struct Reduce<'a, 'k> {
-    layout: &'a Layout,
-    locals: &'a [u32],
+    depth: usize,
     coupled: &'a Coupled,
     kept: &'a mut &'k [f64],
-    right: &'a [f64],
-    found: &'a mut Taken,
+    found: &'a mut OfHome,
 }
 
 impl Kernel for Reduce<'_, '_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
-        let (count, start) = (L * self.locals.len(), self.found.own.len());
+        let count = L * self.depth;
         let width: usize = self.coupled.ranges.iter().map(Range::len).sum();
         let coupling = skip_ref(self.kept, count * width);
         skip_ref(self.kept, count);
-        let triangles = skip_ref(self.kept, self.locals.len() * Triangle::numbers(L));
-        for (&local, numbers) in self.locals.iter().zip(triangles.chunks_exact(Triangle::numbers(L))) {
-            let mut own = [0.0; L];
-            own.copy_from_slice(&self.right[self.layout.local_range(local as usize)]);
-            Triangle::of(L, numbers).forward::<L>(&mut own, 1);
-            self.found.own.extend_from_slice(&own);
+        let triangles = skip_ref(self.kept, self.depth * Triangle::numbers(L));
+        let start = self.found.own.len() - count;
+        let own = self.found.own[start..].as_chunks_mut::<L>().0;
+        for (own, numbers) in own.iter_mut().zip(triangles.chunks_exact(Triangle::numbers(L))) {
+            Triangle::of(L, numbers).forward::<L>(own, 1);
         }
         let mut at = 0;
         for range in &self.coupled.ranges {
-            let first = self.found.values.len();
-            self.found.values.resize(first + range.len(), 0.0);
+            let first = self.found.room(range.clone());
             let sums = &mut self.found.values[first..];
             let rows = coupling[at..][..count * range.len()].chunks_exact(range.len().max(1));
             for (row, value) in rows.zip(&self.found.own[start..]) {
-                sums.iter_mut().zip(row).for_each(|(sum, v)| *sum += v * value);
+                sums.iter_mut().zip(row).for_each(|(sum, v)| *sum -= v * value);
             }
-            self.found.ranges.push(range.clone());
             at += count * range.len();
         }
     }

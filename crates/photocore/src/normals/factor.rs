@@ -7,21 +7,19 @@ use std::time::Instant;
 
 use faer::MatMut;
 use rayon::ThreadPool;
-use rayon::prelude::*;
 
+use super::assembly::Sums;
 use super::dense::{Pivots, factor_front};
 use super::equations::{Equations, Prior};
 use super::front::Front;
 use super::further::{blocks_of, of_others, subtract_sides};
 use super::layout::Layout;
 use super::panels::{Handover, Panels, lock};
-use super::stack::Stack;
 use super::symbolic::Supernode;
 use super::system::System;
-use super::tie_equations::TieEquations;
 use super::vectorised::{Side, dot_in_lanes};
 use super::watch::{Between, Control, Stopped, watched};
-use super::workspace::{Eliminated, reserved};
+use super::workspace::Eliminated;
 
 /// The Cholesky factor L of the reduced normal equations.
 #[derive(Debug)]
@@ -57,16 +55,6 @@ struct Update {
     sides: Vec<Side>,
 }
 
-/// What the formation at one supernode adds up.
-#[derive(Default)]
-struct Sums {
-    sum_of_squares: f64,
-    decrease: f64,
-    deficient: Vec<usize>,
-    /// What is kept of the local blocks.
-    kept: Vec<f64>,
-}
-
 /// What a visit to a supernode leaves to the result.
 struct Visited {
     sums: Sums,
@@ -82,27 +70,22 @@ struct Visited {
 }
 
 /// What is formed.
-struct Formation<'a, E> {
-    system: &'a System,
-    equations: &'a E,
-    prior: &'a Prior,
-    damping: f64,
+pub(super) struct Formation<'a, E> {
+    pub system: &'a System,
+    pub equations: &'a E,
+    pub prior: &'a Prior,
+    pub damping: f64,
     /// Over all unknowns, one after the other.
-    rights: &'a [f64],
+    pub rights: &'a [f64],
     /// Whether to keep what [`System::solve`] needs of the local blocks.
-    keeps: bool,
-    control: &'a Control,
+    pub keeps: bool,
+    pub control: &'a Control,
 }
 
-/// Local blocks at one supernode from which on several threads work at them.
-const MANY: usize = 256;
 /// What rounding leaves of a combination of unknowns that the equations do not determine, relative to what those of each unknown by
 /// itself would make of it, is less than a unit in the last place; weights that alone make a datum (GIANT's default of 60000 m for a
 /// station) leave a hundred.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
-/// Stacks gathered by several threads before they are added to the front.
-const WAVE: usize = 64;
-
 impl System {
     /// Forms the normal equations, with the local blocks reduced out, and factors them. `damping` is added to the diagonal of the normal
     /// equations as a fraction of it. The result has the same bits for any number of threads: every value is summed by one
@@ -285,126 +268,6 @@ impl<E: Equations> Formation<'_, E> {
         }
         kept
     }
-
-    /// Adds what the local blocks at home in a supernode leave, in their order; None without memory.
-    fn assemble(&self, front: &mut Front<'_>, index: usize, kept: &Handover<Vec<f64>>) -> Option<Sums> {
-        let Self { system, control, .. } = self;
-        let layout = &system.layout;
-        let stacks = system.incidence.stacks_at(index);
-        let mut sums = Sums::default();
-        if self.keeps {
-            sums.kept = kept.take(index).unwrap_or_default();
-            sums.kept.clear();
-            let numbers = system.kept[index];
-            if sums.kept.capacity() < numbers {
-                sums.kept = control.allocated(reserved(numbers))?;
-            }
-        }
-        if stacks.locals() < MANY || rayon::current_num_threads() == 1 {
-            let mut stack = system.workspace.stack();
-            for run in stacks.iter() {
-                if !control.stopped() {
-                    self.fill(&mut stack, run);
-                    stack.add_to(&mut front.columns(), layout);
-                    sums.add(&mut stack);
-                    if self.keeps {
-                        stack.keep(layout, &mut sums.kept);
-                    }
-                }
-            }
-            system.workspace.put_back_stack(stack);
-            return Some(sums);
-        }
-        let mut filled: Vec<Stack> = (0..WAVE).map(|_| system.workspace.stack()).collect();
-        let starts = self.shares(index);
-        for wave in stacks.parts(WAVE).into_iter().take_while(|_| !control.stopped()) {
-            let runs: Vec<&[u32]> = wave.iter().collect();
-            let filled = &mut filled[..runs.len()];
-            filled.par_iter_mut().zip(runs).for_each(|(stack, run)| self.fill(stack, run));
-            front.parts(&starts).into_par_iter().for_each(|mut columns| {
-                for stack in &*filled {
-                    stack.add_to(&mut columns, layout);
-                }
-            });
-            for stack in filled {
-                sums.add(stack);
-                if self.keeps {
-                    stack.keep(layout, &mut sums.kept);
-                }
-            }
-        }
-        filled.into_iter().for_each(|stack| system.workspace.put_back_stack(stack));
-        Some(sums)
-    }
-
-    fn fill(&self, stack: &mut Stack, run: &[u32]) {
-        stack.gather(self.system, self.equations, run);
-        stack.eliminate(&self.system.layout, self.prior, self.damping);
-        stack.reduce(&self.system.layout, self.rights);
-        self.control.count(run.len());
-    }
-
-    /// The first columns of the shares of a front that several threads add to, each a few blocks.
-    fn shares(&self, index: usize) -> Vec<usize> {
-        let symbolic = &*self.system.symbolic;
-        let Some(s) = symbolic.supernodes().get(index) else { return Vec::new() };
-        let first = symbolic.first_unknown(index);
-        let own = s.blocks.clone().map(|position| symbolic.range(position).start - first);
-        let starts: Vec<usize> = own.chain(s.row_offset[..s.rows.len()].iter().copied()).collect();
-        let few = starts.len().div_ceil(8 * rayon::current_num_threads());
-        starts.into_iter().step_by(few).collect()
-    }
-
-    /// Adds the ties at home in a supernode; returns the sum of squares of their right-hand sides.
-    fn add_ties(&self, front: &mut Front<'_>, index: usize) -> f64 {
-        let mut sum_of_squares = 0.0;
-        let mut tie = TieEquations::default();
-        for &each in self.system.ties.at(index) {
-            tie.gather(self.system, self.equations, index, each as usize);
-            for (coefficients, constant) in tie.rows() {
-                front.add_equation(tie.columns(), coefficients, constant);
-                sum_of_squares += constant * constant;
-            }
-        }
-        sum_of_squares
-    }
-
-    /// Adds what systems below have left, in the order of the layout.
-    fn add_contributions(&self, front: &mut Front<'_>, index: usize) {
-        for &below in self.system.contributions.at(index) {
-            let blocks = &self.system.layout.contributions()[below as usize];
-            if let Some(given) = self.equations.contribution(below as usize) {
-                front.add_contribution(given, &self.system.rows_of(index, blocks));
-            }
-        }
-    }
-
-    /// Adds the priors and the damping of the own blocks of a supernode.
-    fn add_prior(&self, front: &mut Front<'_>, index: usize) {
-        let (layout, symbolic) = (&self.system.layout, &*self.system.symbolic);
-        let positions = symbolic.supernodes()[index].blocks.clone();
-        let unknowns = positions.flat_map(|position| symbolic.unknowns_at(layout, position));
-        for (column, unknown) in unknowns.enumerate() {
-            let weight = self.prior.weight[unknown];
-            front.diagonal[column] += weight;
-            front.right[column] += self.prior.right[unknown];
-            front.panel[column * (front.height + 1)] += weight + self.damping * front.diagonal[column];
-            front.diagonal[column] *= 1.0 + self.damping;
-            let between = &self.prior.between;
-            let own = between.partition_point(|&(i, ..)| i < unknown);
-            for &(_, other, weight) in between[own..].iter().take_while(|&&(i, ..)| i == unknown) {
-                front.panel[(column - (unknown - other)) * front.height + column] += weight;
-            }
-        }
-    }
-}
-
-impl Sums {
-    fn add(&mut self, stack: &mut Stack) {
-        self.sum_of_squares += stack.sum_of_squares;
-        self.decrease += stack.decrease;
-        self.deficient.append(&mut stack.deficient);
-    }
 }
 
 impl Front<'_> {
@@ -461,6 +324,11 @@ impl Factor {
         if keeps {
             self.eliminated.push(sums.kept);
         }
+    }
+
+    /// Whether it has kept what the elimination of the local blocks has left.
+    pub fn has_kept(&self) -> bool {
+        !self.eliminated.is_empty()
     }
 
     /// Gives back what was kept for [`System::solve`].

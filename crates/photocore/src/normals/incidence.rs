@@ -1,5 +1,6 @@
 //! Which front each local block is eliminated into.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -26,6 +27,10 @@ pub(super) struct Incidence {
     home_ptr: Vec<usize>,
     /// Where each stack starts: a run of blocks of one home whose equations touch the same unknowns in the same way.
     stack_ptr: Vec<usize>,
+    /// What each of the groups has in common with others, as a number; empty where none has anything.
+    commons: Vec<u32>,
+    /// One group that has it, of each of these.
+    group_with: Vec<u32>,
 }
 
 impl Incidence {
@@ -64,7 +69,15 @@ impl Incidence {
         for index in 1..home_ptr.len() {
             home_ptr[index] += home_ptr[index - 1];
         }
-        let mut incidence = Self { groups, positions, by_home, home_ptr, stack_ptr: vec![0] };
+        let (numbers, group_with) = commons(layout);
+        let of_group = |&group: &u32| numbers[group as usize];
+        let commons = if numbers.is_empty() {
+            Vec::new()
+        } else {
+            groups.par_iter().with_min_len(MANY).map(of_group).collect()
+        };
+        let mut incidence =
+            Self { groups, positions, by_home, home_ptr, stack_ptr: vec![0], commons, group_with };
         let runs = incidence.by_home.chunk_by(|&a, &b| incidence.alike(layout, a as usize, b as usize));
         let lengths: Vec<usize> = runs.flat_map(|run| run.chunks(MOST)).map(<[u32]>::len).collect();
         let mut end = 0;
@@ -77,10 +90,8 @@ impl Incidence {
 
     /// Whether the equations of two local blocks touch the same unknowns in the same way.
     fn alike(&self, layout: &Layout, a: usize, b: usize) -> bool {
-        let common = |&group: &u32| (layout.further_of(group as usize), layout.border_of(group as usize));
-        let commons = |local: usize| self.groups_of(layout, local).iter().map(common);
         self.positions_of(layout, a) == self.positions_of(layout, b)
-            && (!layout.has_common() || commons(a).eq(commons(b)))
+            && self.commons_of(layout, a) == self.commons_of(layout, b)
     }
 
     /// The groups of a local block, by position.
@@ -91,6 +102,16 @@ impl Incidence {
     /// The positions of the main blocks of the groups of a local block.
     pub fn positions_of(&self, layout: &Layout, local: usize) -> &[u32] {
         &self.positions[layout.groups_of(local)]
+    }
+
+    /// What each group of a local block has in common with others, as a number; empty where none has anything.
+    pub fn commons_of(&self, layout: &Layout, local: usize) -> &[u32] {
+        self.commons.get(layout.groups_of(local)).unwrap_or_default()
+    }
+
+    /// A group that has in common with others what has this number.
+    pub fn group_with(&self, common: u32) -> usize {
+        self.group_with[common as usize] as usize
     }
 
     /// All local blocks, by home.
@@ -114,6 +135,33 @@ impl Incidence {
         let (first, last) = (place(self.home_ptr[supernode]), place(self.home_ptr[supernode + 1]));
         Stacks { locals: &self.by_home, ptr: &self.stack_ptr[first..=last] }
     }
+}
+
+/// Numbers what groups have in common with others: that of each group, none where no group has anything, and a group that has it of each
+/// number. The images of one photo nearly always have the same.
+fn commons(layout: &Layout) -> (Vec<u32>, Vec<u32>) {
+    if !layout.has_common() {
+        return (Vec::new(), Vec::new());
+    }
+    let mut group_with: Vec<u32> = Vec::new();
+    let mut known: HashMap<(&[u32], Range<usize>), u32> = HashMap::new();
+    let mut last: Vec<Option<u32>> = vec![None; layout.kept()];
+    let number = |group: usize| {
+        let own = &mut last[layout.kept_of(group)];
+        if let Some(common) =
+            own.filter(|&common| layout.share_alike(group_with[common as usize] as usize, group))
+        {
+            return common;
+        }
+        let common = *known.entry((layout.further_of(group), layout.border_of(group))).or_insert_with(|| {
+            group_with.push(group as u32);
+            group_with.len() as u32 - 1
+        });
+        *own = Some(common);
+        common
+    };
+    let numbers = (0..layout.groups()).map(number).collect();
+    (numbers, group_with)
 }
 
 /// A local block, and what it is sorted by before all else: its home, and the first three of its positions, zero where there are fewer.

@@ -449,6 +449,11 @@ impl Layout {
         }
     }
 
+    /// Whether two groups have the same in common with others.
+    pub(super) fn share_alike(&self, a: usize, b: usize) -> bool {
+        self.further_of(a).iter().eq(self.further_of(b)) && self.border_of(a) == self.border_of(b)
+    }
+
     /// All kept blocks that a group touches, the main one first.
     pub fn blocks_of(&self, group: usize) -> impl Iterator<Item = usize> + '_ {
         std::iter::once(self.kept_of(group)).chain(self.further_of(group).iter().map(|&block| block as usize))

@@ -43,6 +43,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod assembly;
+mod chord;
 mod cofactors;
 mod contribution;
 mod deficiency;

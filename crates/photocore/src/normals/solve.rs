@@ -5,13 +5,14 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::eliminated::{self, Coupled, Taken};
+use super::eliminated::{self, Coupled, OfHome};
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::further::of_others;
 use super::incidence::Stacks;
 use super::stack::Stack;
 use super::system::System;
+use super::vectorised::dot;
 use super::watch::{Between, Control, Stopped, watched};
 use super::workspace::{Eliminated, zeros};
 
@@ -79,24 +80,41 @@ impl System {
             return self.solve_for(pool, factor, equations, prior, damping, right, between);
         }
         watched(pool, between, |control| {
-            let mut others = control.allocated(of_others(self, right))?;
+            let others = control.allocated(of_others(self, right))?;
             let reduced = |coupled: &mut Coupled, (index, kept): (usize, &Vec<f64>)| {
                 let mut kept = &kept[..];
-                let mut found = Taken::default();
+                let mut found = OfHome::default();
                 for run in self.incidence.stacks_at(index).iter().take_while(|_| !control.stopped()) {
-                    eliminated::reduce(self, run, coupled, &mut kept, right, &mut found);
+                    let ranges = run.iter().map(|&local| self.layout.local_range(local as usize));
+                    ranges.for_each(|range| found.own.extend_from_slice(&right[range]));
+                    eliminated::reduce(self, run, coupled, &mut kept, &mut found);
                 }
                 found
             };
-            let taken: Vec<Taken> =
-                factor.eliminated.par_iter().enumerate().map_init(Coupled::default, reduced).collect();
-            // One after the other in a fixed order, whichever thread has found them.
-            taken.iter().for_each(|taken| taken.subtract_from(&mut others));
-            factor.solve_columns(&mut others);
-            let own: Vec<Vec<f64>> = taken.into_iter().map(|taken| taken.own).collect();
-            let found = self.kept_locals(&factor.eliminated, Some(&own), &others, control);
-            self.in_order_of_layout(&found, &others, control)
+            let homes = factor.eliminated.par_iter().enumerate();
+            let found = homes.map_init(Coupled::default, reduced).collect();
+            self.solve_reduced(factor, found, others, control).map(|(solution, _)| solution)
         })
+    }
+
+    /// Solves N x = r for a right-hand side that the local blocks have reduced; `others` without what they leave, in the order of elimination.
+    /// The solution, and r^T x.
+    pub(super) fn solve_reduced(
+        &self,
+        factor: &Factor,
+        found: Vec<OfHome>,
+        mut others: Vec<f64>,
+        control: &Control,
+    ) -> Option<(Vec<f64>, f64)> {
+        // One after the other in a fixed order, whichever thread has found them.
+        found.iter().for_each(|found| found.add_to(&mut others));
+        let reduced = others.clone();
+        factor.solve_columns(&mut others);
+        let own: Vec<Vec<f64>> = found.into_iter().map(|found| found.own).collect();
+        // With N = L L^T, r^T x is the square of L^-1 r, of which the local blocks have their parts.
+        let product = dot(&reduced, &others) + own.iter().map(|own| dot(own, own)).sum::<f64>();
+        let found = self.kept_locals(&factor.eliminated, Some(&own), &others, control);
+        Some((self.in_order_of_layout(&found, &others, control)?, product))
     }
 
     /// The local blocks in the order of the incidence, from what was kept of them; `own`: with other right-hand sides.

@@ -21,13 +21,13 @@ impl Triangle {
         rows * (rows + 1) / 2
     }
 
-    /// Appends them, row by row.
-    pub fn append_to(&self, rows: usize, numbers: &mut Vec<f64>) {
-        self.values
-            .iter()
-            .take(rows)
-            .enumerate()
-            .for_each(|(row, own)| numbers.extend_from_slice(&own[..=row]));
+    /// Writes them, row by row.
+    pub fn write_to(&self, rows: usize, numbers: &mut [f64]) {
+        let mut at = 0;
+        for (row, own) in self.values[..rows].iter().enumerate() {
+            numbers[at..=at + row].copy_from_slice(&own[..=row]);
+            at += row + 1;
+        }
     }
 
     /// The triangle of such numbers.

@@ -1,8 +1,10 @@
 //! Local blocks whose equations touch the same unknowns, gathered and eliminated side by side.
 
 mod add;
+mod chord;
 mod eliminate;
 mod gather;
+mod place;
 mod solve;
 
 use std::ops::Range;
@@ -12,9 +14,9 @@ use smallvec::SmallVec;
 use super::front::Strip;
 use super::symbolic::Symbolic;
 use super::triangle::Triangle;
-use super::vectorised::{LANES, Rows, Side, size};
+use super::vectorised::{Rows, Side, size};
 
-pub(super) use gather::{parts_of, united, unlike};
+pub(super) use place::{parts_of, united, unlike};
 
 /// A main kept block that the local blocks are tied to.
 #[derive(Debug, Clone)]
@@ -81,6 +83,20 @@ struct Place {
     rows: usize,
 }
 
+/// What some groups of the pattern have in common with others.
+#[derive(Debug, Clone)]
+struct Common {
+    /// Its number, and a group that has it.
+    number: u32,
+    group: usize,
+    /// Among the parts of the stack.
+    parts: Range<usize>,
+    /// Of all its parts.
+    width: usize,
+    /// The first position of its further blocks; that of none.
+    first: usize,
+}
+
 /// A part of what a group has in common with others: a further kept block, or a range of the border.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
@@ -117,12 +133,18 @@ pub(super) struct Stack {
     /// Local blocks that their equations do not determine.
     pub deficient: Vec<usize>,
     places: Vec<Place>,
+    /// The supernode that the local blocks are at home in.
+    home: usize,
+    commons: Vec<Common>,
     parts: Vec<Part>,
     constants: Vec<f64>,
     local_rows: Vec<f64>,
     kept_rows: Vec<f64>,
     common_rows: Vec<f64>,
-    coupling: Vec<f64>,
+    /// V, from `start` to `end`: what is kept of stacks before may stand before it.
+    pub coupling: Vec<f64>,
+    pub start: usize,
+    pub end: usize,
     pub reduced: Vec<f64>,
     /// L^-1 r of further right-hand sides, so many at a time: row by row of all local blocks; empty where there are none.
     pub sides: Vec<Side>,
@@ -137,7 +159,7 @@ impl Stack {
 
     /// The coupling to everything, main blocks before segments, each local block by local block.
     pub fn coupling(&self) -> &[f64] {
-        &self.coupling[..self.coupling.len() - LANES]
+        &self.coupling[self.start..self.end]
     }
 
     /// The coupling to a main block, local block by local block.

@@ -1,0 +1,166 @@
+//! What goes into the front of a supernode: the local blocks at home there, ties, what systems below have left, priors.
+
+use rayon::prelude::*;
+
+use super::equations::Equations;
+use super::factor::Formation;
+use super::front::Front;
+use super::incidence::Stacks;
+use super::panels::Handover;
+use super::stack::Stack;
+use super::tie_equations::TieEquations;
+use super::vectorised::LANES;
+use super::workspace::reserved;
+
+/// What the formation at one supernode adds up.
+#[derive(Default)]
+pub(super) struct Sums {
+    pub sum_of_squares: f64,
+    pub decrease: f64,
+    pub deficient: Vec<usize>,
+    /// What is kept of the local blocks.
+    pub kept: Vec<f64>,
+}
+
+/// Local blocks at one supernode from which on several threads work at them.
+const MANY: usize = 256;
+/// Stacks gathered by several threads before they are added to the front.
+const WAVE: usize = 64;
+
+impl<E: Equations> Formation<'_, E> {
+    /// Adds what the local blocks at home in a supernode leave, in their order; None without memory.
+    pub(super) fn assemble(
+        &self,
+        front: &mut Front<'_>,
+        index: usize,
+        kept: &Handover<Vec<f64>>,
+    ) -> Option<Sums> {
+        let Self { system, control, .. } = self;
+        let layout = &system.layout;
+        let stacks = system.incidence.stacks_at(index);
+        let mut sums = Sums::default();
+        if self.keeps {
+            sums.kept = kept.take(index).unwrap_or_default();
+            let numbers = system.kept[index] + LANES;
+            if sums.kept.capacity() < numbers {
+                sums.kept = control.allocated(reserved(numbers))?;
+            }
+        }
+        if stacks.locals() < MANY || rayon::current_num_threads() == 1 {
+            self.assemble_in_turn(front, stacks, &mut sums);
+            return Some(sums);
+        }
+        sums.kept.clear();
+        let mut filled: Vec<Stack> = (0..WAVE).map(|_| system.workspace.stack()).collect();
+        let starts = self.shares(index);
+        for wave in stacks.parts(WAVE).into_iter().take_while(|_| !control.stopped()) {
+            let runs: Vec<&[u32]> = wave.iter().collect();
+            let filled = &mut filled[..runs.len()];
+            filled.par_iter_mut().zip(runs).for_each(|(stack, run)| self.fill(stack, run));
+            front.parts(&starts).into_par_iter().for_each(|mut columns| {
+                for stack in &*filled {
+                    stack.add_to(&mut columns, layout);
+                }
+            });
+            for stack in filled {
+                sums.add(stack);
+                if self.keeps {
+                    stack.keep(layout, &mut sums.kept);
+                }
+            }
+        }
+        filled.into_iter().for_each(|stack| system.workspace.put_back_stack(stack));
+        Some(sums)
+    }
+
+    /// The same stack by stack: what is kept of them is written where it stays.
+    fn assemble_in_turn(&self, front: &mut Front<'_>, stacks: Stacks<'_>, sums: &mut Sums) {
+        let layout = &self.system.layout;
+        let mut stack = self.system.workspace.stack();
+        if self.keeps {
+            std::mem::swap(&mut stack.coupling, &mut sums.kept);
+        }
+        for run in stacks.iter().take_while(|_| !self.control.stopped()) {
+            self.fill(&mut stack, run);
+            stack.add_to(&mut front.columns(), layout);
+            sums.add(&mut stack);
+            if self.keeps {
+                stack.keep_in_place(layout);
+            }
+        }
+        if self.keeps {
+            std::mem::swap(&mut stack.coupling, &mut sums.kept);
+            stack.start = 0;
+        }
+        self.system.workspace.put_back_stack(stack);
+    }
+
+    fn fill(&self, stack: &mut Stack, run: &[u32]) {
+        stack.gather(self.system, self.equations, run);
+        stack.eliminate(&self.system.layout, self.prior, self.damping);
+        stack.reduce(&self.system.layout, self.rights);
+        self.control.count(run.len());
+    }
+
+    /// The first columns of the shares of a front that several threads add to, each a few blocks.
+    fn shares(&self, index: usize) -> Vec<usize> {
+        let symbolic = &*self.system.symbolic;
+        let Some(s) = symbolic.supernodes().get(index) else { return Vec::new() };
+        let first = symbolic.first_unknown(index);
+        let own = s.blocks.clone().map(|position| symbolic.range(position).start - first);
+        let starts: Vec<usize> = own.chain(s.row_offset[..s.rows.len()].iter().copied()).collect();
+        let few = starts.len().div_ceil(8 * rayon::current_num_threads());
+        starts.into_iter().step_by(few).collect()
+    }
+
+    /// Adds the ties at home in a supernode; returns the sum of squares of their right-hand sides.
+    pub(super) fn add_ties(&self, front: &mut Front<'_>, index: usize) -> f64 {
+        let mut sum_of_squares = 0.0;
+        let mut tie = TieEquations::default();
+        for &each in self.system.ties.at(index) {
+            tie.gather(self.system, self.equations, index, each as usize);
+            for (coefficients, constant) in tie.rows() {
+                front.add_equation(tie.columns(), coefficients, constant);
+                sum_of_squares += constant * constant;
+            }
+        }
+        sum_of_squares
+    }
+
+    /// Adds what systems below have left, in the order of the layout.
+    pub(super) fn add_contributions(&self, front: &mut Front<'_>, index: usize) {
+        for &below in self.system.contributions.at(index) {
+            let blocks = &self.system.layout.contributions()[below as usize];
+            if let Some(given) = self.equations.contribution(below as usize) {
+                front.add_contribution(given, &self.system.rows_of(index, blocks));
+            }
+        }
+    }
+
+    /// Adds the priors and the damping of the own blocks of a supernode.
+    pub(super) fn add_prior(&self, front: &mut Front<'_>, index: usize) {
+        let (layout, symbolic) = (&self.system.layout, &*self.system.symbolic);
+        let positions = symbolic.supernodes()[index].blocks.clone();
+        let unknowns = positions.flat_map(|position| symbolic.unknowns_at(layout, position));
+        for (column, unknown) in unknowns.enumerate() {
+            let weight = self.prior.weight[unknown];
+            front.diagonal[column] += weight;
+            front.right[column] += self.prior.right[unknown];
+            front.panel[column * (front.height + 1)] += weight + self.damping * front.diagonal[column];
+            front.diagonal[column] *= 1.0 + self.damping;
+            let between = &self.prior.between;
+            let own = between.partition_point(|&(i, ..)| i < unknown);
+            for &(_, other, weight) in between[own..].iter().take_while(|&&(i, ..)| i == unknown) {
+                front.panel[(column - (unknown - other)) * front.height + column] += weight;
+            }
+        }
+    }
+}
+
+impl Sums {
+    fn add(&mut self, stack: &mut Stack) {
+        self.sum_of_squares += stack.sum_of_squares;
+        self.decrease += stack.decrease;
+        self.deficient.append(&mut stack.deficient);
+    }
+}

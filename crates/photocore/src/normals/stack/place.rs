@@ -1,0 +1,255 @@
+//! Where the equations of a stack and what they touch stand.
+
+use std::ops::Range;
+
+use smallvec::SmallVec;
+
+use super::{Common, Part, Place, Run, Segment, Slot, Stack};
+use crate::normals::layout::Layout;
+use crate::normals::symbolic::Symbolic;
+use crate::normals::system::System;
+use crate::normals::triangle::Triangle;
+use crate::normals::vectorised::LANES;
+
+/// Groups that are looked at for one that has the same in common with others: the cameras of a flight are few.
+const FEW: usize = 4;
+
+impl Stack {
+    /// Lays out the buffers for local blocks of one pattern.
+    pub(super) fn place(&mut self, system: &System, locals: &[u32]) {
+        let (layout, symbolic) = (&system.layout, &*system.symbolic);
+        let (rows, l, depth) = (layout.rows(), layout.local_dim(), locals.len());
+        self.locals.clear();
+        self.locals.extend_from_slice(locals);
+        self.slots.clear();
+        self.places.clear();
+        let Some(&first) = locals.first() else { return };
+        let groups = system.incidence.groups_of(layout, first as usize);
+        let positions = system.incidence.positions_of(layout, first as usize);
+        self.place_slots(symbolic, positions);
+        let common = self.place_commons(system, first as usize);
+        let (mut kept, mut coupling) = (0, self.start);
+        for slot in &mut self.slots {
+            // Every kept block of a local block is in the pattern of its home.
+            slot.row = symbolic.panel_row(self.home, slot.position).unwrap_or_default();
+            slot.constants = slot.groups.start * rows * depth;
+            (slot.kept, slot.coupling) = (kept, coupling);
+            kept += slot.groups.len() * rows * depth * slot.dim;
+            coupling += l * depth * slot.dim;
+        }
+        for segment in &mut self.segments {
+            segment.coupling = coupling;
+            coupling += l * depth * segment.unknowns.len();
+        }
+        self.find_runs();
+        self.end = coupling;
+        make_room(&mut self.constants, groups.len() * rows * depth);
+        make_room(&mut self.local_rows, groups.len() * rows * depth * l);
+        // Products read beyond the end.
+        make_room(&mut self.kept_rows, kept + LANES);
+        make_room(&mut self.common_rows, common + LANES);
+        let behind = self.numbers_beside(layout).max(LANES);
+        make_room(&mut self.coupling, coupling + behind);
+        self.reduced.resize(l * depth, 0.0);
+        self.triangles.resize(depth, Triangle::default());
+    }
+
+    /// Finds the main blocks.
+    fn place_slots(&mut self, symbolic: &Symbolic, positions: &[u32]) {
+        for (p, &position) in positions.iter().enumerate() {
+            match self.slots.last_mut() {
+                Some(slot) if slot.position == position as usize => slot.groups.end += 1,
+                _ => self.slots.push(Slot {
+                    position: position as usize,
+                    row: 0,
+                    dim: symbolic.dim(position as usize),
+                    groups: p..p + 1,
+                    constants: 0,
+                    kept: 0,
+                    coupling: 0,
+                }),
+            }
+        }
+    }
+
+    /// Finds what each group has in common with others, and the segments; returns how many coefficients these have. The segments of the stack
+    /// before stay where that was at home in the same front and had the same in common.
+    fn place_commons(&mut self, system: &System, local: usize) -> usize {
+        let (layout, symbolic) = (&system.layout, &*system.symbolic);
+        let positions = system.incidence.positions_of(layout, local);
+        let (of_groups, are_other) = self.find_commons(system, local);
+        let main = positions.first().map(|&main| main as usize);
+        let first = self.commons.iter().map(|common| common.first).chain(main).min();
+        let home = first.map_or(0, |first| symbolic.supernode_of(first));
+        if home != std::mem::replace(&mut self.home, home) || are_other {
+            self.place_parts(layout, symbolic);
+        }
+        let mut end = 0;
+        for p in 0..positions.len() {
+            let common = of_groups.get(p).map(|&common| &self.commons[common]);
+            let (parts, width) = common.map_or((0..0, 0), |common| (common.parts.clone(), common.width));
+            self.places.push(Place { parts, width, rows: end });
+            end += self.locals.len() * layout.rows() * width;
+        }
+        end
+    }
+
+    /// Which of all that its groups have in common with others each of them has, for a local block, and whether it is not what the stack before
+    /// had.
+    fn find_commons(&mut self, system: &System, local: usize) -> (SmallVec<[usize; 16]>, bool) {
+        let (mut found, mut are_other) = (0usize, false);
+        let of_group = |&number: &u32| {
+            let start = found.saturating_sub(FEW);
+            let is_it = |common: &Common| common.number == number;
+            if let Some(known) = self.commons[start..found].iter().rposition(is_it) {
+                return start + known;
+            }
+            if !self.commons.get(found).is_some_and(is_it) {
+                self.commons.truncate(found);
+                self.commons.push(Common::of(system, number));
+                are_other = true;
+            }
+            found += 1;
+            found - 1
+        };
+        let of_groups = system.incidence.commons_of(&system.layout, local).iter().map(of_group).collect();
+        are_other |= found < self.commons.len();
+        self.commons.truncate(found);
+        (of_groups, are_other)
+    }
+
+    /// Finds the parts of what groups have in common with others, and unites those that overlap or meet in one block.
+    fn place_parts(&mut self, layout: &Layout, symbolic: &Symbolic) {
+        self.parts.clear();
+        for common in &mut self.commons {
+            let start = self.parts.len();
+            let part =
+                |(position, unknowns, column)| Part { position, unknowns, segment: 0, shift: 0, column };
+            self.parts.extend(parts_of(layout, symbolic, common.group).map(part));
+            common.parts = start..self.parts.len();
+        }
+        let all = self.parts.iter().map(|part| (part.position, part.unknowns.clone()));
+        let segment = |(position, unknowns): (usize, Range<usize>)| Segment {
+            position,
+            row: symbolic.panel_row(self.home, position).unwrap_or_default() + unknowns.start,
+            unknowns,
+            coupling: 0,
+            runs: SmallVec::new(),
+            plain: false,
+        };
+        self.segments = united(all).into_iter().map(segment).collect();
+        for part in &mut self.parts {
+            let key = (part.position, part.unknowns.start);
+            let after =
+                self.segments.partition_point(|segment| (segment.position, segment.unknowns.start) <= key);
+            part.segment = after.saturating_sub(1);
+            part.shift = part.unknowns.start - self.segments[part.segment].unknowns.start;
+        }
+    }
+
+    /// Finds the groups whose coefficients in a segment stand one below the other.
+    fn find_runs(&mut self) {
+        self.segments.iter_mut().for_each(|segment| segment.runs.clear());
+        let single = self.slots.iter().filter(|slot| slot.groups.len() == 1).map(|slot| slot.groups.start);
+        for p in single {
+            let place = &self.places[p];
+            for &Part { segment, column, ref unknowns, .. } in &self.parts[place.parts.clone()] {
+                let Segment { unknowns: all, runs, .. } = &mut self.segments[segment];
+                if unknowns.len() < all.len() {
+                    continue;
+                }
+                let goes_on = |run: &&mut Run| {
+                    let width = self.places[run.places.start].width;
+                    run.places.end == p && run.column == column && width == place.width
+                };
+                match runs.last_mut().filter(goes_on) {
+                    Some(run) => run.places.end += 1,
+                    None => runs.push(Run { places: p..p + 1, column }),
+                }
+            }
+        }
+        for (index, segment) in self.segments.iter_mut().enumerate() {
+            let parts = self.places.iter().flat_map(|place| &self.parts[place.parts.clone()]);
+            let touching = parts.filter(|part| part.segment == index).count();
+            segment.plain = segment.runs.iter().map(|run| run.places.len()).sum::<usize>() == touching;
+        }
+    }
+}
+
+impl Common {
+    /// What has a number.
+    fn of(system: &System, number: u32) -> Self {
+        let (layout, group) = (&system.layout, system.incidence.group_with(number));
+        let further = layout.further_of(group).iter();
+        let first = further.map(|&block| system.symbolic.position(block as usize)).min();
+        let first = first.unwrap_or(usize::MAX);
+        Self { number, group, parts: 0..0, width: layout.common_width(group), first }
+    }
+}
+
+/// Makes a buffer so long at least; what it holds is of no use.
+fn make_room(buffer: &mut Vec<f64>, length: usize) {
+    if buffer.len() < length {
+        buffer.resize(length, 0.0);
+    }
+}
+
+/// The parts of what a group has in common with others: the position of a block, some of its unknowns, and the first of their columns
+/// among those that the group has in common.
+pub(in crate::normals) fn parts_of<'a>(
+    layout: &'a Layout,
+    symbolic: &'a Symbolic,
+    group: usize,
+) -> impl Iterator<Item = (usize, Range<usize>, usize)> + 'a {
+    let blocks = layout.further_of(group).iter().scan(0, |width, &block| {
+        let block = block as usize;
+        let first = std::mem::replace(width, *width + layout.kept_dim(block));
+        Some((block, first))
+    });
+    let further = blocks.flat_map(move |(block, first)| {
+        let position = symbolic.position(block);
+        layout.free_of(block).map(move |free| (position, free.clone(), first + free.start))
+    });
+    // The border is the last block.
+    let border = layout.border_of(group);
+    let own = (!border.is_empty()).then(|| {
+        let column = layout.common_width(group) - border.len();
+        (symbolic.blocks() - 1, border, column)
+    });
+    further.chain(own)
+}
+
+/// Numbers of what groups have in common with others, less those that are one of the few before.
+pub(in crate::normals) fn unlike(numbers: &[u32]) -> SmallVec<[u32; 4]> {
+    let mut found: SmallVec<[u32; 4]> = SmallVec::new();
+    for number in numbers {
+        if !found.iter().rev().take(FEW).any(|other| other == number) {
+            found.push(*number);
+        }
+    }
+    found
+}
+
+/// Unites ranges of the unknowns of blocks that overlap or meet, in the order of their positions.
+pub(in crate::normals) fn united(
+    parts: impl Iterator<Item = (usize, Range<usize>)>,
+) -> SmallVec<[(usize, Range<usize>); 4]> {
+    let mut sorted: SmallVec<[(usize, Range<usize>); 4]> = SmallVec::new();
+    // Most groups have the same in common as one of the few before.
+    parts.for_each(|part| {
+        if !sorted.iter().rev().take(FEW).any(|other| *other == part) {
+            sorted.push(part);
+        }
+    });
+    sorted.sort_unstable_by_key(|(position, unknowns)| (*position, unknowns.start));
+    let mut found: SmallVec<[(usize, Range<usize>); 4]> = SmallVec::new();
+    for (position, unknowns) in sorted {
+        match found.last_mut() {
+            Some((at, last)) if position == *at && unknowns.start <= last.end => {
+                last.end = last.end.max(unknowns.end);
+            }
+            _ => found.push((position, unknowns)),
+        }
+    }
+    found
+}
