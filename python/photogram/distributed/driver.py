@@ -45,6 +45,8 @@ ROUNDING = 1e-12
 """A step is accepted when the sum of squares does not rise by more than this fraction of it."""
 NEGLIGIBLE = 1e-3
 """A full step that changes no unknown by more than this multiple of its standard deviation is accepted."""
+IN_THE_MEAN = 1e-5
+"""Nor does one that changes them by no more than this in the mean bring about other cofactors."""
 FAR = 30.0
 """Beyond so many standard deviations in the mean points are intersected anew."""
 STILL = 1e-4
@@ -227,7 +229,8 @@ class Driver:
             return True
         before = self._course.iterations[-1] if self._course.iterations else None
         rate = change / before.largest_change if before is not None and before.damping == 0.0 else 1.0
-        return change <= NEGLIGIBLE and rate < 1.0 and rate / (1.0 - rate) * change <= self.stop.tolerance
+        leaves_cofactors = change <= max(NEGLIGIBLE, IN_THE_MEAN * math.sqrt(self._unknowns[4]))
+        return leaves_cofactors and rate < 1.0 and rate / (1.0 - rate) * change <= self.stop.tolerance
 
     def _falls_no_more(self, change: float) -> bool:
         """Whether full steps are negligible and have long been as long as this one: rounding, no more."""

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::method::{NEGLIGIBLE, Stop};
+use super::method::{NEGLIGIBLE, Stop, leaves_cofactors};
 use super::options::{Iteration, Status};
 use super::problem::Model;
 use super::result::AdjustError;
@@ -260,12 +260,13 @@ impl<'a, M: Model> Run<'a, '_, M> {
         Ok(None)
     }
 
-    /// Whether a step is negligible itself and, the steps falling at the rate of the last two, chords counted, all further ones together
+    /// Whether a step leaves cofactors as they are and, the steps falling at the rate of the last two, chords counted, all further ones together
     /// would not exceed a limit (Hairer and Wanner 1996, section IV.8).
     fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
         let before = self.iterations.last().filter(|iteration| iteration.damping == 0.0);
         let rate = before.map_or(1.0, |before| change / self.chord.unwrap_or(before.largest_change));
-        change <= NEGLIGIBLE && rate < 1.0 && rate / (1.0 - rate) * change <= limit
+        let unknowns = self.problem.layout().unknowns();
+        leaves_cofactors(change, unknowns) && rate < 1.0 && rate / (1.0 - rate) * change <= limit
     }
 
     /// Whether full steps are negligible and have long been as long as this one: what still moves, the observations do not determine

@@ -7,7 +7,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::datum::{Adjusted, AtTarget, Datum, Target, moved};
 use super::loss::Reweighting;
-use super::method::{FIRST_DAMPING, Method, NEGLIGIBLE};
+use super::method::{FIRST_DAMPING, Method, leaves_cofactors};
 use super::options::{Event, Iteration, Options, Phase, Status};
 use super::problem::{Linearized, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds, unless_stopped};
@@ -306,7 +306,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let full = |iteration: &Iteration| iteration.damping == 0.0;
         let before = self.iterations.last().filter(|before| full(before) && full(last));
         let next = before.map(|before| last.largest_change.powi(3) / before.largest_change.powi(2));
-        self.is_near = self.target.is_some() && next.is_some_and(|next| next <= NEGLIGIBLE);
+        let unknowns = self.problem.layout().unknowns();
+        self.is_near = self.target.is_some() && next.is_some_and(|next| leaves_cofactors(next, unknowns));
     }
 
     /// Moves the network to the datum that it is to end in; it stays where it cannot be moved there.
