@@ -247,17 +247,20 @@ pub fn way_back(
         if determinant <= 0.0 {
             return None;
         }
+        if value == target {
+            return Some(at);
+        }
         let [x, y] = [target[0] - value[0], target[1] - value[1]].map(|lack| lack / determinant);
         let step = [by[1][1] * x - by[0][1] * y, by[0][0] * y - by[1][0] * x];
         at = [at[0] + step[0], at[1] + step[1]];
         let [square, size] = [step, at].map(square_of);
-        // A step leaves its square times how much the map bends: as much as the step before has shown, or a lens does anyway.
-        let left = (square / before).powi(2).max(square / size).min(1.0);
-        grown += usize::from(square >= before);
-        before = square;
-        if left * square <= ROUNDING * ROUNDING * size {
+        // A step leaves its square times how much the map bends: as much as the step before has shown, and as a lens does anyway.
+        let (rounding, shown) = (ROUNDING * ROUNDING * size, if square > before { square } else { before });
+        if square * square <= rounding * size && square * square * square <= rounding * shown * shown {
             return Some(at);
         }
+        grown += usize::from(square >= before);
+        before = square;
         if grown == 2 || !square.is_finite() {
             return (square <= REACHED * REACHED * size).then_some(at);
         }

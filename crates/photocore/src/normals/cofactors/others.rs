@@ -26,11 +26,22 @@ pub(super) struct Others {
     by_group: bool,
 }
 
-/// The cofactors of a local block; its rows are as long as vectors.
-type Own<const L: usize> = [[f64; LANES]; L];
+/// Coefficients of C equations in consecutive unknowns.
+#[derive(Clone, Copy)]
+struct Tied<'a, const C: usize> {
+    /// The place of the first among the others.
+    start: usize,
+    width: usize,
+    /// They go on for [`LANES`] elements at least.
+    x: [&'a [f64]; C],
+}
 
-/// Coefficients of C equations in consecutive unknowns, from a place among the others on.
-type Tied<'a, const C: usize> = (usize, [&'a [f64]; C]);
+impl<'a, const C: usize> Tied<'a, C> {
+    #[inline(always)]
+    fn coefficients(&self) -> [&'a [f64]; C] {
+        self.x.map(|x| &x[..self.width])
+    }
+}
 
 /// A group of equations: of a local block of the stack, in a slot that starts there, and in the pattern.
 #[derive(Clone, Copy)]
@@ -104,7 +115,8 @@ impl Others {
                 let diagonal = found.equations.len();
                 for row in (1..rows).step_by(2) {
                     let shares = self.shares::<S, 2, L, D>(simd, stack, group, [row - 1, row], &own);
-                    found.equations.extend_from_slice(&[shares[0][0], shares[1][1]]);
+                    found.equations.push(shares[0][0]);
+                    found.equations.push(shares[1][1]);
                 }
                 if rows % 2 == 1 {
                     let [[share]] = self.shares::<S, 1, L, D>(simd, stack, group, [rows - 1], &own);
@@ -155,9 +167,8 @@ impl Others {
         let vectors = self.stride / S::F64_LANES;
         let h: [&[f64]; L] = std::array::from_fn(|d| &self.h[d * self.stride..][..self.width]);
         let mut sums = [[simd.splat_f64s(0.0); V]; L];
-        let rows = S::as_simd_f64s(&self.inverse).0[first..].chunks_exact(vectors);
+        let rows = S::as_simd_f64s(&self.inverse).0[first..].windows(V).step_by(vectors);
         for (i, row) in rows.take(self.width).enumerate() {
-            let row = &row[..V];
             for d in 0..L {
                 let factor = simd.splat_f64s(h[d][i]);
                 for v in 0..V {
@@ -174,8 +185,14 @@ impl Others {
 
     /// Q_ll of local block `t` of the stack, which is found, and N_ll^-1 besides where that is asked for.
     #[inline(always)]
-    fn own<S: Simd, const L: usize>(&self, simd: S, stack: &Stack, t: usize, found: &mut AtHome) -> Own<L> {
-        let mut own = [[0.0; LANES]; L];
+    fn own<S: Simd, const L: usize>(
+        &self,
+        simd: S,
+        stack: &Stack,
+        t: usize,
+        found: &mut AtHome,
+    ) -> [[f64; L]; L] {
+        let mut own = [[0.0; L]; L];
         for a in 0..L {
             let mut unit = [0.0; L];
             unit[a] = 1.0;
@@ -195,7 +212,7 @@ impl Others {
                 (own[a][b], own[b][a]) = (value, value);
             }
         }
-        own.iter().for_each(|row| found.local.extend_from_slice(&row[..L]));
+        found.local.extend_from_slice(own.as_flattened());
         own
     }
 
@@ -206,7 +223,7 @@ impl Others {
         simd: S,
         stack: &Stack,
         group: Group<'_>,
-        own: &Own<L>,
+        own: &[[f64; L]; L],
         diagonal: usize,
         found: &mut AtHome,
     ) {
@@ -243,71 +260,95 @@ impl Others {
         stack: &Stack,
         group: Group<'_>,
         picked: [usize; C],
-        own: &Own<L>,
+        own: &[[f64; L]; L],
     ) -> [[f64; C]; C] {
         let Group { t, slot, start, k, p, rows } = group;
         let dim = size::<D>(slot.dim);
         let local = stack.local_rows::<L>(t, p, rows);
         let local = picked.map(|row| &local[row]);
         let at = (t * slot.groups.len() + k) * rows;
-        let coefficients = &stack.slot_rows::<D>(slot, rows).rows.values[at * dim..][..rows * dim];
-        let kept = (start, picked.map(|row| &coefficients[row * dim..][..dim]));
-        let common = |part: &Part| {
-            let equations = t * rows..(t + 1) * rows;
-            let Rows { values, width, stride, .. } = stack.part_rows(p, part, equations).rows;
-            let start = self.strips[stack.slots.len() + part.segment].1 + part.shift;
-            (start, picked.map(|row| &values[row * stride..][..width]))
-        };
+        let coefficients = &stack.slot_rows::<D>(slot, rows).rows.values[at * dim..];
+        let kept = Tied { start, width: dim, x: picked.map(|row| &coefficients[row * dim..]) };
         let mut form = [[simd.splat_f64s(0.0); C]; C];
-        let mut along = [[simd.splat_f64s(0.0); LANES]; C];
-        add_rows(simd, &mut along, own.as_flattened(), LANES, local.map(|a| &a[..]));
-        add_form(simd, &mut form, &along, local.map(|a| &a[..]));
-        // Q_lo is -H Q: the coefficients of local unknowns change their signs.
-        let turned = local.map(|a| a.map(|value| -value));
-        self.tied(simd, &mut form, &turned, &[], kept);
+        self.tied(simd, &mut form, local, &[], kept);
         match stack.parts(p) {
             [] => {}
-            [part] => self.tied(simd, &mut form, &turned, &[kept], common(part)),
+            [part] => self.tied(simd, &mut form, local, &[kept], self.common(stack, group, picked, part)),
             parts => {
                 let mut before: SmallVec<[_; 4]> = smallvec![kept];
                 for part in parts {
-                    self.tied(simd, &mut form, &turned, &before, common(part));
-                    before.push(common(part));
+                    let common = self.common(stack, group, picked, part);
+                    self.tied(simd, &mut form, local, &before, common);
+                    before.push(common);
                 }
             }
         }
-        halves(simd, &form)
+        let mut found = [[0.0; C]; C];
+        for i in 0..C {
+            for j in 0..C {
+                found[i][j] = 0.5 * simd.reduce_sum_f64s(simd.add_f64s(form[i][j], form[j][i]));
+                for d in 0..L {
+                    found[i][j] += local[i][d] * dot(&own[d], local[j]);
+                }
+            }
+        }
+        found
     }
 
-    /// Adds what coefficients x of further unknowns make of a Q b^T: (x Q + 2 y Q + 2 a H Q) x^T, a those of the local unknowns, with
-    /// their signs turned, and y those that were added before.
+    /// The coefficients of a part of what a group has in common with others, in some of its rows.
+    #[inline(always)]
+    fn common<'s, const C: usize>(
+        &self,
+        stack: &'s Stack,
+        Group { t, p, rows, .. }: Group<'_>,
+        picked: [usize; C],
+        part: &Part,
+    ) -> Tied<'s, C> {
+        let Rows { values, width, stride, .. } = stack.part_rows(p, part, t * rows..(t + 1) * rows).rows;
+        let start = self.strips[stack.slots.len() + part.segment].1 + part.shift;
+        Tied { start, width, x: picked.map(|row| &values[row * stride..]) }
+    }
+
+    /// Adds what coefficients x of further unknowns make of a Q a^T: (x Q + 2 y Q - 2 a H Q) x^T, a those of the local unknowns, and y
+    /// those that were added before; in lanes, and for a Q b^T in two halves.
     #[inline(always)]
     fn tied<S: Simd, const C: usize, const L: usize>(
         &self,
         simd: S,
         form: &mut [[S::f64s; C]; C],
-        a: &[[f64; L]; C],
+        a: [&[f64; L]; C],
         before: &[Tied<'_, C>],
-        (start, x): Tied<'_, C>,
+        own: Tied<'_, C>,
     ) {
         let (stride, two) = (self.stride, simd.splat_f64s(2.0));
-        for first in (0..x[0].len()).step_by(LANES) {
-            let column = start + first;
-            let [mut others, mut along] = [[[simd.splat_f64s(0.0); LANES]; C]; 2];
-            add_rows(simd, &mut others, &self.hq[column..], stride, a.each_ref().map(|a| &a[..]));
-            for &(place, y) in before {
-                add_rows(simd, &mut others, &self.inverse[place * stride + column..], stride, y);
+        for first in (0..own.width).step_by(LANES) {
+            let column = own.start + first;
+            let rows = |start: usize| &self.inverse[start * stride + column..];
+            let [mut local, mut others, mut along] = [[[simd.splat_f64s(0.0); LANES]; C]; 3];
+            add_rows(simd, &mut local, &self.hq[column..], stride, a.map(|a| &a[..]));
+            for tied in before {
+                add_rows(simd, &mut others, rows(tied.start), stride, tied.coefficients());
             }
-            add_rows(simd, &mut along, &self.inverse[start * stride + column..], stride, x);
-            for c in 0..C {
-                for k in 0..LANES / S::F64_LANES {
-                    along[c][k] = simd.mul_add_f64s(others[c][k], two, along[c][k]);
+            add_rows(simd, &mut along, rows(own.start), stride, own.coefficients());
+            for k in 0..LANES / S::F64_LANES {
+                let places = S::as_simd_f64s(&PLACES).0[k];
+                let within = simd.less_than_f64s(places, simd.splat_f64s((own.width - first) as f64));
+                for j in 0..C {
+                    let x = S::as_simd_f64s(&own.x[j][first..][..LANES]).0[k];
+                    let x = simd.select_f64s(within, x, simd.splat_f64s(0.0));
+                    for i in 0..C {
+                        let twice = simd.mul_f64s(simd.sub_f64s(others[i][k], local[i][k]), two);
+                        let sum = simd.add_f64s(along[i][k], twice);
+                        form[i][j] = simd.mul_add_f64s(sum, x, form[i][j]);
+                    }
                 }
             }
-            add_form(simd, form, &along, x.map(|x| &x[first..]));
         }
     }
 }
+
+/// The places of the lanes.
+const PLACES: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 /// Adds the sum over rows of x[row] times the start of the row, for each of C x, to sums.
 #[inline(always)]
@@ -318,8 +359,8 @@ fn add_rows<S: Simd, const C: usize>(
     stride: usize,
     x: [&[f64]; C],
 ) {
-    for (i, row) in rows.chunks_exact(stride).take(x[0].len()).enumerate() {
-        let vectors = S::as_simd_f64s(&row[..LANES]).0;
+    for (i, row) in rows.windows(LANES).step_by(stride).take(x[0].len()).enumerate() {
+        let vectors = S::as_simd_f64s(row).0;
         for c in 0..C {
             let factor = simd.splat_f64s(x[c][i]);
             for k in 0..LANES / S::F64_LANES {
@@ -327,39 +368,6 @@ fn add_rows<S: Simd, const C: usize>(
             }
         }
     }
-}
-
-/// Adds the products of C vectors with C others, which may end before, in lanes.
-#[inline(always)]
-fn add_form<S: Simd, const C: usize>(
-    simd: S,
-    form: &mut [[S::f64s; C]; C],
-    along: &[[S::f64s; LANES]; C],
-    x: [&[f64]; C],
-) {
-    for j in 0..C {
-        for (k, part) in x[j][..LANES.min(x[j].len())].chunks(S::F64_LANES).enumerate() {
-            let x = simd.partial_load_f64s(part);
-            for i in 0..C {
-                form[i][j] = simd.mul_add_f64s(along[i][k], x, form[i][j]);
-            }
-        }
-    }
-}
-
-/// The symmetric half of a matrix that was summed in lanes.
-#[inline(always)]
-fn halves<S: Simd, const C: usize>(simd: S, form: &[[S::f64s; C]; C]) -> [[f64; C]; C] {
-    let mut found = [[0.0; C]; C];
-    for i in 0..C {
-        for j in 0..C {
-            found[i][j] = match i == j {
-                true => simd.reduce_sum_f64s(form[i][i]),
-                false => 0.5 * simd.reduce_sum_f64s(simd.add_f64s(form[i][j], form[j][i])),
-            };
-        }
-    }
-    found
 }
 
 /// Copies a row of a block; the common sizes without a call.
