@@ -310,7 +310,7 @@ impl Others {
     }
 
     /// Adds what coefficients x of further unknowns make of a Q a^T: (x Q + 2 y Q - 2 a H Q) x^T, a those of the local unknowns, and y
-    /// those that were added before; in lanes, and for a Q b^T in two halves.
+    /// those that were added before; in lanes. What they make of a Q b^T is the mean of two elements.
     #[inline(always)]
     fn tied<S: Simd, const C: usize, const L: usize>(
         &self,
