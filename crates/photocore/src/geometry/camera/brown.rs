@@ -63,7 +63,7 @@ pub struct BrownTerms {
 
 impl BrownTerms {
     /// What its lens has.
-    const TERMS: Terms = Terms { powers: [3, 0], prism: false };
+    pub(super) const TERMS: Terms = Terms { powers: [3, 0], prism: false };
 
     /// The lens that they are: 1 + R is its radial factor.
     #[inline(always)]
@@ -159,7 +159,7 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
     fn measured(&self, corrected: [f64; 2]) -> Option<[f64; 2]> {
         let ([a1, a2], [b1, b2]) = self.affine();
         let lens = self.terms.lens();
-        let [x, y] = from_radial(&lens.radial, corrected, |[x, y]| {
+        let [x, y] = from_radial(&lens.radial, BrownTerms::TERMS.powers, corrected, |[x, y]| {
             let Bent { xy, by_place: [by_x, by_y], .. } = lens.bend([x, y]);
             ([xy[0] + b1 * x + b2 * y, xy[1]], [[by_x[0] + b1, by_x[1] + b2], by_y])
         })?;

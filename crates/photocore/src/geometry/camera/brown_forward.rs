@@ -104,7 +104,7 @@ impl CameraModel for BrownForward {
 
     fn direction(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
         let target = [x - self.principal_point[0], y - self.principal_point[1]];
-        let ideal = from_radial(&self.terms.lens().radial, target, |place| {
+        let ideal = from_radial(&self.terms.lens().radial, BrownTerms::TERMS.powers, target, |place| {
             let (_, xy, by_place) = self.bent(place);
             (xy, by_place)
         })?;

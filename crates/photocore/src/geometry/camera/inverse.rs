@@ -9,6 +9,8 @@ const STEPS: usize = 50;
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// What a way back may be wrong by where rounding ends it, as a fraction of its size.
 const REACHED: f64 = 1e-9;
+/// A radial part that surely rises up to so many times the radius of a place needs no search for where it ends.
+const BEYOND: f64 = 1.25;
 
 /// Up to where the radial part of a lens is one-to-one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,8 +71,9 @@ impl RadialFactor {
     }
 
     /// D^2 d(r s)/dr = N D + 2 q (N' D - N D'): the lens is one-to-one while this and D are positive.
-    fn slope(&self) -> [f64; 10] {
-        let ([numerator, denominator], mut slope) = (self.powers(), [0.0; 10]);
+    #[inline(always)]
+    fn slope(&self, [numerator, denominator]: [usize; 2]) -> [f64; 10] {
+        let mut slope = [0.0; 10];
         for (i, n) in self.numerator[..=numerator].iter().enumerate() {
             for (j, d) in self.denominator[..=denominator].iter().enumerate() {
                 slope[i + j] += n * d * (1.0 + 2.0 * i as f64 - 2.0 * j as f64);
@@ -81,7 +84,7 @@ impl RadialFactor {
 
     /// Up to where r s is one-to-one; None where it is so everywhere.
     pub fn limit(&self) -> Option<RadialLimit> {
-        let ends = [first_root(&self.slope()), first_root(&self.denominator)];
+        let ends = [first_root(&self.slope(self.powers())), first_root(&self.denominator)];
         let q = ends.into_iter().flatten().reduce(f64::min)?;
         Some(RadialLimit { radius: q.sqrt(), distorted: q.sqrt() * self.value(q).abs() })
     }
@@ -91,10 +94,25 @@ impl RadialFactor {
         self.limit().map_or(f64::INFINITY, |limit| limit.radius)
     }
 
-    /// Whether r s rises up to a radius because what the negative terms take away by then leaves something: most lenses need no root.
-    fn surely_rises(&self, slope: &[f64], radius: f64) -> bool {
-        let q = radius * radius;
-        lower_bound(slope, q) > 0.0 && lower_bound(&self.denominator, q) > 0.0
+    /// Whether r s rises up to a radius of the given square because what the negative terms take away by then leaves something: most
+    /// lenses need no root. Coefficients beyond the given powers are zero.
+    #[inline(always)]
+    fn surely_rises(&self, q: f64, powers: [usize; 2]) -> bool {
+        let [numerator, denominator] = powers;
+        let slope = &self.slope(powers)[..=numerator + denominator];
+        lower_bound(slope, q) > 0.0 && lower_bound(&self.denominator[..=denominator], q) > 0.0
+    }
+
+    /// About which part of a distorted radius of the given square the radius is that becomes it: one step of Newton's method; None unless
+    /// that radius surely lies within [`BEYOND`] times what this says, and r s rises up to there.
+    #[inline(always)]
+    fn nearly(&self, distorted: f64, powers: [usize; 2]) -> Option<f64> {
+        let [n, d, by_n, by_d] = self.at(distorted, powers);
+        let ratio = 1.0 - (n - d) * d / (n * d + 2.0 * distorted * (by_n * d - n * by_d));
+        let far = BEYOND * ratio;
+        let [n, d, ..] = self.at(far * far * distorted, powers);
+        let within = ratio > 0.0 && far * n >= d && self.surely_rises(far * far * distorted, powers);
+        within.then_some(ratio)
     }
 
     /// The radius that becomes the given one; None where there is none before the limit.
@@ -102,9 +120,8 @@ impl RadialFactor {
         if !distorted.is_finite() {
             return None;
         }
-        let slope = self.slope();
         let free = self.newton(distorted, f64::INFINITY);
-        if let Some(radius) = free.filter(|&radius| self.surely_rises(&slope, radius)) {
+        if let Some(radius) = free.filter(|&radius| self.surely_rises(radius * radius, self.powers())) {
             return Some(radius);
         }
         match self.limit() {
@@ -152,6 +169,7 @@ fn horner(coefficients: &[f64], x: f64) -> (f64, f64) {
 }
 
 /// What a polynomial is nowhere less than from zero to x: its constant and its negative terms at x.
+#[inline(always)]
 fn lower_bound(coefficients: &[f64], x: f64) -> f64 {
     let terms = coefficients.iter().rev().fold(0.0, |value, c| value * x + c.min(0.0));
     terms + coefficients[0].max(0.0)
@@ -215,6 +233,7 @@ pub fn times([x, y]: &Matrix2, v: [f64; 2]) -> [f64; 2] {
 
 /// The place that a map (its value and partials) takes to `target`, by Newton's method from `start`; None where there is none near, or
 /// where the map has turned over on the way.
+#[inline(always)]
 pub fn way_back(
     start: [f64; 2],
     target: [f64; 2],
@@ -224,31 +243,65 @@ pub fn way_back(
     let (mut before, mut grown) = (f64::INFINITY, 0);
     for _ in 0..STEPS {
         let (value, by) = map(at);
-        if by[0][0] * by[1][1] <= by[0][1] * by[1][0] {
+        let determinant = by[0][0] * by[1][1] - by[0][1] * by[1][0];
+        if determinant <= 0.0 {
             return None;
         }
-        let step = times(&inverted(by), [target[0] - value[0], target[1] - value[1]]);
-        at = [at[0] + step[0], at[1] + step[1]];
-        let [length, size] = [step, at].map(|[a, b]| (a * a + b * b).sqrt());
-        grown += usize::from(length >= before);
-        before = length;
-        if length <= ROUNDING * size {
+        if value == target {
             return Some(at);
         }
-        if grown == 2 || !length.is_finite() {
-            return (length <= REACHED * size).then_some(at);
+        let [x, y] = [target[0] - value[0], target[1] - value[1]].map(|lack| lack / determinant);
+        let step = [by[1][1] * x - by[0][1] * y, by[0][0] * y - by[1][0] * x];
+        at = [at[0] + step[0], at[1] + step[1]];
+        let [square, size] = [step, at].map(square_of);
+        // A step leaves its square times how much the map bends: as much as the step before has shown, and as a lens does anyway.
+        let (rounding, shown) = (ROUNDING * ROUNDING * size, if square > before { square } else { before });
+        if square * square <= rounding * size && square * square * square <= rounding * shown * shown {
+            return Some(at);
+        }
+        grown += usize::from(square >= before);
+        before = square;
+        if grown == 2 || !square.is_finite() {
+            return (square <= REACHED * REACHED * size).then_some(at);
         }
     }
     None
 }
 
 /// The place that a lens (its value and partials) takes to `target`: from what its radial part alone says, along the direction of that.
+/// Coefficients of that part beyond the given powers are zero.
+#[inline(always)]
 pub fn from_radial(
     radial: &RadialFactor,
+    powers: [usize; 2],
+    target: [f64; 2],
+    lens: impl Fn([f64; 2]) -> ([f64; 2], Matrix2) + Copy,
+) -> Option<[f64; 2]> {
+    let distorted = square_of(target);
+    if let Some(ratio) = radial.nearly(distorted, powers) {
+        let found = way_back(target.map(|value| ratio * value), target, lens);
+        let far = BEYOND * ratio;
+        if found.is_some_and(|place| square_of(place) <= far * far * distorted) {
+            return found;
+        }
+    }
+    from_limited(*radial, target, lens)
+}
+
+/// The same of a lens whose radial part may end before: by value, so that what is hardly ever called keeps nothing in memory.
+#[cold]
+#[inline(never)]
+fn from_limited(
+    radial: RadialFactor,
     target: [f64; 2],
     lens: impl Fn([f64; 2]) -> ([f64; 2], Matrix2),
 ) -> Option<[f64; 2]> {
     let distorted = target[0].hypot(target[1]);
     let ratio = if distorted > 0.0 { radial.invert(distorted)? / distorted } else { 1.0 };
     way_back(target.map(|value| ratio * value), target, lens)
+}
+
+#[inline(always)]
+fn square_of([a, b]: [f64; 2]) -> f64 {
+    a * a + b * b
 }

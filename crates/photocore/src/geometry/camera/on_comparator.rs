@@ -184,7 +184,7 @@ impl BackwardModel for OnComparator {
 
     fn measured(&self, corrected: [f64; 2]) -> Option<[f64; 2]> {
         let lens = self.terms.lens();
-        let place = from_radial(&lens.radial, corrected, |place| {
+        let place = from_radial(&lens.radial, BrownTerms::TERMS.powers, corrected, |place| {
             let bent = lens.bend(place);
             (bent.xy, bent.by_place)
         })?;

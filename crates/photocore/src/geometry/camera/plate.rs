@@ -114,7 +114,7 @@ impl CameraModel for Plate {
 
     fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
         let distorted = self.lens.upright(xy);
-        let [x, y] = from_radial(&self.radial(), distorted, |offset| {
+        let [x, y] = from_radial(&self.radial(), [3, 0], distorted, |offset| {
             let Displacement { shift, offset: by, .. } = self.lens.distortion().linearize(offset);
             let by_offset = [[1.0 + by[0][0], by[0][1]], [by[1][0], 1.0 + by[1][1]]];
             ([offset[0] + shift[0], offset[1] + shift[1]], by_offset)

@@ -234,7 +234,7 @@ trait Table<const N: usize>: Copy {
         let parts = self.parts();
         let b = (y - parts.origin[1]) / parts.focal[1];
         let a = (x - parts.origin[0] - parts.shear * b) / parts.focal[0];
-        let ab = from_radial(&parts.lens.radial, [a, b], |place| {
+        let ab = from_radial(&parts.lens.radial, Self::TERMS.powers, [a, b], move |place| {
             let bending = parts.bend(place, Self::ACTION, Self::TERMS);
             (bending.last.xy, bending.by_place)
         })?;

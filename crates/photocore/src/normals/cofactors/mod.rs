@@ -1,0 +1,227 @@
+//! Cofactors of every unknown and of every adjusted equation, from the selected inverse.
+
+mod others;
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use self::others::Others;
+use super::equations::{Equations, Prior};
+use super::further::Known;
+use super::incidence::Stacks;
+use super::selected::SelectedInverse;
+use super::stack::Stack;
+use super::system::System;
+use super::tie_equations::TieEquations;
+use super::vectorised::{Side, dot};
+use super::watch::Control;
+use super::workspace::zeros;
+
+/// Cofactors: the inverse normal matrix where it is needed. All blocks are square, row by row.
+#[derive(Debug, Clone)]
+pub struct Cofactors {
+    /// Of each local block, one after the other.
+    pub local: Vec<f64>,
+    /// Of each kept block, one after the other.
+    pub kept: Vec<f64>,
+    /// Of the border.
+    pub border: Vec<f64>,
+    /// Of each kept block with the border (its unknowns x those of the border, row by row), one after the other.
+    pub kept_border: Vec<f64>,
+    /// a Q a^T of each equation a x = l, in the order of groups and rows, then of ties and rows: the share of the equation that its own
+    /// unknowns take up. One minus it is the redundancy number of an observation.
+    pub equations: Vec<f64>,
+    /// a Q a^T of the equations a of each tie, a square block row by row, one after the other.
+    pub ties: Vec<f64>,
+    /// Of the pairs of kept blocks that were asked for, one after the other; NaN where no equations touch both.
+    pub pairs: Vec<f64>,
+    /// What the equations of each group have to do with each other, where that was asked for.
+    pub groups: Option<GroupCofactors>,
+    /// Diagonal of the normal equations of the unknowns of all kept blocks before any elimination, priors counted: the reciprocal cofactor
+    /// that each would have if all other unknowns were known.
+    pub information: Vec<f64>,
+}
+
+/// What the equations a of each group have to do with each other. All blocks are square, row by row, one after the other.
+#[derive(Debug, Clone)]
+pub struct GroupCofactors {
+    /// a Q a^T of every two equations of a group. The identity minus it is the cofactor matrix of residuals of unit weight.
+    pub shares: Vec<f64>,
+    /// The same with all unknowns known but those of the local block.
+    pub by_local: Vec<f64>,
+    /// Of each local block, all others being known.
+    pub alone: Vec<f64>,
+}
+
+impl Cofactors {
+    /// Puts together what was found at each supernode, and last for the local blocks without equations, with the information; None
+    /// without memory.
+    pub(super) fn collect(
+        system: &System,
+        control: &Control,
+        inverse: &SelectedInverse,
+        found: &[AtHome],
+        information: Vec<f64>,
+    ) -> Option<Self> {
+        let layout = &system.layout;
+        let (rows, l) = (layout.rows(), layout.local_dim());
+        let mut local = control.allocated(zeros(layout.locals() * l * l))?;
+        let mut equations = control.allocated(zeros(layout.equations()))?;
+        let (of_groups, of_ties) = equations.split_at_mut(layout.groups() * rows);
+        let mut ties = control.allocated(zeros(layout.tie_blocks().end))?;
+        for (index, at_home) in found.iter().enumerate() {
+            let mut values = at_home.equations.chunks_exact(rows.max(1));
+            let blocks = at_home.local.chunks_exact(l * l);
+            for (&block, cofactors) in system.incidence.locals_at(index).iter().zip(blocks) {
+                local[block as usize * l * l..][..l * l].copy_from_slice(cofactors);
+                for (&group, values) in
+                    system.incidence.groups_of(layout, block as usize).iter().zip(&mut values)
+                {
+                    of_groups[group as usize * rows..][..rows].copy_from_slice(values);
+                }
+            }
+            let mut values = &at_home.ties[..];
+            for &tie in system.ties.at(index) {
+                let (tie, rows) = (tie as usize, layout.ties()[tie as usize].rows);
+                let (own, rest) = values.split_at(rows * rows);
+                ties[layout.tie_block(tie)].copy_from_slice(own);
+                let diagonal = own.iter().step_by(rows + 1);
+                of_ties[layout.tie_rows(tie)].iter_mut().zip(diagonal).for_each(|(to, &share)| *to = share);
+                values = rest;
+            }
+        }
+        let blocks = 0..layout.kept();
+        let kept = blocks.clone().filter_map(|block| inverse.block(block, block)).flatten().collect();
+        let pair = |pair: &[u32; 2]| {
+            let [row, column] = pair.map(|block| block as usize);
+            let size = layout.kept_dim(row) * layout.kept_dim(column);
+            inverse.block(row, column).unwrap_or_else(|| vec![f64::NAN; size])
+        };
+        let pairs = layout.pairs().iter().flat_map(pair).collect();
+        let (mut border, mut kept_border) = (Vec::new(), Vec::new());
+        if layout.border_dim() > 0 {
+            border = inverse.block(layout.kept(), layout.kept()).unwrap_or_default();
+            kept_border = blocks.filter_map(|block| inverse.block(block, layout.kept())).flatten().collect();
+        }
+        Some(Self { local, kept, border, kept_border, equations, ties, pairs, groups: None, information })
+    }
+}
+
+impl GroupCofactors {
+    /// Puts together what was found at each supernode, and last for the local blocks without equations; None without memory.
+    pub(super) fn collect(system: &System, control: &Control, found: &[AtHome]) -> Option<Self> {
+        let layout = &system.layout;
+        let (size, l) = (layout.rows() * layout.rows(), layout.local_dim());
+        let mut shares = control.allocated(zeros(layout.groups() * size))?;
+        let mut by_local = control.allocated(zeros(layout.groups() * size))?;
+        let mut alone = control.allocated(zeros(layout.locals() * l * l))?;
+        for (index, at_home) in found.iter().enumerate() {
+            let blocks = at_home.alone.chunks_exact(l * l);
+            let mut pairs = at_home.shares.chunks_exact(size).zip(at_home.by_local.chunks_exact(size));
+            for (&block, own) in system.incidence.locals_at(index).iter().zip(blocks) {
+                alone[block as usize * l * l..][..l * l].copy_from_slice(own);
+                for (&group, (together, own)) in
+                    system.incidence.groups_of(layout, block as usize).iter().zip(&mut pairs)
+                {
+                    shares[group as usize * size..][..size].copy_from_slice(together);
+                    by_local[group as usize * size..][..size].copy_from_slice(own);
+                }
+            }
+        }
+        Some(Self { shares, by_local, alone })
+    }
+}
+
+/// The cofactors of the local blocks at home in one supernode, and of their equations, in the order of the incidence.
+#[derive(Default)]
+pub(super) struct AtHome {
+    local: Vec<f64>,
+    equations: Vec<f64>,
+    /// Of the equations of the ties at home there, in their order: a square block for each.
+    ties: Vec<f64>,
+    /// See [`GroupCofactors`]; in the order of the incidence too, empty where they are not asked for.
+    shares: Vec<f64>,
+    by_local: Vec<f64>,
+    alone: Vec<f64>,
+    /// Solutions for further right-hand sides, stack by stack.
+    pub further: Vec<Side>,
+    /// Time that it took.
+    pub seconds: f64,
+}
+
+/// Local blocks at one supernode from which on several threads work at them.
+const MANY: usize = 256;
+
+impl AtHome {
+    /// `front` is the inverse over the rows of the front of the supernode, full square, of the order `height`.
+    pub fn new<E: Equations>(
+        system: &System,
+        index: usize,
+        equations: &E,
+        prior: &Prior,
+        known: &Known<'_>,
+        control: &Control,
+        front: &[f64],
+        height: usize,
+        by_group: bool,
+    ) -> Self {
+        let start = Instant::now();
+        let layout = &system.layout;
+        let stacks = system.incidence.stacks_at(index);
+        let room = || (Stack::default(), Others::new(by_group));
+        let part = |(stack, others): &mut (Stack, Others), stacks: Stacks<'_>| {
+            let mut part = Self::default();
+            for run in stacks.iter().take_while(|_| !control.stopped()) {
+                stack.gather(system, equations, run);
+                stack.eliminate(layout, prior, 0.0);
+                others.gather(stack, front, height);
+                others.cofactors(stack, layout, &mut part);
+                known.solve(system, stack, &mut part.further);
+                control.count(run.len());
+            }
+            part
+        };
+        let mut found = if stacks.locals() < MANY {
+            part(&mut room(), stacks)
+        } else {
+            let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map_init(room, part).collect();
+            parts.into_iter().fold(Self::default(), |mut all, part| {
+                all.local.extend(part.local);
+                all.equations.extend(part.equations);
+                all.shares.extend(part.shares);
+                all.by_local.extend(part.by_local);
+                all.alone.extend(part.alone);
+                all.further.extend(part.further);
+                all
+            })
+        };
+        found.ties = ties_at_home(system, index, equations, front, height);
+        found.seconds = start.elapsed().as_secs_f64();
+        found
+    }
+}
+
+/// a Q a^T of the equations of the ties at home in a supernode, a square block for each.
+fn ties_at_home<E: Equations>(
+    system: &System,
+    index: usize,
+    equations: &E,
+    front: &[f64],
+    height: usize,
+) -> Vec<f64> {
+    let (mut tie, mut found) = (TieEquations::default(), Vec::new());
+    for &each in system.ties.at(index) {
+        tie.gather(system, equations, index, each as usize);
+        let columns = tie.columns();
+        for (own, _) in tie.rows() {
+            // a Q, the columns of the tie.
+            let by_column = |&column: &usize| {
+                columns.iter().zip(own).map(|(&row, value)| front[column * height + row] * value).sum::<f64>()
+            };
+            let product: Vec<f64> = columns.iter().map(by_column).collect();
+            found.extend(tie.rows().map(|(other, _)| dot(&product, other)));
+        }
+    }
+    found
+}

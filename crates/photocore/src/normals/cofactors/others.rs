@@ -1,0 +1,398 @@
+//! Cofactors of local blocks and of their equations, from the inverse over everything that they are tied to.
+
+use pulp::Simd;
+use smallvec::{SmallVec, smallvec};
+
+use super::AtHome;
+use crate::normals::layout::Layout;
+use crate::normals::stack::{Part, Slot, Stack};
+use crate::normals::vectorised::{Kernel, LANES, Rows, dot, run, size};
+
+/// Everything that the local blocks of a stack are tied to: main blocks in the order of the slots, then segments.
+#[derive(Default)]
+pub(super) struct Others {
+    /// The first row in the front, the first row here and the width of each.
+    strips: Vec<(usize, usize, usize)>,
+    width: usize,
+    /// From the start of a row of the following matrices to that of the next: full vectors, zero beyond the width.
+    stride: usize,
+    /// Q, the inverse over them, full square, row by row; then zeros, which products read.
+    inverse: Vec<f64>,
+    /// H = N_ll^-1 N_lo, row by row.
+    h: Vec<f64>,
+    /// H Q, row by row; then zeros.
+    hq: Vec<f64>,
+    /// Whether to find [`GroupCofactors`](super::GroupCofactors) besides.
+    by_group: bool,
+}
+
+/// Coefficients of C equations in consecutive unknowns.
+#[derive(Clone, Copy)]
+struct Tied<'a, const C: usize> {
+    /// The place of the first among the others.
+    start: usize,
+    width: usize,
+    /// They go on for [`LANES`] elements at least.
+    x: [&'a [f64]; C],
+}
+
+impl<'a, const C: usize> Tied<'a, C> {
+    #[inline(always)]
+    fn coefficients(&self) -> [&'a [f64]; C] {
+        self.x.map(|x| &x[..self.width])
+    }
+}
+
+/// A group of equations: of a local block of the stack, in a slot that starts there, and in the pattern.
+#[derive(Clone, Copy)]
+struct Group<'a> {
+    t: usize,
+    slot: &'a Slot,
+    start: usize,
+    k: usize,
+    p: usize,
+    rows: usize,
+}
+
+impl Others {
+    pub fn new(by_group: bool) -> Self {
+        Self { by_group, ..Self::default() }
+    }
+
+    /// Collects the inverse over everything that a stack is tied to; it stays as it is where the last stack was tied to the same.
+    pub fn gather(&mut self, stack: &Stack, front: &[f64], height: usize) {
+        let slots = stack.slots.iter().map(|slot| (slot.row, slot.dim));
+        let segments = stack.segments.iter().map(|segment| (segment.row, segment.unknowns.len()));
+        let all = slots.chain(segments);
+        if self.strips.iter().map(|&(row, _, width)| (row, width)).eq(all.clone()) {
+            return;
+        }
+        self.strips.clear();
+        self.width = 0;
+        for (row, width) in all {
+            self.strips.push((row, self.width, width));
+            self.width += width;
+        }
+        self.stride = self.width.next_multiple_of(LANES);
+        self.h.clear();
+        self.hq.clear();
+        self.inverse.resize((self.width + 1) * self.stride, 0.0);
+        self.inverse[self.width * self.stride..].fill(0.0);
+        for &(from_column, to_column, columns) in &self.strips {
+            for k in 0..columns {
+                let source = &front[(from_column + k) * height..][..height];
+                let target = &mut self.inverse[(to_column + k) * self.stride..][..self.stride];
+                target.last_chunk_mut::<LANES>().into_iter().for_each(|end| *end = [0.0; LANES]);
+                for &(from_row, to_row, rows) in &self.strips {
+                    copy_few(&source[from_row..from_row + rows], &mut target[to_row..to_row + rows]);
+                }
+            }
+        }
+    }
+
+    /// With H = N_ll^-1 N_lo and Q_oo the inverse over the others o: Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and
+    /// a Q a^T for each equation.
+    pub fn cofactors(&mut self, stack: &Stack, layout: &Layout, found: &mut AtHome) {
+        run(layout, stack.kept_dim(), Find { others: self, stack, rows: layout.rows(), found });
+    }
+
+    #[inline(always)]
+    fn cofactors_of<S: Simd, const R: usize, const L: usize, const D: usize>(
+        &mut self,
+        simd: S,
+        stack: &Stack,
+        t: usize,
+        rows: usize,
+        found: &mut AtHome,
+    ) {
+        let rows = size::<R>(rows);
+        self.reduce::<L, D>(stack, t);
+        self.multiply::<S, L>(simd);
+        let own = self.own::<S, L>(simd, stack, t, found);
+        for (slot, &(_, start, _)) in stack.slots.iter().zip(&self.strips) {
+            for (k, p) in slot.groups.clone().enumerate() {
+                let group = Group { t, slot, start, k, p, rows };
+                let diagonal = found.equations.len();
+                for row in (1..rows).step_by(2) {
+                    let shares = self.shares::<S, 2, L, D>(simd, stack, group, [row - 1, row], &own);
+                    found.equations.push(shares[0][0]);
+                    found.equations.push(shares[1][1]);
+                }
+                if rows % 2 == 1 {
+                    let [[share]] = self.shares::<S, 1, L, D>(simd, stack, group, [rows - 1], &own);
+                    found.equations.push(share);
+                }
+                if self.by_group {
+                    self.group::<S, L, D>(simd, stack, group, &own, diagonal, found);
+                }
+            }
+        }
+    }
+
+    /// Computes H = L^-T V, for local block `t` of the stack.
+    #[inline(always)]
+    fn reduce<const L: usize, const D: usize>(&mut self, stack: &Stack, t: usize) {
+        let stride = self.stride;
+        self.h.resize(L * stride, 0.0);
+        let slots = stack.slots.iter().map(|slot| stack.slot_coupling::<L, D>(slot));
+        let segments = stack.segments.iter().map(|segment| stack.segment_coupling::<L>(segment));
+        for (v, &(_, start, _)) in slots.chain(segments).zip(&self.strips) {
+            for d in 0..L {
+                let row = &v.rows.values[(t * L + d) * v.rows.width..][..v.rows.width];
+                copy_few(row, &mut self.h[d * stride + start..][..row.len()]);
+            }
+        }
+        stack.triangles[t].backward::<L>(&mut self.h, stride);
+    }
+
+    /// Computes H Q.
+    #[inline(always)]
+    fn multiply<S: Simd, const L: usize>(&mut self, simd: S) {
+        self.hq.resize((L + 1) * self.stride, 0.0);
+        let (mut first, vectors) = (0, self.stride / S::F64_LANES);
+        while first < vectors {
+            // Five vectors are three and two, not four and one whose sums wait for each other.
+            first += match vectors - first {
+                1 => self.multiply_vectors::<S, L, 1>(simd, first),
+                2 => self.multiply_vectors::<S, L, 2>(simd, first),
+                3 | 5 | 6 => self.multiply_vectors::<S, L, 3>(simd, first),
+                _ => self.multiply_vectors::<S, L, 4>(simd, first),
+            };
+        }
+    }
+
+    /// V vectors of the columns of H Q; returns V.
+    #[inline(always)]
+    fn multiply_vectors<S: Simd, const L: usize, const V: usize>(&mut self, simd: S, first: usize) -> usize {
+        let vectors = self.stride / S::F64_LANES;
+        let h: [&[f64]; L] = std::array::from_fn(|d| &self.h[d * self.stride..][..self.width]);
+        let mut sums = [[simd.splat_f64s(0.0); V]; L];
+        let rows = S::as_simd_f64s(&self.inverse).0[first..].windows(V).step_by(vectors);
+        for (i, row) in rows.take(self.width).enumerate() {
+            for d in 0..L {
+                let factor = simd.splat_f64s(h[d][i]);
+                for v in 0..V {
+                    sums[d][v] = simd.mul_add_f64s(row[v], factor, sums[d][v]);
+                }
+            }
+        }
+        let product = S::as_mut_simd_f64s(&mut self.hq).0;
+        for d in 0..L {
+            product[d * vectors + first..][..V].copy_from_slice(&sums[d]);
+        }
+        V
+    }
+
+    /// Q_ll of local block `t` of the stack, which is found, and N_ll^-1 besides where that is asked for.
+    #[inline(always)]
+    fn own<S: Simd, const L: usize>(
+        &self,
+        simd: S,
+        stack: &Stack,
+        t: usize,
+        found: &mut AtHome,
+    ) -> [[f64; L]; L] {
+        let mut own = [[0.0; L]; L];
+        for a in 0..L {
+            let mut unit = [0.0; L];
+            unit[a] = 1.0;
+            stack.triangles[t].forward::<L>(&mut unit, 1);
+            stack.triangles[t].backward::<L>(&mut unit, 1);
+            if self.by_group {
+                found.alone.extend_from_slice(&unit);
+            }
+            let hq = S::as_simd_f64s(&self.hq[a * self.stride..][..self.stride]).0;
+            for b in 0..=a {
+                let h = S::as_simd_f64s(&self.h[b * self.stride..][..self.stride]).0;
+                let mut sum = simd.splat_f64s(0.0);
+                for (x, y) in hq.iter().zip(h) {
+                    sum = simd.mul_add_f64s(*x, *y, sum);
+                }
+                let value = unit[b] + simd.reduce_sum_f64s(sum);
+                (own[a][b], own[b][a]) = (value, value);
+            }
+        }
+        found.local.extend_from_slice(own.as_flattened());
+        own
+    }
+
+    /// The blocks of [`GroupCofactors`](super::GroupCofactors) of a group whose own equations are found from `diagonal` on.
+    #[inline(always)]
+    fn group<S: Simd, const L: usize, const D: usize>(
+        &self,
+        simd: S,
+        stack: &Stack,
+        group: Group<'_>,
+        own: &[[f64; L]; L],
+        diagonal: usize,
+        found: &mut AtHome,
+    ) {
+        let Group { t, p, rows, .. } = group;
+        let first = found.shares.len();
+        let along: SmallVec<[[f64; L]; 4]> = stack.local_rows::<L>(t, p, rows)[..rows]
+            .iter()
+            .map(|&(mut row)| {
+                stack.triangles[t].forward::<L>(&mut row, 1);
+                row
+            })
+            .collect();
+        found.by_local.resize(first + rows * rows, 0.0);
+        found.shares.resize(first + rows * rows, 0.0);
+        for i in 0..rows {
+            for j in 0..=i {
+                let share = match i == j {
+                    true => found.equations[diagonal + i],
+                    false => self.shares::<S, 2, L, D>(simd, stack, group, [i, j], own)[0][1],
+                };
+                for at in [first + i * rows + j, first + j * rows + i] {
+                    found.by_local[at] = dot(&along[i], &along[j]);
+                    found.shares[at] = share;
+                }
+            }
+        }
+    }
+
+    /// a Q b^T of every two of some rows of a group.
+    #[inline(always)]
+    fn shares<S: Simd, const C: usize, const L: usize, const D: usize>(
+        &self,
+        simd: S,
+        stack: &Stack,
+        group: Group<'_>,
+        picked: [usize; C],
+        own: &[[f64; L]; L],
+    ) -> [[f64; C]; C] {
+        let Group { t, slot, start, k, p, rows } = group;
+        let dim = size::<D>(slot.dim);
+        let local = stack.local_rows::<L>(t, p, rows);
+        let local = picked.map(|row| &local[row]);
+        let at = (t * slot.groups.len() + k) * rows;
+        let coefficients = &stack.slot_rows::<D>(slot, rows).rows.values[at * dim..];
+        let kept = Tied { start, width: dim, x: picked.map(|row| &coefficients[row * dim..]) };
+        let mut form = [[simd.splat_f64s(0.0); C]; C];
+        self.tied(simd, &mut form, local, &[], kept);
+        match stack.parts(p) {
+            [] => {}
+            [part] => self.tied(simd, &mut form, local, &[kept], self.common(stack, group, picked, part)),
+            parts => {
+                let mut before: SmallVec<[_; 4]> = smallvec![kept];
+                for part in parts {
+                    let common = self.common(stack, group, picked, part);
+                    self.tied(simd, &mut form, local, &before, common);
+                    before.push(common);
+                }
+            }
+        }
+        let mut found = [[0.0; C]; C];
+        for i in 0..C {
+            for j in 0..C {
+                found[i][j] = 0.5 * simd.reduce_sum_f64s(simd.add_f64s(form[i][j], form[j][i]));
+                for d in 0..L {
+                    found[i][j] += local[i][d] * dot(&own[d], local[j]);
+                }
+            }
+        }
+        found
+    }
+
+    /// The coefficients of a part of what a group has in common with others, in some of its rows.
+    #[inline(always)]
+    fn common<'s, const C: usize>(
+        &self,
+        stack: &'s Stack,
+        Group { t, p, rows, .. }: Group<'_>,
+        picked: [usize; C],
+        part: &Part,
+    ) -> Tied<'s, C> {
+        let Rows { values, width, stride, .. } = stack.part_rows(p, part, t * rows..(t + 1) * rows).rows;
+        let start = self.strips[stack.slots.len() + part.segment].1 + part.shift;
+        Tied { start, width, x: picked.map(|row| &values[row * stride..]) }
+    }
+
+    /// Adds what coefficients x of further unknowns make of a Q a^T: (x Q + 2 y Q - 2 a H Q) x^T, a those of the local unknowns, and y
+    /// those that were added before; in lanes. What they make of a Q b^T is the mean of two elements.
+    #[inline(always)]
+    fn tied<S: Simd, const C: usize, const L: usize>(
+        &self,
+        simd: S,
+        form: &mut [[S::f64s; C]; C],
+        a: [&[f64; L]; C],
+        before: &[Tied<'_, C>],
+        own: Tied<'_, C>,
+    ) {
+        let (stride, two) = (self.stride, simd.splat_f64s(2.0));
+        for first in (0..own.width).step_by(LANES) {
+            let column = own.start + first;
+            let rows = |start: usize| &self.inverse[start * stride + column..];
+            let [mut local, mut others, mut along] = [[[simd.splat_f64s(0.0); LANES]; C]; 3];
+            add_rows(simd, &mut local, &self.hq[column..], stride, a.map(|a| &a[..]));
+            for tied in before {
+                add_rows(simd, &mut others, rows(tied.start), stride, tied.coefficients());
+            }
+            add_rows(simd, &mut along, rows(own.start), stride, own.coefficients());
+            for k in 0..LANES / S::F64_LANES {
+                let places = S::as_simd_f64s(&PLACES).0[k];
+                let within = simd.less_than_f64s(places, simd.splat_f64s((own.width - first) as f64));
+                for j in 0..C {
+                    let x = S::as_simd_f64s(&own.x[j][first..][..LANES]).0[k];
+                    let x = simd.select_f64s(within, x, simd.splat_f64s(0.0));
+                    for i in 0..C {
+                        let twice = simd.mul_f64s(simd.sub_f64s(others[i][k], local[i][k]), two);
+                        let sum = simd.add_f64s(along[i][k], twice);
+                        form[i][j] = simd.mul_add_f64s(sum, x, form[i][j]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The places of the lanes.
+const PLACES: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+
+/// Adds the sum over rows of x[row] times the start of the row, for each of C x, to sums.
+#[inline(always)]
+fn add_rows<S: Simd, const C: usize>(
+    simd: S,
+    sums: &mut [[S::f64s; LANES]; C],
+    rows: &[f64],
+    stride: usize,
+    x: [&[f64]; C],
+) {
+    for (i, row) in rows.windows(LANES).step_by(stride).take(x[0].len()).enumerate() {
+        let vectors = S::as_simd_f64s(row).0;
+        for c in 0..C {
+            let factor = simd.splat_f64s(x[c][i]);
+            for k in 0..LANES / S::F64_LANES {
+                sums[c][k] = simd.mul_add_f64s(vectors[k], factor, sums[c][k]);
+            }
+        }
+    }
+}
+
+/// Copies a row of a block; the common sizes without a call.
+#[inline(always)]
+fn copy_few(from: &[f64], to: &mut [f64]) {
+    match from.len() {
+        6 => to[..6].copy_from_slice(&from[..6]),
+        8 => to[..8].copy_from_slice(&from[..8]),
+        9 => to[..9].copy_from_slice(&from[..9]),
+        _ => to.copy_from_slice(from),
+    }
+}
+
+struct Find<'a> {
+    others: &'a mut Others,
+    stack: &'a Stack,
+    rows: usize,
+    found: &'a mut AtHome,
+}
+
+impl Kernel for Find<'_> {
+    #[inline(always)]
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
+        for t in 0..self.stack.locals.len() {
+            self.others.cofactors_of::<S, R, L, D>(simd, self.stack, t, self.rows, self.found);
+        }
+    }
+}
