@@ -70,6 +70,8 @@ impl<E: Equations> Formation<'_, E> {
             }
         }
         filled.into_iter().for_each(|stack| system.workspace.put_back_stack(stack));
+        // Products read beyond the end.
+        sums.kept.resize(sums.kept.len() + LANES, 0.0);
         Some(sums)
     }
 

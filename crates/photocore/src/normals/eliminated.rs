@@ -10,7 +10,7 @@ use super::panels::skip_ref;
 use super::stack::{Stack, parts_of, united, unlike};
 use super::system::System;
 use super::triangle::Triangle;
-use super::vectorised::{Kernel, dot, dot_by_fours, run, size};
+use super::vectorised::{Kernel, Rows, add_right, dot, dot_by_fours, run, size};
 
 impl Stack {
     /// Appends what the elimination has left: V, v and L.
@@ -165,26 +165,25 @@ struct Reduce<'a, 'k> {
 
 impl Kernel for Reduce<'_, '_> {
     #[inline(always)]
-    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
+        let Self { coupled, kept, found, .. } = self;
         let count = L * self.depth;
-        let width: usize = self.coupled.ranges.iter().map(Range::len).sum();
-        let coupling = skip_ref(self.kept, count * width);
-        skip_ref(self.kept, count);
-        let triangles = skip_ref(self.kept, self.depth * Triangle::numbers(L));
-        let start = self.found.own.len() - count;
-        let own = self.found.own[start..].as_chunks_mut::<L>().0;
+        let width: usize = coupled.ranges.iter().map(Range::len).sum();
+        // What follows V is read, and not used.
+        let mut coupling = *kept;
+        skip_ref(kept, count * width + count);
+        let triangles = skip_ref(kept, self.depth * Triangle::numbers(L));
+        let start = found.own.len() - count;
+        let own = found.own[start..].as_chunks_mut::<L>().0;
         for (own, numbers) in own.iter_mut().zip(triangles.chunks_exact(Triangle::numbers(L))) {
             Triangle::of(L, numbers).forward::<L>(own, 1);
         }
-        let mut at = 0;
-        for range in &self.coupled.ranges {
-            let first = self.found.room(range.clone());
-            let sums = &mut self.found.values[first..];
-            let rows = coupling[at..][..count * range.len()].chunks_exact(range.len().max(1));
-            for (row, value) in rows.zip(&self.found.own[start..]) {
-                sums.iter_mut().zip(row).for_each(|(sum, v)| *sum -= v * value);
-            }
-            at += count * range.len();
+        for (index, range) in coupled.ranges.iter().enumerate() {
+            let width = if index < coupled.main { size::<D>(range.len()) } else { range.len() };
+            let rows = Rows { values: coupling, width, stride: width, count };
+            let first = found.room(range.clone());
+            add_right(simd, &mut found.values[first..], None, -1.0, rows, &found.own[start..]);
+            skip_ref(&mut coupling, count * width);
         }
     }
 }

@@ -169,7 +169,7 @@ impl AtHome {
         let start = Instant::now();
         let layout = &system.layout;
         let stacks = system.incidence.stacks_at(index);
-        let room = || (Stack::default(), Others::new(by_group));
+        let room = || (system.workspace.stack(), Others::new(by_group));
         let part = |(stack, others): &mut (Stack, Others), stacks: Stacks<'_>| {
             let mut part = Self::default();
             for run in stacks.iter().take_while(|_| !control.stopped()) {
@@ -183,7 +183,10 @@ impl AtHome {
             part
         };
         let mut found = if stacks.locals() < MANY {
-            part(&mut room(), stacks)
+            let mut room = room();
+            let part = part(&mut room, stacks);
+            system.workspace.put_back_stack(room.0);
+            part
         } else {
             let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map_init(room, part).collect();
             parts.into_iter().fold(Self::default(), |mut all, part| {
