@@ -41,6 +41,13 @@ pub struct Datum {
     pub relative: bool,
 }
 
+impl Datum {
+    /// A vector over all unknowns in the rows of the carriers, times their factors.
+    fn of_carriers<'a>(&'a self, vector: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        self.carriers.iter().map(|&(carrier, factor)| factor * vector[carrier])
+    }
+}
+
 /// An adjusted network in another datum.
 #[derive(Debug, Clone)]
 pub struct InDatum {
@@ -210,9 +217,14 @@ impl Basis {
     /// The transformation, with W = Q B.
     pub fn transformation(self, w: Vec<f64>, datum: &Datum) -> Transformation {
         let Self { b, t, d, condition } = self;
-        let of = |row: usize, k: usize| w[datum.carriers[row].0 * d + k];
-        let of_carriers = Mat::from_fn(datum.carriers.len(), d, of);
-        let common = product(b.transpose(), of_carriers.as_ref());
+        let mut common = Mat::zeros(d, d);
+        for (row, &(carrier, _)) in datum.carriers.iter().enumerate() {
+            let own = &w[carrier * d..][..d];
+            for k in 0..d {
+                let along = b[(row, k)];
+                own.iter().enumerate().for_each(|(j, value)| common[(k, j)] += along * value);
+            }
+        }
         let mut staying = vec![];
         if datum.carriers.len() == d {
             staying = datum.carriers.iter().map(|&(carrier, _)| carrier).collect();
@@ -246,8 +258,8 @@ pub(super) fn moved<M: Model>(
         }
         all_open |= adjusted.held.len() == kept.1;
         let combinations = match all_open {
-            true => Mat::identity(count, count),
-            false => problem.open(&unknowns, &motions, pool).ok_or(DatumError::NotFree)?.combinations,
+            true => None,
+            false => Some(problem.open(&unknowns, &motions, pool).ok_or(DatumError::NotFree)?.combinations),
         };
         let apart = problem.model.step_between(&unknowns, reference);
         let carried = Carried::new(&motions, combinations, datum, &apart).ok_or(DatumError::NotCarried)?;
@@ -300,15 +312,19 @@ struct Carried {
 }
 
 impl Carried {
-    /// The carriers are the step `apart` away from their references. None where they do not carry all open motions.
-    fn new(motions: &Motions, combinations: Mat<f64>, datum: &Datum, apart: &[f64]) -> Option<Self> {
-        let (d, carriers) = (combinations.ncols(), &datum.carriers);
+    /// The carriers are the step `apart` away from their references. Without combinations all motions are open. None where the carriers do
+    /// not carry all open motions.
+    fn new(motions: &Motions, combinations: Option<Mat<f64>>, datum: &Datum, apart: &[f64]) -> Option<Self> {
+        let (count, carriers) = (motions.vectors.len(), &datum.carriers);
+        let d = combinations.as_ref().map_or(count, Mat::ncols);
         if carriers.len() < d {
             return None;
         }
-        let of = |row: usize, motion: usize| carriers[row].1 * motions.vectors[motion][carriers[row].0];
-        let rows = Mat::from_fn(carriers.len(), motions.vectors.len(), of);
-        let rows = product(rows.as_ref(), combinations.as_ref());
+        let rows = by_columns(carriers.len(), count, |motion| datum.of_carriers(&motions.vectors[motion]));
+        let rows = match &combinations {
+            Some(own) => product(rows.as_ref(), own.as_ref()),
+            None => rows,
+        };
         let normal = product(rows.transpose(), rows.as_ref());
         let scale: Vec<f64> = (0..d).map(|k| normal[(k, k)].sqrt().recip()).collect();
         let scaled = Mat::from_fn(d, d, |i, k| normal[(i, k)] * scale[i] * scale[k]);
@@ -318,8 +334,8 @@ impl Carried {
             return None;
         }
         let factor = scaled.llt(Side::Lower).ok()?.L().to_owned();
-        let of = |&(carrier, factor): &(usize, f64)| factor * apart[carrier];
-        let distances = Mat::from_fn(carriers.len(), 1, |row, _| of(&carriers[row]));
+        let combinations = combinations.unwrap_or_else(|| Mat::identity(count, count));
+        let distances = by_columns(carriers.len(), 1, |_| datum.of_carriers(apart));
         let right = product(rows.transpose(), distances.as_ref());
         let mut amounts = Mat::from_fn(d, 1, |k, _| scale[k] * right[(k, 0)]);
         solve_lower_triangular_in_place(factor.as_ref(), amounts.as_mut(), Par::Seq);
@@ -347,8 +363,11 @@ impl Carried {
         let left = product(nearly.transpose(), nearly.as_ref()).llt(Side::Lower).ok()?.L().to_owned();
         let mut second = Mat::identity(d, d);
         solve_upper_triangular_in_place(left.transpose(), second.as_mut(), Par::Seq);
-        let orthonormal = product(nearly.as_ref(), second.as_ref());
-        let b = Mat::from_fn(rows.nrows(), d, |row, k| datum.carriers[row].1 * orthonormal[(row, k)]);
+        let mut b = product(nearly.as_ref(), second.as_ref());
+        for k in 0..d {
+            let column = b.col_mut(k).iter_mut().zip(&datum.carriers);
+            column.for_each(|(value, &(_, factor))| *value *= factor);
+        }
         let by_motion = product(combinations.as_ref(), product(first.as_ref(), second.as_ref()).as_ref());
         let count = motions.vectors.first().map_or(0, Vec::len);
         let mut t = vec![0.0; count * d];
@@ -360,6 +379,15 @@ impl Carried {
         }
         Some(Basis { b, t, d, condition })
     }
+}
+
+/// A matrix of columns that are filled one by one.
+fn by_columns<I: Iterator<Item = f64>>(rows: usize, columns: usize, values: impl Fn(usize) -> I) -> Mat<f64> {
+    let mut found = Mat::zeros(rows, columns);
+    for column in 0..columns {
+        found.col_mut(column).iter_mut().zip(values(column)).for_each(|(to, value)| *to = value);
+    }
+    found
 }
 
 /// A product on one thread: the same bits for any number of threads.
