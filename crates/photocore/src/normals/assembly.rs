@@ -2,15 +2,29 @@
 
 use rayon::prelude::*;
 
-use super::equations::Equations;
-use super::factor::Formation;
+use super::equations::{Equations, Prior};
 use super::front::Front;
 use super::incidence::Stacks;
 use super::panels::Handover;
 use super::stack::Stack;
+use super::system::System;
 use super::tie_equations::TieEquations;
 use super::vectorised::LANES;
+use super::watch::Control;
 use super::workspace::reserved;
+
+/// What is formed.
+pub(super) struct Formation<'a, E> {
+    pub system: &'a System,
+    pub equations: &'a E,
+    pub prior: &'a Prior,
+    pub damping: f64,
+    /// Over all unknowns, one after the other.
+    pub rights: &'a [f64],
+    /// Whether to keep what [`System::solve`] needs of the local blocks.
+    pub keeps: bool,
+    pub control: &'a Control,
+}
 
 /// What the formation at one supernode adds up.
 #[derive(Default)]

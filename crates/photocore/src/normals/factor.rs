@@ -8,7 +8,7 @@ use std::time::Instant;
 use faer::MatMut;
 use rayon::ThreadPool;
 
-use super::assembly::Sums;
+use super::assembly::{Formation, Sums};
 use super::dense::{Pivots, factor_front};
 use super::equations::{Equations, Prior};
 use super::front::Front;
@@ -67,19 +67,6 @@ struct Visited {
     sides: Vec<Side>,
     formation: f64,
     factorisation: f64,
-}
-
-/// What is formed.
-pub(super) struct Formation<'a, E> {
-    pub system: &'a System,
-    pub equations: &'a E,
-    pub prior: &'a Prior,
-    pub damping: f64,
-    /// Over all unknowns, one after the other.
-    pub rights: &'a [f64],
-    /// Whether to keep what [`System::solve`] needs of the local blocks.
-    pub keeps: bool,
-    pub control: &'a Control,
 }
 
 /// What rounding leaves of a combination of unknowns that the equations do not determine, relative to what those of each unknown by
