@@ -217,14 +217,9 @@ impl Basis {
     /// The transformation, with W = Q B.
     pub fn transformation(self, w: Vec<f64>, datum: &Datum) -> Transformation {
         let Self { b, t, d, condition } = self;
-        let mut common = Mat::zeros(d, d);
-        for (row, &(carrier, _)) in datum.carriers.iter().enumerate() {
-            let own = &w[carrier * d..][..d];
-            for k in 0..d {
-                let along = b[(row, k)];
-                own.iter().enumerate().for_each(|(j, value)| common[(k, j)] += along * value);
-            }
-        }
+        let of_carrier = |row: usize| w[datum.carriers[row].0 * d..][..d].iter().copied();
+        let of_carriers = by_columns(d, datum.carriers.len(), of_carrier);
+        let common = product(b.transpose(), of_carriers.transpose());
         let mut staying = vec![];
         if datum.carriers.len() == d {
             staying = datum.carriers.iter().map(|&(carrier, _)| carrier).collect();

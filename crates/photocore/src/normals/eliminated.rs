@@ -88,6 +88,13 @@ impl Coupled {
         self.numbers = numbers;
     }
 
+    /// Unknowns in a range: D in a main block, where that is known.
+    #[inline(always)]
+    fn width<const D: usize>(&self, index: usize) -> usize {
+        let width = self.ranges[index].len();
+        if index < self.main { size::<D>(width) } else { width }
+    }
+
     /// Unknowns of every main block, where all have the same number.
     fn main_dim(&self) -> Option<usize> {
         let dim = self.ranges[..self.main].first()?.len();
@@ -179,7 +186,7 @@ impl Kernel for Reduce<'_, '_> {
             Triangle::of(L, numbers).forward::<L>(own, 1);
         }
         for (index, range) in coupled.ranges.iter().enumerate() {
-            let width = if index < coupled.main { size::<D>(range.len()) } else { range.len() };
+            let width = coupled.width::<D>(index);
             let rows = Rows { values: coupling, width, stride: width, count };
             let first = found.room(range.clone());
             add_right(simd, &mut found.values[first..], None, -1.0, rows, &found.own[start..]);
@@ -209,7 +216,7 @@ impl Kernel for Solve<'_, '_> {
         let own = &mut self.found[start..];
         let mut at = 0;
         for (index, range) in self.coupled.ranges.iter().enumerate() {
-            let width = if index < self.coupled.main { size::<D>(range.len()) } else { range.len() };
+            let width = self.coupled.width::<D>(index);
             let x = &self.others[range.start..][..width];
             let rows = own.iter_mut().zip(coupling[at..].chunks_exact(width.max(1)));
             // The width of a main block is known where this is compiled: its sum needs no loop.

@@ -11,7 +11,6 @@ use super::equations::{Equations, Prior};
 use super::further::Known;
 use super::incidence::Stacks;
 use super::selected::SelectedInverse;
-use super::stack::Stack;
 use super::system::System;
 use super::tie_equations::TieEquations;
 use super::vectorised::{Side, dot};
@@ -169,26 +168,24 @@ impl AtHome {
         let start = Instant::now();
         let layout = &system.layout;
         let stacks = system.incidence.stacks_at(index);
-        let room = || (system.workspace.stack(), Others::new(by_group));
-        let part = |(stack, others): &mut (Stack, Others), stacks: Stacks<'_>| {
-            let mut part = Self::default();
+        let others = || Others::new(by_group);
+        let part = |others: &mut Others, stacks: Stacks<'_>| {
+            let (mut stack, mut part) = (system.workspace.stack(), Self::default());
             for run in stacks.iter().take_while(|_| !control.stopped()) {
                 stack.gather(system, equations, run);
                 stack.eliminate(layout, prior, 0.0);
-                others.gather(stack, front, height);
-                others.cofactors(stack, layout, &mut part);
-                known.solve(system, stack, &mut part.further);
+                others.gather(&stack, front, height);
+                others.cofactors(&stack, layout, &mut part);
+                known.solve(system, &stack, &mut part.further);
                 control.count(run.len());
             }
+            system.workspace.put_back_stack(stack);
             part
         };
         let mut found = if stacks.locals() < MANY {
-            let mut room = room();
-            let part = part(&mut room, stacks);
-            system.workspace.put_back_stack(room.0);
-            part
+            part(&mut others(), stacks)
         } else {
-            let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map_init(room, part).collect();
+            let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map_init(others, part).collect();
             parts.into_iter().fold(Self::default(), |mut all, part| {
                 all.local.extend(part.local);
                 all.equations.extend(part.equations);
