@@ -1,10 +1,11 @@
-"""Blocks that calibrate two cameras of eight parameters, beside the same with known cameras, and the peers.
+"""Blocks that calibrate two cameras of eight parameters, beside the same with both known, and the peers.
 
 python benches/peers/self_calibration.py [20x50 ...] [--repetitions N] [--without gtsam colmap]
 
 photogram computes the adjustment with all covariances and redundancy numbers; gtsam (`Cal3DS2` as an unknown
 that photos share, skew held) and pycolmap (OPENCV cameras, Ceres) the bare solution, from the same initial
-values. All runs are interleaved.
+values. The last columns are of a block of the same shape whose images have no distortion. All runs are
+interleaved.
 """
 
 from __future__ import annotations
@@ -32,13 +33,17 @@ START = {"fx": 152.7, "fy": 152.7, "cx": 0.0, "cy": 0.0}
 """A principal distance, as a certificate of long ago has it, and no distortion."""
 
 
-def blocks(size: Size) -> tuple[Block, Block]:
-    """Return a block with known cameras, and the one that calibrates its two."""
+def blocks(size: Size) -> dict[str, Block]:
+    """Return a block that calibrates its two cameras, the same with both known, and one without lenses."""
     shape = {"strips": size.strips, "photos_per_strip": size.photos_per_strip, "seed": 1}
     true = [Camera("opencv", own, unit="mm", name=f"camera {n}") for n, own in enumerate(TRUE, 1)]
     start = [Camera("opencv", START, FREE, unit="mm", name=each.name) for each in true]
-    made = photogram.simulate(**shape, cameras=true, start_cameras=start).block
-    return photogram.simulate(**shape).block, made
+    made = {
+        "plain": photogram.simulate(**shape),
+        "known": photogram.simulate(**shape, cameras=true),
+        "unknown": photogram.simulate(**shape, cameras=true, start_cameras=start),
+    }
+    return {name: each.block for name, each in made.items()}
 
 
 def gtsam_solution(block: Block) -> Callable[[], float]:
@@ -95,23 +100,23 @@ def main() -> None:
     parser.add_argument("--without", nargs="*", choices=list(PEERS), default=[])
     arguments = parser.parse_args()
     print(f"{processor()}; seconds, the fastest of {arguments.repetitions}; cpu: of all processors\n")
-    head = ["photos", "known cameras", "cpu", "steps", "two of 8 unknown", "cpu", "steps", "ratio", "of cpu"]
+    head = ["photos", "two of 8 unknown", "cpu", "steps", "both known", "cpu", "steps", "ratio", "of cpu"]
+    head += ["no lenses", "cpu", "steps", "ratio", "of cpu"]
     peers = [name for name in PEERS if name not in arguments.without]
     for name in peers:
         head += [f"{name}, bare", f"{name} / photogram"]
     print("| " + " | ".join(head) + " |\n|" + "---:|" * len(head))
     for size in arguments.sizes:
-        known, unknown = blocks(size)
+        made = blocks(size)
         work: dict[str, Callable[[], object]] = {
-            "known": lambda block=known: photogram.adjust(block),
-            "unknown": lambda block=unknown: photogram.adjust(block),
+            name: lambda block=block: photogram.adjust(block) for name, block in made.items()
         }
         seconds: dict[str, float] = dict.fromkeys([*work, *peers], np.inf)
         cpu = dict(seconds)
         found: dict[str, object] = {}
         for _ in range(arguments.repetitions):
             # A solution of a peer cannot be repeated from where it has ended.
-            ready = work | {name: PEERS[name](unknown) for name in peers}
+            ready = work | {name: PEERS[name](made["unknown"]) for name in peers}
             for side, run in ready.items():
                 start, start_cpu = time.perf_counter(), time.process_time()
                 found[side] = run()
@@ -122,15 +127,14 @@ def main() -> None:
 
 def row(size: Size, seconds: dict[str, float], cpu: dict[str, float], found: dict[str, object]) -> str:
     """Return a row of the table; the sums of squares must agree."""
-    known, unknown = found["known"], found["unknown"]
-    assert isinstance(known, photogram.Result)
-    assert isinstance(unknown, photogram.Result)
+    results = {side: result for side, result in found.items() if isinstance(result, photogram.Result)}
     cells = [f"{size.photos:,}"]
-    for side, result in (("known", known), ("unknown", unknown)):
-        cells += [f"{seconds[side]:.2f}", f"{cpu[side]:.2f}", str(len(result.iterations))]
-    cells += [f"{each['unknown'] / each['known']:.2f}" for each in (seconds, cpu)]
+    for side in ("unknown", "known", "plain"):
+        cells += [f"{seconds[side]:.2f}", f"{cpu[side]:.2f}", str(len(results[side].iterations))]
+        if side != "unknown":
+            cells += [f"{each['unknown'] / each[side]:.2f}" for each in (seconds, cpu)]
     for name in [name for name in PEERS if name in seconds]:
-        ours, theirs = unknown.sums_of_squares.total, float(str(found[name]))
+        ours, theirs = results["unknown"].sums_of_squares.total, float(str(found[name]))
         if abs(theirs / ours - 1.0) > 1e-4:
             raise SystemExit(f"The solutions do NOT agree: {ours} and {theirs} of {name}")
         cells += [f"{seconds[name]:.1f}", f"{seconds[name] / seconds['unknown']:.1f}"]

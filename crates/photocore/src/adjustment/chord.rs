@@ -44,7 +44,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
         self.seconds.solve += start.elapsed().as_secs_f64();
         let (chord, decrease) = unless_stopped(chord)?;
         let change = decrease.sqrt();
-        if change > FALLING * iteration.largest_change {
+        let falls = change <= FALLING * iteration.largest_change;
+        if !falls {
             return Ok(values);
         }
         self.chord = Some(change);

@@ -363,12 +363,16 @@ impl<M: Model> Equations for Linearized<'_, M> {
     fn write_alike(&self, locals: &[u32], groups: impl Fn(usize) -> usize, rows: &mut GroupRows<'_>) {
         let model = &self.problem.model;
         let written = model.observe_alike(&self.prepared, locals, &groups, self.observation_sd, rows);
+        // Most equations are as they shall be; to look for the parts of each takes a division.
+        if written && self.reweighting.is_none() && self.fixed.is_none() {
+            return;
+        }
         for (t, &local) in locals.iter().enumerate() {
             let mut rows = rows.part(t, locals.len());
-            if !written {
-                self.write(local as usize, groups(t), &mut rows);
-            } else if self.reweighting.is_some() || self.fixed.is_some() {
+            if written {
                 self.adapt(local as usize, groups(t), &mut rows);
+            } else {
+                self.write(local as usize, groups(t), &mut rows);
             }
         }
     }

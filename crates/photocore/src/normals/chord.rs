@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::eliminated::{Coupled, OfHome, reduce};
+use super::eliminated::OfHome;
 use super::equations::{Equations, Prior, TieRows};
 use super::factor::Factor;
 use super::further::of_others;
@@ -13,9 +13,10 @@ use super::system::System;
 use super::watch::{Between, Control, Stopped, watched};
 
 impl System {
-    /// N^-1 A^T l over all unknowns, in the order of the layout, N of the factor, A and l of equations and priors at other values of the
-    /// unknowns: a chord step; and by how much it lowers the sum of squares of the equations there if N is their normal matrix. The same bits
-    /// for any number of threads.
+    /// About N^-1 A^T l over all unknowns, in the order of the layout, A and l of equations and priors at other values of the unknowns than those
+    /// that the factor comes from: a chord step; and by how much it lowers the sum of squares of the equations there. The local blocks are
+    /// eliminated from the right-hand sides by the equations given; the others are solved, and the local blocks from them, with the factor and
+    /// what it has kept. The same bits for any number of threads.
     ///
     /// For a factor that has kept what the elimination of the local blocks has left ([`Factor::has_kept`]). What systems below a part of
     /// a larger one have left is not in it.
@@ -30,31 +31,33 @@ impl System {
         watched(pool, between, |control| {
             let mut others = control.allocated(of_others(self, &prior.right))?;
             self.add_rights_of_ties(equations, &mut others);
-            let at_home = |coupled: &mut Coupled, (index, kept): (usize, &Vec<f64>)| {
-                self.rights_at_home(equations, prior, index, kept, coupled, control)
-            };
-            let homes = factor.eliminated.par_iter().enumerate();
-            let found: Vec<OfHome> = homes.map_init(Coupled::default, at_home).collect();
+            let homes = 0..factor.eliminated.len();
+            let found: Vec<OfHome> = homes
+                .into_par_iter()
+                .map(|index| self.rights_at_home(equations, prior, index, control))
+                .collect();
             self.solve_reduced(factor, found, others, control)
         })
     }
 
-    /// What the local blocks at home in a supernode have as right-hand sides, and what they leave to others.
+    /// What the local blocks at home in a supernode have as right-hand sides, and what they leave to others. Their normal matrices are those of the
+    /// equations: to form them takes less time than to read what the factor has kept.
     fn rights_at_home<E: Equations>(
         &self,
         equations: &E,
         prior: &Prior,
         index: usize,
-        mut kept: &[f64],
-        coupled: &mut Coupled,
         control: &Control,
     ) -> OfHome {
         let (mut stack, mut found) = (self.workspace.stack(), OfHome::default());
         for run in self.incidence.stacks_at(index).iter().take_while(|_| !control.stopped()) {
             stack.gather(self, equations, run);
-            stack.rights_of_locals(&self.layout, prior, &mut found.own);
+            stack.eliminate_from_rights(&self.layout, prior);
+            found.own.extend_from_slice(&stack.reduced);
             let start = found.values.len();
-            reduce(self, run, coupled, &mut kept, &mut found);
+            stack.ranges(&self.symbolic).for_each(|range| {
+                found.room(range);
+            });
             stack.add_rights_of_others(&self.layout, &mut found.values[start..]);
             control.count(run.len());
         }

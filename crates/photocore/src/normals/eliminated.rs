@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 
 use super::layout::Layout;
 use super::panels::skip_ref;
-use super::stack::{Stack, parts_of, united, unlike};
+use super::stack::{Stack, parts_of, united};
 use super::system::System;
 use super::triangle::Triangle;
 use super::vectorised::{Kernel, Rows, add_right, dot, dot_by_fours, run, size};
@@ -50,8 +50,8 @@ pub(super) struct Coupled {
     ranges: SmallVec<[Range<usize>; 16]>,
     /// How many of them are main blocks, the first.
     main: usize,
-    /// What the groups of the last stack had in common with others, by its numbers, and where that stands.
-    numbers: SmallVec<[u32; 4]>,
+    /// The set of what the groups of the last stack had in common with others, and where that stands.
+    set: Option<u32>,
     common: SmallVec<[Range<usize>; 4]>,
 }
 
@@ -67,17 +67,18 @@ impl Coupled {
             }
         }
         self.main = self.ranges.len();
-        let numbers = unlike(system.incidence.commons_of(layout, first as usize));
-        if numbers != self.numbers {
-            self.find_common(system, numbers);
+        let set = system.incidence.set_of(first as usize);
+        if self.set.replace(set) != Some(set) {
+            self.find_common(system, set);
         }
         self.ranges.extend(self.common.iter().cloned());
     }
 
-    /// Of what some groups have in common with others.
-    fn find_common(&mut self, system: &System, numbers: SmallVec<[u32; 4]>) {
+    /// Of a set of what groups have in common with others.
+    fn find_common(&mut self, system: &System, set: u32) {
         let (layout, symbolic) = (&system.layout, &*system.symbolic);
-        let groups = numbers.iter().map(|&number| system.incidence.group_with(number));
+        let numbers = system.incidence.members(set).iter();
+        let groups = numbers.map(|&number| system.incidence.group_with(number));
         let parts = groups.flat_map(|group| parts_of(layout, symbolic, group));
         let all = united(parts.map(|(position, unknowns, _)| (position, unknowns))).into_iter();
         let place = |(position, unknowns): (usize, Range<usize>)| {
@@ -85,7 +86,6 @@ impl Coupled {
             start + unknowns.start..start + unknowns.end
         };
         self.common = all.map(place).collect();
-        self.numbers = numbers;
     }
 
     /// Unknowns in a range: D in a main block, where that is known.

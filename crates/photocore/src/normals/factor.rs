@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use faer::MatMut;
+use pulp::Simd;
 use rayon::ThreadPool;
 
 use super::assembly::{Formation, Sums};
@@ -17,7 +18,7 @@ use super::layout::Layout;
 use super::panels::{Handover, Panels, lock};
 use super::symbolic::Supernode;
 use super::system::System;
-use super::vectorised::{Side, dot_in_lanes};
+use super::vectorised::{Kernel, Side, dot_in_lanes, run_unsized};
 use super::watch::{Between, Control, Stopped, watched};
 use super::workspace::Eliminated;
 
@@ -430,8 +431,20 @@ impl Factor {
 
     /// x := L^-T x; outer unknowns stay as they are.
     pub(super) fn solve_backward(&self, x: &mut [f64]) {
-        let symbolic = &*self.panels.symbolic;
-        let mut own = Vec::new();
+        run_unsized(Backward { panels: &self.panels, x });
+    }
+}
+
+struct Backward<'a> {
+    panels: &'a Panels,
+    x: &'a mut [f64],
+}
+
+impl Kernel for Backward<'_> {
+    #[inline(always)]
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
+        let Self { panels, x } = self;
+        let (symbolic, mut own) = (&*panels.symbolic, Vec::new());
         for (index, s) in symbolic.closed().iter().enumerate().rev() {
             let first = symbolic.first_unknown(index);
             own.clear();
@@ -440,7 +453,7 @@ impl Factor {
             if own.iter().all(|&value| value == 0.0) {
                 continue;
             }
-            for (j, column) in self.panels.panel(index).chunks_exact(s.height()).enumerate().rev() {
+            for (j, column) in panels.panel(index).chunks_exact(s.height()).enumerate().rev() {
                 own[j] = (own[j] - dot_in_lanes(&column[j + 1..], &own[j + 1..])) / column[j];
             }
             x[first..first + s.width].copy_from_slice(&own[..s.width]);

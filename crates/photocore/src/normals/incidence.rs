@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
 use super::layout::Layout;
 use super::symbolic::Symbolic;
@@ -31,6 +32,10 @@ pub(super) struct Incidence {
     commons: Vec<u32>,
     /// One group that has it, of each of these.
     group_with: Vec<u32>,
+    /// All that the groups of each local block have in common with others, as the number of a set; empty where none has anything.
+    sets: Vec<u32>,
+    /// What is in each set, ascending: photos of two cameras alternate, and see points with one before the other or after it.
+    members: Vec<Vec<u32>>,
 }
 
 impl Incidence {
@@ -76,8 +81,9 @@ impl Incidence {
         } else {
             groups.par_iter().with_min_len(MANY).map(of_group).collect()
         };
+        let (stack_ptr, sets, members) = (vec![0], Vec::new(), vec![Vec::new()]);
         let mut incidence =
-            Self { groups, positions, by_home, home_ptr, stack_ptr: vec![0], commons, group_with };
+            Self { groups, positions, by_home, home_ptr, stack_ptr, commons, group_with, sets, members };
         let runs = incidence.by_home.chunk_by(|&a, &b| incidence.alike(layout, a as usize, b as usize));
         let lengths: Vec<usize> = runs.flat_map(|run| run.chunks(MOST)).map(<[u32]>::len).collect();
         let mut end = 0;
@@ -85,7 +91,29 @@ impl Incidence {
             end += length;
             end
         }));
+        if !incidence.commons.is_empty() {
+            incidence.find_sets(layout);
+        }
         incidence
+    }
+
+    /// Numbers the sets of what the groups of local blocks have in common with others. Neighbours nearly always have the same.
+    fn find_sets(&mut self, layout: &Layout) {
+        let mut known: HashMap<SmallVec<[u32; 16]>, u32> = HashMap::from([(SmallVec::new(), 0)]);
+        let (mut sets, mut members, mut last) = (vec![0; layout.locals()], vec![Vec::new()], 0);
+        for locals in self.stacks().iter() {
+            let mut own = SmallVec::from(self.commons_of(layout, locals[0] as usize));
+            own.sort_unstable();
+            own.dedup();
+            if members[last as usize][..] != own[..] {
+                last = *known.entry(own).or_insert_with_key(|own| {
+                    members.push(own.to_vec());
+                    members.len() as u32 - 1
+                });
+            }
+            locals.iter().for_each(|&local| sets[local as usize] = last);
+        }
+        (self.sets, self.members) = (sets, members);
     }
 
     /// Whether the equations of two local blocks touch the same unknowns in the same way.
@@ -107,6 +135,16 @@ impl Incidence {
     /// What each group of a local block has in common with others, as a number; empty where none has anything.
     pub fn commons_of(&self, layout: &Layout, local: usize) -> &[u32] {
         self.commons.get(layout.groups_of(local)).unwrap_or_default()
+    }
+
+    /// The set of all that the groups of a local block have in common with others.
+    pub fn set_of(&self, local: usize) -> u32 {
+        self.sets.get(local).copied().unwrap_or_default()
+    }
+
+    /// What is in a set, ascending.
+    pub fn members(&self, set: u32) -> &[u32] {
+        &self.members[set as usize]
     }
 
     /// A group that has in common with others what has this number.

@@ -163,7 +163,9 @@ pub(super) fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
     let ((a, last), (b, end)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
     let mut sums = [0.0; LANES];
     for (a, b) in a.iter().zip(b) {
-        (0..LANES).for_each(|k| sums[k] += a[k] * b[k]);
+        for k in 0..LANES {
+            sums[k] += a[k] * b[k];
+        }
     }
     sums.iter().sum::<f64>() + last.iter().zip(end).map(|(a, b)| a * b).sum::<f64>()
 }

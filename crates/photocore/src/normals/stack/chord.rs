@@ -1,4 +1,4 @@
-//! The right-hand sides that the equations of a stack make by themselves.
+//! The right-hand sides that a stack leaves, without its coupling.
 
 use pulp::Simd;
 use smallvec::SmallVec;
@@ -6,12 +6,13 @@ use smallvec::SmallVec;
 use super::Stack;
 use crate::normals::equations::Prior;
 use crate::normals::layout::Layout;
-use crate::normals::vectorised::{Kernel, add_right, run, size};
+use crate::normals::vectorised::{Kernel, add_right, dot, run, size};
 
 impl Stack {
-    /// Appends the right-hand sides A^T l of the local blocks, with what their priors add.
-    pub fn rights_of_locals(&self, layout: &Layout, prior: &Prior, found: &mut Vec<f64>) {
-        run(layout, self.kept_dim(), OfLocals { stack: self, layout, prior, found });
+    /// Eliminates the unknowns of the local blocks from the right-hand sides alone: v, and l - A N^-1 A^T l in the place of l, with what priors
+    /// add. Of that, A^T l of the others is what the elimination leaves them.
+    pub fn eliminate_from_rights(&mut self, layout: &Layout, prior: &Prior) {
+        run(layout, self.kept_dim(), FromRights { stack: self, layout, prior });
     }
 
     /// Adds A^T l of all that the local blocks are tied to: main blocks before segments.
@@ -40,28 +41,30 @@ impl Stack {
     }
 }
 
-struct OfLocals<'a> {
-    stack: &'a Stack,
+struct FromRights<'a> {
+    stack: &'a mut Stack,
     layout: &'a Layout,
     prior: &'a Prior,
-    found: &'a mut Vec<f64>,
 }
 
-impl Kernel for OfLocals<'_> {
+impl Kernel for FromRights<'_> {
     #[inline(always)]
-    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
-        let (stack, rows) = (self.stack, size::<R>(self.layout.rows()));
-        for (t, &local) in stack.locals.iter().enumerate() {
-            let (_, mut right) = self.prior.of_local::<L>(self.layout, local as usize);
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
+        let Self { stack, layout, prior } = self;
+        let rows = size::<R>(layout.rows());
+        stack.factor::<S, L>(simd, rows, (layout, prior), 0.0);
+        let depth = stack.locals.len();
+        for (t, triangle) in stack.triangles.iter().enumerate() {
+            let mut x: [f64; L] = std::array::from_fn(|d| stack.reduced[t * L + d]);
+            triangle.backward::<L>(&mut x, 1);
             for slot in &stack.slots {
                 for (k, p) in slot.groups.clone().enumerate() {
-                    let constants = &stack.constants[slot.constants + (t * slot.groups.len() + k) * rows..];
-                    for (row, constant) in stack.local_rows::<L>(t, p, rows).iter().zip(constants) {
-                        (0..L).for_each(|d| right[d] += row[d] * constant);
-                    }
+                    let constants =
+                        &mut stack.constants[slot.constants + (t * slot.groups.len() + k) * rows..];
+                    let own = stack.local_rows[(p * depth + t) * rows * L..][..rows * L].as_chunks::<L>().0;
+                    constants.iter_mut().zip(own).for_each(|(constant, row)| *constant -= dot(row, &x));
                 }
             }
-            self.found.extend_from_slice(&right);
         }
     }
 }

@@ -13,14 +13,29 @@ use crate::normals::vectorised::{Kernel, LANES, copy_vectors, run, size};
 impl Stack {
     /// Eliminates the unknowns of the local blocks. `damping` is added to the diagonal of each as a fraction of it.
     pub fn eliminate(&mut self, layout: &Layout, prior: &Prior, damping: f64) {
-        (self.sum_of_squares, self.decrease) = (0.0, 0.0);
-        self.deficient.clear();
         run(layout, self.kept_dim(), Eliminate { stack: self, layout, prior, damping });
     }
 
-    /// Eliminates some local blocks, from the first on, side by side: at most as many as there are lanes.
+    /// Factors the normal matrices of the local blocks and reduces their right-hand sides: L and v.
     #[inline(always)]
-    fn eliminate_some<S: Simd, const L: usize, const D: usize>(
+    pub(super) fn factor<S: Simd, const L: usize>(
+        &mut self,
+        simd: S,
+        rows: usize,
+        prior: (&Layout, &Prior),
+        damping: f64,
+    ) {
+        (self.sum_of_squares, self.decrease) = (0.0, 0.0);
+        self.deficient.clear();
+        let count = self.locals.len();
+        for first in (0..count).step_by(LANES) {
+            self.factor_some::<S, L>(simd, first..count.min(first + LANES), rows, prior, damping);
+        }
+    }
+
+    /// The same of some, side by side: at most as many as there are lanes.
+    #[inline(always)]
+    fn factor_some<S: Simd, const L: usize>(
         &mut self,
         simd: S,
         locals: Range<usize>,
@@ -50,7 +65,6 @@ impl Stack {
             triangle.forward::<L>(right, 1);
             self.decrease += right.iter().map(|v| v * v).sum::<f64>();
             self.reduced[t * L..][..L].copy_from_slice(right);
-            self.couple::<S, L, D>(simd, t, rows, &triangle);
             self.triangles[t] = triangle;
         }
     }
@@ -82,44 +96,44 @@ impl Stack {
         }
     }
 
-    /// Computes the coupling V of local block `t` of the stack to everything else.
+    /// Computes the coupling V of all local blocks to everything else.
     #[inline(always)]
-    fn couple<S: Simd, const L: usize, const D: usize>(
-        &mut self,
-        simd: S,
-        t: usize,
-        rows: usize,
-        triangle: &Triangle,
-    ) {
+    fn couple<S: Simd, const L: usize, const D: usize>(&mut self, simd: S, rows: usize) {
+        let depth = self.locals.len();
         for slot in &self.slots {
             let dim = size::<D>(slot.dim);
-            let coupling = &mut self.coupling[slot.coupling + t * L * dim..];
-            for first in (0..dim).step_by(LANES) {
-                let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
-                for (k, p) in slot.groups.clone().enumerate() {
-                    let own = &self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L];
-                    let at = slot.kept + (t * slot.groups.len() + k) * rows * dim;
-                    add_rows::<S, L>(simd, &mut sums, own, &self.kept_rows[at + first..], dim);
+            let couplings = self.coupling[slot.coupling..].chunks_mut((L * dim).max(1));
+            for (t, (triangle, coupling)) in self.triangles.iter().zip(couplings).enumerate() {
+                for first in (0..dim).step_by(LANES) {
+                    let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
+                    for (k, p) in slot.groups.clone().enumerate() {
+                        let own = &self.local_rows[(p * depth + t) * rows * L..][..rows * L];
+                        let at = slot.kept + (t * slot.groups.len() + k) * rows * dim;
+                        add_rows::<S, L>(simd, &mut sums, own, &self.kept_rows[at + first..], dim);
+                    }
+                    triangle.forward_vectors::<S, L>(simd, &mut sums);
+                    write_sums::<S, L>(simd, &sums, coupling, dim, first);
                 }
-                triangle.forward_vectors::<S, L>(simd, &mut sums);
-                write_sums::<S, L>(simd, &sums, coupling, dim, first);
             }
         }
-        for segment in &self.segments {
-            if segment.plain {
-                let stack = (&self.places[..], &self.local_rows[..], &self.common_rows[..]);
-                let (width, depth) = (segment.unknowns.len(), self.locals.len());
-                let coupling = &mut self.coupling[segment.coupling + t * L * width..];
+        for segment in self.segments.iter().filter(|segment| segment.plain) {
+            let width = segment.unknowns.len();
+            let stack = (&self.places[..], &self.local_rows[..], &self.common_rows[..]);
+            let couplings = self.coupling[segment.coupling..].chunks_mut((L * width).max(1));
+            for (t, (triangle, coupling)) in self.triangles.iter().zip(couplings).enumerate() {
                 couple_runs::<S, L>(simd, stack, segment, (t, depth), rows, triangle, coupling);
             }
         }
         if !self.segments.iter().all(|segment| segment.plain) {
-            self.couple_segments::<L>(t, rows, triangle);
+            for t in 0..depth {
+                self.couple_segments::<L>(t, rows);
+            }
         }
     }
 
     #[inline(always)]
-    fn couple_segments<const L: usize>(&mut self, t: usize, rows: usize, triangle: &Triangle) {
+    fn couple_segments<const L: usize>(&mut self, t: usize, rows: usize) {
+        let triangle = self.triangles[t];
         for segment in self.segments.iter().filter(|segment| !segment.plain) {
             let width = segment.unknowns.len();
             self.coupling[segment.coupling + t * L * width..][..L * width].fill(0.0);
@@ -155,12 +169,10 @@ struct Eliminate<'a> {
 impl Kernel for Eliminate<'_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
-        let (rows, count) = (size::<R>(self.layout.rows()), self.stack.locals.len());
-        for first in (0..count).step_by(LANES) {
-            let locals = first..count.min(first + LANES);
-            let given = (self.layout, self.prior);
-            self.stack.eliminate_some::<S, L, D>(simd, locals, rows, given, self.damping);
-        }
+        let Self { stack, layout, prior, damping } = self;
+        let rows = size::<R>(layout.rows());
+        stack.factor::<S, L>(simd, rows, (layout, prior), damping);
+        stack.couple::<S, L, D>(simd, rows);
     }
 }
 

@@ -16,7 +16,7 @@ use super::symbolic::Symbolic;
 use super::triangle::Triangle;
 use super::vectorised::{Rows, Side, size};
 
-pub(super) use place::{parts_of, united, unlike};
+pub(super) use place::{parts_of, united};
 
 /// A main kept block that the local blocks are tied to.
 #[derive(Debug, Clone)]
@@ -135,6 +135,8 @@ pub(super) struct Stack {
     places: Vec<Place>,
     /// The supernode that the local blocks are at home in.
     home: usize,
+    /// The set of what their groups have in common with others, and what is in it, by number.
+    set: Option<u32>,
     commons: Vec<Common>,
     parts: Vec<Part>,
     constants: Vec<f64>,
@@ -178,6 +180,12 @@ impl Stack {
         Strip { at: segment.row, rows: Rows { values, width, stride: width, count } }
     }
 
+    /// Where the unknowns that it is tied to stand in the order of elimination: main blocks before segments.
+    pub fn ranges<'s>(&'s self, symbolic: &'s Symbolic) -> impl Iterator<Item = Range<usize>> + 's {
+        let of_segments = self.segments.iter().map(|segment| segment.range(symbolic));
+        self.slots.iter().map(|slot| symbolic.range(slot.position)).chain(of_segments)
+    }
+
     /// Its coupling V, part by part: where the coupled unknowns stand in the order of elimination, and its rows, local block by local
     /// block.
     #[inline(always)]
@@ -185,11 +193,9 @@ impl Stack {
         &'s self,
         symbolic: &'s Symbolic,
     ) -> impl Iterator<Item = (Range<usize>, Rows<'s>)> {
-        let of_slot =
-            move |slot: &'s Slot| (symbolic.range(slot.position), self.slot_coupling::<L, D>(slot).rows);
-        let of_segment =
-            move |segment: &'s Segment| (segment.range(symbolic), self.segment_coupling::<L>(segment).rows);
-        self.slots.iter().map(of_slot).chain(self.segments.iter().map(of_segment))
+        let of_slots = self.slots.iter().map(|slot| self.slot_coupling::<L, D>(slot).rows);
+        let of_segments = self.segments.iter().map(|segment| self.segment_coupling::<L>(segment).rows);
+        self.ranges(symbolic).zip(of_slots.chain(of_segments))
     }
 
     /// The coefficients of a main block in all its equations, local block by local block.

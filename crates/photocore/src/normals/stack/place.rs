@@ -11,7 +11,7 @@ use crate::normals::system::System;
 use crate::normals::triangle::Triangle;
 use crate::normals::vectorised::LANES;
 
-/// Groups that are looked at for one that has the same in common with others: the cameras of a flight are few.
+/// Parts that are looked at for one that is the same: the cameras of a flight are few.
 const FEW: usize = 4;
 
 impl Stack {
@@ -75,47 +75,32 @@ impl Stack {
     /// Finds what each group has in common with others, and the segments; returns how many coefficients these have. The segments of the stack
     /// before stay where that was at home in the same front and had the same in common.
     fn place_commons(&mut self, system: &System, local: usize) -> usize {
-        let (layout, symbolic) = (&system.layout, &*system.symbolic);
-        let positions = system.incidence.positions_of(layout, local);
-        let (of_groups, are_other) = self.find_commons(system, local);
+        let (layout, incidence, symbolic) = (&system.layout, &system.incidence, &*system.symbolic);
+        let set = incidence.set_of(local);
+        let are_other = self.set.replace(set) != Some(set);
+        if are_other {
+            self.commons.clear();
+            self.commons.extend(incidence.members(set).iter().map(|&number| Common::of(system, number)));
+        }
+        let positions = incidence.positions_of(layout, local);
         let main = positions.first().map(|&main| main as usize);
         let first = self.commons.iter().map(|common| common.first).chain(main).min();
         let home = first.map_or(0, |first| symbolic.supernode_of(first));
         if home != std::mem::replace(&mut self.home, home) || are_other {
             self.place_parts(layout, symbolic);
         }
+        let of_groups = incidence.commons_of(layout, local);
         let mut end = 0;
         for p in 0..positions.len() {
-            let common = of_groups.get(p).map(|&common| &self.commons[common]);
+            let common = of_groups.get(p).map(|number| {
+                let place = self.commons.partition_point(|common| common.number < *number);
+                &self.commons[place]
+            });
             let (parts, width) = common.map_or((0..0, 0), |common| (common.parts.clone(), common.width));
             self.places.push(Place { parts, width, rows: end });
             end += self.locals.len() * layout.rows() * width;
         }
         end
-    }
-
-    /// Which of all that its groups have in common with others each of them has, for a local block, and whether it is not what the stack before
-    /// had.
-    fn find_commons(&mut self, system: &System, local: usize) -> (SmallVec<[usize; 16]>, bool) {
-        let (mut found, mut are_other) = (0usize, false);
-        let of_group = |&number: &u32| {
-            let start = found.saturating_sub(FEW);
-            let is_it = |common: &Common| common.number == number;
-            if let Some(known) = self.commons[start..found].iter().rposition(is_it) {
-                return start + known;
-            }
-            if !self.commons.get(found).is_some_and(is_it) {
-                self.commons.truncate(found);
-                self.commons.push(Common::of(system, number));
-                are_other = true;
-            }
-            found += 1;
-            found - 1
-        };
-        let of_groups = system.incidence.commons_of(&system.layout, local).iter().map(of_group).collect();
-        are_other |= found < self.commons.len();
-        self.commons.truncate(found);
-        (of_groups, are_other)
     }
 
     /// Finds the parts of what groups have in common with others, and unites those that overlap or meet in one block.
@@ -217,17 +202,6 @@ pub(in crate::normals) fn parts_of<'a>(
         (symbolic.blocks() - 1, border, column)
     });
     further.chain(own)
-}
-
-/// Numbers of what groups have in common with others, less those that are one of the few before.
-pub(in crate::normals) fn unlike(numbers: &[u32]) -> SmallVec<[u32; 4]> {
-    let mut found: SmallVec<[u32; 4]> = SmallVec::new();
-    for number in numbers {
-        if !found.iter().rev().take(FEW).any(|other| other == number) {
-            found.push(*number);
-        }
-    }
-    found
 }
 
 /// Unites ranges of the unknowns of blocks that overlap or meet, in the order of their positions.
