@@ -110,8 +110,11 @@ pub(super) fn add_products<S: Simd, const N: usize>(
         let mut j = 0;
         while j < width {
             let target = &mut target[j * stride..];
-            // Eight columns are twice four, not six and two that wait for each other.
+            // Eight columns are one where their sums have room in registers, or twice four, not six and two that wait for each other.
             j += match width - j {
+                LANES if S::F64_LANES == LANES => {
+                    add_columns::<S, N, LANES>(simd, target, stride, &products, i, j)
+                }
                 8 | 4 | 5 => add_columns::<S, N, 4>(simd, target, stride, &products, i, j),
                 3 => add_columns::<S, N, 3>(simd, target, stride, &products, i, j),
                 2 => add_columns::<S, N, 2>(simd, target, stride, &products, i, j),

@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use pulp::Simd;
+use smallvec::SmallVec;
 
-use super::{Place, Segment, Stack};
+use super::{Place, Stack};
 use crate::normals::equations::Prior;
 use crate::normals::layout::Layout;
 use crate::normals::triangle::Triangle;
@@ -118,10 +119,26 @@ impl Stack {
         }
         for segment in self.segments.iter().filter(|segment| segment.plain) {
             let width = segment.unknowns.len();
-            let stack = (&self.places[..], &self.local_rows[..], &self.common_rows[..]);
+            let groups = segment.runs.iter().flat_map(|run| {
+                let group = |p: usize| {
+                    let Place { width, rows: start, .. } = self.places[p];
+                    Group { local: p * depth * rows * L, common: start + run.column, stride: width }
+                };
+                run.places.clone().map(group)
+            });
+            let groups: SmallVec<[Group; 8]> = groups.collect();
             let couplings = self.coupling[segment.coupling..].chunks_mut((L * width).max(1));
             for (t, (triangle, coupling)) in self.triangles.iter().zip(couplings).enumerate() {
-                couple_runs::<S, L>(simd, stack, segment, (t, depth), rows, triangle, coupling);
+                for first in (0..width).step_by(LANES) {
+                    let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
+                    for &Group { local, common, stride } in &groups {
+                        let own = &self.local_rows[local + t * rows * L..][..rows * L];
+                        let others = &self.common_rows[common + t * rows * stride + first..];
+                        add_rows::<S, L>(simd, &mut sums, own, others, stride);
+                    }
+                    triangle.forward_vectors::<S, L>(simd, &mut sums);
+                    write_sums::<S, L>(simd, &sums, coupling, width, first);
+                }
             }
         }
         if !self.segments.iter().all(|segment| segment.plain) {
@@ -159,6 +176,14 @@ impl Stack {
     }
 }
 
+/// A group that touches all of a segment: where its coefficients for the first local block stand, and how far the rows of those in common with
+/// others lie apart.
+struct Group {
+    local: usize,
+    common: usize,
+    stride: usize,
+}
+
 struct Eliminate<'a> {
     stack: &'a mut Stack,
     layout: &'a Layout,
@@ -173,34 +198,6 @@ impl Kernel for Eliminate<'_> {
         let rows = size::<R>(layout.rows());
         stack.factor::<S, L>(simd, rows, (layout, prior), damping);
         stack.couple::<S, L, D>(simd, rows);
-    }
-}
-
-/// The coupling V of local block `t` of the `depth` of a stack to a segment that runs are all of: their products summed in registers, L^-1 times them
-/// written. The stack is its places, coefficients of local blocks and those that are in common with others.
-#[inline(always)]
-fn couple_runs<S: Simd, const L: usize>(
-    simd: S,
-    (places, local_rows, common_rows): (&[Place], &[f64], &[f64]),
-    segment: &Segment,
-    (t, depth): (usize, usize),
-    rows: usize,
-    triangle: &Triangle,
-    coupling: &mut [f64],
-) {
-    let width = segment.unknowns.len();
-    for first in (0..width).step_by(LANES) {
-        let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
-        for run in &segment.runs {
-            for p in run.places.clone() {
-                let Place { width: stride, rows: start, .. } = places[p];
-                let own = &local_rows[(p * depth + t) * rows * L..][..rows * L];
-                let at = start + t * rows * stride + run.column + first;
-                add_rows::<S, L>(simd, &mut sums, own, &common_rows[at..], stride);
-            }
-        }
-        triangle.forward_vectors::<S, L>(simd, &mut sums);
-        write_sums::<S, L>(simd, &sums, coupling, width, first);
     }
 }
 
