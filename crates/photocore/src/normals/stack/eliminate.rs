@@ -100,6 +100,16 @@ impl Stack {
     /// Computes the coupling V of all local blocks to everything else.
     #[inline(always)]
     fn couple<S: Simd, const L: usize, const D: usize>(&mut self, simd: S, rows: usize) {
+        self.couple_slots::<S, L, D>(simd, rows);
+        self.couple_runs::<S, L>(simd, rows);
+        if !self.segments.iter().all(|segment| segment.plain) {
+            (0..self.locals.len()).for_each(|t| self.couple_segments::<L>(t, rows));
+        }
+    }
+
+    /// To main blocks.
+    #[inline(always)]
+    fn couple_slots<S: Simd, const L: usize, const D: usize>(&mut self, simd: S, rows: usize) {
         let depth = self.locals.len();
         for slot in &self.slots {
             let dim = size::<D>(slot.dim);
@@ -117,6 +127,12 @@ impl Stack {
                 }
             }
         }
+    }
+
+    /// To segments that runs are all of.
+    #[inline(always)]
+    fn couple_runs<S: Simd, const L: usize>(&mut self, simd: S, rows: usize) {
+        let depth = self.locals.len();
         for segment in self.segments.iter().filter(|segment| segment.plain) {
             let width = segment.unknowns.len();
             let groups = segment.runs.iter().flat_map(|run| {
@@ -141,13 +157,9 @@ impl Stack {
                 }
             }
         }
-        if !self.segments.iter().all(|segment| segment.plain) {
-            for t in 0..depth {
-                self.couple_segments::<L>(t, rows);
-            }
-        }
     }
 
+    /// Of local block `t` of the stack to the other segments.
     #[inline(always)]
     fn couple_segments<const L: usize>(&mut self, t: usize, rows: usize) {
         let triangle = self.triangles[t];
