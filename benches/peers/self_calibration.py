@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from gtsam_block import SETTINGS, poses
@@ -109,7 +110,7 @@ def main() -> None:
     for size in arguments.sizes:
         made = blocks(size)
         work: dict[str, Callable[[], object]] = {
-            name: lambda block=block: photogram.adjust(block) for name, block in made.items()
+            name: partial(photogram.adjust, block) for name, block in made.items()
         }
         seconds: dict[str, float] = dict.fromkeys([*work, *peers], np.inf)
         cpu = dict(seconds)

@@ -238,6 +238,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
         for (value, other) in chord.iter().zip(&solution) {
             assert_close(*value, *other, 1e-11 * expected.norm_max(), "chord from the same values");
         }
+        compare_chord(dense, &system, &factor);
     }
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
     compare_columns(dense, &system, &factor, &inverse);
@@ -261,6 +262,31 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     for (k, value) in cofactors.equations.iter().enumerate() {
         let exact: f64 = (0..layout.unknowns()).map(|i| adjusted[(k, i)] * dense.matrix[(k, i)]).sum();
         assert_close(*value, exact, 1e-9, "adjusted equation");
+    }
+}
+
+/// A chord with equations of other coefficients: their own normal matrices L L^T eliminate the local blocks from the right-hand side, the
+/// factor does all else.
+fn compare_chord(dense: &Dense, system: &System, factor: &Factor) {
+    let there = Dense::new(dense.layout.clone(), 97);
+    let (chord, _) = done(system.chord(&pool(2), factor, &there, &there.prior, &mut go));
+    let count = dense.layout.locals() * dense.layout.local_dim();
+    let (before, after, right) = (dense.normal_matrix(), there.normal_matrix(), there.normal_right());
+    let (right, others) = right.split_at_row(count);
+    let local = |normal: &Mat<f64>| normal.submatrix(0, 0, count, count).llt(faer::Side::Lower).unwrap();
+    let coupling = |normal: &Mat<f64>| normal.submatrix(0, count, count, others.nrows()).to_owned();
+    let reduced = others - coupling(&after).transpose() * local(&after).solve(right);
+    let all = before.llt(faer::Side::Lower).unwrap();
+    let alone = Mat::from_fn(before.nrows(), 1, |i, _| if i < count { 0.0 } else { reduced[(i - count, 0)] });
+    let others = all.solve(alone).subrows(count, others.nrows()).to_owned();
+    let root = local(&before).L().to_owned();
+    let own = local(&after).L().partial_piv_lu().solve(right);
+    let coupled = root.partial_piv_lu().solve(coupling(&before) * &others);
+    let locals = root.transpose().partial_piv_lu().solve(own - coupled);
+    let largest = locals.norm_max().max(others.norm_max());
+    for (i, value) in chord.iter().enumerate() {
+        let expected = if i < count { locals[(i, 0)] } else { others[(i - count, 0)] };
+        assert_close(*value, expected, 1e-9 * largest, "chord from other values");
     }
 }
 

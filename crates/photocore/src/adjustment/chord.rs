@@ -3,7 +3,8 @@
 //! Gauss-Newton steps leave out the second derivatives of the observations times their residuals. Where unknowns are determined well this is
 //! nothing, and steps fall quadratically; where photos share cameras that are calibrated, combinations of these with attitudes, positions and
 //! heights are determined weakly, and steps fall at last by a constant factor, 30 to 50 in practice. A chord step from the values reached,
-//! N_k^-1 A^T l with A and l formed there, falls by as much as the next full step would: it needs no normal matrix and no factorisation.
+//! N_k^-1 A^T l with A and l formed there, falls by as much as the next full step would: it needs no normal matrix but those of the local
+//! blocks, and no new factor.
 
 use std::time::Instant;
 
@@ -44,6 +45,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         self.seconds.solve += start.elapsed().as_secs_f64();
         let (chord, decrease) = unless_stopped(chord)?;
         let change = decrease.sqrt();
+        // What is not a number does not fall.
         let falls = change <= FALLING * iteration.largest_change;
         if !falls {
             return Ok(values);
