@@ -1,13 +1,21 @@
 """Plates with blunders, slow iterations, far attitudes: what is said, and what is found all the same."""
 
+import shutil
 from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from photogram.cli import app
+from photogram.statistics.verdict import EXIT_NOT_USABLE
 from photogram.stellar import calibrate
 from photogram.stellar.combination import combine
 from photogram.stellar.parameters import INDEX, NAMES
+
+EXAMPLE = Path(str(files("photogram") / "examples" / "stellar"))
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +63,38 @@ def test_a_failed_global_test_comes_first(plain, solved):
     assert texts(calibrate(small))[0].startswith("the global test fails: residuals are 3.02 times larger")
     right = calibrate(replace(plain, options=replace(plain.options, mean_error=3e-6)))
     assert not right.test.rejected_high
+
+
+def test_a_blunder_that_bends_the_camera_is_no_calibration(plain, solved):
+    """5 mm on one image: m is 183 um, and the camera is another one; a residual of 30 um harms nobody."""
+    assert not solved.spoiled
+    result = calibrate(spoilt(plain, 100, 5e-3))
+    assert result.converged
+    assert result.verdict.exit == EXIT_NOT_USABLE
+    name = solved.problem.image_points[100]
+    assert result.verdict.headline.startswith("Gross errors: outliers change ")
+    assert f"point {name} of star" in result.verdict.headline
+    assert calibrate(spoilt(plain, 7, 30e-6)).verdict.exit == 0
+
+
+@pytest.mark.parametrize("moved", ["x", "place"])
+def test_harm_is_told_against_the_solution_without_outliers(plain, moved):
+    """What outliers change, in standard deviations of the solution without them, is over one."""
+    if moved == "x":
+        wrong = spoilt(plain, 200, 5e-4)
+        clean = plain.without(np.zeros(75, bool), np.arange(375) == 200)
+    else:
+        places = plain.star_places.copy()
+        places[12, 1] += 1e-3
+        wrong = replace(plain, star_places=places)
+        clean = plain.without(np.arange(75) == 12, np.zeros(375, bool))
+    result, right = calibrate(wrong), calibrate(clean)
+    assert not right.spoiled
+    errors = np.array([right.mean_errors[name] for name in NAMES[9:22]])
+    change = np.abs(result.solved.parameters - right.solved.parameters)[9:22] / np.where(
+        errors > 0, errors, 1
+    )
+    assert f"{NAMES[9 + change.argmax()]} by {change.max():.3g} of" in result.spoiled
 
 
 def test_a_wrong_place_of_a_star_is_a_problem(plain):
@@ -146,3 +186,22 @@ def test_as_published_from_the_attitude_of_the_event(plain, solved):
     off = (far.solved.parameters - near.solved.parameters)[:22]
     off[[2, 5, 8, INDEX["phi_T"]]] = np.remainder(off[[2, 5, 8, INDEX["phi_T"]]] + np.pi, 2 * np.pi) - np.pi
     assert np.abs(off / errors).max() < 0.01
+
+
+def test_a_camera_that_must_not_be_used_is_withheld(tmp_path, monkeypatch):
+    """Listing and report are written; camera.json of an earlier run is named, not left as if it were new."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(EXAMPLE, "plate")
+    command = ["stellar-camera", "plate/plate.toml", "--out", "out", "--no-html"]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    before = Path("out/camera.json").read_bytes()
+    lines = Path("plate/images.csv").read_text().splitlines()
+    star, point, x, y, time = lines[101].split(",")
+    lines[101] = ",".join([star, point, x, f"{float(y) + 5e-3:.8f}", time])
+    Path("plate/images.csv").write_text("\n".join(lines) + "\n")
+    run = CliRunner().invoke(app, command)
+    assert run.exit_code == EXIT_NOT_USABLE
+    assert "camera.json withheld" in run.stderr
+    assert "out/camera.json is from an earlier run" in run.stderr
+    assert "out/camera.json" not in run.stdout
+    assert Path("out/camera.json").read_bytes() == before

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import errors, output, print_remark
+from photogram.cli.console import output, print_remark, print_withheld
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
 from photogram.cli.options import Quiet, default_out, out_option
@@ -169,13 +169,11 @@ def _withheld(calibrations: list[Calibration], folder: Path) -> None:
     for number, calibration in enumerate(calibrations, 1):
         if calibration.usable:
             continue
-        errors.print(
-            f"[bold red]error:[/] comparator {calibration.session.comparator}:"
-            " the correction is withheld: outliers make it unusable"
+        print_withheld(
+            f"comparator {calibration.session.comparator}: the correction is withheld:"
+            " outliers make it unusable",
+            _corrections(calibration, _place(folder, number, len(calibrations))),
         )
-        for path in _corrections(calibration, _place(folder, number, len(calibrations))):
-            if path.exists():
-                print_remark(f"{path} is from an earlier run")
 
 
 def _corrections(calibration: Calibration, place: Path) -> dict[Path, bytes]:

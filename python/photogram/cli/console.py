@@ -26,6 +26,7 @@ __all__ = [
     "print_remark",
     "print_report",
     "print_sections",
+    "print_withheld",
     "print_written",
 ]
 
@@ -75,6 +76,14 @@ def print_report(paths: Iterable[Path], to: Console = output) -> None:
     pages = [path for path in paths if path.suffix == ".html"]
     if pages:
         to.print(f"open in a browser: {escape(printable(', '.join(map(str, pages))))}")
+
+
+def print_withheld(what: str, paths: Iterable[Path]) -> None:
+    """Say what is withheld and why, and which of its files are there from an earlier run."""
+    errors.print(f"[bold red]error:[/] {escape(what)}")
+    for path in paths:
+        if path.exists():
+            print_remark(f"{path} is from an earlier run")
 
 
 def print_remark(text: object) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.console import print_sections
+from photogram.cli.console import print_sections, print_withheld
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import (
@@ -88,12 +88,15 @@ def stellar_camera(
 ) -> None:
     """Calibrate a camera by a plate with images of stars (NOAA Technical Report NOS 55).
 
+    Where the verdict is that the result must not be used, camera.json is withheld.
+
     `photogram stellar-camera exposures` does so by digital exposures of the sky.
     """
     with job:
         from photogram.show.ways import page_of
         from photogram.statistics.verdict import worst
         from photogram.stellar import calibrate
+        from photogram.stellar.cameras import camera_document
         from photogram.stellar.document import to_json
 
         if deck is None:
@@ -113,6 +116,7 @@ def stellar_camera(
             results.append(result)
             mark = f"-{number}" if len(problems) > 1 else ""
             written |= _files(result, target, mark, pictures)
+            written |= _cameras(result, {target / f"camera{mark}.json": camera_document(result)})
             make = partial(page_of, result)
             written |= html_files(job, "stellar-camera", place, html is not None, make, mark)
             if json is not None:
@@ -248,15 +252,20 @@ def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
     return ([read_plain(deck)], inputs(deck)) if deck.suffix.lower() == ".toml" else (read_deck(deck), [deck])
 
 
+def _cameras(result: Result | CalibratedNight, files: dict[Path, bytes]) -> dict[Path, bytes]:
+    """Return the files of a camera, or none, and say so, where it must not be used."""
+    if result.verdict.usable:
+        return files
+    names = ", ".join(path.name for path in files)
+    print_withheld(f"{names} withheld: the calibration must not be used as it is", files)
+    return {}
+
+
 def _files(result: Result, out: Path, mark: str, pictures: str) -> dict[Path, bytes]:
     """Make everything that is written for one problem."""
-    from photogram.stellar.cameras import camera_document
     from photogram.stellar.listing import listing, plate_list
 
-    made = {
-        out / f"listing{mark}.txt": listing(result).encode(),
-        out / f"camera{mark}.json": camera_document(result),
-    }
+    made = {out / f"listing{mark}.txt": listing(result).encode()}
     if result.problem.options.plate_list:
         made[out / f"plate{mark}.txt"] = plate_list(result)
     if pictures:
@@ -275,13 +284,14 @@ def _night_files(result: CalibratedNight, out: Path, pictures: str) -> dict[Path
 
     made = {
         out / "report.txt": report(result).encode(),
-        out / "camera.json": result.camera.to_json(),
         out / "exposures.csv": exposure_table(result).to_csv(index=False).encode(),
         out / "star-images.csv": image_table(result).to_csv(index=False).encode(),
     }
+    cameras = {out / "camera.json": result.camera.to_json()}
     if result.camera.lens in WITH_YAML:
-        made[out / "camera.yaml"] = to_yaml(result.camera, result.night.frame, "opencv")
-        made[out / "camera-ros.yaml"] = to_yaml(result.camera, result.night.frame, "ros")
+        cameras[out / "camera.yaml"] = to_yaml(result.camera, result.night.frame, "opencv")
+        cameras[out / "camera-ros.yaml"] = to_yaml(result.camera, result.night.frame, "ros")
+    made |= _cameras(result, cameras)
     if pictures:
         from photogram.show.pictures import files as drawn
         from photogram.stellar.night_plots import figures

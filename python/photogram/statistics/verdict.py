@@ -153,7 +153,8 @@ def _identification(e: Evidence) -> _Line | None:
 
 def _gross_errors(e: Evidence) -> _Line | None:
     if e.found.spoiled:
-        return _Line("gross-errors", f"Gross errors: {e.found.spoiled}", EXIT_NOT_USABLE)
+        named = f": {e.named(e.single)}" if e.single else ""
+        return _Line("gross-errors", f"Gross errors: {e.found.spoiled}{named}", EXIT_NOT_USABLE)
     if not e.rejected or e.found.snooped or not e.gross:
         return None
     # A few gross errors make s larger than the median says; a wrong model spoils all residuals alike.

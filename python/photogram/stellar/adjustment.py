@@ -15,7 +15,7 @@ from photogram.stellar import published, strict
 from photogram.stellar.combination import combine
 from photogram.stellar.counts import degrees_of_freedom
 from photogram.stellar.movement import movement, pairs_to_combine
-from photogram.stellar.outliers import culprits, outliers
+from photogram.stellar.outliers import culprits, harm, outliers
 from photogram.stellar.parameters import GROUPS, INDEX
 from photogram.stellar.problem import Problem
 from photogram.stellar.result import PreRun, Result, Stage
@@ -93,13 +93,16 @@ def calibrate(
         stages = (*stages, _stage(problem, solved))
     elif problem.options.refraction:
         remarks = ["REFRACTION SOLUTION ELIMINATED FROM PROBLEM"]
+
+    def again(left: Problem) -> Solved:
+        found = iterate(left, initial, free_parameters(left), solution="maximum", limit=limit)
+        return _refraction(left, iterate, found) if problem.options.refraction and found.converged else found
+
     if not stages[-1].converged:
-        remarks += culprits(
-            problem,
-            solved,
-            lambda left: iterate(left, initial, free_parameters(left), solution="maximum", limit=limit),
-        )
+        remarks += culprits(problem, solved, again)
     result = _result(problem, problem, solved, stages, remarks=remarks)
+    if result.converged:
+        result = replace(result, spoiled=harm(result, lambda left: _solution(left, again(left))))
     return _combined(result, threads) if problem.options.movement_factor > 0 else result
 
 
@@ -213,6 +216,12 @@ def _stage(problem: Problem, solved: Solved) -> Stage:
         solved.converged,
         solved.log_determinant,
     )
+
+
+def _solution(problem: Problem, solved: Solved) -> Result:
+    """Return the result of one solution, without remarks."""
+    stage = _stage(problem, solved)
+    return Result(problem, solved, stage.counts, (), problem, (stage,))
 
 
 def _result(

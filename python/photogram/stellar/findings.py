@@ -44,6 +44,7 @@ def plate_findings(result: Result) -> Findings:
         untested="the mean error of unit weight is not given"
         if not problem.options.mean_error
         else "no degrees of freedom",
+        spoiled=result.spoiled,
     )
 
 

@@ -64,10 +64,13 @@ def night_page(result: CalibratedNight) -> Page:
         what="Calibration of a camera by exposures of the sky",
         title=result.night.title,
         judgements=[judged(result.verdict)],
-        advice=advice(result.verdict, others=[ready] if result.usable else []),
+        advice=advice(result.verdict, others=[ready if result.usable else _WITHHELD]),
         highlights=_highlights(result),
         sections=sections,
     )
+
+
+_WITHHELD = "The files of the camera are withheld: no block may take this camera."
 
 
 def _highlights(result: CalibratedNight) -> list[Fact]:

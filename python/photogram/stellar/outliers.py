@@ -13,19 +13,22 @@ from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError
 from photogram.messages import listed
 from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
+from photogram.stellar.parameters import INDEX, NAMES
 
 if TYPE_CHECKING:
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
     from photogram.stellar.state import Solved
 
-__all__ = ["Tests", "culprits", "outliers", "studentized"]
+__all__ = ["Tests", "culprits", "harm", "outliers", "studentized"]
 
 
 _TESTABLE = 0.01
 """Redundancy numbers below this test nothing."""
 _HELPS = 10.0
 """By how much the sum of squares falls when what spoils a solution is left out."""
+_ROUNDS = 10
+"""Solutions at most when outliers are left out, each without what is half as far off as the farthest."""
 _SUSPECTS = 12
 """Stars that are left out one after the other to find what spoils a solution."""
 
@@ -87,6 +90,40 @@ def outliers(result: Result) -> list[str]:
         f"outliers (residuals {kind}, limit {tests.limit:.2f}): "
         + listed([f"{name} ({value:.3g})" for value, name in found])
     ]
+
+
+def harm(result: Result, iterate: Callable[[Problem], Result]) -> str:
+    """Say which parameter of the camera outliers change by more than it is uncertain without them.
+
+    Nothing where there are none, where they do no harm, or where the rest does not determine the camera.
+
+    Parameters
+    ----------
+    result
+        A solution that has converged.
+    iterate
+        Solves a problem.
+    """
+    clean = result
+    for _ in range(_ROUNDS):
+        tests = studentized(clean)
+        images, stars = (np.nan_to_num(each).max(axis=1, initial=0.0) for each in (tests.images, tests.stars))
+        far = max(tests.limit, 0.5 * max(images.max(initial=0.0), stars.max(initial=0.0)))
+        if not ((images > far).any() or (stars > far).any()):
+            break
+        try:
+            clean = iterate(clean.problem.without(stars > far, images > far))
+        except AdjustmentError:
+            return ""
+        if not clean.converged:
+            return ""
+    sd = np.sqrt(np.diag(clean.covariance))
+    camera = np.flatnonzero(clean.solved.free & (sd > 0) & (np.arange(len(sd)) >= INDEX["epsilon"]))
+    change = np.abs(result.solved.parameters - clean.solved.parameters)[camera] / sd[camera]
+    if not change.size or change.max() <= 1.0:
+        return ""
+    name = NAMES[camera[int(change.argmax())]]
+    return f"outliers change {name} by {change.max():.3g} of the standard deviations that it has without them"
 
 
 def _named(values: Floats, names: list[str], limit: float) -> list[tuple[float, str]]:

@@ -92,6 +92,8 @@ def _next(result: Result) -> list[str]:
             "camera.json holds the calibrated camera: blocks take it with its covariance"
             " (`photogram.camera_from`)."
         )
+    else:
+        found.append("camera.json is withheld: no block may take this camera.")
     return found
 
 

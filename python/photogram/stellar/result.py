@@ -172,6 +172,8 @@ class Result(Judged, Brief):
         The combined solution, if attitudes do not differ: a result of its own.
     pairs
         Of a combined solution: the pairs that the movement test found equal.
+    spoiled
+        By how much outliers change the camera, where that is more than it is uncertain without them.
     """
 
     problem: Problem
@@ -184,6 +186,7 @@ class Result(Judged, Brief):
     movement: tuple[Movement, ...] = ()
     combined: Result | None = None
     pairs: tuple[tuple[str, str], ...] = ()
+    spoiled: str = ""
 
     def to_html(self) -> bytes:
         """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
