@@ -119,16 +119,15 @@ def with_images(project: Project, path: Path, pixel_origin: str | None) -> Proje
     InputError
         Photos that are not there, images that are there already, cameras in millimetres.
     """
-    block = project.block
-    if block.image_unit != "px":
-        raise InputError("further images are in pixels, and the cameras of the project in mm", file=path)
-    table = pixel_table(path)
-    return _with_table(project, path, table, pixel_origin)
+    return _with_table(project, path, pixel_table(path), pixel_origin)
 
 
 def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: str | None) -> Project:
     block = project.block
-    assert block.photo_cameras is not None
+    if not table.count:
+        return project
+    if block.image_unit != "px" or block.photo_cameras is None:
+        raise InputError("further images are in pixels, and the cameras of the project in mm", file=path)
     photos = indices_of(table, "photo", {name: row for row, name in enumerate(block.photo_ids)}, "photo")
     names = table.names("point")
     known = {name: row for row, name in enumerate(block.point_ids)}

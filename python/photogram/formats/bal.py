@@ -51,4 +51,5 @@ FORMAT = Format(
     write=write,
     files=(FILE, "problem-*.txt", "*.bal"),
     cannot_hold=cannot_hold,
+    pixels=True,
 )

@@ -65,4 +65,5 @@ FORMAT = Format(
     write=write,
     files=(FILE, "*.out"),
     cannot_hold=cannot_hold,
+    pixels=True,
 )

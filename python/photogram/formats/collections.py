@@ -67,7 +67,7 @@ def cannot_hold(project: Project) -> list[str]:
         "names of points, standard deviations, the frame and its unit",
         "that photos share a camera: each has f, k1, k2 of its own",
     ]
-    if any(_reduced(each, size) is None for each, size in zip(*_cameras(project), strict=True)):
+    if any(_reduced(each, size) is None for each, size in zip(block.cameras, project.sizes, strict=True)):
         found.append(
             "principal points and lens terms beside k1, k2: image coordinates are moved to where a camera"
             " without"
@@ -80,16 +80,13 @@ def cannot_hold(project: Project) -> list[str]:
     return found
 
 
-def _cameras(project: Project) -> tuple[list[Camera], list[Size | None]]:
-    cameras, _ = known_cameras(project.block)
-    return cameras, [*project.sizes, *(None for _ in cameras[len(project.sizes) :])]
-
-
 def _reduced(camera: Camera, size: Size | None) -> tuple[float, float, float] | None:
     """Return f, k1, k2 of a camera that has no more than that; None for all others."""
     values = camera.parameters
     if camera.model == "bal":
         return values["f"], values["k1"], values["k2"]
+    if camera.model == "perspective":
+        return -values["c"], 0.0, 0.0
     if (
         camera.model == "radial"
         and size is not None
@@ -111,7 +108,7 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
     if block.geographic:
         raise InputError("the format is cartesian: geographic coordinates have no place there")
     cameras, photo_cameras = known_cameras(block)
-    sizes = _cameras(project)[1]
+    sizes = project.sizes
     positions = complete_positions(project)
     poses = np.hstack([block.photo_positions, block.photo_attitudes])
     placed: Bools = np.asarray(np.isfinite(positions).all(axis=1))

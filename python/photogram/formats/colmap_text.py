@@ -15,4 +15,5 @@ FORMAT = Format(
     read=read,
     write=write_as_text,
     cannot_hold=cannot_hold,
+    pixels=True,
 )

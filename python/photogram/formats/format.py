@@ -60,6 +60,8 @@ class Format:
     files
         The file that is written, the first of them where there are several, and patterns of the names by
         which a user may say the format; empty for a format that is a folder.
+    pixels
+        Whether its images are pixels: what is written is in pixels, whatever the project has.
     folders
         Names of folders that say the format, beside its own name.
     """
@@ -73,3 +75,4 @@ class Format:
     results: Callable[[Project, Result], Mapping[str, bytes]] | None = None
     files: tuple[str, ...] = ()
     folders: tuple[str, ...] = ()
+    pixels: bool = False

@@ -37,24 +37,18 @@ def to_corner(project: Project) -> Floats:
     Raises
     ------
     InputError
-        A camera in millimetres without the size of a pixel, one whose pictures have no known size.
+        Images in millimetres, a camera whose pictures have no known size.
     """
     block = project.block
+    if block.image_unit != "px" or block.photo_cameras is None:
+        raise InputError("images are in millimetres: they have no columns and rows")
     found = block.image_xy.copy()
-    assert block.photo_cameras is not None
     cameras = block.photo_cameras[block.image_photos]
     for row, camera in enumerate(block.cameras):
         own = cameras == row
-        xy = found[own]
-        if camera.unit == "mm":
-            pixel = project.pixel_mm[row]
-            if pixel is None:
-                raise InputError(f"the camera {camera.title} is in millimetres and has no pixel_mm")
-            xy = xy / pixel
         if camera.image_y == "up":
             width, height = _size(camera, project.sizes[row])
-            xy = np.column_stack([xy[:, 0] + width / 2, height / 2 - xy[:, 1]])
-        found[own] = xy
+            found[own] = np.column_stack([found[own, 0] + width / 2, height / 2 - found[own, 1]])
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from photogram.formats.project import Size
@@ -9,9 +10,10 @@ from photogram.network.cameras import Camera
 
 __all__ = ["Lens", "lens_of"]
 
-_FAMILY = frozenset(
+_MIDDLE = frozenset({"bal", "perspective", "brown", "brown_forward"})
+"""Models that count from the middle of the picture, y up."""
+_FAMILY = _MIDDLE | frozenset(
     {
-        "bal",
         "radial",
         "simple_radial",
         "simple_pinhole",
@@ -92,11 +94,23 @@ def lens_of(camera: Camera, size: Size | None) -> Lens | None:
             values["h"] / 2 + values["cy"],
             **terms,
         )
-    if camera.model == "bal":
-        if size is None:
-            return None
-        return Lens(values["f"], values["f"], size[0] / 2, size[1] / 2, **terms)
+    if camera.model in _MIDDLE:
+        return None if size is None else _about_middle(camera, size, terms)
     if "k" in values:
         terms = {"k1": values["k"]}
     fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
     return Lens(fx, fy, values["cx"], values["cy"], **terms)
+
+
+def _about_middle(camera: Camera, size: Size, terms: Mapping[str, float]) -> Lens | None:
+    values = camera.parameters
+    f = values["f"] if camera.model == "bal" else -values["c"]
+    lost = {"brown": ("K1", "K2", "K3", "P1", "P2", "b1", "b2"), "brown_forward": ("C1", "C2", "r0")}
+    if f < 0 or any(values[name] for name in lost.get(camera.model, ())):
+        return None
+    if camera.model == "brown_forward":
+        # With y down B2 has the other sign.
+        terms = {"p1": -values["B2"] * f, "p2": values["B1"] * f}
+        terms |= {f"k{n}": values[f"A{n}"] * f ** (2 * n) for n in (1, 2, 3)}
+    middle = size[0] / 2 + values.get("xp", 0.0), size[1] / 2 - values.get("yp", 0.0)
+    return Lens(f, f, *middle, **terms)

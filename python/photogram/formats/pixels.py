@@ -14,6 +14,7 @@ from photogram.formats.images import from_corner, to_corner
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import bare_settings
 from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.writing import camera_table, known_cameras
 from photogram.formats.project import Project, assembled
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import ColumnTable, read_columns
@@ -23,6 +24,7 @@ __all__ = ["FORMAT", "TITLE", "corner_of", "pixel_table"]
 
 TITLE = "table of pixels"
 FILE = "images.csv"
+CAMERAS = "cameras.csv"
 _SYNONYMS = {
     "image": "photo",
     "file": "photo",
@@ -175,8 +177,10 @@ def _cameras_of(table: ColumnTable, names: list[str]) -> np.ndarray[tuple[int], 
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the table."""
+    """Return the table, and that of the cameras."""
     block = project.block
+    cameras, which = known_cameras(block)
+    names = np.array([cameras[row].name for row in which], dtype=object)
     photos, points = np.array(block.photo_ids, dtype=object), np.array(block.point_ids, dtype=object)
     corner = to_corner(project)
     columns = {
@@ -186,16 +190,21 @@ def write(project: Project) -> Mapping[str, bytes]:
         "row": corner[:, 1],
         "sd_column": block.image_sd[:, 0],
         "sd_row": block.image_sd[:, 1],
+        "camera": names[block.image_photos],
     }
     return {
-        FILE: csv_text(columns, ["pixels from the upper-left corner: the middle of the first is 0.5, 0.5"])
+        FILE: csv_text(columns, ["pixels from the upper-left corner: the middle of the first is 0.5, 0.5"]),
+        CAMERAS: csv_text(camera_table(project, cameras)),
     }
 
 
 def cannot_hold(project: Project) -> list[str]:
     """Return what of a project a table of pixels has no place for."""
     del project
-    return ["everything but image coordinates and their standard deviations"]
+    return [
+        f"everything but image coordinates and their standard deviations; cameras: {CAMERAS} beside it is a"
+        " table for --camera"
+    ]
 
 
 FORMAT = Format(
@@ -206,4 +215,5 @@ FORMAT = Format(
     write=write,
     files=(FILE, "*.csv"),
     cannot_hold=cannot_hold,
+    pixels=True,
 )

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from photogram.errors import InputError, PhotogramError
 from photogram.formats.format import Format, Wishes
+from photogram.formats.millimetres import in_pixels, nominal_pixels
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
 from photogram.io.files import reading
@@ -135,7 +136,7 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
     if chosen.write is None:
         writable = ", ".join(name for name, each in FORMATS.items() if each.write)
         raise InputError(f"{chosen.title} is only read; what can be written: {writable}")
-    return chosen.write(project)
+    return chosen.write(in_pixels(project) if chosen.pixels else project)
 
 
 @dataclass(frozen=True)
@@ -221,7 +222,10 @@ def target(path: Path, file_format: str | None = None) -> Target:
 
 def cannot_hold(project: Project, file_format: str) -> list[str]:
     """Return what of a project a format has no place for, in sentences."""
-    return _named(file_format).cannot_hold(project)
+    chosen = _named(file_format)
+    if not chosen.pixels:
+        return chosen.cannot_hold(project)
+    return [*chosen.cannot_hold(in_pixels(project)), *nominal_pixels(project)]
 
 
 def _named(file_format: str) -> Format:

@@ -26,4 +26,5 @@ FORMAT = Format(
     write=write,
     files=(FILE, "*.xml"),
     cannot_hold=cannot_hold,
+    pixels=True,
 )

@@ -62,11 +62,9 @@ def write(project: Project) -> Mapping[str, bytes]:
         raise InputError("no photo has a pose, and the file holds nothing but photos with one")
     world = _world(project.frame)
     cameras, which = known_cameras(block)
-    sizes = [*project.sizes, *(None for _ in cameras[len(project.sizes) :])]
-    pixels = [*project.pixel_mm, *(None for _ in cameras[len(project.pixel_mm) :])]
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<document version="2.0.0">', '<chunk enabled="true">']
     lines += [f'<sensors next_id="{len(cameras)}">']
-    for row, (camera, size, pixel) in enumerate(zip(cameras, sizes, pixels, strict=True)):
+    for row, (camera, size, pixel) in enumerate(zip(cameras, project.sizes, project.pixel_mm, strict=True)):
         lines += _sensor(row, camera, size, pixel)
     lines += [
         "</sensors>",

@@ -17,6 +17,7 @@ FORMAT = Format(
     read=read,
     write=write,
     cannot_hold=cannot_hold,
+    pixels=True,
     results=covariance_files,
     folders=("sparse",),
 )

@@ -89,7 +89,8 @@ def write(project: Project) -> Mapping[str, bytes]:
     Raises
     ------
     InputError
-        Cameras of other models than those of COLMAP, pictures of unknown size, geographic coordinates.
+        Cameras of other models than those of COLMAP, pictures of unknown size, geographic coordinates, no
+        poses.
     """
     found = made(project)
     return {**binary_files(found.model), **names_file(found.points)}
@@ -122,6 +123,8 @@ def made(project: Project) -> Made:
     sizes = sizes_of(project)
     lines = [_camera(each, size, numbers[each.name]) for each, size in zip(cameras, sizes, strict=True)]
     posed = np.flatnonzero(~_unposed(project))
+    if not len(posed):
+        raise InputError("no photo has a pose, and a model holds nothing but photos with one")
     photos = numbered([block.photo_ids[row] for row in posed], project.details.get("image numbers"))
     positions = complete_positions(project)
     placed = np.flatnonzero(np.isfinite(positions).all(axis=1))

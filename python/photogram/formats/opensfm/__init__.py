@@ -16,4 +16,5 @@ FORMAT = Format(
     write=write,
     files=(MODEL,),
     cannot_hold=cannot_hold,
+    pixels=True,
 )

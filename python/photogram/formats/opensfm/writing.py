@@ -53,7 +53,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     Raises
     ------
     InputError
-        Cameras that the package does not have, pictures of unknown size, geographic coordinates.
+        Cameras that the package does not have, pictures of unknown size, geographic coordinates, no poses.
     """
     block = project.block
     if block.geographic:
@@ -61,6 +61,8 @@ def write(project: Project) -> Mapping[str, bytes]:
     cameras, which = known_cameras(block)
     sizes = sizes_of(project)
     rows = np.flatnonzero(np.isfinite(np.hstack([block.photo_positions, block.photo_attitudes])).all(axis=1))
+    if not len(rows):
+        raise InputError("no photo has a pose, and a reconstruction holds nothing but photos with one")
     attitudes = Attitudes(attitude_matrices(block)[rows])
     rotations = attitudes.values("rotation_vector_to_vision").tolist()
     translations = attitudes.translations(block.photo_positions[rows]).tolist()

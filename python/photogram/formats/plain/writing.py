@@ -21,7 +21,7 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Control, Position
 
-__all__ = ["attitude_matrices", "cannot_hold", "control_table", "known_cameras", "write"]
+__all__ = ["attitude_matrices", "camera_table", "cannot_hold", "control_table", "known_cameras", "write"]
 
 _ANGLES = ("omega", "phi", "kappa")
 
@@ -98,7 +98,7 @@ def write(project: Project) -> Mapping[str, bytes]:
         down = np.array([each.image_y == "down" for each in cameras])[of_images]
         xy = np.where(down[:, np.newaxis], xy * [1.0, -1.0], xy)
     tables = {
-        "cameras": _cameras(project, cameras),
+        "cameras": camera_table(project, cameras),
         "photos": _photos(block, [cameras[row].name for row in photo_cameras]),
         "images": _images(block, names, xy),
         "points": _points(project),
@@ -140,7 +140,8 @@ def _settings(project: Project, image_y: str) -> str:
     return "\n".join(lines)
 
 
-def _cameras(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
+def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
+    """Return the columns of the cameras of a project."""
     columns: dict[str, Any] = {
         "camera": [each.name for each in cameras],
         "model": [each.model for each in cameras],
