@@ -32,14 +32,19 @@ SENTENCES = (
 
 
 def written(project, name, folder):
-    """Return a project as it comes back from a format."""
-    for path, content in formats.target(folder / "there", name).files(project).items():
+    """Return a project as it comes back from a format; None where that says why it cannot hold it."""
+    try:
+        files = formats.target(folder / "there", name).files(project)
+    except InputError as error:
+        if any(each in str(error) for each in SENTENCES):
+            return None
+        raise
+    for path, content in files.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
     main = formats.FORMATS[name].files
     path = folder / "there" / main[0] if main else folder / "there"
-    beside = path.parent / "cameras.csv"
-    return formats.read(path, name, Wishes(cameras=beside if name == "pixels" else None))
+    return formats.read(path, name, Wishes(cameras=path.parent / "cameras.csv" if name == "pixels" else None))
 
 
 @pytest.fixture(scope="module")
@@ -94,10 +99,8 @@ def shape(result):
 @pytest.mark.parametrize("name", WRITTEN)
 @pytest.mark.parametrize("source", ["project", "galveston", *SIMULATED])
 def test_all_formats_hold_the_same_block_or_say_why_not(sources, tmp_path, source, name):
-    try:
-        first = written(sources[source], name, tmp_path / "first")
-    except InputError as error:
-        assert any(each in str(error) for each in SENTENCES), error
+    first = written(sources[source], name, tmp_path / "first")
+    if first is None:
         return
 
     @cache
@@ -105,10 +108,8 @@ def test_all_formats_hold_the_same_block_or_say_why_not(sources, tmp_path, sourc
         return adjust(free(first.block, sources[source].block), datum=MinimumConstraints(), tolerance=1e-9)
 
     for other in WRITTEN:
-        try:
-            second = written(first, other, tmp_path / other)
-        except InputError as error:
-            assert any(each in str(error) for each in SENTENCES), (other, error)
+        second = written(first, other, tmp_path / other)
+        if second is None:
             continue
         assert formats.cannot_hold(first, other) or other in ("plain", "giant")
         if name == "agisoft" or other == "agisoft" or sources[source].block.geographic:

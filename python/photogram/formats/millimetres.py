@@ -22,9 +22,9 @@ ROUND = 100
 def in_pixels(project: Project) -> Project:
     """Return a project with the same rays whose cameras are given, and count pixels.
 
-    Millimetres are divided by the size of a pixel, or a nominal one; negative planes are turned by 180 degrees
-    into positive ones. Pictures whose size is not known get one that holds all images, where coordinates do
-    not count from their corners.
+    Millimetres are divided by the size of a pixel, or a nominal one; negative planes are turned by 180
+    degrees into positive ones. Pictures whose size is not known get one that holds all images, where
+    coordinates do not count from their corners.
     """
     block = project.block
     given = block.image_unit == "px"
@@ -73,7 +73,7 @@ def _unsized(project: Project) -> bool:
 
 
 def _is_free(camera: Camera) -> bool:
-    """Return whether no coordinate depends on the size of a picture: they count from its middle, or are mm."""
+    """Return whether no coordinate depends on the size of a picture: they count from the middle or are mm."""
     return camera.image_y == "up" or camera.unit == "mm"
 
 
