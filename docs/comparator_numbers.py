@@ -9,6 +9,7 @@ from importlib.resources import as_file, files
 import numpy as np
 
 from photogram import comparator
+from photogram.comparator.gridfile import adjusted_grid, corrected_grid
 from photogram.comparator.listing.joint import tests_page
 from photogram.comparator.listing.parameters import combined_linear_page
 from photogram.comparator.listing.summary import variance_lines
@@ -57,13 +58,15 @@ def _check() -> str:
 
 
 def grid_lines() -> list[str]:
-    """Show the three estimates of the grid's standard deviation."""
+    """Show the estimates of the grid's standard deviation, and what corrections leave of it."""
     result = calibration().plates[1320]
     return [
         f"listing      {result.listed.grid_um:.3f} um",
         f"equation 64  {result.text_um:.3f} um",
         f"unbiased     {result.unbiased_um:.3f} um",
         f"a priori     {calibration().session.grids[1320].sigma_um:.3f} um",
+        f"coordinates corrected by averages            {corrected_grid(calibration(), 1320).sigma_um:.3f} um",
+        f"coordinates corrected by joint adjustment    {adjusted_grid(calibration(), 1320).sigma_um:.3f} um",
     ]
 
 

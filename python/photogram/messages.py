@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,6 +47,13 @@ def locate(message: str, file: Path | None, record: int | None, text: str | None
 def printable(text: str) -> str:
     """Return a text with U+FFFD for each character that does not print: no terminal should get it."""
     return "".join(character if character.isprintable() else "\ufffd" for character in text)
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Return the end of a sentence that refuses a name: the known one that was meant, or all of them."""
+    names = list(known)
+    close = difflib.get_close_matches(word, names, 1, 0.5)
+    return f"; did you mean {close[0]}?" if close else f", but {', '.join(names)}"
 
 
 def counted(count: int, noun: str) -> str:

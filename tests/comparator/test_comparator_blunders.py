@@ -321,7 +321,7 @@ def test_columns_without_names_stay_where_they_are(run, tmp_path):
     path.write_bytes(calibrate(noisy(4), QUICK).correction.to_json())
     table.write_text("x_um,,y_um,,\n1000,a,2000,b,c\n")
     result = run("comparator", "correct", path, table)
-    assert result.output.splitlines()[1].startswith("1000,a,2000,b,c,")
+    assert result.stdout.splitlines()[1].startswith("1000,a,2000,b,c,")
 
 
 def test_case_2_of_the_report_has_one_point_with_two_pointings_apart():

@@ -47,7 +47,7 @@ def test_the_packaged_example_runs_in_one_command(run):
     pytest.importorskip("matplotlib")
     result = run("--example", "--json", "result.json")
     assert result.exit_code == 0, result.output
-    assert names("comparator-calibrated") == TEXTS | {"report.html", "grid-1320.csv"}
+    assert names("comparator-calibrated") == TEXTS | {"report.html", "grid-1320.csv", "grid-1320-joint.csv"}
     assert "SYSTEMATIC COMPARATOR, LINEAR" in result.output
     document = json.loads(Path("result.json").read_bytes())
     printed = {"scale_x": 0.99999522, "scale_y": 0.99997765}
@@ -76,7 +76,7 @@ def test_the_example_is_what_its_script_makes(tmp_path, monkeypatch):
 def test_tables_make_one_calibration(run, tables, tmp_path):
     result = run(*tables, "--no-plots", "--json", "result.json", "--quiet")
     assert (result.exit_code, result.output) == (0, "")
-    assert names(tmp_path / "first-calibrated") == TEXTS | {"grid-1.csv"}
+    assert names(tmp_path / "first-calibrated") == TEXTS | {"grid-1.csv", "grid-1-joint.csv"}
     document = json.loads(Path("result.json").read_bytes())
     assert [case["case"] for case in document["cases"]] == [1, 2, 3, 4]
     corrected = read_grid(tmp_path / "first-calibrated" / "grid-1.csv")
@@ -91,7 +91,7 @@ def test_batches_of_decks(run, tmp_path):
     result = run("batch.txt", "--no-plots", "--json", "all.json")
     assert result.exit_code == 0, result.output
     assert names("batch-calibrated") == {"1", "2"}
-    assert names("batch-calibrated/2") == TEXTS | {"grid-1320.csv"}
+    assert names("batch-calibrated/2") == TEXTS | {"grid-1320.csv", "grid-1320-joint.csv"}
     documents = json.loads(Path("all.json").read_bytes())
     assert len(documents) == 2
     assert documents[0]["linear"] == documents[1]["linear"]
@@ -102,7 +102,7 @@ def test_pdf_and_other_choices(run, tables):
     pytest.importorskip("matplotlib")
     result = run(*tables, "--out", "out", "--pdf", "--as-published", "--linear-only", "--estimate-grid")
     assert result.exit_code == 0, result.output
-    assert names("out") == TEXTS | {"report.pdf", "grid-1.csv"}
+    assert names("out") == TEXTS | {"report.pdf", "grid-1.csv", "grid-1-joint.csv"}
     assert "NONLINEAR PARAMETERS" not in Path("out/listing.txt").read_text()
 
 
@@ -204,6 +204,9 @@ def test_tables_and_pictures_of_every_case(run, tables):
         ("range_centre_um = 1e300", "range_centre_um = 1e+300 is beyond every comparator"),
         ("range_centre_um = nan", "range_centre_um = 'nan' is not a number"),
         ("left_handed = perhaps", "left_handed = 'perhaps' is neither yes nor no"),
+        ("comparater = 3", "there is no setting 'comparater'; did you mean comparator?"),
+        ("Left handed = yes", "there is no setting 'left handed'; did you mean left_handed?"),
+        ("foo = bar", "there is no setting 'foo', but grid, comparator, date,"),
     ],
 )
 def test_settings_that_cannot_be_name_their_record(run, tables, setting, words):
@@ -252,7 +255,7 @@ def test_correct_applies_and_inverts(run, tables, tmp_path):
     result = run("correct", "out/correction-joint.json", "points.csv", "corrected.csv")
     assert result.exit_code == 0, result.output
     head, *rows = Path("corrected.csv").read_text().splitlines()
-    assert head == "name,x_mm,y_mm,corrected_x_um,corrected_y_um,sd_x_um,sd_y_um"
+    assert head == "name,x_mm,y_mm,corrected_x_um,corrected_y_um,sd_x_um,sd_y_um,in_range"
     correction = Correction.read(Path("out/correction-joint.json"))
     expected = correction.apply(np.array([[50_000.1, 60_000.0], [200_000.0, 12_500.0]]))
     found = np.array([[float(cell) for cell in row.split(",")[3:5]] for row in rows])
@@ -262,12 +265,44 @@ def test_correct_applies_and_inverts(run, tables, tmp_path):
         "x_um,y_um\n" + "\n".join(",".join(row.split(",")[3:5]) for row in rows) + "\n"
     )
     result = run("correct", "out/correction-joint.json", "back.csv", "--invert")
-    assert result.output.splitlines()[0] == "x_um,y_um,reading_x_um,reading_y_um"
+    assert result.output.splitlines()[0] == "x_um,y_um,reading_x_um,reading_y_um,in_range"
     assert float(result.output.splitlines()[1].split(",")[2]) == pytest.approx(50_000.1, abs=2e-4)
     Path("blank.csv").write_text("x_um,y_um\n,\n1,2\n3,\n")
     result = run("correct", "out/correction.json", "blank.csv")
     assert result.exit_code == 1
     assert "record 4" in result.stderr or "coordinates are blank" in result.stderr
+
+
+def test_places_that_were_not_calibrated_are_remarked_on_or_refused(run, tables):
+    assert run(*tables, "--no-plots", "--out", "out", "--quiet").exit_code == 0
+    correction = Correction.read(Path("out/correction.json"))
+    (low_x, low_y), (high_x, _) = correction.identity.low_um, correction.identity.high_um
+    edge = 0.1 * (high_x - low_x) / 2
+    lines = ["x_um,y_um", f"{low_x!r},{low_y!r}", f"{low_x - edge!r},{low_y!r}"]
+    Path("near.csv").write_text("\n".join(lines) + "\n")
+    result = run("correct", "out/correction.json", "near.csv", "near-corrected.csv")
+    assert result.exit_code == 0
+    assert "near.csv, record 3: 1 point of 2 outside the calibrated range" in result.stderr
+    ends = [line.rsplit(",", 1)[1] for line in Path("near-corrected.csv").read_text().splitlines()]
+    assert ends == ["in_range", "yes", "no"]
+    Path("far.csv").write_text("\n".join([*lines, "500000,-300000"]) + "\n")
+    result = run("correct", "out/correction.json", "far.csv", "far-corrected.csv")
+    assert result.exit_code == 1
+    assert "far.csv, record 4: 2 points of 3 outside the calibrated range" in result.stderr
+    assert not Path("far-corrected.csv").exists()
+    assert (
+        run("correct", "out/correction.json", "far.csv", "far-corrected.csv", "--extrapolate").exit_code == 0
+    )
+
+
+def test_tables_of_one_calibration_may_not_contradict(run, tables):
+    text = tables[1].read_text()
+    tables[1].write_text(text.replace("# comparator = 1", "# comparator = 2"))
+    result = run(*tables, "--no-plots")
+    assert result.exit_code == 1
+    assert "comparator = '2', but another table says 1" in result.stderr
+    tables[1].write_text(f"# comparator = 1\n{text}")
+    assert "comparator is set twice" in run(*tables, "--no-plots").stderr
 
 
 def test_the_numbers_of_the_page_are_those_of_the_command():

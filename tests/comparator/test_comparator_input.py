@@ -23,6 +23,7 @@ from photogram.comparator import (
 )
 from photogram.comparator.cards import join_least_count
 from photogram.comparator.closeout import close_out
+from photogram.comparator.gridfile import corrected_grid
 from photogram.comparator.grouping import group, group_as_listed
 from photogram.comparator.legs import intersect_legs, reduce_legs
 from photogram.errors import InputError
@@ -188,6 +189,29 @@ def test_feature_02_plates_from_files(tmp_path):
     path.write_text("point,x_um,y_um\n1,0,0\n1,5,5\n")
     with pytest.raises(InputError, match=r"plate\.csv: plate 0 has point 1 twice"):
         read_grid(path)
+    path.write_text("# sigma = 0.2\npoint,x_um,y_um\n1,0,0\n")
+    with pytest.raises(InputError, match="no setting 'sigma'; did you mean sigma_um"):
+        read_grid(path)
+
+
+def test_plates_expand_with_their_temperature(tmp_path):
+    """A warm plate is larger than its certificate says: the scale of the comparator is not to blame."""
+    made = simulate_calibration(Grid.square(sigma_um=0.3), STRAIGHT, random_um=0.2, seed=3).session
+    path = tmp_path / "plate.csv"
+    path.write_bytes(replace(made.grids[1], temperature_c=20.0, expansion_per_k=8e-6).to_csv())
+    cold = read_grid(path)
+    session = replace(made, grids={1: cold}, temperature_c=24.0)
+    (tmp_path / "readings.csv").write_bytes(to_csv(session))
+    found = calibrate(read([tmp_path / "readings.csv"], [cold])[0], QUICK)
+    plain = calibrate(made, QUICK)
+    assert found.correction.scale_x / plain.correction.scale_x - 1 == pytest.approx(4 * 8e-6, rel=1e-3)
+    assert found.correction.identity.temperature_c == 24.0
+    assert corrected_grid(found, 1).temperature_c == 24.0
+    assert not [each for each in found.messages if "expansion" in each.text]
+    unsaid = calibrate(replace(made, temperature_c=24.0), QUICK)
+    assert "its temperature_c, expansion_per_k are not said" in str(unsaid.messages)
+    with pytest.raises(InputError, match="no material expands by 1 of itself"):
+        replace(cold, expansion_per_k=1.0)
 
 
 # 3: handedness

@@ -7,6 +7,7 @@ import pytest
 from plates import QUICK, STRAIGHT, bent, noisy
 
 from photogram.comparator import Grid, Options, calibrate, simulate_calibration
+from photogram.comparator.gridfile import adjusted_grid, corrected_grid
 
 RUNS = 240
 LINEAR = Options(joint=False, polynomial=False)
@@ -153,3 +154,23 @@ def test_even_grid_errors_show_and_odd_ones_hide():
             assert found == pytest.approx(shape, abs=1e-4)
         else:
             assert np.abs(found).max() < 0.02 * np.abs(shape).max()
+
+
+def test_corrected_grids_say_their_own_uncertainty():
+    """Not that of the given coordinates: averages of few cases may be worse than these."""
+    said, off = [], {"averages": [], "joint": []}
+    for seed in range(60):
+        made = simulate_calibration(
+            Grid.square(sigma_um=0.4), bent(), pointing_um=0.5, random_um=0.6, grid_um=0.4, seed=seed
+        )
+        calibration = calibrate(made.session)
+        grids = {"averages": corrected_grid(calibration, 1), "joint": adjusted_grid(calibration, 1)}
+        true = made.session.grids[1].xy_um + made.grid_errors_um
+        for name, grid in grids.items():
+            off[name].append(float(((grid.xy_um - true) ** 2).mean() / grid.sigma_um**2))
+        said.append([grid.sigma_um for grid in grids.values()])
+    assert excess(off["averages"], 1.0) < 3.5
+    assert excess(off["joint"], 1.0) < 3.5
+    averages, joint = np.mean(said, axis=0)
+    assert joint < averages
+    assert grids["joint"].adopted == "undated by comparator 1, from the values of an unknown date"

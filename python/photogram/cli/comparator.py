@@ -178,13 +178,15 @@ def _withheld(calibrations: list[Calibration], folder: Path) -> None:
 
 def _corrections(calibration: Calibration, place: Path) -> dict[Path, bytes]:
     """Make what measurements are corrected by: corrections and corrected grids."""
-    from photogram.comparator.gridfile import corrected_grid
+    from photogram.comparator.gridfile import adjusted_grid, corrected_grid
 
     made = {place / "correction.json": calibration.correction.to_json()}
     if calibration.joint:
         made[place / "correction-joint.json"] = calibration.joint.correction.to_json()
     for plate in calibration.plates:
         made[place / f"grid-{plate}.csv"] = corrected_grid(calibration, plate).to_csv()
+        if calibration.joint:
+            made[place / f"grid-{plate}-joint.csv"] = adjusted_grid(calibration, plate).to_csv()
     return made
 
 
@@ -308,18 +310,27 @@ def correct(
     invert: Annotated[
         bool, typer.Option("--invert", help="Turn corrected coordinates back into readings.")
     ] = False,
+    extrapolate: Annotated[
+        bool, typer.Option("--extrapolate", help="Correct points far outside the calibrated range, too.")
+    ] = False,
     quiet: Quiet = False,
 ) -> None:
     """Correct measurements by a calibration.
 
-    Adds the columns corrected_x_um, corrected_y_um, sd_x_um, sd_y_um (what the calibration contributes).
+    Adds the columns corrected_x_um, corrected_y_um, sd_x_um, sd_y_um (what the calibration contributes), and
+    in_range: no where nothing was calibrated. Points far outside are refused.
     """
     with job:
         from photogram.comparator.apply import correct_table
         from photogram.comparator.correction import Correction
         from photogram.comparator.csvfile import read_table
 
-        made = correct_table(Correction.read(correction), read_table(measurements), invert=invert)
+        made, remarks = correct_table(
+            Correction.read(correction), read_table(measurements), invert=invert, extrapolate=extrapolate
+        )
+        if not quiet:
+            for remark in remarks:
+                print_remark(remark)
         tables = [path for path in (corrected, out) if path]
         if not tables:
             typer.echo(made.decode(), nl=False)

@@ -13,6 +13,7 @@ from photogram.comparator.correction import Correction
 from photogram.comparator.decomposition import Decomposition
 from photogram.comparator.document import to_json
 from photogram.comparator.grid import Grid, built_in_grid, find_grid, read_grid
+from photogram.comparator.identity import Identity
 from photogram.comparator.listing import listing
 from photogram.comparator.options import Options
 from photogram.comparator.polynomial import Frame, Polynomial
@@ -30,6 +31,7 @@ __all__ = [
     "Decomposition",
     "Frame",
     "Grid",
+    "Identity",
     "Options",
     "Place",
     "PlateResult",
@@ -61,6 +63,7 @@ check_arguments(
         "Case",
         "CaseResult",
         "Decomposition",
+        "Identity",
         "Place",
         "PlateResult",
         "Pointing",

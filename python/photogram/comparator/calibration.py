@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +27,7 @@ from photogram.comparator.gridsigma import (
     text_grid_sigma,
     unbiased_grid_sigma,
 )
+from photogram.comparator.identity import Identity
 from photogram.comparator.joint import LEAST_UM, JointFit, Weights, adjust_jointly
 from photogram.comparator.options import Options
 from photogram.comparator.outliers import FarPointing, Screening, far_pointings, screen
@@ -185,7 +186,13 @@ class Calibration(Judged, Brief):
     @property
     def correction(self) -> Correction:
         """The correction by the method of the report: linear parameters and polynomials of all cases."""
-        return self.nonlinear.correction if self.nonlinear else self.linear.correction
+        found = self.nonlinear.correction if self.nonlinear else self.linear.correction
+        return replace(found, identity=self.identity)
+
+    @property
+    def identity(self) -> Identity:
+        """What was calibrated, when, and over which range of readings."""
+        return Identity.of(self.session, [case.placed.means_um for case in self.cases])
 
     @property
     def last_stage(self) -> str:
@@ -242,6 +249,7 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
     """
     options = options or Options()
     session.check()
+    session = session.expanded()
     pointings = sum(len(case.points) for case in session.cases)
     require(needed_memory(pointings), f"a calibration of {pointings} pointings")
     messages = list(session.messages)
@@ -440,7 +448,9 @@ def _joint(
             )
             grid[plate] = 0.0
     try:
-        return adjust_jointly(placed, session.grids, linear, Weights(grid, known), polynomial=polynomial)
+        found = adjust_jointly(placed, session.grids, linear, Weights(grid, known), polynomial=polynomial)
+        identity = Identity.of(session, [case.means_um for case in placed])
+        return replace(found, correction=replace(found.correction, identity=identity))
     except AdjustmentError as error:
         messages.append(Message(str(error)))
         return None

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import orjson
 
+from photogram.comparator.identity import Identity
 from photogram.comparator.polynomial import Frame, Polynomial, design
 from photogram.errors import InputError
 from photogram.io import json
@@ -54,6 +55,8 @@ class Correction:
     covariance
         (21, 21) of Sx, Sy, alpha (rad) and the coefficients (micrometres, in the frame of the polynomial), x
         then y.
+    identity
+        What was calibrated, when, and over which range; None where that is not known.
     """
 
     scale_x: float
@@ -61,6 +64,7 @@ class Correction:
     nonorthogonality_rad: float
     polynomial: Polynomial | None = None
     covariance: Floats = field(default_factory=_no_covariance, repr=False)
+    identity: Identity | None = None
 
     def __post_init__(self) -> None:
         """Refuse parameters by which nothing can be corrected or turned back."""
@@ -99,6 +103,20 @@ class Correction:
         """
         corrected = self.linear(xy_um)
         return corrected if self.polynomial is None else corrected + self.polynomial.evaluate(corrected)
+
+    def reach(self, xy_um: Floats) -> Floats:
+        """Return how far out readings (n, 2) lie: up to 1 within the calibrated range, 2 as far again.
+
+        (n,) the larger of both axes, from the middle of the range in half ranges. Beyond 1 the polynomials
+        extrapolate. NaN where the range is not known.
+        """
+        if self.identity is not None:
+            arguments = self.identity.frame.arguments(xy_um)
+        elif self.polynomial is not None:
+            arguments = self.polynomial.frame.arguments(self.linear(xy_um))
+        else:
+            return np.full(len(xy_um), math.nan)
+        return np.asarray(np.abs(arguments).max(axis=1))
 
     def invert(self, corrected_um: Floats) -> Floats:
         """Return the readings (n, 2) that `apply` corrects to the given coordinates (n, 2).
@@ -224,6 +242,7 @@ class Correction:
             "nonorthogonality_rad": self.nonorthogonality_rad,
             "polynomial": None,
             "covariance": self.covariance.tolist(),
+            "identity": None if self.identity is None else self.identity.document(),
         }
         if self.polynomial is not None:
             document["polynomial"] = {
@@ -254,7 +273,10 @@ class Correction:
             _numbers(document[name], ()).item() for name in ("scale_x", "scale_y", "nonorthogonality_rad")
         )
         covariance = _numbers(document["covariance"], (PARAMETERS, PARAMETERS))
-        return cls(scale_x, scale_y, lean, polynomial, covariance)
+        # Files of earlier versions have none.
+        members = document.get("identity")
+        identity = None if members is None else Identity.from_document(members)
+        return cls(scale_x, scale_y, lean, polynomial, covariance, identity)
 
     def to_json(self) -> bytes:
         """Return the correction as a JSON document (UTF-8)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,12 +10,14 @@ from photogram.io import rows
 from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 from photogram.io.rows import Row
-from photogram.messages import quoted
+from photogram.messages import nearest, quoted
 
 __all__ = ["Setting", "Table", "read_table"]
 
 MICROMETRES = {"um": 1.0, "mm": 1000.0}
 """Units of coordinates, as the names of columns end."""
+NOTE = "note"
+"""The key of lines that set nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +106,7 @@ class Table:
         return x * factor, y * factor
 
 
-def read_table(path: Path, *columns: str) -> Table:
+def read_table(path: Path, *columns: str, keys: Collection[str] | None = None) -> Table:
     """Read a table with coordinates in micrometres or millimetres.
 
     Parameters
@@ -113,11 +115,14 @@ def read_table(path: Path, *columns: str) -> Table:
         The file.
     columns
         Columns that it must have besides coordinates.
+    keys
+        What `# key = value` lines may set besides `note`; None where nothing depends on them.
 
     Raises
     ------
     InputError
-        The file cannot be read, has no names of columns, lacks one, or mixes units.
+        The file cannot be read, has no names of columns, lacks one, or mixes units; a key that nothing
+        reads, or one that is there twice.
     """
     records = rows.Table.read(path, comment="#", spelling=str.lower)
     records.require(*columns)
@@ -126,8 +131,19 @@ def read_table(path: Path, *columns: str) -> Table:
         key, equals, value = (place.text or "").lstrip("# ").partition("=")
         if equals:
             name = key.strip().lower()
+            if keys is not None:
+                _refuse_key(name, (*keys, NOTE), settings, place)
             settings[name] = Setting(name, value.strip(), place)
     return Table(records, settings, _unit(records))
+
+
+def _refuse_key(name: str, known: Collection[str], settings: Mapping[str, Setting], place: Place) -> None:
+    """Refuse a setting that nothing reads: it would be lost without a word."""
+    if name not in known:
+        meant = nearest("_".join(name.split()), known)
+        raise place.error(f"there is no setting {quoted(name)}{meant}")
+    if name in settings and name != NOTE:
+        raise place.error(f"{name} is set twice")
 
 
 def _unit(records: rows.Table) -> str:

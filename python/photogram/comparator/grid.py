@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -25,6 +25,10 @@ __all__ = ["BUILT_IN", "Grid", "built_in_grid", "find_grid", "read_grid"]
 
 BUILT_IN = (773, 1320, 778)
 """The master grids of the program, in the order of its option MASTER (0, 1, 2)."""
+KEYS = ("grid", "owner", "adopted", "sigma_um", "temperature_c", "expansion_per_k")
+"""What lines above the coordinates of a plate may set."""
+MOST_EXPANSION = 1e-3
+"""A kelvin; steel has 1.2e-5, glass 8e-6."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,7 +46,10 @@ class Grid(Brief):
     sigma_um
         Standard deviation of a calibrated coordinate; None where it is not known.
     adopted
-        Date of the calibration, as text.
+        Date of the calibration, as text, and what it rests on.
+    temperature_c, expansion_per_k
+        At which the coordinates hold (degrees Celsius), and by which part of themselves they grow a kelvin;
+        None where that is not known.
     source
         The file that it was read from.
     """
@@ -53,6 +60,8 @@ class Grid(Brief):
     sigma_um: float | None = None
     adopted: str = ""
     source: Path | None = None
+    temperature_c: float | None = None
+    expansion_per_k: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse plates that cannot be."""
@@ -63,6 +72,10 @@ class Grid(Brief):
             raise InputError(f"plate {self.number} needs two coordinates for each of its points")
         if self.sigma_um is not None and not 0 <= self.sigma_um < np.inf:
             raise InputError(f"plate {self.number}: {self.sigma_um} um is no standard deviation")
+        if self.expansion_per_k is not None and not abs(self.expansion_per_k) < MOST_EXPANSION:
+            raise InputError(
+                f"plate {self.number}: no material expands by {self.expansion_per_k:g} of itself a kelvin"
+            )
 
     @classmethod
     def square(
@@ -75,6 +88,19 @@ class Grid(Brief):
             number, np.arange(1, columns**2 + 1), np.column_stack([x.ravel(), y.ravel()]), sigma_um=sigma_um
         )
 
+    def at(self, temperature_c: float) -> Grid:
+        """Return the plate at another temperature: X (1 + expansion (t - t0)).
+
+        Raises
+        ------
+        InputError
+            Its temperature or its expansion is not known.
+        """
+        if self.temperature_c is None or self.expansion_per_k is None:
+            raise InputError(f"plate {self.number} has no temperature_c or no expansion_per_k")
+        growth = 1.0 + self.expansion_per_k * (temperature_c - self.temperature_c)
+        return replace(self, xy_um=self.xy_um * growth, temperature_c=temperature_c)
+
     def rows_of(self, points: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the rows of points, which must all be on the plate."""
         order = np.argsort(self.points)
@@ -86,6 +112,8 @@ class Grid(Brief):
         lines = [f"# grid = {self.number}"]
         lines += [f"# adopted = {self.adopted}"] if self.adopted else []
         lines += [f"# sigma_um = {self.sigma_um:g}"] if self.sigma_um is not None else []
+        lines += [f"# temperature_c = {self.temperature_c:g}"] if self.temperature_c is not None else []
+        lines += [f"# expansion_per_k = {self.expansion_per_k:g}"] if self.expansion_per_k is not None else []
         rows = zip(self.points.tolist(), self.xy_um.tolist(), strict=True)
         lines += ["point,x_um,y_um", *(f"{point},{x!r},{y!r}" for point, (x, y) in rows)]
         return ("\n".join(lines) + "\n").encode()
@@ -94,30 +122,38 @@ class Grid(Brief):
 def read_grid(path: Path) -> Grid:
     """Read a plate: columns point, x_um, y_um (or x_mm, y_mm); `# grid = number`, `# sigma_um = ...` above.
 
+    Above may stand, too, `# adopted = date`, `# owner = ...`, `# temperature_c = 20`, `# expansion_per_k =
+    8.5e-6`, `# note = ...`.
+
     Points with a blank coordinate are left out.
 
     Raises
     ------
     InputError
-        The file cannot be read or is not such a table.
+        The file cannot be read or is not such a table, or sets what nothing reads.
     """
-    table = read_table(path, "point")
+    table = read_table(path, "point", keys=KEYS)
     points, xy = [], []
     for row in table.records.rows():
         coordinates = table.coordinates_um(row)
         if coordinates is not None:
             points.append(row.integer("point"))
             xy.append(coordinates)
-    number, sigma = table.settings.get("grid"), table.settings.get("sigma_um")
-    deviation = None if sigma is None else sigma.number()
+    number = table.settings.get("grid")
+    sigma, temperature, expansion = (
+        table.settings[key].number() if key in table.settings else None
+        for key in ("sigma_um", "temperature_c", "expansion_per_k")
+    )
     try:
         return Grid(
             0 if number is None else number.integer(),
             np.array(points, dtype=np.int64),
             np.array(xy, dtype=float).reshape(-1, 2),
-            deviation,
+            sigma,
             table.text("adopted"),
             path,
+            temperature,
+            expansion,
         )
     except InputError as error:
         raise InputError(error.message, file=path) from None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,13 @@ if TYPE_CHECKING:
     from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Integers
 
-__all__ = ["ListedGridSigma", "listed_grid_sigma", "text_grid_sigma", "unbiased_grid_sigma"]
+__all__ = [
+    "ListedGridSigma",
+    "corrected_grid_sigma",
+    "listed_grid_sigma",
+    "text_grid_sigma",
+    "unbiased_grid_sigma",
+]
 
 
 @dataclass(frozen=True)
@@ -108,9 +114,8 @@ def unbiased_grid_sigma(
         Standard deviation of a grid coordinate of each plate, and of a measured coordinate; NaN where the
         cases do not separate them, 0 where the estimate of a variance is negative.
     """
-    plates = list(dict.fromkeys(case.case.plate for case in cases))
-    reduction = Reduction.of(stage)
-    errors = {plate: GridErrors.of(plate, grid_rows, cases, stage) for plate in plates}
+    reduction, errors = _effects(grid_rows, cases, stage)
+    plates = list(errors)
     residuals = np.vstack([fit.residuals.comparator_um for fit in stage.cases])
     forms = np.empty((len(plates) + 1, len(plates) + 1))
     found = np.empty(len(plates) + 1)
@@ -127,3 +132,52 @@ def unbiased_grid_sigma(
     variances = np.linalg.solve(forms, found)
     sigmas = [math.sqrt(max(0.0, float(variance))) for variance in variances]
     return dict(zip(plates, sigmas, strict=False)), sigmas[-1]
+
+
+def corrected_grid_sigma(
+    grid_rows: Sequence[Integers],
+    cases: Sequence[PlacedCase],
+    stage: CombinedLinear | CombinedPolynomial,
+    known_um: Mapping[int, float | None],
+) -> dict[int, float]:
+    """Compute the standard deviation of grid coordinates that average residuals have corrected.
+
+    Averages take over a part of the errors of the comparator, and do not show what looks alike in the grid
+    and in the comparator: with few cases corrected coordinates may be worse than good given ones.
+
+    Parameters
+    ----------
+    grid_rows, cases, stage
+        As of :func:`unbiased_grid_sigma`.
+    known_um
+        Standard deviations of the given coordinates; None where they are not known: those computed hold.
+
+    Returns
+    -------
+    Root mean square over the coordinates of each plate, micrometres; NaN where it cannot be known.
+    """
+    computed, random = unbiased_grid_sigma(grid_rows, cases, stage)
+    reduction, errors = _effects(grid_rows, cases, stage)
+    given = {plate: computed[plate] if known_um[plate] is None else known_um[plate] for plate in errors}
+    return {
+        plate: math.sqrt(
+            (
+                random**2 * reduction.averages_of_units(own)
+                + sum(
+                    (given[other] or 0.0) ** 2
+                    * reduction.averages_of_errors(own, errors[other], lost=other == plate)
+                    for other in errors
+                )
+            )
+            / (2 * len(own.counts))
+        )
+        for plate, own in errors.items()
+    }
+
+
+def _effects(
+    grid_rows: Sequence[Integers], cases: Sequence[PlacedCase], stage: CombinedLinear | CombinedPolynomial
+) -> tuple[Reduction, dict[int, GridErrors]]:
+    """Return what the adjustment leaves of errors, and how those of each plate come in."""
+    plates = dict.fromkeys(case.case.plate for case in cases)
+    return Reduction.of(stage), {plate: GridErrors.of(plate, grid_rows, cases, stage) for plate in plates}

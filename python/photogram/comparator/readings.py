@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -169,6 +169,8 @@ class Session(Brief):
     range_centre_um
         Middle of the range of the comparator in x and in y (TRANS of the listing); None for that of the
         program for this comparator.
+    temperature_c
+        Of the plates while they were measured, degrees Celsius; None where it is not known.
     source
         File of the first record.
     messages
@@ -186,6 +188,7 @@ class Session(Brief):
     plot_each_case: bool = False
     range_centre_um: float | None = None
     source: Path | None = None
+    temperature_c: float | None = None
     messages: list[Message] = field(default_factory=list)
 
     @property
@@ -209,6 +212,20 @@ class Session(Brief):
             listed = ", ".join(str(number) for number in self.grids)
             raise case.place.error(f"case {case.number} is on plate {case.plate}; there is only {listed}")
         return self.grids[case.plate]
+
+    def expanded(self) -> Session:
+        """Return the session with its plates as they were while they were measured, and what is not known."""
+        t, grids, remarks = self.temperature_c, dict(self.grids), []
+        for number, grid in self.grids.items():
+            known = grid.temperature_c is not None and grid.expansion_per_k is not None
+            if known and t is not None:
+                grids[number] = grid.at(t)
+            elif t is not None or grid.expansion_per_k:
+                missing = (
+                    "temperature_c of the measurements" if known else "its temperature_c, expansion_per_k"
+                )
+                remarks.append(Message(f"plate {number} is taken as it is given: {missing} are not said"))
+        return replace(self, grids=grids, messages=[*self.messages, *remarks])
 
     def check(self) -> None:
         """Refuse a session that contradicts itself.

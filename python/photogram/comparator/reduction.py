@@ -175,8 +175,11 @@ class Reduction:
             + float((_product(left, left) * _product(self.right, self.right)).sum())
         )
 
-    def averages_of_errors(self, averaged: GridErrors, errors: GridErrors) -> float:
-        """Sum of squares of A R E, A of one plate, E of the same or another."""
+    def averages_of_errors(self, averaged: GridErrors, errors: GridErrors, *, lost: bool = False) -> float:
+        """Sum of squares of A R E, A of one plate, E of the same or another.
+
+        With `lost` that of I - A R E, of one plate: what averages do not show of its errors.
+        """
         left, right = averaged.average(self.left), errors.gathered(self.right)
         total = float((_product(left, left) * _product(right, right)).sum())
         if averaged is not errors:
@@ -184,10 +187,11 @@ class Reduction:
         # A E = I; A P E = X Y^T, three columns a case.
         y = self._rigid_effects(errors)
         x = np.asarray((y.T / errors.counts).T)
-        total += 2 * len(errors.counts) - 2 * float((x * y).sum())
         total += float((_product(x, x) * _product(y, y)).sum())
-        total -= 2 * float((left * right).sum() - (_product(x, left) * _product(y, right)).sum())
-        return total
+        total += 2 * float((_product(x, left) * _product(y, right)).sum())
+        if lost:
+            return total
+        return total + 2 * len(errors.counts) - 2 * float((x * y).sum() + (left * right).sum())
 
     def _rigid_effects(self, errors: GridErrors) -> Floats:
         """Return E^T P's columns: (l, 2, 3 times the cases of the plate)."""

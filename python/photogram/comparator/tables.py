@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from photogram.comparator.csvfile import Setting, Table, read_table
 from photogram.comparator.grid import Grid, find_grid
@@ -11,8 +12,14 @@ from photogram.comparator.readings import LARGEST_UM, Case, Reading, Session, co
 from photogram.errors import InputError
 from photogram.io.numbers import is_whole_number
 from photogram.io.rows import Row
+from photogram.messages import quoted
 
 __all__ = ["read_csv", "to_csv"]
+
+T = TypeVar("T")
+
+KEYS = ("grid", "comparator", "date", "left_handed", "range_centre_um", "temperature_c")
+"""What lines above the table may set."""
 
 
 def read_csv(
@@ -24,7 +31,8 @@ def read_csv(
     of the grid), `leg` (1 to 4; 0 or blank: intersection) and `operator`. Rows stand in the order measured;
     those with blank coordinates are missing. Lines above the table may set `# grid = 1320` (a built-in grid,
     or a file beside the table), `# comparator = 3`, `# date = 7/17/72`, `# left_handed = yes`,
-    `# range_centre_um = 125000` (middle of the range of the comparator).
+    `# range_centre_um = 125000` (middle of the range of the comparator), `# temperature_c = 21.7` (of the
+    plate while it was measured); `# note = ...` sets nothing.
 
     Parameters
     ----------
@@ -38,34 +46,40 @@ def read_csv(
     Raises
     ------
     InputError
-        A file that is no such table, no plate, a case measured twice.
+        A file that is no such table, no plate, a case measured twice, a key that nothing reads, tables that
+        set one thing differently.
     """
     if not paths:
         raise InputError("there is no table to read")
-    tables = [read_table(path, "case", "point") for path in paths]
+    tables = [read_table(path, "case", "point", keys=KEYS) for path in paths]
     plates = {grid.number: grid for grid in grids}
     if not plates:
         plates = {grid.number: grid for table in tables for grid in _named_grids(table)}
     if not plates:
         raise InputError("names no grid plate: '# grid = 1320', or --grid", file=paths[0])
     cases = collect_cases(reading for table in tables for reading in _readings(table, plates))
-    said = [setting.switch() for setting in _settings(tables, "left_handed")]
-    centres = [_range_centre_um(setting) for setting in _settings(tables, "range_centre_um")]
     session = Session(
         cases=cases,
         grids=plates,
-        comparator=max((setting.integer() for setting in _settings(tables, "comparator")), default=0),
-        date=next((setting.text for setting in _settings(tables, "date")), ""),
-        left_handed=left_handed if left_handed is not None else next(iter(said), None),
-        range_centre_um=next(iter(centres), None),
+        comparator=_one(tables, "comparator", Setting.integer) or 0,
+        date=next((table.text("date") for table in tables if table.text("date")), ""),
+        left_handed=left_handed if left_handed is not None else _one(tables, "left_handed", Setting.switch),
+        range_centre_um=_one(tables, "range_centre_um", _range_centre_um),
+        temperature_c=_one(tables, "temperature_c", Setting.number),
         source=paths[0],
     )
     session.check()
     return session
 
 
-def _settings(tables: Sequence[Table], key: str) -> list[Setting]:
-    return [table.settings[key] for table in tables if key in table.settings]
+def _one(tables: Sequence[Table], key: str, value_of: Callable[[Setting], T]) -> T | None:
+    """Return what the tables of a calibration set, None where none does; they may not contradict."""
+    settings = [table.settings[key] for table in tables if key in table.settings]
+    values = [value_of(setting) for setting in settings]
+    for setting, value in zip(settings, values, strict=True):
+        if value != values[0]:
+            raise setting.place.error(f"{key} = {quoted(setting.text)}, but another table says {values[0]}")
+    return values[0] if values else None
 
 
 def _range_centre_um(setting: Setting) -> float:
@@ -111,6 +125,8 @@ def to_csv(session: Session) -> bytes:
     lines += [f"# date = {session.date}"] if session.date else []
     if session.range_centre_um is not None:
         lines.append(f"# range_centre_um = {session.range_centre_um:g}")
+    if session.temperature_c is not None:
+        lines.append(f"# temperature_c = {session.temperature_c:g}")
     if session.left_handed is not None:
         lines.append(f"# left_handed = {'yes' if session.left_handed else 'no'}")
     lines.append("plate,case,operator,leg,point,x_um,y_um")

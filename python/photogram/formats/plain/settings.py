@@ -15,7 +15,7 @@ from photogram.errors import InputError
 from photogram.formats.project import DatumName, Frame, Options
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
-from photogram.messages import Message, listed
+from photogram.messages import Message, listed, nearest
 
 __all__ = ["TABLES", "Settings", "bare_settings", "read_settings", "unread_tables"]
 
@@ -261,12 +261,12 @@ class _File:
         """Refuse sections and keys that there are not."""
         for section, values in self.content.items():
             if section not in _KEYS:
-                self.fail(section, f"there is no section [{section}]{_nearest(section, _KEYS)}")
+                self.fail(section, f"there is no section [{section}]{nearest(section, _KEYS)}")
             if not isinstance(values, dict):
                 self.fail(section, f"{section} is no section")
             for key in values:
                 if key not in _KEYS[section]:
-                    self.fail(key, f"[{section}] has no key {key}{_nearest(key, _KEYS[section])}")
+                    self.fail(key, f"[{section}] has no key {key}{nearest(key, _KEYS[section])}")
 
     def has(self, section: str, key: str) -> bool:
         """Whether a key is there."""
@@ -325,11 +325,6 @@ class _File:
         if not all(each >= 0 for each in found):
             self.fail(table, f"{list(found)} is no standard deviation")
         return found
-
-
-def _nearest(word: str, known: Any) -> str:
-    close = difflib.get_close_matches(word, list(known), 1, 0.5)
-    return f"; did you mean {close[0]}?" if close else f", but {', '.join(known)}"
 
 
 def unread_tables(settings: Settings) -> list[Message]:
