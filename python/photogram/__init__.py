@@ -135,7 +135,7 @@ _HOMES = {
     "Snooped": "results.snooped",
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
-    "adjust": "distributed.entrance",
+    "adjust": "adjustment.adjustment",
     "camera_from": "stellar.cameras",
     "check": "checks.checking",
     "Cleaned": "adjustment.cleaning",

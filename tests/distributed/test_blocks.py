@@ -1,5 +1,8 @@
 """Blocks in parts by the core: what one process gives."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from test_parts import tied_block
@@ -26,6 +29,14 @@ def block():
 @pytest.fixture(scope="module")
 def whole(block):
     return adjust(block)
+
+
+@pytest.mark.parametrize("home", ["photogram.adjustment", "photogram.adjustment.adjustment"])
+def test_whoever_imports_adjust_by_another_name_has_parts_too(home):
+    code = f"from {home} import adjust; from photogram.network.simulation import simulate;"
+    code += "print(adjust(simulate(strips=2, photos_per_strip=4).block, parts=2).status)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("converged\n", "")
 
 
 def agrees(found, whole, least=1e-9, *, tied=False):

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.elsewhere import IN_PARTS, Division
+from photogram.adjustment.elsewhere import Division, in_parts
 from photogram.adjustment.ends import behind, folded, harmful, rounded, too_coarse, undetermined
 from photogram.adjustment.exchanges import with_exchanges
 from photogram.adjustment.hints import hinted, with_hints
@@ -239,7 +239,7 @@ def adjust(
     if division.is_asked_for:
         if inner is not None or options.minimum is not None or row or as_published:
             raise InputError("in parts there is no loss, no datum to choose and no published iteration")
-        found = IN_PARTS[0](block, options, division, threads, progress)
+        found = in_parts()(block, options, division, threads, progress)
         if found is not None:
             return found
     return _adjusted(block, options, processors, progress, inner, as_published, keep=verdict)

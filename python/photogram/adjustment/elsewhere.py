@@ -1,13 +1,14 @@
 """Adjustments that are not done in this process as a whole: on a cluster, or in parts, one after the other.
 
-This floor knows nothing of either. `photogram.distributed.entrance`, a file above, says how; whoever asks for
-`photogram.adjust` has loaded it.
+This floor knows nothing of either. `photogram.distributed.entrance`, a file above, says how: it is loaded when
+such an adjustment is asked for, by whichever name `adjust` was imported.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from photogram.network.core import CoreOptions
     from photogram.results.result import Result
 
-__all__ = ["IN_PARTS", "Division", "InParts"]
+__all__ = ["Division", "InParts", "in_parts"]
 
 MOST = 100_000
 """Workers or parts: more is a slip."""
@@ -55,5 +56,8 @@ InParts = Callable[
 ]
 """Adjusts a block that is ready to be; None where it fits into this process as a whole."""
 
-IN_PARTS: list[InParts] = []
-"""The one that does it, once it is loaded."""
+
+def in_parts() -> InParts:
+    """Return the one that does it."""
+    found: InParts = import_module("photogram.distributed.entrance").adjusted_in_parts
+    return found

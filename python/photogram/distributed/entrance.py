@@ -1,12 +1,12 @@
-"""`photogram.adjust`, which also knows how to adjust in parts."""
+"""Where `photogram.adjust` finds how to adjust in parts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from photogram.adjustment.adjustment import UnitVariance, adjust
-from photogram.adjustment.elsewhere import IN_PARTS, Division
+from photogram.adjustment.adjustment import UnitVariance
+from photogram.adjustment.elsewhere import Division
 from photogram.adjustment.started import started
 from photogram.network.block import Block, checked
 from photogram.network.core import CoreOptions
@@ -15,7 +15,7 @@ from photogram.results.result import Result
 if TYPE_CHECKING:
     from photogram.distributed.planned import PartsPlan
 
-__all__ = ["adjust", "plan_in_parts"]
+__all__ = ["adjusted_in_parts", "plan_in_parts"]
 
 
 def plan_in_parts(
@@ -47,7 +47,7 @@ def plan_in_parts(
     return planned(started(checked(block)), options, division)
 
 
-def _in_parts(
+def adjusted_in_parts(
     block: Block,
     options: CoreOptions,
     division: Division,
@@ -55,9 +55,6 @@ def _in_parts(
     progress: Callable[[Any], None] | None,
 ) -> Result | None:
     """Load what does it when it is asked for: nobody else waits for it."""
-    from photogram.distributed.running import adjusted_in_parts
+    from photogram.distributed import running
 
-    return adjusted_in_parts(block, options, division, threads, progress)
-
-
-IN_PARTS.append(_in_parts)
+    return running.adjusted_in_parts(block, options, division, threads, progress)
