@@ -145,6 +145,7 @@ def good(tmp_path_factory):
             "check": {"network": block},
             "snoop": {"block": block},
             "first_values": {"block": block},
+            "adjust_started": {"started": photogram.first_values(block)},
             "camera_from": {"path": star_camera, "name": "stars", "weighted": True},
             "clean": {"network": block},
             "compare": {"results": {"one": calibrated, "two": calibrated}},

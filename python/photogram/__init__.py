@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
+    from photogram.adjustment.again import adjust_started
     from photogram.adjustment.cleaning import Cleaned, clean
     from photogram.adjustment.components import variance_components
     from photogram.adjustment.elimination import eliminate_terms
@@ -83,6 +84,7 @@ __all__ = [
     "VarianceFunction",
     "__version__",
     "adjust",
+    "adjust_started",
     "camera_from",
     "check",
     "clean",
@@ -136,6 +138,7 @@ _HOMES = {
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "adjust_started": "adjustment.again",
     "camera_from": "stellar.cameras",
     "check": "checks.checking",
     "Cleaned": "adjustment.cleaning",

@@ -1,7 +1,7 @@
 """Adjustments that are not done in this process as a whole: on a cluster, or in parts, one after the other.
 
-This floor knows nothing of either. `photogram.distributed.entrance`, a file above, says how: it is loaded when
-such an adjustment is asked for, by whichever name `adjust` was imported.
+This floor knows nothing of either. `photogram.distributed.entrance`, a file above, says how: it is loaded
+when such an adjustment is asked for, by whichever name `adjust` was imported.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.known import Cartesian, Known
+from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
@@ -89,7 +90,7 @@ class FirstValues(Brief):
         return of_photos(kept_images(self.block, ~self.set_aside), started)
 
 
-def first_values(block: Block) -> FirstValues:
+def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
     """Find initial positions and attitudes of photos.
 
     Photos whose position or attitude is NaN in the block are started from what is known: rays are intersected
@@ -104,6 +105,8 @@ def first_values(block: Block) -> FirstValues:
     block
         Photos with NaN for what is not known. A position without an attitude, or an observed one with a
         standard deviation, serves as an observed position; so does an attitude.
+    keep_all
+        Whether images that do not fit stay in: they are counted, and none is set aside.
 
     Returns
     -------
@@ -139,6 +142,7 @@ def first_values(block: Block) -> FirstValues:
     names = block.photo_ids
     missing = {photo: _reason(*why) for photo, why in zip(names, how, strict=True) if why[0] not in SOURCES}
     sources = {photo: why[0] for photo, why in zip(names, how, strict=True) if why[0] in SOURCES}
+    kept = truth_value("keep_all", keep_all)
     mirrored = _mirrored(block, known, directions, len(sources), aside)
     if not sources:
         hints = "".join(f"\n  hint: {hint}" for hint in mirrored)
@@ -154,12 +158,12 @@ def first_values(block: Block) -> FirstValues:
             photo for photo, why in zip(names, how, strict=True) if photo in missing and why[0] == "misfit"
         ),
         point_positions=axes.from_cartesian(points),
-        set_aside=aside,
+        set_aside=np.zeros_like(aside) if kept else aside,
         misfit=np.nan if misfit is None else misfit,
         first_photo=None if first is None else names[first],
         messages=[
             *mirrored,
-            *_messages(block, sources, missing, aside, None if first is None else names[first]),
+            *_messages(block, sources, missing, aside, None if first is None else names[first], kept=kept),
         ],
     )
 
@@ -264,7 +268,13 @@ def _reasons(missing: dict[str, str]) -> str:
 
 
 def _messages(
-    block: Block, sources: dict[str, str], missing: dict[str, str], aside: Bools, first: str | None
+    block: Block,
+    sources: dict[str, str],
+    missing: dict[str, str],
+    aside: Bools,
+    first: str | None,
+    *,
+    kept: bool,
 ) -> list[Message]:
     counts = {source: sum(own == source for own in sources.values()) for source in SOURCES}
     parts = [f"{count} {SOURCES[source]}" for source, count in counts.items() if count]
@@ -277,9 +287,8 @@ def _messages(
         )
     if aside.any():
         points = sorted({block.point_ids[point] for point in block.image_points[aside]})
-        messages.append(
-            Message(f"{int(aside.sum())} images do not fit and were set aside: points {listed(points)}")
-        )
+        done = "take part all the same" if kept else "were set aside"
+        messages.append(Message(f"{int(aside.sum())} images do not fit and {done}: points {listed(points)}"))
     if block.refraction is not None:
         messages.append(Message("refraction was left out of the first values"))
     return messages

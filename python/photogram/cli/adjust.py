@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -46,7 +46,7 @@ from photogram.cli.projects import (
 )
 
 if TYPE_CHECKING:
-    from photogram import Block, Result
+    from photogram import Block, FirstValues, Result
     from photogram.adjustment.elsewhere import Division
     from photogram.formats import Project
     from photogram.results.snooped import Snooped
@@ -129,6 +129,14 @@ def adjust(
         bool,
         typer.Option("--snoop", help="Take gross errors out, one after the other; removed.csv lists them."),
     ] = False,
+    keep_all: Annotated[
+        bool,
+        typer.Option(
+            "--keep-all",
+            help="Of photos without a pose: adjust with all images from the beginning, those too that first"
+            " values would set aside.",
+        ),
+    ] = False,
     divided: Parts = WHOLE,
     ordering: Ordering = OrderingName.AUTO,
     threads: Threads = None,
@@ -169,7 +177,7 @@ def adjust(
             from photogram.formats.placing import check_place
 
             check_place(project.block, crs)
-        block, remarks = _started(project)
+        block, started = _started(project, keep_all=keep_all)
         if divided.plan:
             from photogram.distributed.entrance import plan_in_parts
 
@@ -177,20 +185,27 @@ def adjust(
             output.print("\n".join(plan.lines()))
             plan.check()
             return
-        for remark in remarks:
-            if not quiet:
-                print_remark(remark)
+        for remark in started.messages if started is not None and not quiet else ():
+            print_remark(str(remark))
         removed = None
         if snoop:
             if divided.division.is_asked_for:
                 raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--snoop")
             if datum is not None or loss is not None or project.options.datum in ("inner", "minimum"):
                 raise typer.BadParameter("goes without --datum and --loss", param_hint="--snoop")
+            aside: tuple[str, ...] = ()
+            if started is not None and (started.set_aside.any() or started.missing):
+                first = _adjusted(job, project, started, datum, loss, ordering, threads, divided.division)
+                block, aside = first.block, first.set_aside
             removed = _snooped(job, project, block, threads)
             result = removed.result
             assert isinstance(result, Result)
+            result = replace(result, set_aside=aside)
+            removed = replace(removed, result=result)
         else:
-            result = _adjusted(job, project, block, datum, loss, ordering, threads, divided.division)
+            result = _adjusted(
+                job, project, started or block, datum, loss, ordering, threads, divided.division
+            )
         files = _files(project, result, sections)
         if crs is not None:
             from photogram.formats.placing import placed, placed_files
@@ -240,17 +255,17 @@ def _on_disk(job: Job, path: Path, target: Path, divided: Parts, threads: int | 
     return True
 
 
-def _started(project: Project) -> tuple[Block, list[str]]:
-    """Return the block with poses for all its photos, and what is to be said about them."""
+def _started(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | None]:
+    """Return the block with poses for all its photos, and the first values where it needed any."""
     import numpy as np
 
     from photogram import first_values
 
     block = project.block
     if np.isfinite(block.photo_positions).all() and np.isfinite(block.photo_attitudes).all():
-        return block, []
-    found = first_values(block)
-    return found.usable(), [str(each) for each in found.messages]
+        return block, None
+    found = first_values(block, keep_all=keep_all)
+    return found.usable(), found
 
 
 def _snooped(job: Job, project: Project, block: Block, threads: int | None) -> Snooped:
@@ -268,14 +283,14 @@ def _snooped(job: Job, project: Project, block: Block, threads: int | None) -> S
 def _adjusted(
     job: Job,
     project: Project,
-    block: Block,
+    block: Block | FirstValues,
     datum: DatumName | None,
     loss: LossName | None,
     ordering: OrderingName,
     threads: int | None,
     division: Division,
 ) -> Result:
-    from photogram import InnerConstraints, InputError, MinimumConstraints
+    from photogram import FirstValues, InnerConstraints, InputError, MinimumConstraints, adjust_started
     from photogram import adjust as adjust_block
 
     options = project.options
@@ -284,21 +299,20 @@ def _adjusted(
         options.loss if loss is None else {"none": None, "huber": "huber", "cauchy": "cauchy"}[loss.value]
     )
     with job.status("adjusting") as status:
-        result = adjust_block(
-            block,
-            unit_variance=options.unit_variance,
-            loss=robust,
-            datum=InnerConstraints()
-            if chosen == "inner"
-            else MinimumConstraints()
-            if chosen == "minimum"
-            else None,
-            ordering=ordering.value,
-            threads=threads,
-            progress=shown(status, "weighted sum of squares", 1.0) if status is not None else None,
+        how: dict[str, Any] = {
+            "unit_variance": options.unit_variance,
+            "loss": robust,
+            "datum": {"inner": InnerConstraints(), "minimum": MinimumConstraints()}.get(chosen or ""),
+            "ordering": ordering.value,
+            "threads": threads,
+            "progress": shown(status, "weighted sum of squares", 1.0) if status is not None else None,
             **vars(division),
-            verdict=True,
-        )
+            "verdict": True,
+        }
+        if isinstance(block, FirstValues):
+            result = adjust_started(block, **how)
+        else:
+            result = adjust_block(block, **how)
     if chosen == "control" and result.datum.is_chosen:
         raise InputError(
             "control gives no datum: --control FILE adds it, --datum inner or minimum does without it",

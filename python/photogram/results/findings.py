@@ -14,7 +14,7 @@ from photogram.results.patterns import CameraImages, patterns
 from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
 from photogram.show.ways import findings_of
-from photogram.statistics.findings import Findings, Systematic, Tested, by_w
+from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_w
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
@@ -47,6 +47,7 @@ def block_findings(result: Result) -> Findings:
         remarks=[*unseen(result), *_left_out(result)],
         hints=result.hints,
         exchanged=result.exchanged,
+        set_aside=_set_aside(result),
         snoop="--snoop (photogram.snoop)",
     )
 
@@ -57,6 +58,16 @@ def _tested(result: Result) -> list[Tested]:
     if summary is None:
         return [by_w(each) for each in tested_observations(result)]
     return groups_tested(summary, [each.label for each in observations_of_core(result.block)])
+
+
+def _set_aside(result: Result) -> Removed | None:
+    """Return what the first values took out and has not returned; none of the images left is among it."""
+    if not result.set_aside:
+        return None
+    images = sum(name.startswith("image") for name in result.set_aside)
+    return Removed(
+        [{"name": name} for name in result.set_aside], images / max(images + len(result.image_points), 1)
+    )
 
 
 def _left_out(result: Result) -> list[str]:

@@ -126,6 +126,9 @@ class Result(AdjustedNetwork):
         sentences; see :func:`photogram.hints`. They head the verdict.
     exchanged
         Names of points that are probably exchanged on a photo, as sentences, where there are gross errors.
+    set_aside
+        What first values took out and does not fit the adjusted block either: photos, images, by name; see
+        :func:`photogram.adjust_started`.
     """
 
     block: Block
@@ -146,6 +149,7 @@ class Result(AdjustedNetwork):
     state: _photocore.BlockState
     hints: tuple[str, ...] = ()
     exchanged: tuple[str, ...] = ()
+    set_aside: tuple[str, ...] = ()
 
     WHOLE: ClassVar[bool] = True
     """Whether the normal equations of all of it may be asked again."""
@@ -170,6 +174,7 @@ class Result(AdjustedNetwork):
             loss=options.loss,
             hints=(),
             exchanged=(),
+            set_aside=(),
             options=options,
             datum=datum,
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),

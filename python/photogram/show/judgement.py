@@ -42,6 +42,14 @@ _NEXT = {
         "Look at what was taken out, and measure it again if it matters.",
         "Standard deviations hold after the removal: the largest residuals are gone.",
     ),
+    "set-aside": (
+        "Look at the images that are named: they are probably of other points, or their photos of something"
+        " else.",
+    ),
+    "too-much-set-aside": (
+        "So many images are not wrong by themselves. Look for what they have in common: a camera, a lens"
+        " that is not modelled, wrong control; {check}.",
+    ),
     "too-much-removed": (
         "So many observations are not wrong by themselves. Look for what they have in common: a camera, a"
         " day, a wrong control system; {check}.",

@@ -261,6 +261,8 @@ class Findings:
         Stars: exposures whose identification is doubtful or rejected.
     systematic, components, snooped
         What further computations have found, where they were made.
+    set_aside
+        What a start has taken out and does not fit the adjusted network either; None for nothing.
     computed
         Whether observations could be tested, that is, whether their redundancy numbers were computed.
     remarks
@@ -284,6 +286,7 @@ class Findings:
     systematic: Sequence[Systematic] = ()
     components: Sequence[GroupFactor] = ()
     snooped: Removed | None = None
+    set_aside: Removed | None = None
     computed: bool = True
     remarks: Sequence[str] = ()
     snoop: str = ""

@@ -25,6 +25,9 @@ WRONG_ALIKE = 1.5
 """Where the median is larger than expected by more, and the mean square by no more than this beside it, all
 residuals are too large, not a few."""
 
+MOST_IMAGES, MOST_CONTROL = 0.05, 1 / 3
+"""Shares of images and of control without which a network may be used."""
+
 _GRAVITY = (0, EXIT_NOT_USABLE, EXIT_NOT_CONVERGED)
 """Exit codes, the worst last."""
 
@@ -174,7 +177,7 @@ def _snooped(e: Evidence) -> _Line | None:
     if found is None or not found.removed:
         return None
     count = len(found.removed)
-    if found.images > 0.05 or found.control > 1 / 3:
+    if found.images > MOST_IMAGES or found.control > MOST_CONTROL:
         return _Line(
             "too-much-removed",
             f"Too much had to be removed ({count} observations: {100 * found.images:.3g} percent of the"
@@ -188,6 +191,22 @@ def _snooped(e: Evidence) -> _Line | None:
     removed = counted(count, "observation")
     text = "; ".join([f"Usable after removal of {removed}: {names}", *found.exchanged])
     return _Line("usable-after-removal", text)
+
+
+def _set_aside(e: Evidence) -> _Line | None:
+    found = e.found.set_aside
+    if found is None:
+        return None
+    names = listed([str(each["name"]) for each in found.removed], NAMED)
+    text = f"{names}; --keep-all (keep_all=True) takes all images in"
+    if found.images > MOST_IMAGES:
+        share = f"{100 * found.images:.3g} percent of the images fit neither the start nor the adjusted block"
+        return _Line(
+            "too-much-set-aside", f"{share}: model or identification is wrong: {text}", EXIT_NOT_USABLE
+        )
+    whole = "" if e.high else "Usable, but "
+    start = f"{whole}without {len(found.removed)} that fit neither the start nor the adjusted block"
+    return _Line("set-aside", f"{start[:1].upper()}{start[1:]}: {text}", warning=True)
 
 
 def _common_factor(e: Evidence) -> _Line | None:
@@ -270,6 +289,7 @@ _CONDITIONS: tuple[Callable[[Evidence], _Line | None], ...] = (
     _identification,
     _gross_errors,
     _snooped,
+    _set_aside,
     _common_factor,
     _components,
     _model,

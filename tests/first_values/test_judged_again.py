@@ -1,0 +1,88 @@
+"""What first values set aside, judged again by the adjusted block: what returns, is named, is kept."""
+
+import re
+
+import networks
+import numpy as np
+import pytest
+
+from photogram import adjust_started, first_values, formats
+from shared_data import SHARED
+
+CAMCAL = SHARED / "camcal"
+
+
+def printed(kind, count):
+    """Return figures of the reference program's report, behind the word `kind`, as text."""
+    text = (CAMCAL / "expected_report.txt").read_text()
+    found = re.findall(rf"{kind}: +(\S+) ?(?:mm\S*|deg|ou)? *$", text, re.MULTILINE)
+    assert len(found) >= count
+    return found
+
+
+@pytest.fixture(scope="module")
+def calibrated():
+    if not CAMCAL.exists():
+        pytest.skip("the calibration of the demonstration is not there (../shared/data/camcal)")
+    block = formats.read(CAMCAL / "camcaldemo.xml").block
+    return adjust_started(first_values(block), unit_variance="free")
+
+
+def test_a_start_without_a_lens_costs_no_image(calibrated):
+    assert calibrated.set_aside == ()
+    assert f"{calibrated.variance_of_unit_weight**0.5:.4f}" == "1.6148"
+    assert calibrated.degrees_of_freedom == 3725
+    assert int(calibrated.used_images.sum()) == 2074
+    assert calibrated.messages[0].text.startswith("67 of 67 images that were set aside fit")
+
+
+def test_the_calibration_has_the_published_digits(calibrated):
+    (camera,) = calibrated.cameras
+    names = ("c", "xp", "yp", "K1", "K2", "K3", "P1", "P2", "b1")
+    sd = [camera.sd[camera.names.index(name)] for name in names]
+    published = printed("Deviation", 135)
+    assert [float(f"{own:.3g}") for own in sd] == [float(each) for each in published[:9]]
+    poses = np.column_stack([np.degrees(calibrated.photo_sd[:, 3:]), calibrated.photo_sd[:, :3]])
+    assert [float(f"{own:.3g}") for own in poses.ravel()] == [float(each) for each in published[9:135]]
+    known = [float(each) for each in printed("Value", 10)]
+    np.testing.assert_allclose([-camera.values[0], *camera.values[3:8]], [known[0], *known[5:10]], rtol=3e-6)
+
+
+def started(wrong, *, seed=3):
+    """Return first values of strips over points of control, without lens, with images wrong by 30 sd."""
+    positions, angles, points = networks.strips(seed)
+    block, _, _ = networks.network(positions, angles, points, seed=7, control=range(0, 400, 4))
+    xy = block.image_xy.copy()
+    xy[wrong] += 30 * block.image_sd[wrong]
+    return block.replace(image_xy=xy)
+
+
+def test_images_that_stay_out_head_the_verdict():
+    block = started([5, 70])
+    result = adjust_started(first_values(block))
+    names = [
+        f"image of point {block.point_ids[block.image_points[row]]} on photo"
+        f" {block.photo_ids[block.image_photos[row]]}"
+        for row in (5, 70)
+    ]
+    assert sorted(result.set_aside) == sorted(names)
+    assert result.verdict.code == "set-aside"
+    assert result.verdict.warning
+    assert all(name in result.verdict.headline for name in names)
+    assert (result.verdict.exit_code(), result.verdict.exit_code(strict=True)) == (0, 4)
+
+
+def test_all_may_be_kept():
+    found = first_values(started([5, 70]), keep_all=True)
+    assert not found.set_aside.any()
+    assert "take part all the same" in found.messages[-1].text
+    result = adjust_started(found)
+    assert result.set_aside == ()
+    assert result.verdict.code == "gross-errors"
+
+
+def test_too_many_are_no_result():
+    rows = np.arange(0, 1800, 12)
+    result = adjust_started(first_values(started(rows)))
+    assert result.verdict.code == "too-much-set-aside"
+    assert result.verdict.exit == 4
