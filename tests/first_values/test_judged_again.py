@@ -86,3 +86,14 @@ def test_too_many_are_no_result():
     result = adjust_started(first_values(started(rows)))
     assert result.verdict.code == "too-much-set-aside"
     assert result.verdict.exit == 4
+
+
+@pytest.mark.skipif(not CAMCAL.exists(), reason="the calibration of the demonstration is not there")
+@pytest.mark.parametrize(
+    ("options", "said"), [([], "were set aside"), (["--keep-all"], "take part all the same")]
+)
+def test_the_command_takes_all_that_fits_in(run, tmp_path, options, said):
+    path = str(CAMCAL / "camcaldemo.xml")
+    done = run("adjust", path, "--out", str(tmp_path / "out"), "--no-html", *options)
+    assert f"67 images do not fit and {said}" in done.output
+    assert "image points                        2074 used of 2074" in done.output
