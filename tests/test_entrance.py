@@ -12,7 +12,9 @@ from photogram.cli.commands import app
 from photogram.cli.job import Writes, roles
 
 PACKAGE = str(files("photogram").joinpath("examples"))
-ELSE = {"plan": ["--strips", "2", "--photos-per-strip", "4"], "new": ["made"], "simulate": ["made"]}
+ELSE = {"plan": ["--strips", "2", "--photos-per-strip", "4"], "new": ["made"], "simulate": ["made"]} | {
+    "stellar-camera places": ["stars.csv", "--utc", "1966-03-01T21:03:05"]
+}
 """Words of commands that need no input, or no example of it."""
 NEEDED = {"convert": ["made"]}
 """Words beside --example."""

@@ -59,6 +59,7 @@ stellar_app = typer.Typer(
 )
 stellar_app.command("plate")(stellar_camera.stellar_camera)
 stellar_app.command("exposures")(stellar_camera.exposures)
+stellar_app.command("places")(stellar_camera.places)
 app.command()(adjust.adjust)
 app.command("check")(check_project.check_project)
 app.command()(info.info)

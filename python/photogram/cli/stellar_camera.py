@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.console import print_sections, print_withheld
+from photogram.cli.console import output, print_sections, print_withheld
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import (
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
 
-__all__ = ["exposures", "stellar_camera"]
+__all__ = ["exposures", "places", "stellar_camera"]
 
 Out = Annotated[
     Path | None,
@@ -216,6 +216,55 @@ def exposures(
             summary=lambda: print_sections(summary(result), "the report"),
             code=result.verdict.exit_code(strict=strict),
         )
+
+
+@with_job
+def places(
+    job: Job,
+    out: Annotated[
+        Path,
+        Writes.FILE,
+        typer.Argument(metavar="OUT", help="Table of stars to write, as a plate in plain form takes it."),
+    ],
+    utc: Annotated[
+        str,
+        typer.Option(metavar="TIME", help="UTC, such as 1966-03-01T21:03:05; before 1960 universal time."),
+    ],
+    catalogue: Annotated[
+        Path | None,
+        Reads.FILE,
+        typer.Option(
+            metavar="FILE",
+            help="Stars as exposures take them (id, ra_deg, dec_deg, pm_ra_mas ...). Default: Hipparcos.",
+            show_default=False,
+        ),
+    ] = None,
+    epoch: Annotated[
+        float, typer.Option(metavar="YEAR", help="Of the places in FILE, Julian year.")
+    ] = 2000.0,
+    faintest: Annotated[float, typer.Option(metavar="MAGNITUDE", help="Stars up to this magnitude.")] = 6.0,
+    quiet: Quiet = False,
+) -> None:
+    """Compute apparent places of stars for a plate (needs pyerfa).
+
+    Geocentric, true equator and equinox of date: proper motion, parallax, light deflection, annual
+    aberration, precession and nutation (IAU 2006/2000A). OUT has star, ra_rad, dec_rad, magnitude.
+    """
+    with job:
+        from photogram.io.csv_text import csv_text
+        from photogram.stellar.catalogue import Catalogue
+        from photogram.stellar.places import apparent_places
+
+        found = Catalogue.read(catalogue, epoch) if catalogue else Catalogue.hipparcos()
+        stars = found.brighter(faintest)
+        right, declination = apparent_places(stars, utc).T
+        columns = {
+            "star": list(stars.ids),
+            "ra_rad": right,
+            "dec_rad": declination,
+            "magnitude": stars.magnitudes,
+        }
+        job.finish({out: csv_text(columns)}, summary=lambda: output.print(f"{len(stars.ids)} stars at {utc}"))
 
 
 def _said(

@@ -78,6 +78,9 @@ def calibrate(
         initial[0:3] = initial[3:6] = initial[6:9]
         if problem.options.pre_run:
             residuals = _pre_run(problem, smallest, initial, solved)
+            # The minimum solution has neither distortion nor refraction: their curves would be zeros.
+            without = replace(smallest.options, curves=False, refraction=False)
+            smallest = replace(smallest, options=without)
             return _result(problem, smallest, solved, stages, pre_run=residuals)
     free = free_parameters(problem)
     _check_groups(problem)
@@ -252,6 +255,8 @@ def _combined(result: Result, threads: int | None) -> Result:
     test = movement(result)
     pairs = pairs_to_combine(test, result.problem.options.movement_factor)
     result = replace(result, movement=test)
+    if not test:
+        return result
     if not pairs:
         text = "no combined solution: the camera has moved between any two of its attitudes"
         return replace(result, messages=(*result.messages, Message(text)))

@@ -55,27 +55,46 @@ class Earth:
         )
 
 
-def _utc(text: str) -> tuple[float, float]:
+_UTC_BEGINS = 1960
+_YEARS = np.arange(1850, 1961, 10)
+_TT_MINUS_UT = np.array([7, 8, 2, -5, -6, -3, 10, 21, 24, 24, 29, 33])
+"""Terrestrial minus universal time in these years, seconds, before there was UTC (Stephenson and Morrison
+1984, Phil. Trans. R. Soc. A 313, 47). A second is 5e-5 arcsec of aberration, and less of all else."""
+
+_Days = tuple[float, float]
+
+
+def _times(text: str, dut1: float = 0.0) -> tuple[_Days, _Days]:
+    """Return terrestrial and universal time (TT, UT1) as Julian dates in two parts.
+
+    Before 1960 there was no UTC: the time is universal time itself, and `dut1` what it lacks of UT1.
+    """
     import erfa
 
     match = _UTC.fullmatch(text.strip())
     if match is None:
         raise InputError(f"{text!r} is not a UTC time such as 2024-03-01T21:03:05.25")
     year, month, day, hour, minute = (int(part) for part in match.groups()[:5])
+    old = _YEARS[0] <= year < _UTC_BEGINS
     with warnings.catch_warnings():
         warnings.simplefilter("error", erfa.ErfaWarning)
         try:
-            first, second = erfa.dtf2d("UTC", year, month, day, hour, minute, float(match[6]))
+            first, second = erfa.dtf2d(
+                "UT1" if old else "UTC", year, month, day, hour, minute, float(match[6])
+            )
         except (erfa.ErfaError, erfa.ErfaWarning) as error:
             raise InputError(f"{text!r}: {error}") from None
-    return float(first), float(second)
+        if not old:
+            return erfa.taitt(*erfa.utctai(first, second)), erfa.utcut1(first, second, dut1)
+    ut1 = float(first), float(second) + dut1 / erfa.DAYSEC
+    return erfa.ut1tt(*ut1, float(np.interp(year, _YEARS, _TT_MINUS_UT))), ut1
 
 
 def epoch(utc: str) -> float:
     """Return the Julian epoch of a UTC time, in years."""
     import erfa
 
-    return float(erfa.epj(*erfa.taitt(*erfa.utctai(*_utc(utc)))))
+    return float(erfa.epj(*_times(utc)[0]))
 
 
 def apparent_places(catalogue: Catalogue, utc: str, effects: Effects = _ALL) -> Floats:
@@ -103,7 +122,7 @@ def apparent_places(catalogue: Catalogue, utc: str, effects: Effects = _ALL) -> 
     """
     import erfa
 
-    tt = erfa.taitt(*erfa.utctai(*_utc(utc)))
+    tt, _ = _times(utc)
     ra, dec = catalogue.places.T
     pm_ra = catalogue.proper_motions[:, 0] / np.cos(dec)
     # erfa.atciq takes places of 2000.0 and parallaxes in seconds of arc.
@@ -165,7 +184,7 @@ def to_date(utc: str) -> Floats:
     """Return the matrix (3, 3) from ICRS to the true equator and equinox of date (IAU 2006/2000A)."""
     import erfa
 
-    return np.asarray(erfa.pnm06a(*erfa.taitt(*erfa.utctai(*_utc(utc)))), float)
+    return np.asarray(erfa.pnm06a(*_times(utc)[0]), float)
 
 
 def sidereal_time(site: Site, utc: str, dut1: float = 0.0) -> float:
@@ -176,15 +195,14 @@ def sidereal_time(site: Site, utc: str, dut1: float = 0.0) -> float:
     site
         The station; its west longitude counts.
     utc
-        Such as 2024-03-01T21:03:05.25.
+        Such as 2024-03-01T21:03:05.25; before 1960 universal time.
     dut1
         UT1 - UTC in seconds; one second is 15 arcsec of attitude, the same for all exposures of a night.
     """
     import erfa
 
-    time = _utc(utc)
-    tt = erfa.taitt(*erfa.utctai(*time))
-    return float(erfa.anp(erfa.gst06a(*erfa.utcut1(*time, dut1), *tt) - site.longitude_west))
+    tt, ut1 = _times(utc, dut1)
+    return float(erfa.anp(erfa.gst06a(*ut1, *tt) - site.longitude_west))
 
 
 def _no_motion(catalogue: Catalogue) -> InputError:

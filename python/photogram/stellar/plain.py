@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,13 @@ from photogram.io.rows import Row, read_rows
 from photogram.messages import listed
 from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import PlateCamera
+from photogram.stellar.landmarks import HOUR, landmark
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
+from photogram.stellar.places import sidereal_time
 from photogram.stellar.problem import Axis, Problem, default_parameters
 from photogram.stellar.rejection import rejected
+from photogram.stellar.sky import Site
 from photogram.stellar.tomlfile import Document, Table, effects, pole_arcsec, read_document, site
 
 __all__ = ["inputs", "read_plain"]
@@ -54,7 +58,7 @@ _IMAGE_WEIGHT = ("weight_xx", "weight_yy", "weight_xy")
 _TABLES = {
     "labels": None,
     "station": None,
-    "places": ("diurnal_aberration", "refraction"),
+    "places": ("diurnal_aberration", "refraction", "dut1_s"),
     "reference": None,
     "pole": ("x_arcsec", "y_arcsec"),
     "camera": None,
@@ -102,26 +106,35 @@ def _problem(document: Document) -> Problem:
     initial, fixed = _camera(camera, known)
     stars, images = document.table("stars"), document.table("images")
     star_rows = read_rows(stars.path("file"), ("star", "ra_rad", "dec_rad"))
-    image_rows = read_rows(images.path("file"), ("star", "point", "x_m", "y_m", "sidereal_time_rad"))
+    image_rows = read_rows(images.path("file"), ("star", "point", "x_m", "y_m"))
+    station = replace(site(document.table("station")), effects=effects(document.optional("places")))
     ids = tuple(row.cells.get("star", "") for row in star_rows)
     place: dict[str, int] = {}
     for index, row in enumerate(star_rows):
         if place.setdefault(ids[index], index) != index:
             raise row.place.error(f"star {ids[index]} is listed twice")
-        if abs(row.required("dec_rad")) > math.pi / 2:
+        if not _is_landmark(row) and abs(row.required("dec_rad")) > math.pi / 2:
             raise row.place.error("dec_rad is beyond the pole: declinations are between -pi/2 and pi/2")
     for row in image_rows:
         name = row.cells.get("star", "")
         if name not in place:
             raise row.place.error(f"ERROR 1: star {name} is not listed")
     star_weight, image_weight = _common_weight(stars), _common_weight(images)
-    groups = _Groups(images)
+    places, weights = _stars(star_rows, star_weight, station)
+    options = _options(document)
+    landmarks = {ids[i] for i, row in enumerate(star_rows) if _is_landmark(row)}
+    if landmarks and options.refraction:
+        raise stars.error(
+            "file", "has observed directions of landmarks: no refraction is estimated with them"
+        )
+    dut1 = document.optional("places").number("dut1_s", 0.0, low=-1, high=1)
+    groups = _Groups(images, landmarks, partial(sidereal_time, station, dut1=dut1))
     problem = Problem(
-        site=replace(site(document.table("station")), effects=effects(document.optional("places"))),
+        site=station,
         star_ids=ids,
         star_names=tuple(row.cells.get("name") or row.cells.get("star", "") for row in star_rows),
-        star_places=_pairs(star_rows, "ra_rad", "dec_rad"),
-        star_weights=_matrices([_star_weight(row, star_weight) for row in star_rows]),
+        star_places=places,
+        star_weights=weights,
         image_points=tuple(row.cells.get("point", "") for row in image_rows),
         image_stars=np.array([place[row.cells.get("star", "")] for row in image_rows], np.int64),
         image_groups=np.array([groups.of(row) for row in image_rows], np.int64),
@@ -132,7 +145,7 @@ def _problem(document: Document) -> Problem:
         parameter_weights=_parameter_weights(document.optional("weights")),
         fixed=fixed,
         axis=_axis(document.table("axis")) if "axis" in document else None,
-        options=_options(document),
+        options=options,
         labels={name: document.table("labels").word(name) for name in document.optional("labels").values},
     )
     if known is not None:
@@ -196,6 +209,30 @@ def _weight(row: Row, common: list[float] | None, names: tuple[str, str, str]) -
     return np.array([[first, cross], [cross, second]])
 
 
+def _is_landmark(row: Row) -> bool:
+    """Whether a row has a terrestrial direction in the place of right ascension and declination."""
+    return bool(row.cells.get("azimuth_north_deg"))
+
+
+def _stars(rows: list[Row], common: list[float] | None, station: Site) -> tuple[Floats, Floats]:
+    """Return (S, 2) places and (S, 2, 2) weights of stars and of landmarks among them."""
+    found = []
+    for row in rows:
+        weight = _star_weight(row, common)
+        if not _is_landmark(row):
+            found.append((np.array([row.required("ra_rad"), row.required("dec_rad")]), weight))
+            continue
+        azimuth, elevation = (
+            math.radians(row.required(f"{name}_deg")) for name in ("azimuth_north", "elevation")
+        )
+        try:
+            found.append(landmark(station, azimuth, elevation, weight))
+        except InputError as error:
+            raise row.place.error(error.message) from None
+    places, weights = ([each[k] for each in found] for k in range(2))
+    return np.array(places).reshape(-1, 2), _matrices(weights)
+
+
 def _star_weight(row: Row, common: list[float] | None) -> Floats:
     if row.cells.get("unknown", "") in ("1", "true", "yes"):
         return np.zeros((2, 2))
@@ -205,7 +242,8 @@ def _star_weight(row: Row, common: list[float] | None) -> Floats:
 class _Groups:
     """How images belong to groups, and what is added to their times."""
 
-    def __init__(self, table: Table) -> None:
+    def __init__(self, table: Table, landmarks: set[str], sidereal: Callable[[str], float]) -> None:
+        self.landmarks, self.sidereal = landmarks, sidereal
         self.post, self.event = table.count("first_post", 500), table.count("first_event", 900)
         self.corrections = table.numbers("time_corrections_rad", 3, [0.0, 0.0, 0.0])
 
@@ -225,7 +263,16 @@ class _Groups:
 
     def time(self, row: Row) -> float:
         """Return the sidereal time of an image."""
-        return row.required("sidereal_time_rad") + self.corrections[self.of(row)]
+        if row.cells.get("star", "") in self.landmarks:
+            return HOUR
+        if utc := row.cells.get("utc", ""):
+            try:
+                time = self.sidereal(utc)
+            except InputError as error:
+                raise row.place.error(error.message) from None
+        else:
+            time = row.required("sidereal_time_rad")
+        return time + self.corrections[self.of(row)]
 
 
 def _axis(table: Table) -> Axis:
