@@ -7,8 +7,7 @@ import pytest
 
 import photogram
 from photogram.distributed.cut import Incidence, cut, homes, joined, tree_of
-from photogram.distributed.parts import read_part
-from photogram.distributed.run import part_folder, partition, read_manifest
+from photogram.distributed.run import partition, read_manifest, read_node
 from photogram.network.cameras import Camera
 from photogram.network.core import CoreOptions
 from photogram.network.geometry import rotation_matrix
@@ -103,7 +102,7 @@ def test_every_observation_is_in_one_part(tmp_path, parts):
     manifest = partition(block, tmp_path, parts, OPTIONS, "here")
     assert read_manifest(tmp_path) == manifest
     tree = manifest.tree
-    found = [read_part(part_folder(tmp_path, node)) for node in range(len(tree))]
+    found = [read_node(tmp_path, manifest, node) for node in range(len(tree))]
     for name, count in (
         ("images", len(block.image_xy)),
         ("points", len(block.point_ids)),

@@ -5,8 +5,7 @@ import pandas as pd
 import pytest
 from test_parts import OPTIONS, tied_block
 
-from photogram.distributed.parts import read_part
-from photogram.distributed.run import part_folder, partition
+from photogram.distributed.run import partition, read_manifest, read_node
 from photogram.errors import InputError
 from photogram.formats import Wishes, read, to_files
 from photogram.formats.plain import streamed
@@ -58,7 +57,9 @@ def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatc
     for name in ("middle", "weighted", "photos", "points", "images"):
         assert getattr(found, name) == getattr(expected, name)
     for node in range(len(tree)):
-        one, other = (read_part(part_folder(tmp_path / each, node)) for each in ("parts", "whole"))
+        one, other = (
+            read_node(tmp_path / each, read_manifest(tmp_path / each), node) for each in ("parts", "whole")
+        )
         same(one, other)
 
 

@@ -1,5 +1,6 @@
 """Results as data: written as Parquet, read again, and the same in everything they say."""
 
+import hashlib
 import json
 import math
 from dataclasses import fields
@@ -20,9 +21,9 @@ from photogram import (
     simulate,
 )
 from photogram import collection as collections
+from photogram.io.seals import seal
 from photogram.network.observations import Distance, OnLevel, Position
 from photogram.network.unknowns import Level, LeverArm, Shift
-from photogram.results.saved import seal
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 
@@ -265,22 +266,99 @@ def test_damaged_folders_are_refused_with_the_file(folder):
     images = folder / "images.parquet"
     whole = images.read_bytes()
     images.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match=r"images\.parquet: is not the file that was written with summary"):
+        read_result(folder)
+    resealed(folder)
     with pytest.raises(InputError, match=r"images\.parquet: cannot be read as Parquet"):
         read_result(folder)
     table = parquet.read_table(folder / "points.parquet")
     images.write_bytes(whole)
     parquet.write_table(table.slice(1), folder / "points.parquet")
+    resealed(folder)
     with pytest.raises(InputError, match=r"images\.parquet: names '.*', which is not in its own table"):
         read_result(folder)
     parquet.write_table(table.drop_columns(["covariance"]), folder / "points.parquet")
+    resealed(folder)
     with pytest.raises(InputError, match=r"points\.parquet: the column covariance is missing"):
+        read_result(folder)
+
+
+def resealed(folder, change=lambda document: None):
+    """Give a folder a summary whose checksums are those of its tables: what only a program would do."""
+    path = folder / "summary.json"
+    document = json.loads(path.read_text())
+    document["tables"] = {
+        name: hashlib.sha256((folder / f"{name}.parquet").read_bytes()).hexdigest()
+        for name in document["tables"]
+    }
+    change(document)
+    document["sha256"] = seal(document)
+    path.write_text(json.dumps(document))
+
+
+@pytest.mark.parametrize(
+    "table", ["photos", "points", "images", "state", "cameras", "control", "observations"]
+)
+def test_a_table_of_another_result_is_refused(folder, tmp_path_factory, table):
+    other = tmp_path_factory.mktemp("other")
+    result = read_result(folder)
+    adjust(result.restarted(), loss="huber", unit_variance="unity").to_parquet(other)
+    summary, others = (json.loads((each / "summary.json").read_text()) for each in (folder, other))
+    assert others["input"] != summary["input"]  # it began where the first has ended
+    (folder / f"{table}.parquet").write_bytes((other / f"{table}.parquet").read_bytes())
+    same = summary["tables"][table] == others["tables"][table]
+    if not same:
+        with pytest.raises(InputError, match=rf"{table}\.parquet: is not the file that was written with"):
+            read_result(folder)
+    assert not same or table in ("control", "observations")
+    (folder / f"{table}.parquet").unlink()
+    with pytest.raises(InputError, match=rf"{table}\.parquet: cannot be read"):
+        read_result(folder)
+
+
+def test_the_input_of_a_result_is_known_again(tmp_path):
+    block = BLOCKS["rectangular"]().block
+    inputs = []
+    for name, changed in (
+        ("one", block),
+        ("two", block),
+        ("other", block.replace(image_sd=2 * block.image_sd)),
+    ):
+        adjust(changed, threads=1).to_parquet(tmp_path / name)
+        inputs.append(json.loads((tmp_path / name / "summary.json").read_text())["input"])
+    assert inputs[0] == inputs[1] != inputs[2]
+
+
+@pytest.mark.parametrize(
+    ("table", "column", "values"),
+    [
+        ("state", "unknown", "text"),
+        ("points", "covariance", "text"),
+        ("points", "covariance", "number"),
+        ("photos", "corrections", "short"),
+        ("images", "residual_x", "text"),
+    ],
+)
+def test_columns_that_hold_something_else_are_named(folder, table, column, values):
+    pyarrow = pytest.importorskip("pyarrow")
+    path = folder / f"{table}.parquet"
+    found = parquet.read_table(path)
+    rows = found.num_rows
+    new = {
+        "text": pyarrow.array(["a"] * rows),
+        "number": pyarrow.array([1.0] * rows),
+        "short": pyarrow.FixedSizeListArray.from_arrays(pyarrow.array([0.0] * 5 * rows), 5),
+    }[values]
+    parquet.write_table(found.set_column(found.schema.get_field_index(column), column, new), path)
+    resealed(folder)
+    with pytest.raises(InputError, match=rf"{table}\.parquet: the column {column} does not hold"):
         read_result(folder)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda document: document.update(format=2), "is of the format 2"),
+        (lambda document: document.update(format=1), "is of the format 1"),
         (lambda document: document.update(kind="other"), "of a kind that is not known: 'other'"),
         (lambda document: document.pop("kept"), "is not the summary of a result"),
         (lambda document: document["kept"]["block"].update(frame={"is": "Path"}), "no class that this"),
@@ -291,11 +369,7 @@ def test_damaged_folders_are_refused_with_the_file(folder):
     ],
 )
 def test_damaged_summaries_are_refused(folder, change, message):
-    path = folder / "summary.json"
-    document = json.loads(path.read_text())
-    change(document)
-    document["sha256"] = seal(document)
-    path.write_text(json.dumps(document))
+    resealed(folder, change)
     with pytest.raises(InputError, match=rf"summary\.json: .*{message}"):
         read_result(folder)
 

@@ -45,6 +45,18 @@ class Division:
         if self.folder is not None:
             path("folder", self.folder)
 
+    def parts_of(self, photos: int) -> int | None:
+        """Return the number of parts that is asked for; None where none is.
+
+        Raises
+        ------
+        InputError
+            There are fewer photos.
+        """
+        if self.parts is not None and self.parts > photos:
+            raise InputError(f"{self.parts} parts of {photos} photos: a part needs a photo, better twenty")
+        return self.parts
+
     @property
     def is_asked_for(self) -> bool:
         """Whether anything of it is given."""

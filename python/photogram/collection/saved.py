@@ -69,7 +69,7 @@ def read_collection_result(folder: Path, document: Mapping[str, Any]) -> Adjuste
     given = saved.members("collection")
     images = saved.sheets["images"]
     for kind in ("photo", "point"):
-        given[f"image_{kind}s"] = images.column(kind)
+        given[f"image_{kind}s"] = images.numbers(kind)
     names, units = Collection.parameters_of(given["camera"])
     own, arrays = saved.arrays(_parts(names, units), "collection")
     collection = Collection(**given, **arrays)

@@ -10,8 +10,8 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import named
 from photogram.distributed.files import read_json, write_file, write_json
-from photogram.distributed.parts import Names, Part, read_part
-from photogram.distributed.run import Manifest, part_folder, read_manifest, result_folder
+from photogram.distributed.parts import Names, Part
+from photogram.distributed.run import Manifest, read_manifest, read_node, result_folder
 from photogram.io.structure import Decoder, Encoder
 from photogram.network.core import block_network
 from photogram.network.observations import observation_rows
@@ -40,7 +40,8 @@ class CoreEngine:
         RankError, AdjustmentError, OutOfMemoryError
             It cannot be adjusted; names the photos and points concerned.
         """
-        manifest, part = read_manifest(run), read_part(part_folder(run, number))
+        manifest = read_manifest(run)
+        part = read_node(run, manifest, number)
         own = len(part.block.unknowns)
         network = block_network(part.block, manifest.options, part.common[own:])
         rows = [
@@ -64,11 +65,12 @@ class CoreEngine:
 
     def failure(self, run: Path, number: int, undetermined: Any) -> Exception:
         """Return what a node leaves undetermined as an error, with names."""
-        return named(read_part(part_folder(run, number)).block, *undetermined)
+        return named(read_node(run, read_manifest(run), number).block, *undetermined)
 
     def keep(self, run: Path, number: int, solution: BlockSolution, variance: float | None) -> None:
         """Write the result of a node as a folder that :func:`photogram.read_result` reads."""
-        manifest, part = read_manifest(run), read_part(part_folder(run, number))
+        manifest = read_manifest(run)
+        part = read_node(run, manifest, number)
         folder = result_folder(run, number)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / OUTCOME).unlink(missing_ok=True)

@@ -36,7 +36,7 @@ from photogram.distributed.tasks import (
     solved,
     state_path,
 )
-from photogram.errors import AdjustmentError, PhotogramError, RankError
+from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
 from photogram.results.iteration import Iteration
 
 __all__ = ["Driver", "Outcome", "Stop"]
@@ -534,6 +534,7 @@ class Driver:
 def _write_course(job: Job, course: _Course) -> None:
     document = {name: each for name, each in vars(course).items() if name != "iterations"}
     document["iterations"] = [asdict(each) for each in course.iterations]
+    document["source"] = job.source
     write_json(job.folder / PROGRESS, document)
 
 
@@ -541,6 +542,8 @@ def _read_course(job: Job) -> _Course:
     if not (job.folder / PROGRESS).is_file():
         return _Course()
     document = read_json(job.folder / PROGRESS)
+    if document.pop("source", None) != job.source:
+        raise InputError("is the progress of another run", file=job.folder / PROGRESS)
     rows: Iterable[dict[str, Any]] = document.pop("iterations")
     ending = document.pop("ending")
     iterations = [Iteration(**row) for row in rows]

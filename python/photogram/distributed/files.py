@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import platform
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -11,8 +15,43 @@ import numpy as np
 import orjson
 
 from photogram.errors import AdjustmentError, InputError
+from photogram.io.files import reading
+from photogram.io.seals import SEAL, check_sealed, seal
+from photogram.io.writing.staging import try_lock
 
-__all__ = ["read_arrays", "read_json", "write_arrays", "write_file", "write_json"]
+__all__ = ["alone", "read_arrays", "read_json", "write_arrays", "write_file", "write_json"]
+
+
+LOCK = "lock"
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Hold the folder of a run, which is made, as long as this process works in it.
+
+    The lock goes with the process, however that ends. Where the file system knows none, nothing is held.
+
+    Raises
+    ------
+    InputError
+        Another process works there.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / LOCK
+    with ExitStack() as stack:
+        with reading(path):
+            file = stack.enter_context(path.open("a+b", buffering=0))
+        if try_lock(file.fileno()) is False:
+            file.seek(0)
+            by = file.readline().decode("utf-8", "replace").strip()
+            raise InputError(
+                f"another run works here ({by}): wait for its end, or give another folder", file=folder
+            )
+        # For that message alone: a disk that is full does no harm.
+        with suppress(OSError):
+            file.truncate(0)
+            file.write(f"process {os.getpid()} on {platform.node()}\n".encode())
+        yield
 
 
 def write_file(path: Path, content: Callable[[BinaryIO], Any]) -> None:
@@ -51,23 +90,31 @@ def write_file(path: Path, content: Callable[[BinaryIO], Any]) -> None:
         ) from None
 
 
-def write_json(path: Path, document: Any) -> None:
-    """Write a document of JSON; errors as of :func:`write_file`."""
-    write_file(path, lambda file: file.write(orjson.dumps(document, option=orjson.OPT_INDENT_2)))
+def write_json(path: Path, document: Mapping[str, Any]) -> str:
+    """Write a document of JSON with its seal, which is returned; errors as of :func:`write_file`."""
+    own = seal(document)
+    sealed = {**document, SEAL: own}
+    write_file(path, lambda file: file.write(orjson.dumps(sealed, option=orjson.OPT_INDENT_2)))
+    return own
 
 
-def read_json(path: Path) -> Any:
-    """Read a document of JSON.
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a document that :func:`write_json` has written, without its seal.
 
     Raises
     ------
     InputError
-        It is missing or damaged.
+        It is missing, damaged or was changed.
     """
     try:
-        return orjson.loads(path.read_bytes())
+        document = orjson.loads(path.read_bytes())
     except (OSError, orjson.JSONDecodeError) as error:
         raise InputError(f"cannot be read ({error})", file=path) from None
+    if not isinstance(document, dict):
+        raise InputError("is no document of a run", file=path)
+    check_sealed(document, path)
+    del document[SEAL]
+    return document
 
 
 def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
@@ -84,7 +131,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         The file is missing or damaged.
     """
     try:
-        with np.load(path, allow_pickle=False) as found:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             return {name: found[name] for name in found.files}
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"cannot be read ({error})", file=path) from None

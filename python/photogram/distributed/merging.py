@@ -17,8 +17,8 @@ from photogram.adjustment.hints import with_hints
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.core import read_outcome
 from photogram.distributed.driver import Outcome
-from photogram.distributed.parts import read_part, shared_cameras
-from photogram.distributed.run import Manifest, part_folder, result_folder
+from photogram.distributed.parts import shared_cameras
+from photogram.distributed.run import Manifest, read_node, result_folder
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
 from photogram.network.observations import observation_rows
@@ -102,7 +102,7 @@ def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InP
         folder = result_folder(run, node)
         details.append(read_outcome(folder))
         result = read_block_result(folder, read_summary(folder))
-        part = read_part(part_folder(run, node))
+        part = read_node(run, manifest, node)
         own = np.flatnonzero(part.owners == node)
         for names, rows, chosen, count in (
             (_OF_PHOTOS, part.photos[own], own, counts[0]),

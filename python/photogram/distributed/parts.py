@@ -14,6 +14,7 @@ from photogram.distributed.cut import Incidence, homes, joined
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.errors import InputError
 from photogram.io.parquet import Column, Repeated, parquet_content, read_sheet
+from photogram.io.seals import Seals, check_seal, seal
 from photogram.io.structure import Decoder, Encoder
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -48,7 +49,6 @@ TABLES: dict[str, tuple[str, ...]] = {
 }
 """The arrays of a block that have a row for each photo, point or image."""
 SETTINGS = "part.json"
-_MEMBERS = {"node", "block", "unknowns", "observations", "common"}
 _ROWS = ("photo_ids", "point_ids")
 
 
@@ -342,15 +342,15 @@ def _touch(block: Block, touched: Bools, observations: list[Observation]) -> Non
     touched[vertices[np.flatnonzero(touched)]] = True
 
 
-def write_part(folder: Path, part: Part) -> None:
-    """Write the tables of a node into a folder, its settings last: with these it is whole.
+def write_part(folder: Path, part: Part) -> str:
+    """Write the tables of a node into a folder, its settings last; return their seal, which is that of all.
 
     Raises
     ------
     AdjustmentError
         The folder cannot be written to.
     """
-    block = part.block
+    block, seals = part.block, Seals()
     for table, fields in TABLES.items():
         columns = []
         if table != "images":
@@ -363,33 +363,33 @@ def write_part(folder: Path, part: Part) -> None:
             values = getattr(block, name)
             if values is not None:
                 columns.append(Column(name, np.asarray(values), "", f"as Block.{name}"))
-        write_file(folder / f"{table}.parquet", parquet_content(columns, {}))
+        write_file(folder / f"{table}.parquet", seals.through(table, parquet_content(columns, {})))
     encoder = Encoder()
     document = {
         "node": part.node,
+        "tables": seals.known,
         "observations": part.observations.tolist(),
         "unknowns": part.unknowns.tolist(),
         "block": encoder.fields(block, [*_ROWS, *(name for each in TABLES.values() for name in each)]),
         # After the block, whose unknowns are the same objects.
         "common": encoder.value(list(part.common)),
     }
-    write_json(folder / SETTINGS, document)
+    return write_json(folder / SETTINGS, document)
 
 
-def read_part(folder: Path) -> Part:
-    """Read what :func:`write_part` has written.
+def read_part(folder: Path, sealed: str) -> Part:
+    """Read what :func:`write_part` has written, and sealed by what it has returned.
 
     Raises
     ------
     InputError
-        A table is missing or damaged.
+        A table is missing, damaged or of another part.
     """
     document = read_json(folder / SETTINGS)
-    if (
-        not isinstance(document, dict)
-        or not {"node", "block", "unknowns", "observations", "common"} <= document.keys()
-    ):
-        raise InputError("is not what was written of a node", file=folder / SETTINGS)
+    if seal(document) != sealed:
+        raise InputError("is not what was written of this node of this run", file=folder / SETTINGS)
+    for table in TABLES:
+        check_seal(folder / f"{table}.parquet", document["tables"][table], SETTINGS)
     sheets = {table: read_sheet(folder / f"{table}.parquet") for table in TABLES}
     decoder = Decoder(_classes(), folder / SETTINGS)
     given: dict[str, Any] = decoder.fields(document["block"])

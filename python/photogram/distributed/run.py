@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from photogram.distributed.parts import (
     incidence_of,
     names_above,
     part_of,
+    read_part,
     shared_cameras,
     vertices_of,
     write_part,
@@ -30,7 +30,16 @@ from photogram.network.core import CoreOptions
 from photogram.network.observations.position import with_epochs
 from photogram.network.unknowns import Unknown
 
-__all__ = ["Manifest", "divided", "part_folder", "partition", "places_of", "read_manifest", "result_folder"]
+__all__ = [
+    "Manifest",
+    "divided",
+    "part_folder",
+    "partition",
+    "places_of",
+    "read_manifest",
+    "read_node",
+    "result_folder",
+]
 
 MANIFEST = "run.json"
 
@@ -57,6 +66,8 @@ class Manifest:
         Weighted unknowns of photos, cameras and common unknowns that are at home in each node.
     photos, points, images
         How many each node has at home.
+    seals
+        Of the parts of the nodes.
     """
 
     version: str
@@ -69,6 +80,7 @@ class Manifest:
     photos: list[int]
     points: list[int]
     images: list[int]
+    seals: list[str]
 
 
 def part_folder(run: Path, number: int) -> Path:
@@ -148,6 +160,7 @@ def divided(
     """
     shared = shared_cameras(block)
     outer: list[Names] = []
+    seals: list[str] = []
     counts: list[tuple[int, int, int, int]] = []
     for node in range(len(tree)):
         below = Names()
@@ -158,10 +171,11 @@ def divided(
         outer.append(names_above(part, below, shared, root=root))
         folder = part_folder(run, node)
         folder.mkdir(parents=True, exist_ok=True)
-        write_part(folder, part)
+        seals.append(write_part(folder, part))
         own = np.flatnonzero(part.owners == node)
-        weighted = _weighted(part.block, own, shared, part.common if root else None)
-        counts.append((weighted, len(own), len(part.points), len(part.images)))
+        stations = _weighted(part.block, own, shared, part.common if root else None)
+        counts.append((stations, len(own), len(part.points), len(part.images)))
+    weighted, photos, points, images = (list(column) for column in zip(*counts, strict=True))
     middle = np.median(block.photo_positions, axis=0)
     manifest = Manifest(
         _photocore.__version__,
@@ -170,7 +184,11 @@ def divided(
         outer,
         (float(middle[0]), float(middle[1]), float(middle[2])),
         options,
-        *([row[k] for row in counts] for k in range(4)),
+        weighted,
+        photos,
+        points,
+        images,
+        seals,
     )
     write_manifest(run, manifest)
     return manifest
@@ -200,7 +218,7 @@ def write_manifest(run: Path, manifest: Manifest) -> None:
     write_json(run / MANIFEST, document)
 
 
-_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images")
+_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals")
 
 
 def read_manifest(run: Path) -> Manifest:
@@ -211,8 +229,8 @@ def read_manifest(run: Path) -> Manifest:
     InputError
         It is missing, damaged or of another version.
     """
-    document: dict[str, Any] = read_json(run / MANIFEST)
-    if not isinstance(document, dict) or document.get("version") != _photocore.__version__:
+    document = read_json(run / MANIFEST)
+    if document.get("version") != _photocore.__version__:
         raise InputError(
             f"is no run of photogram {_photocore.__version__}: a run ends with the version that began it",
             file=run / MANIFEST,
@@ -228,3 +246,14 @@ def read_manifest(run: Path) -> Manifest:
         options=CoreOptions(**options),
         **plain,
     )
+
+
+def read_node(run: Path, manifest: Manifest, number: int) -> Part:
+    """Read the part of a node.
+
+    Raises
+    ------
+    InputError
+        It is missing, damaged, or that of another node or run.
+    """
+    return read_part(part_folder(run, number), manifest.seals[number])

@@ -20,6 +20,7 @@ from photogram.distributed.core import CoreEngine
 from photogram.distributed.counts import Counts, counted_work
 from photogram.distributed.driver import Driver, Outcome, Stop
 from photogram.distributed.executors import Executor, Serial
+from photogram.distributed.files import alone
 from photogram.distributed.merging import InParts, merged
 from photogram.distributed.parts import incidence_of, vertices_of
 from photogram.distributed.planned import SHARE, PartsPlan, measured_rates
@@ -138,7 +139,7 @@ def opened(
     divided
         Writes a number of parts into the folder.
     chosen
-        Gives this number for so many workers with so much memory for nodes.
+        Gives this number: that asked for, or one for so many workers with so much memory for nodes.
     division, threads
         As of :func:`photogram.adjust`.
 
@@ -148,7 +149,6 @@ def opened(
         Options that cannot be, workers that cannot work together, a folder of another run.
     """
     memory = None if division.memory is None else bytes_of(division.memory)
-    folder.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         executor: Executor
         if division.cluster is None:
@@ -170,9 +170,9 @@ def opened(
                 )
         else:
             room = None if memory is None else int(SHARE * memory) - held
-            manifest = divided(division.parts or chosen(workers, room))
+            manifest = divided(chosen(workers, room))
         most = None if memory is None else int(SHARE * memory) + others
-        job = Job(folder, CoreEngine(), _photocore.__version__, threads or 0, most)
+        job = Job(folder, CoreEngine(), _photocore.__version__, threads or 0, most, source)
         yield Run(folder, manifest, executor, job, workers, memory, held)
 
 
@@ -234,14 +234,16 @@ def _run(block: Block, options: CoreOptions, division: Division, threads: int | 
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="photogram-")))
         else:
             folder = Path(division.folder)
+        stack.enter_context(alone(folder))
         source = fingerprint(block, options)
         yield stack.enter_context(
             opened(
                 folder,
                 source,
                 lambda parts: partition(block, folder, parts, options, source),
-                lambda workers, room: parts_for(
-                    lambda parts: _counted(block, parts), len(block.photo_ids), workers, room
+                lambda workers, room: (
+                    division.parts_of(len(block.photo_ids))
+                    or parts_for(lambda parts: _counted(block, parts), len(block.photo_ids), workers, room)
                 ),
                 division,
                 threads,

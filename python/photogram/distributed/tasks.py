@@ -7,6 +7,7 @@ ask for: a task that misses one says so (:class:`Lost`).
 
 from __future__ import annotations
 
+import hashlib
 import sys
 import threading
 import time
@@ -21,8 +22,8 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.distributed.engine import ContributionRow, Engine, FormedNode, Node
-from photogram.distributed.files import write_file
-from photogram.errors import AdjustmentError, InputError
+from photogram.distributed.files import read_arrays, write_arrays
+from photogram.errors import InputError
 from photogram.memory import give_back, resident_memory
 
 __all__ = [
@@ -81,6 +82,8 @@ class Job:
         Of each task; 0 for all processors.
     memory
         Bytes that a process may hold; None for any number.
+    source
+        What tells the block and its options from others.
     """
 
     folder: Path
@@ -88,6 +91,7 @@ class Job:
     version: str
     threads: int = 0
     memory: int | None = None
+    source: str = ""
 
 
 @dataclass(frozen=True)
@@ -208,7 +212,7 @@ shelf = Shelf()
 
 def state_path(folder: Path, number: int, state: str) -> Path:
     """Return where a state of a node is kept."""
-    return folder / "states" / f"{number:05d}" / f"{state}.npy"
+    return folder / "states" / f"{number:05d}" / f"{state}.npz"
 
 
 def formed(job: Job, number: int, at: Point, contributions: Sequence[Contribution]) -> Contribution:
@@ -395,16 +399,20 @@ def _state(job: Job, node: Node, number: int, state: str) -> Floats:
     if state == GIVEN:
         return node.initial
     path = state_path(job.folder, number, state)
-    try:
-        found: Floats = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"the state of a node cannot be read ({error})", file=path) from None
-    if found.shape != node.initial.shape:
-        raise AdjustmentError(f"{path}: is the state of another node or run")
-    return found
+    found = read_arrays(path)
+    if found.keys() != {"values", "seal"} or str(found["seal"]) != _seal(job, number, state, found["values"]):
+        raise InputError("was changed, or is a state of another node, step or run", file=path)
+    return found["values"]
 
 
 def _write_state(job: Job, number: int, state: str, values: Floats) -> None:
     path = state_path(job.folder, number, state)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_file(path, lambda file: np.save(file, values, allow_pickle=False))
+    write_arrays(path, {"values": values, "seal": np.array(_seal(job, number, state, values))})
+
+
+def _seal(job: Job, number: int, state: str, values: Floats) -> str:
+    """Return what binds values to the run, node and step that they belong to."""
+    digest = hashlib.sha256(f"{job.source} {number} {state} {values.dtype.str}".encode())
+    digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()

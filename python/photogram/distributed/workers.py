@@ -103,6 +103,7 @@ class Workers:
             self._client.cancel(futures, force=True)
 
 
+LOOPBACK = "127.0.0.1"
 ADDRESS = re.compile(r"(?:[a-z]+://)?[\w.\-\[\]:]+:\d{1,5}", re.ASCII)
 """Of a scheduler. Dask looks for other things in what is no address (scheduler files, plug-ins)."""
 
@@ -138,9 +139,11 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
                 n_workers=workers,
                 threads_per_worker=1,
                 memory_limit=memory or "auto",
+                # Whoever reaches a scheduler or worker has it run what he likes: this machine alone.
+                host=LOOPBACK,
                 dashboard_address=None,
                 # Any free port: the usual one may be another cluster's.
-                scheduler_kwargs={"dashboard_address": ":0"},
+                scheduler_kwargs={"dashboard_address": f"{LOOPBACK}:0"},
                 # Nodes and factors are memory that Dask does not manage: it warns of them.
                 silence_logs=logging.ERROR,
             ) as own,

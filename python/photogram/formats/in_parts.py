@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from photogram.adjustment.adjustment import Progress
 from photogram.adjustment.elsewhere import Division
 from photogram.distributed.driver import Outcome, Stop
+from photogram.distributed.files import alone
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import Manifest, result_folder
 from photogram.distributed.running import Run, check, opened, parts_for
@@ -113,23 +114,23 @@ def planned_on_disk(path: Path, wishes: Wishes, folder: Path, division: Division
 
 @contextmanager
 def _run(path: Path, wishes: Wishes, folder: Path, division: Division, threads: int | None) -> Iterator[Run]:
-    folder.mkdir(parents=True, exist_ok=True)
-    streamed = Streamed(path, wishes, folder)
-    try:
+    with ExitStack() as stack:
+        stack.enter_context(alone(folder))
+        streamed = Streamed(path, wishes, folder)
+        stack.callback(streamed.close)
         variance = streamed.project.options.unit_variance
         options = CoreOptions("fraction", TOLERANCE, MAX_ITERATIONS, True, None, "auto", variance, None)
         check(options)
-        source = streamed.source(options)
+        source, photos = streamed.source(options), len(streamed.block.photo_ids)
         with opened(
             folder,
             source,
             lambda parts: streamed.divided(folder, parts, options, source),
-            lambda workers, room: parts_for(
-                lambda parts: streamed.counted(parts)[1], len(streamed.block.photo_ids), workers, room
+            lambda workers, room: (
+                division.parts_of(photos)
+                or parts_for(lambda parts: streamed.counted(parts)[1], photos, workers, room)
             ),
             division,
             threads,
         ) as run:
             yield run
-    finally:
-        streamed.close()

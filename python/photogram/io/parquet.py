@@ -97,6 +97,24 @@ class Sheet:
             raise InputError(f"the column {name} is missing", file=self.path)
         return self.columns[name]
 
+    def numbers(self, name: str, columns: int = 0) -> Any:
+        """Return a column of numbers: (rows,), or (rows, columns) of lists; a negative count divides theirs.
+
+        Raises
+        ------
+        InputError
+            It is not there, or holds something else.
+        """
+        found = self.column(name)
+        kind = found.dtype.kind if isinstance(found, np.ndarray) else ""
+        width = found.shape[1] if kind and found.ndim == 2 else 0
+        fits = width == columns if columns >= 0 else width > 0 and width % columns == 0
+        if kind not in tuple("iuf") or not fits:
+            raise InputError(
+                f"the column {name} does not hold what it should: {found!r}"[:200], file=self.path
+            )
+        return found
+
 
 def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Callable[[BinaryIO], None]:
     """Return what writes a table to a file that is open.

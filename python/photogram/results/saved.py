@@ -11,7 +11,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import orjson
@@ -20,6 +20,7 @@ from photogram import _photocore
 from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.io.parquet import Column, Repeated, Sheet, packed, parquet_content, read_sheet, unpacked
+from photogram.io.seals import SEAL, Seals, check_seal, check_sealed, seal
 from photogram.io.structure import Decoder, Encoder
 from photogram.io.writing import Content
 from photogram.network.frame import Frame
@@ -37,13 +38,14 @@ __all__ = [
     "read_saved",
     "read_summary",
     "rows_of",
-    "seal",
     "written",
 ]
 
-FORMAT = 1
+FORMAT = 2
 SUMMARY = "summary.json"
 _STATE = "state"
+_READ = ("photos", "points", "images", _STATE)
+"""Tables that are read again; the others are for people."""
 TRIANGLE = "covariances, lower triangle row by row, scaled by the variance of unit weight"
 REDUNDANCY = "redundancy number of {} as an observation; 0 unless weighted"
 GIVEN_SD = "standard deviation of {} that was given: infinite free, 0 fixed"
@@ -102,16 +104,17 @@ class Part:
     def array(self, sheet: Sheet, scale: float) -> np.ndarray | None:
         """Return the array that a table has; None where it was None."""
         if self.form == "matrix":
-            return unpacked(_divided(sheet.column(self.prefix), scale))
+            k = len(self.names)
+            return unpacked(_divided(sheet.numbers(self.prefix, k * (k + 1) // 2), scale))
         if self.form == "list" and self.prefix not in sheet.columns:
             return np.zeros((0, sheet.rows, len(self.names)))
         if self.form == "list":
-            cells = sheet.column(self.prefix)
+            cells = sheet.numbers(self.prefix, -len(self.names))
             return np.ascontiguousarray(cells.reshape(len(cells), -1, len(self.names)).transpose(1, 0, 2))
         own = [self.prefix + name for name in self.names]
         if not any(name in sheet.columns for name in own):
             return None
-        parts = [sheet.column(name) for name in own]
+        parts = [sheet.numbers(name) for name in own]
         return np.array(parts[0]) if len(own) == 1 else np.column_stack(parts)
 
 
@@ -217,7 +220,7 @@ class Saved:
 
     def state(self) -> _photocore.BlockState:
         """Return where the core has ended."""
-        unknowns = read_sheet(self.folder / f"{_STATE}.parquet").column("unknown")
+        unknowns = read_sheet(self.folder / f"{_STATE}.parquet").numbers("unknown")
         rest = self.decoder.value(self.summary["kept"][_STATE])
         try:
             return _photocore.BlockState(unknowns.tolist(), *rest)
@@ -278,15 +281,35 @@ def written(
         "kind": kind,
         "variance_of_unit_weight": result.variance_of_unit_weight,
         **summary,
-        "tables": list(sheets),
+        "input": _digest(result, given, parts, kept[given]),
         "kept": kept,
     }
-    document["sha256"] = seal(document)
+    seals = Seals()
     files: dict[str, Content] = {
-        f"{table}.parquet": parquet_content(columns, about) for table, columns in sheets.items()
+        f"{table}.parquet": seals.through(table, parquet_content(columns, about))
+        for table, columns in sheets.items()
     }
-    files[SUMMARY] = orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+
+    def last(file: BinaryIO) -> None:
+        document["tables"] = seals.known
+        document[SEAL] = seal(document)
+        file.write(orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE))
+
+    # The last one that is written: it knows the checksums of all others.
+    files[SUMMARY] = last
     return files
+
+
+def _digest(result: AdjustedNetwork, given: str, parts: Mapping[str, Sequence[Part]], rest: Any) -> str:
+    """Return what tells what was adjusted from anything else."""
+    digest = hashlib.sha256(orjson.dumps(rest))
+    adjusted = getattr(result, given)
+    own = [each.field for one in parts.values() for each in one if each.field.startswith(f"{given}.")]
+    for name in (*_ROWS, *(each.removeprefix(f"{given}.") for each in own)):
+        values = getattr(adjusted, name, None)
+        texts = isinstance(values, list)
+        digest.update(orjson.dumps(values) if texts else np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
 
 
 def _about(result: AdjustedNetwork, frame: Frame) -> dict[str, str]:
@@ -306,9 +329,12 @@ def read_saved(folder: Path, classes: Iterable[type], document: Mapping[str, Any
     Raises
     ------
     InputError
-        One of them is missing or damaged.
+        One of them is missing, damaged, or of another result.
     """
-    sheets = {name: read_sheet(folder / f"{name}.parquet") for name in ("photos", "points", "images")}
+    tables = document["tables"]
+    for name in dict.fromkeys((*_READ, *tables)):
+        check_seal(folder / f"{name}.parquet", tables.get(name), SUMMARY)
+    sheets = {name: read_sheet(folder / f"{name}.parquet") for name in _READ[:-1]}
     return Saved(folder, document, Decoder(classes, folder / SUMMARY), sheets)
 
 
@@ -325,21 +351,14 @@ def read_summary(folder: Path) -> Mapping[str, Any]:
         document = orjson.loads(read_bytes(path))
     except orjson.JSONDecodeError as error:
         raise InputError(f"is no JSON document: {error}", file=path) from None
-    if not isinstance(document, dict) or not {"kind", "format", "kept"} <= document.keys():
+    if not isinstance(document, dict) or not {"kind", "format", "kept", "tables"} <= document.keys():
         raise InputError("is not the summary of a result that was written by to_parquet", file=path)
     if document["format"] != FORMAT:
         raise InputError(
             f"is of the format {document['format']}, which this version does not read", file=path
         )
-    if document.get("sha256") != seal(document):
-        raise InputError("was changed after it was written: its checksum is another one", file=path)
+    check_sealed(document, path)
     return document
-
-
-def seal(document: Mapping[str, Any]) -> str:
-    """Return the checksum of a summary."""
-    content = {name: each for name, each in document.items() if name != "sha256"}
-    return hashlib.sha256(orjson.dumps(content)).hexdigest()
 
 
 def rows_of(names: Any, known: Sequence[str], path: Path) -> np.ndarray:

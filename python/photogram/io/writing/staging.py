@@ -12,7 +12,7 @@ from contextlib import suppress
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["Staging", "alive", "remove_leftovers", "sync_directory"]
+__all__ = ["Staging", "alive", "remove_leftovers", "sync_directory", "try_lock"]
 
 NAME = re.compile(r"\.photogram-([0-9a-f]{16})")
 LOCK = "lock"
@@ -65,7 +65,7 @@ class Staging:
             self._lock = os.open(lock, os.O_RDWR | NEW, 0o600)
         except FileNotFoundError:
             return False
-        locked = _try_lock(self._lock)
+        locked = try_lock(self._lock)
         return locked is None or (locked and os.fstat(self._lock).st_nlink > 0)
 
     def remove(self) -> None:
@@ -86,7 +86,7 @@ def alive(directory: str, token: str) -> bool:
     except OSError:
         return False
     try:
-        return not _try_lock(lock)
+        return not try_lock(lock)
     finally:
         os.close(lock)
 
@@ -112,7 +112,7 @@ def _remove_dead(path: str) -> None:
                 os.rmdir(path)
                 return
             try:
-                if _try_lock(lock):
+                if try_lock(lock):
                     _empty(path)
             finally:
                 os.close(lock)
@@ -131,7 +131,7 @@ def _empty(path: str) -> None:
     os.rmdir(path)
 
 
-def _try_lock(descriptor: int) -> bool | None:
+def try_lock(descriptor: int) -> bool | None:
     """Lock a file; False where another process holds it, None where the file system knows no locks."""
     if sys.platform == "win32":
         return None

@@ -1,0 +1,112 @@
+"""Checksums (SHA-256) that hold files together: what was changed, cut or exchanged is refused."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import orjson
+
+from photogram.errors import InputError
+from photogram.io.files import reading
+
+__all__ = ["SEAL", "Seals", "check_seal", "check_sealed", "seal"]
+
+SEAL = "sha256"
+"""The member of a document that holds its own checksum."""
+
+
+def seal(document: Mapping[str, Any]) -> str:
+    """Return the checksum of a document of JSON, whatever its own member says."""
+    content = {name: each for name, each in document.items() if name != SEAL}
+    return hashlib.sha256(orjson.dumps(content)).hexdigest()
+
+
+def check_sealed(document: Mapping[str, Any], path: Path) -> None:
+    """Refuse a document that is not the one which was sealed.
+
+    Raises
+    ------
+    InputError
+        Its checksum is another one.
+    """
+    if document.get(SEAL) != seal(document):
+        raise InputError("was changed after it was written: its checksum is another one", file=path)
+
+
+def check_seal(path: Path, expected: object, of: str) -> None:
+    """Refuse a file that is not the one which was sealed.
+
+    Parameters
+    ----------
+    path
+        The file.
+    expected
+        Its checksum, as it stands elsewhere.
+    of
+        The file that says so.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or is another one.
+    """
+    with reading(path), path.open("rb") as file:
+        found = hashlib.file_digest(file, "sha256").hexdigest()
+    if found != expected:
+        raise InputError(
+            f"is not the file that was written with {of}: changed since, or of another result", file=path
+        )
+
+
+class Seals:
+    """Checksums of files that are being written: known when they are."""
+
+    def __init__(self) -> None:
+        self.known: dict[str, str] = {}
+
+    def through(self, name: str, content: Callable[[Any], object]) -> Callable[[BinaryIO], None]:
+        """Return what writes a content and keeps the checksum under a name."""
+
+        def write(file: BinaryIO) -> None:
+            hashing = _Hashing(file)
+            content(hashing)
+            self.known[name] = hashing.digest.hexdigest()
+
+        return write
+
+
+class _Hashing:
+    """A file that is written from its beginning to its end."""
+
+    closed = False
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self.digest = hashlib.sha256()
+        self._at = 0
+
+    def write(self, data: Any) -> int:
+        self.digest.update(data)
+        self._at += len(data)
+        return self._file.write(data)
+
+    def tell(self) -> int:
+        return self._at
+
+    def flush(self) -> None:
+        self._file.flush()
+
+    def writable(self) -> bool:
+        return True
+
+    def readable(self) -> bool:
+        return False
+
+    def seekable(self) -> bool:
+        return False
+
+    def close(self) -> None:
+        """Leave the file open: who has opened it closes it."""
