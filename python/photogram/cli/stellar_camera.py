@@ -313,8 +313,11 @@ def _cameras(result: Result | CalibratedNight, files: dict[Path, bytes]) -> dict
 def _files(result: Result, out: Path, mark: str, pictures: str) -> dict[Path, bytes]:
     """Make everything that is written for one problem."""
     from photogram.stellar.listing import listing, plate_list
+    from photogram.stellar.printout import printout
 
     made = {out / f"listing{mark}.txt": listing(result).encode()}
+    if result.problem.options.as_published:
+        made[out / f"printout{mark}.txt"] = printout(result).encode()
     if result.problem.options.plate_list:
         made[out / f"plate{mark}.txt"] = plate_list(result)
     if pictures:

@@ -14,14 +14,14 @@ from photogram.stellar.lens_tests import LEVEL, equal
 from photogram.stellar.parameters import GROUPS, INDEX
 from photogram.stellar.result import SIGNIFICANT, Result, Stage
 
-__all__ = ["listing", "plate_list", "summary"]
+__all__ = ["descriptors", "listing", "plate_list", "summary"]
 
 
 def listing(result: Result) -> str:
     """Return the listing of a calibration."""
     sections = [
         ("Problem", _labels(result)),
-        ("Problem descriptors", _descriptors(result)),
+        ("Problem descriptors", descriptors(result)),
         *summary(result),
         *((f"{stage.solution.capitalize()} solution", _stage(stage)) for stage in result.stages),
         *_solution(result),
@@ -112,7 +112,7 @@ def _labels(result: Result) -> list[str]:
     return [f"{name:<36}{value}" for name, value in rows]
 
 
-def _descriptors(result: Result) -> list[str]:
+def descriptors(result: Result) -> list[str]:
     """Say of every option in which state it is."""
     o, problem = result.problem.options, result.given
     states = [

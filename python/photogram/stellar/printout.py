@@ -1,0 +1,162 @@
+"""Printed pages of the 1967 program (NOAA TR NOS 55, figure 22): 132 columns, numbers as E14.8 wrote them.
+
+Of the six pages of the figure two survive, the second in part: columns whose width is lost are as wide as
+their headings. What pages 3 to 6 held stands in `listing.txt`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.show.angles import ARCSEC, degrees_minutes_seconds
+from photogram.stellar.curves import star_means
+from photogram.stellar.listing import descriptors
+from photogram.stellar.parameters import GROUPS
+from photogram.stellar.result import Result, Stage
+from photogram.stellar.sky import Site
+
+__all__ = ["exponential", "printout"]
+
+WIDTH = 132
+
+
+def printout(result: Result) -> str:
+    """Return the pages: the problem, then stars with their plate coordinates; a form feed begins each."""
+    pages = [_problem(result), _coordinates(result)]
+    return "\f".join("".join(f"{line[:WIDTH].rstrip()}\n" for line in page) for page in pages)
+
+
+def exponential(value: float, digits: int = 8) -> str:
+    """Write a number as the program did, `.60000000E-01`: E14.8, or fewer digits."""
+    mantissa, _, tens = f"{abs(value) + 0.0:.{digits - 1}e}".partition("e")
+    exponent = int(tens) + 1 if value else 0
+    sign = "-" if value < 0 else " "
+    power = "+" if exponent > 0 else "-" if exponent < 0 else " "
+    return f"{sign}.{mantissa.replace('.', '')}E{power}{abs(exponent):02d}"
+
+
+def _problem(result: Result) -> Iterator[str]:
+    problem, o = result.problem, result.problem.options
+    labels, site = problem.labels, problem.site
+    yield labels.get("title", "").upper().center(WIDTH)
+    yield ""
+    yield _columns("STATION NUMBER", "STATION NAME", "LATITUDE", "LONGITUDE", "ELEVATION")
+    yield _station(site)
+    yield ""
+    yield from (f"{name.upper()} {value}" for name, value in labels.items() if name != "title")
+    yield ""
+    constants = {
+        "PROBLEM TOLERANCE": o.tolerance,
+        "REFRACTION TOLERANCE (SEC ARC)": o.refraction_tolerance / ARCSEC,
+        "DISTORTION TOLERANCE": o.distortion_tolerance,
+        "STATION TEMPERATURE (DEGREES KELVIN)": site.air.temperature,
+        "STATION PRESSURE (MM MERCURY)": site.air.pressure,
+        "DISTORTION CURVE CROSSOVER DISTANCE": o.crossover,
+        "DISTORTION CURVE INTERVAL": o.interval,
+        "DISTORTION CURVE MAXIMUM DISTANCE": o.extent,
+    }
+    yield from (f"{name:<48}{exponential(value)}" for name, value in constants.items())
+    yield ""
+    yield from descriptors(result)
+    if o.reference is not None:
+        yield ""
+        yield _columns("STATION NUMBER", "REFERENCE STATION NAME", "LATITUDE", "LONGITUDE", "ELEVATION")
+        yield _station(o.reference)
+        x, y = (value / ARCSEC for value in o.pole)
+        yield f"X-CORRECTION ANGLE (SEC) = {x:9.4f}     Y-CORRECTION ANGLE (SEC) = {y:9.4f}"
+    yield ""
+    yield "TOTAL NUMBER OF STARS AND PLATE POINTS IN PROBLEM"
+    known = int(problem.known.sum())
+    yield (
+        f"KNOWN STARS {known:6d}     UNKNOWN STARS {len(problem.star_ids) - known:6d}"
+        f"     PLATE POINTS {len(problem.image_points):6d}"
+    )
+    for stage in result.stages:
+        yield from _stage(stage)
+
+
+def _station(site: Site) -> str:
+    latitude, longitude = (
+        "{:4d} {:2d} {:7.4f}".format(*degrees_minutes_seconds(angle, 4))
+        for angle in (site.latitude, site.longitude_west)
+    )
+    return _columns(site.number, site.name, latitude, longitude, f"{site.elevation:.4f}")
+
+
+def _columns(*cells: str) -> str:
+    return "".join(f"{cell:<26}" for cell in cells)
+
+
+def _stage(stage: Stage) -> Iterator[str]:
+    counts = stage.counts
+    yield ""
+    yield f"{stage.solution.upper()} SOLUTION"
+    yield _columns("", "OBSERVATIONS", "UNKNOWNS")
+    rows = {
+        "ORIENTATION PARAMETERS": (counts.parameter_observations, counts.parameter_unknowns),
+        "STAR COORDINATES": (counts.star_observations, counts.star_unknowns),
+        "PLATE COORDINATES": (counts.plate_observations, 0),
+        "TOTALS": (counts.observations, counts.unknowns),
+    }
+    yield from (_columns(name, *map(str, numbers)) for name, numbers in rows.items())
+    yield f"DEGREES OF FREEDOM {counts.degrees_of_freedom}"
+    yield "LEVEL OF DISCREPANCIES"
+    yield from (exponential(level.level) for level in stage.levels)
+    yield stage.stop
+
+
+def _coordinates(result: Result) -> Iterator[str]:
+    """Give each known star a block: weight and residuals, then its images, then their means."""
+    problem = result.problem
+    names = problem.star_names or problem.star_ids
+    means = {star: (mean, residual, parts) for star, mean, residual, parts in star_means(result)}
+    yield "STAR AND PLATE COORDINATE DATA".center(WIDTH)
+    for star in np.flatnonzero(problem.known).tolist():
+        weight, residual = problem.star_weights[star], result.star_residuals[star] / ARCSEC
+        shown = [weight[0, 0], weight[1, 1], weight[0, 1]] if np.isfinite(weight).all() else [0.0, 0.0, 0.0]
+        yield ""
+        yield f"{'STAR':<8}{'NORMALIZED STAR WEIGHTS':<51}{'CATALOG NO.':<13}STAR RESIDUALS"
+        yield (
+            f"{'NUMBER':<8}{'RIGHT ASCENSION':<17}{'DECLINATION':<17}{'CORRELATION':<17}{'':<13}"
+            f"{'R A (SEC. TIME)':<19}{'R A (SEC. ARC)':<19}DECL (SEC. ARC)"
+        )
+        yield (
+            f"{problem.star_ids[star]:<8}{_row(shown, 17)}{names[star]:<13}"
+            f"{_row([residual[0] / 15, *residual], 19)}"
+        )
+        yield (
+            f"{'POINT':<9}{'ORIENT-':<9}{'PLATE COORDINATES (MM)':<24}{'NORMALIZED PLATE WEIGHTS':<36}"
+            f"{'SIDEREAL TIME':<20}PLATE RESIDUALS (MICRONS)"
+        )
+        yield (
+            f"{'NUMBER':<9}{'ATION':<9}" + 2 * f"{'LX':<12}{'LY':<12}" + f"{'CORR.':<12}{'':<20}{'LX':<12}LY"
+        )
+        yield from (_image(result, image) for image in np.flatnonzero(problem.image_stars == star).tolist())
+        if problem.star_ids[star] in means:
+            yield from _mean(problem.star_ids[star], *means[problem.star_ids[star]])
+
+
+def _image(result: Result, image: int) -> str:
+    problem = result.problem
+    (x, y), weight = 1e3 * problem.image_xy[image], problem.image_weights[image]
+    hours, minutes, seconds = degrees_minutes_seconds(problem.image_times[image] / 15, 4)
+    vx, vy = 1e6 * result.solved.residuals[image]
+    weights = "".join(f"{exponential(v, 3):<12}" for v in (weight[0, 0], weight[1, 1], weight[0, 1]))
+    return (
+        f"{problem.image_points[image]:<9}{GROUPS[problem.image_groups[image]].upper():<9}"
+        f"{x:<12.5f}{y:<12.5f}{weights}{hours:3d} {minutes:2d} {seconds:7.4f}     {vx:<12.3f}{vy:.3f}"
+    )
+
+
+def _mean(star: str, mean: Floats, residual: Floats, parts: tuple[float, float]) -> Iterator[str]:
+    yield f"{'STAR':<9}{'MEAN PLATE COORDINATES':<38}{'MEAN RESIDUALS (MICRONS)':<36}RADIAL AND TANGENTIAL"
+    yield f"{'NUMBER':<9}{'LX':<19}{'LY':<19}{'LX':<18}{'LY':<18}"
+    micrometres = "".join(f"{1e6 * value:<18.3f}" for value in (*residual, *parts))
+    yield f"{star:<9}{_row(mean, 19)}{micrometres}"
+
+
+def _row(values: Sequence[float] | Floats, width: int) -> str:
+    return "".join(f"{exponential(float(value)):<{width}}" for value in values)
