@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import resource
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -164,7 +166,7 @@ def test_absurd_numbers_of_threads(small_block):
 
 
 def test_a_limit_of_addresses_is_divided_among_fewer_threads(machine, monkeypatch, tmp_path):
-    """Products of matrices take twice the cache for each thread, and cannot be refused."""
+    """Products of matrices take twice the cache for each thread."""
     cache = {"sys/devices/system/cpu/cpu0/cache/index3/size": "32768K\n"}
     own = (64 << 20) + memory.STACK
     limit = 8 * own
@@ -191,3 +193,55 @@ def test_threads_have_ended_when_an_adjustment_returns():
     for _ in range(20):
         adjust(block, threads=3)
         assert set(os.listdir("/proc/self/task")) <= before
+
+
+SHORT = """
+import resource, sys, threading
+from pathlib import Path
+from photogram import OutOfMemoryError, adjust, simulate
+
+block = simulate(strips=3, photos_per_strip=12, seed=2).block
+used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+limit = used + int(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+said = []
+
+def work(threads):
+    try:
+        said.append(adjust(block, threads=threads).status)
+    except OutOfMemoryError:
+        said.append("refused")
+
+workers = [threading.Thread(target=work, args=(own,)) for own in (1, None)]
+for each in workers:
+    each.start()
+for each in workers:
+    each.join()
+print(*said)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="this system has no such limits")
+@pytest.mark.parametrize("room", [0.05, 0.5, 1.2, 3.5])
+def test_short_addresses_are_an_error_and_no_abort(room):
+    """Two adjustments at once in threads of Python, with addresses for so many threads of the core."""
+    own = memory.addresses_of_a_thread() or 160 << 20
+    command = [sys.executable, "-c", SHORT, str(int(room * own) + (64 << 20))]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert len(done.stdout.split()) == 2
+    assert set(done.stdout.split()) <= {"converged", "refused"}
+    if room != 1.2:
+        assert set(done.stdout.split()) == {"converged" if room > 1 else "refused"}
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="this system does not list threads")
+def test_no_threads_are_started_beside_those_of_the_adjustment():
+    """A pool of the whole process, which solvers of a library would start, may find no threads."""
+    code = "import os; from photogram import adjust, simulate; adjust(simulate(strips=1, photos_per_strip=3,"
+    code += " points_per_photo=8).block, threads=2); print(len(os.listdir('/proc/self/task')))"
+    own = {**os.environ, "RAYON_NUM_THREADS": "7", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=own, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert (done.stdout, done.stderr) == ("1\n", "")

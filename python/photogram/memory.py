@@ -44,7 +44,10 @@ def available_memory(root: Path = Path("/")) -> int | None:
     root
         Where `proc` and `sys` are.
     """
-    parts = [*_machine(root), *_groups(root), *_limits(root)]
+    threads = os.cpu_count() or 1
+    own = addresses_of_a_thread(root)
+    limits = [max(left - own * _fitting(left, threads, own), 0) for left in _limits(root)]
+    parts = [*_machine(root), *_groups(root), *limits]
     return min(parts) if parts else None
 
 
@@ -153,24 +156,22 @@ def _limits(root: Path) -> Iterator[int]:
     except ImportError:
         # Not on this system.
         return
-    limits = {kind: resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)}
-    if all(soft == resource.RLIM_INFINITY for soft in limits.values()):
+    limits = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
+    if all(soft == resource.RLIM_INFINITY for soft in limits):
         return
     fields = _text(root / "proc/self/statm").split()
     if len(fields) > 5:
         page = os.sysconf("SC_PAGE_SIZE")
-        for (kind, soft), used in zip(limits.items(), (fields[0], fields[5]), strict=True):
+        for soft, used in zip(limits, (fields[0], fields[5]), strict=True):
             if soft != resource.RLIM_INFINITY:
-                own = addresses_of_a_thread(root) if kind == resource.RLIMIT_AS else 0
-                yield max(soft - page * int(used) - own, 0)
+                yield soft - page * int(used)
 
 
 @cache
 def addresses_of_a_thread(root: Path = Path("/")) -> int:
     """Return the addresses that a thread of the core takes; 0 where the cache is not known.
 
-    The products of matrices have buffers of twice the cache. They cannot be refused: the process ends where
-    a limit of addresses leaves none.
+    The products of matrices have buffers of twice the cache. The core takes them before it begins.
     """
     size = _text(root / "sys/devices/system/cpu/cpu0/cache/index3/size").strip()
     return 2048 * int(size[:-1]) + STACK if size.endswith("K") and size[:-1].isdecimal() else 0
@@ -179,9 +180,12 @@ def addresses_of_a_thread(root: Path = Path("/")) -> int:
 def threads_that_fit(threads: int, root: Path = Path("/")) -> int:
     """Return how many of some threads half of what a limit of addresses leaves suffices for; one at least."""
     left = min(_limits(root), default=None)
-    if left is None or not (own := addresses_of_a_thread(root)):
-        return threads
-    return max(1, min(threads, left // 2 // own))
+    return threads if left is None else _fitting(left, threads, addresses_of_a_thread(root))
+
+
+def _fitting(left: int, threads: int, own: int) -> int:
+    """Return how many of some threads, each with `own` addresses, half of those left suffices for."""
+    return max(1, min(threads, (left - own) // 2 // own)) if own else threads
 
 
 def _text(path: Path) -> str:

@@ -27,6 +27,8 @@ static ALLOCATOR: memory::Reserved = memory::Reserved;
 #[pymodule]
 fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     memory::arm()?;
+    // Threads are those of the caller's pool: the solvers of the library would start a pool of the whole process beside it.
+    faer::set_global_parallelism(faer::Par::Seq);
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     distributions::register(module)?;
     attitude::register(module)?;

@@ -2,12 +2,20 @@
 //!
 //! Rust aborts the process where a vector cannot grow. The large arrays of the engine are asked for and may be refused; for all the
 //! small ones a reserve is kept, which is given back to the system when the first of them fails. The work then has room to end.
+//!
+//! Products of matrices have buffers for each thread, twice the last cache, which the library takes with the first larger product and
+//! ends the process where it gets none. They are taken before work begins, where a failure is an error.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::hint::spin_loop;
+use std::cell::Cell;
+use std::fs::read_to_string;
+use std::hint::{black_box, spin_loop};
 use std::ptr;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering::SeqCst};
 
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, Par};
 use pyo3::import_exception;
 use pyo3::prelude::*;
 
@@ -61,6 +69,13 @@ fn or_again(size: usize, allocate: impl Fn() -> *mut u8) -> *mut u8 {
 /// Gives the reserve back and tries once more.
 #[cold]
 fn again(size: usize, allocate: impl Fn() -> *mut u8) -> *mut u8 {
+    if let Some(room) = ROOM.take() {
+        room.give_back();
+        let pointer = allocate();
+        if !pointer.is_null() {
+            return pointer;
+        }
+    }
     FAILED.store(size.max(1), SeqCst);
     if size > LARGE {
         return ptr::null_mut();
@@ -109,8 +124,76 @@ pub fn arm() -> PyResult<()> {
         return Err(exhausted("there is no memory left to begin with"));
     }
     // Or the compiler would see that nobody needs it.
-    std::hint::black_box(margin.as_mut_ptr());
+    black_box(margin.as_mut_ptr());
     Ok(())
+}
+
+/// Addresses that a thread holds until its buffers, which need them, are taken.
+#[derive(Clone, Copy)]
+struct Room(*mut u8, Layout);
+
+impl Room {
+    fn give_back(self) {
+        // SAFETY: it was allocated with this layout, and is given back once.
+        unsafe { System.dealloc(self.0, self.1) }
+    }
+}
+
+thread_local! {
+    static ROOM: Cell<Option<Room>> = const { Cell::new(None) };
+    static HAS_BUFFERS: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Takes the buffers that products of matrices need on this thread, once; whether there was room for them.
+pub fn take_buffers() -> bool {
+    if HAS_BUFFERS.get() {
+        return true;
+    }
+    let Ok(layout) = Layout::from_size_align(buffers(), 4096) else { return false };
+    // SAFETY: the layout is not empty.
+    let pointer = unsafe { System.alloc(layout) };
+    if pointer.is_null() {
+        return false;
+    }
+    // Where there is no room beside it, the buffers take its place.
+    ROOM.set(Some(Room(pointer, layout)));
+    let ones = Mat::<f64>::full(SIDE, SIDE, 1.0);
+    let mut product = Mat::<f64>::zeros(SIDE, SIDE);
+    matmul(product.as_mut(), Accum::Replace, ones.as_ref(), ones.as_ref(), 1.0, Par::Seq);
+    black_box(product.as_ref());
+    if let Some(room) = ROOM.take() {
+        room.give_back();
+    }
+    HAS_BUFFERS.set(true);
+    true
+}
+
+/// Side of matrices whose product is large enough for the buffers.
+const SIDE: usize = 32;
+/// What the library takes the last cache for where the system does not tell.
+const CACHE: usize = 4 << 20;
+
+/// Bytes of the buffers of a thread: twice the last cache of all processors, as the library finds it.
+fn buffers() -> usize {
+    static BYTES: OnceLock<usize> = OnceLock::new();
+    *BYTES.get_or_init(|| {
+        let told = |name: &str| read_to_string(format!("/sys/devices/system/cpu/{name}")).ok();
+        let size =
+            told("cpu0/cache/index3/size").and_then(|size| size.trim().strip_suffix('K')?.parse().ok());
+        let last = told("present").and_then(|all| all.trim().rsplit(['-', ',']).next()?.parse().ok());
+        let sharing = told("cpu0/cache/index3/shared_cpu_map")
+            .map_or(1, |map| map.chars().filter_map(|digit| digit.to_digit(16)).map(u32::count_ones).sum());
+        let caches = (last.unwrap_or(0) + 1usize).div_ceil(sharing.max(1) as usize);
+        2 * size.map_or(CACHE, |kibibytes: usize| 1024 * kibibytes).max(CACHE) * caches
+    })
+}
+
+/// What Python hears when there is no room for them.
+pub fn no_buffers() -> PyErr {
+    exhausted(&format!(
+        "products of matrices take {} MiB of addresses for each thread, and there are not so many: fewer threads, or a higher limit",
+        buffers() >> 20
+    ))
 }
 
 /// Whether an allocation has failed since the work began.

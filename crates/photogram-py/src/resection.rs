@@ -81,7 +81,7 @@ fn resect(
 
 /// Adjusts on the calling thread: one photo is too little work for another one.
 fn run(py: Python<'_>, resection: &Resection, options: &Options) -> PyResult<ResectionSolution> {
-    let solution = watched(py, Workers::Caller, None, |pool, watch| resection.adjust(options, pool, watch))?;
+    let solution = watched(py, Workers::CALLER, None, |pool, watch| resection.adjust(options, pool, watch))?;
     solution
         .map(|solution| ResectionSolution { solution })
         .map_err(|error| ResectionError::new_err((kind(error), error.to_string())))

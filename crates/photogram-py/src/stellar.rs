@@ -326,7 +326,7 @@ impl StellarProblem {
     fn without_effect(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
         let work =
             |pool: &rayon::ThreadPool, _: &mut dyn FnMut(_) -> _| self.calibration.without_effect(pool);
-        watched(py, Workers::Caller, None, work)?.map_err(|error| failure(&error))
+        watched(py, Workers::of(0, 0), None, work)?.map_err(|error| failure(&error))
     }
 
     #[pyo3(signature = (*, refraction, distortion, passes))]
@@ -341,7 +341,7 @@ impl StellarProblem {
         let work = |pool: &rayon::ThreadPool, _: &mut dyn FnMut(_) -> _| {
             self.calibration.correction(&tolerances, pool)
         };
-        let correction = watched(py, Workers::Caller, None, work)?.map_err(|error| failure(&error))?;
+        let correction = watched(py, Workers::of(0, 0), None, work)?.map_err(|error| failure(&error))?;
         let found = PyDict::new(py);
         found.set_item("parameters", PyArray1::from_vec(py, correction.parameters))?;
         found.set_item("without_effect", correction.without_effect)?;

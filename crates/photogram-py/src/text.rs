@@ -110,7 +110,7 @@ fn csv_rows<'py>(py: Python<'py>, columns: Vec<Column>) -> PyResult<Bound<'py, P
         own
     };
     let firsts: Vec<usize> = (0..rows).step_by(STRETCH).collect();
-    let Ok(parts) = watched(py, Workers::of(0, rows), None, |pool, _| {
+    let Ok(parts) = watched(py, Workers::reading(rows), None, |pool, _| {
         let parts = pool.install(|| firsts.par_iter().map(|&first| stretch(first)).collect());
         Ok::<Vec<Vec<u8>>, Infallible>(parts)
     })?;

@@ -22,17 +22,26 @@ const THREADS_EACH: usize = 4;
 const SMALL: usize = 5000;
 
 /// Who does work.
-pub enum Workers {
-    /// The calling thread; signals and progress are looked after between the phases of the work.
-    Caller,
-    /// So many threads, 0 for all processors; the calling thread watches.
-    Threads(usize),
+pub struct Workers {
+    /// So many threads, 0 for all processors, which the calling thread watches; None for the calling thread itself, which looks after
+    /// signals and progress between the phases of the work.
+    threads: Option<usize>,
+    /// Whether they multiply matrices, for which each needs buffers.
+    multiply: bool,
 }
 
 impl Workers {
+    /// The calling thread, for work without larger matrices.
+    pub const CALLER: Self = Self { threads: None, multiply: false };
+
     /// As many threads as asked for; where none are, the calling one when there are few observed points.
     pub fn of(threads: usize, points: usize) -> Self {
-        if threads == 0 && points <= SMALL { Self::Caller } else { Self::Threads(threads) }
+        Self { threads: (threads > 0 || points > SMALL).then_some(threads), multiply: true }
+    }
+
+    /// The same without buffers for products of matrices.
+    pub fn reading(rows: usize) -> Self {
+        Self { multiply: false, ..Self::of(0, rows) }
     }
 }
 
@@ -66,15 +75,17 @@ pub fn watched<T: Send, E: Send>(
             }
         }
     };
-    let done = match workers {
-        Workers::Caller => {
+    let done = match workers.threads {
+        None => {
             let pool = calling_thread()?;
-            py.detach(|| work(pool, &mut watch))
+            py.detach(|| (!workers.multiply || memory::take_buffers()).then(|| work(pool, &mut watch)))
         }
-        Workers::Threads(threads) => {
+        Some(threads) => {
             let (pool, handles) = start(threads)?;
             py.detach(|| {
-                let done = work(&pool, &mut watch);
+                let room = !workers.multiply
+                    || pool.broadcast(|_| memory::take_buffers()).into_iter().all(|has| has);
+                let done = room.then(|| work(&pool, &mut watch));
                 drop(pool);
                 // Threads keep buffers until they have ended, and the next ones may need the room. A panic has reached the caller.
                 handles.into_iter().for_each(|thread| drop(thread.join()));
@@ -82,6 +93,7 @@ pub fn watched<T: Send, E: Send>(
             })
         }
     };
+    let done = done.ok_or_else(memory::no_buffers)?;
     match raised {
         Some(error) => Err(error),
         None if done.is_err() && memory::failed() => Err(memory::failure()),
