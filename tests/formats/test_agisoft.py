@@ -5,7 +5,7 @@ import pytest
 from block import sample, truth
 from damaged import check_damaged
 from test_opensfm import only
-from test_plain_project import written
+from test_plain_project import EXAMPLE, written
 
 from photogram import Attitudes, Camera, InputError, adjust, formats
 from photogram.formats import additions
@@ -164,3 +164,79 @@ def test_what_metashape_does_not_have_is_refused():
 
 def test_damaged_documents_end_in_a_message(tmp_path):
     assert check_damaged(sample("agisoft", "cameras.xml"), tmp_path, "agisoft", 500, 5) > 100
+
+
+def document(tmp_path, change, shift=(0.0, 0.0, 0.0)):
+    """Return the packaged project, shifted, as a document whose text is changed, read again."""
+    project = formats.read(EXAMPLE)
+    block = project.block
+    block = block.replace(
+        photo_positions=block.photo_positions + shift,
+        point_positions=block.point_positions + shift,
+        observations=(),
+    )
+    place = written(project.replace(block=block, starts=project.starts + shift), tmp_path, "agisoft")
+    path = place / "cameras.xml"
+    path.write_text(change(path.read_text()))
+    return block, path
+
+
+def as_photoscan(text):
+    """Return a document as PhotoScan 1.2 has it: a list of chunks, a transform of the whole chunk."""
+    text = text.replace('version="2.0.0"', 'version="1.2.0"')
+    text = text.replace(
+        '<chunk enabled="true">', '<chunks next_id="2" active_id="0"><chunk id="0" label="A">'
+    )
+    return text.replace("</chunk>", '</chunk><chunk id="1" label="B"></chunk></chunks>')
+
+
+def test_projects_of_photoscan_have_a_list_of_chunks(tmp_path):
+    block, path = document(tmp_path, as_photoscan)
+    project = formats.read(path)
+    np.testing.assert_array_equal(project.block.photo_positions, block.photo_positions)
+    assert any("2 chunks (A, B); taken is 0 (--model N)" in str(each) for each in project.messages)
+    with pytest.raises(InputError, match="has no sensors"):
+        formats.read(path, None, formats.Wishes(model=1))
+    with pytest.raises(InputError, match="2 chunks; there is no model 2"):
+        formats.read(path, None, formats.Wishes(model=2))
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_local_coordinates_far_from_0_are_no_degrees_and_not_geocentric(tmp_path, named):
+    start, end = "<reference>", "</reference>"
+
+    def unnamed(text):
+        return text if named else text[: text.index(start)] + text[text.index(end) + len(end) :]
+
+    block, path = document(tmp_path, unnamed, shift=(5e5, 5.9e6, 100.0))
+    project = formats.read(path)
+    assert project.frame == Frame()
+    np.testing.assert_array_equal(project.block.photo_positions, block.photo_positions)
+    rows = [block.point_ids.index(name) for name in project.block.point_ids]
+    np.testing.assert_array_equal(project.block.point_positions, block.point_positions[rows])
+
+
+def test_references_of_a_chunk_without_a_place_are_left_out(tmp_path):
+    def geographic(text):
+        start = text.index("<reference>LOCAL") + len("<reference>")
+        return f"{text[:start]}EPSG:4326{text[text.index('</reference>', start) :]}"
+
+    _, path = document(tmp_path, geographic)
+    project = formats.read(path)
+    assert not np.isfinite(project.block.point_positions).any()
+    assert any("no place on the earth: 5 references" in str(each) for each in project.messages)
+
+
+def test_accuracies_of_the_settings_and_of_all_coordinates_count(tmp_path):
+    def coarse(text):
+        for axis in "xyz":
+            for value in (0.01, 0.02, 0.015):
+                text = text.replace(f' s{axis}="{value}"', "")
+        text = text.replace("<reference x", '<reference sxyz="0.25" x', 1)
+        settings = '<settings><property name="accuracy_markers" value="0.5"/></settings>'
+        return text.replace("</chunk>", f"{settings}</chunk>")
+
+    _, path = document(tmp_path, coarse)
+    found = formats.read(path).block.point_sd
+    held = np.isfinite(found).all(axis=1)
+    assert sorted(found[held][:, 0]) == [0.25, 0.5, 0.5, 0.5]

@@ -113,6 +113,25 @@ def test_an_export_is_the_truth(tmp_path):
     assert set(other.block.point_sd[np.isfinite(other.block.point_sd)]) == {0.1}
 
 
+def test_deviations_of_control_that_are_not_computed_do_not_hold_it(tmp_path):
+    path = export_of(tmp_path)
+    lines = path.read_text().splitlines()
+    first = next(row for row in range(5, len(lines)) if not lines[row - 1] and len(lines[row].split()) == 7)
+    words = lines[first].split()
+    lines[first] = " ".join([*words[:4], "-1", "-1", "-1"])
+    second = lines[first + 1].split()
+    lines[first + 1] = " ".join([*second[:6], "-1"])
+    path.write_text("\n".join(lines) + "\n")
+    project = formats.read(path)
+    block = project.block
+    assert [block.point_ids[row] for row in project.checks] == [words[0]]
+    assert any("1 control points are negative, not computed" in each for each in project.lacks)
+    row = block.point_ids.index(second[0])
+    assert np.isfinite(block.point_sd[row]).tolist() == [True, True, False]
+    held = formats.read(path, None, Wishes(sd={"control": (0.1,)}))
+    assert not held.checks
+
+
 def test_photos_with_another_camera_have_their_own(tmp_path):
     path = export_of(tmp_path)
     lines = path.read_text().splitlines()

@@ -184,3 +184,14 @@ def test_control_is_written_with_its_measurements(tmp_path):
     (tmp_path / "gcp_list.txt").write_text("\n".join([lines[0], " ".join(moved), *lines[2:]]) + "\n")
     with pytest.raises(InputError, match="has two images on the photo"):
         additions.with_control(other, place / "gcp_list.txt", sd, None)
+
+
+@pytest.mark.parametrize("command", ["info", "check"])
+def test_a_reconstruction_without_tracks_is_told(run, tmp_path, command):
+    assert run("convert", "--example", "opensfm").exit_code == 0
+    (tmp_path / "opensfm" / "tracks.csv").unlink()
+    done = run(command, "opensfm")
+    assert "no tracks.csv beside it: no image measurements" in done.output
+    assert "6 photos, 6 with a position; 0 images" in done.output
+    assert done.exit_code == (0 if command == "info" else 1)
+    assert command == "info" or "the block has no images: there is nothing to check" in done.stderr

@@ -94,7 +94,7 @@ def check(network: object, *, threads: int | None = None) -> Check:
     Raises
     ------
     InputError
-        What is no network.
+        What is no network, a block without images.
 
     Examples
     --------
@@ -124,6 +124,8 @@ def _(network: Block, threads: int | None) -> Check:
 
 def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     """Check a block; returns the sections, and the adjustment where there was one."""
+    if not len(block.image_xy):
+        raise InputError("the block has no images: there is nothing to check")
     # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if np.isfinite(block.photo_positions).all() and np.isfinite(block.photo_attitudes).all():

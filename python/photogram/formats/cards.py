@@ -15,7 +15,7 @@ from photogram.io.numbers import finite_number
 from photogram.io.places import Place
 from photogram.messages import quoted
 
-__all__ = ["END", "Card", "angle_unit", "cards", "names_beside", "to_radians"]
+__all__ = ["END", "Card", "angle_unit", "cards", "names_beside", "one_file", "to_radians"]
 
 END = "-99"
 """What ends a photo, or a file."""
@@ -86,6 +86,20 @@ def names_beside(path: Path) -> dict[str, str]:
             raise table.error(row, f"the number {quoted(number)} is there twice, or has no name")
         found[number] = name
     return found
+
+
+def one_file(path: Path, suffix: str) -> Path | None:
+    """Return the file of an ending in a folder, in any case; None without.
+
+    Raises
+    ------
+    InputError
+        There are several.
+    """
+    found = [each for each in sorted(path.iterdir()) if each.suffix.lower() == suffix and each.is_file()]
+    if len(found) > 1:
+        raise InputError(f"has several files {suffix}: {', '.join(each.name for each in found)}", file=path)
+    return found[0] if found else None
 
 
 def angle_unit(wished: str | None, default: str | None, path: Path) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.formats.cards import END, Card, angle_unit, cards, names_beside, to_radians
+from photogram.formats.cards import END, Card, angle_unit, cards, names_beside, one_file, to_radians
 from photogram.formats.format import Format, Wishes
 from photogram.formats.names import numbered
 from photogram.formats.project import Project
@@ -33,14 +33,6 @@ DIGITS = 6
 """Of principal distances in millimetres: files have three of the micrometre."""
 
 
-def _one(path: Path, suffix: str) -> Path | None:
-    """Return the file of an ending in a folder, in any case."""
-    found = [each for each in sorted(path.iterdir()) if each.suffix.lower() == suffix and each.is_file()]
-    if len(found) > 1:
-        raise InputError(f"has several files {suffix}: {', '.join(each.name for each in found)}", file=path)
-    return found[0] if found else None
-
-
 def _recognises(path: Path) -> bool:
     if path.is_dir():
         return any(each.suffix.lower() == IMAGES for each in path.iterdir())
@@ -56,7 +48,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         Lines that hold something else, rotations by which rays do not meet.
     """
     folder = path if path.is_dir() else path.parent
-    images = path if path.is_file() else _one(folder, IMAGES)
+    images = path if path.is_file() else one_file(folder, IMAGES)
     if images is None:
         raise InputError(f"has no image file *{IMAGES}", file=path)
     names = names_beside(folder / NAMES)
@@ -72,9 +64,9 @@ def read(path: Path, wishes: Wishes) -> Project:
             images,
         )
     )
-    if (orientation := _one(folder, ORIENTATION)) is not None:
+    if (orientation := one_file(folder, ORIENTATION)) is not None:
         _orientation(orientation, names, found, wishes)
-    if (control := _one(folder, CONTROL)) is not None:
+    if (control := one_file(folder, CONTROL)) is not None:
         _control(control, names, found)
     return with_fitting_rotations(project_of(found, images, TITLE, wishes, messages))
 

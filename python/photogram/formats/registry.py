@@ -33,6 +33,7 @@ FORMATS: dict[str, Format] = {
         "patb",
         "bingo",
         "dbat",
+        "aicon",
         "giant",
         "results",
     )

@@ -21,6 +21,7 @@ __all__ = ["TITLE", "read"]
 
 TITLE = "Agisoft camera XML"
 FLIP = np.diag([1.0, -1.0, -1.0])
+LOCAL = "LOCAL_CS"
 GEOCENTRIC = 1e6
 """Metres from the origin beyond which a world is geocentric."""
 _TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2")
@@ -43,7 +44,7 @@ class _Similarity:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the first chunk of a document.
+    """Read the first chunk of a document, or the one that is asked for; PhotoScan has a list of them.
 
     Raises
     ------
@@ -51,19 +52,17 @@ def read(path: Path, wishes: Wishes) -> Project:
         What is no such document, a calibration in a form that is not known for certain.
     """
     root = read_stream(path, {}, "document")
-    chunk = root.child("chunk")
-    if chunk is None:
-        raise root.error("has no chunk")
     messages: list[Message] = []
+    chunk = _chunk(root, wishes.model, messages)
     sensors = _sensors(chunk, messages)
     shots = _shots(chunk, sensors, messages)
-    centres, matrices, world = _poses(chunk, shots)
-    references = chunk.word("reference")
-    frame, positions = _frame(world, centres, matrices, references, messages)
-    names = [each.attributes["label"] for each in shots]
-    observations, lacks = _gnss(positions, shots, names, wishes)
+    centres, matrices = _poses(chunk, shots)
     markers = {each.attributes.get("id", ""): each for each in _members(chunk, "markers", "marker")}
-    points, starts, held, sd, full = _markers(positions, list(markers.values()), wishes)
+    frame, positions = _frame(chunk, centres, matrices, [*shots, *markers.values()], messages)
+    given = _accuracies(chunk, wishes)
+    names = [each.attributes["label"] for each in shots]
+    observations, lacks = _gnss(positions, shots, names, given["gnss"])
+    points, starts, held, sd, full = _markers(positions, list(markers.values()), given["control"])
     rows = {each.attributes["id"]: row for row, each in enumerate(shots)}
     photos, owners, xy = _locations(chunk, rows, {key: row for row, key in enumerate(markers)})
     order = {key: row for row, key in enumerate(sensors)}
@@ -89,6 +88,31 @@ def read(path: Path, wishes: Wishes) -> Project:
         lacks=["no tie points: export BlocksExchange for these", *lacks],
         messages=messages,
     )
+
+
+def _chunk(root: Element, wanted: int | None, messages: list[Message]) -> Element:
+    chunks = [*root.all("chunk"), *_members(root, "chunks", "chunk")]
+    if not chunks or (wanted or 0) >= len(chunks):
+        raise root.error(
+            f"has {len(chunks)} chunks; there is no model {wanted or 0}" if chunks else "has no chunk"
+        )
+    if len(chunks) > 1:
+        names = listed([each.attributes.get("label", "?") for each in chunks], 4)
+        messages.append(Message(f"{len(chunks)} chunks ({names}); taken is {wanted or 0} (--model N)"))
+    return chunks[wanted or 0]
+
+
+def _accuracies(chunk: Element, wishes: Wishes) -> dict[str, Floats]:
+    """Return standard deviations where references have none: those of a user, else of the settings."""
+    settings = {
+        each.attributes.get("name"): each.attribute("value")
+        for each in _members(chunk, "settings", "property")
+        if each.attributes.get("name") in ("accuracy_cameras", "accuracy_markers")
+    }
+    return {
+        kind: np.broadcast_to(wishes.sd.get(kind, (settings.get(f"accuracy_{name}", np.nan),)), 3)
+        for kind, name in (("gnss", "cameras"), ("control", "markers"))
+    }
 
 
 def _members(chunk: Element, folder: str, name: str) -> list[Element]:
@@ -184,8 +208,8 @@ def _shots(chunk: Element, sensors: dict[str, _Sensor], messages: list[Message])
     return found
 
 
-def _poses(chunk: Element, shots: list[Element]) -> tuple[Floats, Floats, bool]:
-    """Return centres and attitudes in the world, and whether that is geocentric."""
+def _poses(chunk: Element, shots: list[Element]) -> tuple[Floats, Floats]:
+    """Return centres and attitudes in the world."""
     own = chunk.child("transform")
     whole = _similarity(own) if own is not None and own.child("rotation") is not None else None
     components = {
@@ -207,7 +231,7 @@ def _poses(chunk: Element, shots: list[Element]) -> tuple[Floats, Floats, bool]:
             similarity = _Similarity(np.eye(3), np.zeros(3), 1.0)
         matrices[row] = similarity.rotation @ turn @ FLIP
         centres[row] = similarity.scale * similarity.rotation @ values[:3, 3] + similarity.translation
-    return centres, matrices, bool(np.linalg.norm(centres.mean(axis=0)) > GEOCENTRIC)
+    return centres, matrices
 
 
 def _similarity(element: Element) -> _Similarity:
@@ -235,6 +259,11 @@ class _Positions:
 
     frame: Frame
     crs: str
+    known: bool = True
+
+    def reference(self, element: Element, default: Floats) -> tuple[Floats, Floats] | None:
+        """Return a reference and its standard deviations; None without, or where no way leads to it."""
+        return _reference(element, default) if self.known else None
 
     def carried(self, xyz: Floats, sd: Floats) -> tuple[Floats, Floats]:
         """Return positions and covariances in the frame."""
@@ -248,13 +277,29 @@ class _Positions:
         return found, turned
 
 
+def _is_geocentric(reference: str, centres: Floats, references: Floats) -> bool:
+    """Return whether a world is geocentric: not if its references are local, or, unnamed, no degrees."""
+    if np.linalg.norm(centres.mean(axis=0)) < GEOCENTRIC or reference.upper().startswith(LOCAL):
+        return False
+    return bool(reference or (np.abs(references[:, :2]) <= (360.0, 90.0)).all())
+
+
 def _frame(
-    geocentric: bool, centres: Floats, matrices: Floats, reference: str, messages: list[Message]
+    chunk: Element, centres: Floats, matrices: Floats, marked: list[Element], messages: list[Message]
 ) -> tuple[Frame, _Positions]:
     """Turn poses from geocentric axes into a topocentric frame, in place."""
-    if not geocentric:
+    reference = chunk.word("reference")
+    given = [own[0] for each in marked if (own := _reference(each, np.ones(3))) is not None]
+    if not _is_geocentric(reference, centres, np.array(given).reshape(-1, 3)):
         frame = Frame()
-        return frame, _Positions(frame, "")
+        known = not reference or reference.upper().startswith(LOCAL)
+        if given and not known:
+            messages.append(
+                Message(
+                    f"the chunk has no place on the earth: {len(given)} references in its system are left out"
+                )
+            )
+        return frame, _Positions(frame, "", known)
     from photogram.formats.crs import GEOCENTRIC as EARTH
     from photogram.formats.crs import GEOGRAPHIC, amid, to_frame, turn_to_frame
 
@@ -275,12 +320,12 @@ def _reference(element: Element, default: Floats) -> tuple[Floats, Floats] | Non
     if own is None or any(axis not in own.attributes for axis in "xyz"):
         return None
     position = np.array([own.attribute(axis) for axis in "xyz"])
-    common = own.attribute("sxy", float("nan")) if "sxy" in own.attributes else None
-    sd = [
-        own.attribute(f"s{axis}", float(default[k] if common is None or k == 2 else common))
-        for k, axis in enumerate("xyz")
-    ]
-    return position, np.array(sd)
+    sd = default.copy()
+    # One for all, one for both coordinates of the plan, or one for each: the finer one counts.
+    for name, axes in (("sxyz", 3), ("sxy", 2)):
+        if name in own.attributes:
+            sd[:axes] = own.attribute(name)
+    return position, np.array([own.attribute(f"s{axis}", float(sd[k])) for k, axis in enumerate("xyz")])
 
 
 def _enabled(element: Element) -> bool:
@@ -289,13 +334,12 @@ def _enabled(element: Element) -> bool:
 
 
 def _gnss(
-    positions: _Positions, shots: list[Element], names: list[str], wishes: Wishes
+    positions: _Positions, shots: list[Element], names: list[str], default: Floats
 ) -> tuple[list[Observation], list[str]]:
-    default = np.broadcast_to(wishes.sd.get("gnss", (np.nan,)), 3)
     given = {
         row: own
         for row, each in enumerate(shots)
-        if _enabled(each) and (own := _reference(each, default)) is not None
+        if _enabled(each) and (own := positions.reference(each, default)) is not None
     }
     known = {row: own for row, own in given.items() if (own[1] > 0).all()}
     lacks = []
@@ -315,20 +359,19 @@ def _gnss(
 
 
 def _markers(
-    positions: _Positions, markers: list[Element], wishes: Wishes
+    positions: _Positions, markers: list[Element], default: Floats
 ) -> tuple[list[str], Floats, Floats, Floats, list[Observation]]:
     names: list[str] = []
     count = len(markers)
     starts, sd = np.full((count, 3), np.nan), np.full((count, 3), np.inf)
     held = starts.copy()
     observed: list[Observation] = []
-    default = np.broadcast_to(wishes.sd.get("control", (np.nan,)), 3)
     for row, each in enumerate(markers):
         name = each.attributes.get("label") or f"marker {row}"
         if name in names or not name.isprintable() or not name.strip():
             raise each.error(f"the marker {name} is there twice, or has no name that prints")
         names.append(name)
-        reference = _reference(each, default)
+        reference = positions.reference(each, default)
         if reference is None:
             continue
         enabled = _enabled(each)

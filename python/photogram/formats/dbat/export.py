@@ -185,12 +185,19 @@ def _control(lines: _Lines, content: Content, wishes: Wishes) -> None:
     given = wishes.sd.get("control")
     for card in lines.until_empty():
         number = _number(card, 0)
-        if number in content.control:
+        if number in content.control or number in content.checks:
             raise card.place.error(f"the control point {number} is there twice")
         sd: Floats = card.numbers(4, "sx sy sz") if given is None else np.broadcast_to(given, 3)
-        if (sd < 0).any():
-            raise card.place.error("a standard deviation is negative: not computed; --sd control=.. gives it")
-        content.control[number] = card.numbers(1, "X Y Z"), sd
+        position = card.numbers(1, "X Y Z")
+        if (sd < 0).all():
+            content.checks[number] = position
+        else:
+            content.control[number] = position, np.where(sd < 0, np.inf, sd)
+    if content.checks:
+        content.lacks.append(
+            f"standard deviations of {len(content.checks)} control points are negative, not computed: the"
+            " points are only compared (--sd control=..)"
+        )
     if content.control:
         content.messages.append(
             Message(

@@ -29,6 +29,7 @@ NO_HEIGHT = 1e4
 """Metres: standard deviation of heights that are no observations."""
 _VERSIONS = {"OPENSFM_TRACKS_VERSION_v1": 9, "OPENSFM_TRACKS_VERSION_v2": 11}
 _FIRST = 8
+_NO_TRACKS = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty((0, 2))
 _FLIP = np.diag([1.0, -1.0, -1.0])
 
 
@@ -64,7 +65,10 @@ def read(path: Path, wishes: Wishes) -> Project:
     of_photo = np.array([camera_rows[shot["camera"].value] for shot in shots.values()], dtype=np.int64)
     rotations, translations = _poses(shots)
     points = dict(model.get("points", {}).items())
-    photos, tracks, xy = _tracks(folder / TRACKS, names, list(points), messages)
+    lacks = (
+        [] if (folder / TRACKS).is_file() else [f"no {TRACKS} beside it: no image measurements (--images)"]
+    )
+    photos, tracks, xy = _tracks(folder / TRACKS, names, list(points), messages) if not lacks else _NO_TRACKS
     scales = np.array([max(size) for size in sizes], dtype=float)[of_photo[photos]]
     middles = np.array(sizes, dtype=float)[of_photo[photos]] / 2
     return assembled(
@@ -83,6 +87,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         image_xy=middles + scales[:, np.newaxis] * xy,
         observations=_gps(shots, wishes, messages),
         frame=_frame(model),
+        lacks=lacks,
         messages=[*messages, *_beside(folder)],
         details={
             "colours": {

@@ -1,0 +1,242 @@
+"""AICON: photo coordinates, interior and exterior orientation, object coordinates and scale bars as text.
+
+Columns as the open reader of such files tells them (applied-geodesy/bundle-adjustment, JAiCov): words between
+blanks, a line for each thing, `#` before comments; millimetres and radians.
+
+    .phc    photo, point, x, y, their standard deviations, residuals, method, active, -
+    .ior    camera, -, -c, xh, yh, A1, A2, R0; then lines A3; B1 B2; C1 C2; width, height (mm), pixels of both
+    .eor    photo, camera, X, Y, Z, omega, phi, kappa, order of rotations (0), active, 1: without orientation
+    .obc    point, X, Y, Z, their standard deviations, rays, active, 0: control, datum
+    .scale  number, "name", point, point, length, standard deviation, active
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.cards import Card, cards, one_file
+from photogram.formats.format import Format, Wishes
+from photogram.formats.project import Project, Size, assembled
+from photogram.messages import Message
+from photogram.network.attitudes import Attitudes
+from photogram.network.cameras import Camera
+from photogram.network.observations import Distance
+
+__all__ = ["FORMAT", "TITLE"]
+
+TITLE = "AICON block"
+IMAGES, CAMERAS, POSES, POINTS, BARS = ".phc", ".ior", ".eor", ".obc", ".scale"
+_NOT_ORIENTED = 1
+
+
+def _recognises(path: Path) -> bool:
+    if path.is_dir():
+        return any(each.suffix.lower() == IMAGES for each in path.iterdir())
+    return path.suffix.lower() == IMAGES
+
+
+@dataclass
+class _Found:
+    """What the files hold, by the names of photos and points."""
+
+    cameras: dict[str, Camera] = field(default_factory=dict)
+    sizes: dict[str, tuple[Size, float]] = field(default_factory=dict)
+    photos: dict[str, str] = field(default_factory=dict)
+    poses: dict[str, Floats] = field(default_factory=dict)
+    points: dict[str, Floats] = field(default_factory=dict)
+    held: dict[str, Floats] = field(default_factory=dict)
+    images: list[tuple[str, str]] = field(default_factory=list)
+    values: list[Floats] = field(default_factory=list)
+    bars: list[Distance] = field(default_factory=list)
+    left: dict[str, set[str]] = field(default_factory=lambda: {"photos": set(), "points": set()})
+    messages: list[Message] = field(default_factory=list)
+
+
+def read(path: Path, wishes: Wishes) -> Project:
+    """Read the photo coordinates, and what lies beside them: the cameras must.
+
+    Raises
+    ------
+    InputError
+        No file of cameras, lines that hold something else, names that are there twice.
+    """
+    folder = path if path.is_dir() else path.parent
+    images = one_file(folder, IMAGES) if path.is_dir() else path
+    assert images is not None
+    beside = {
+        suffix: each if (each := images.with_suffix(suffix)).is_file() else one_file(folder, suffix)
+        for suffix in (CAMERAS, POSES, POINTS, BARS)
+    }
+    if beside[CAMERAS] is None:
+        raise InputError(f"has no file *{CAMERAS} beside it: the cameras", file=images)
+    found = _Found()
+    beside[IMAGES] = images
+    readers = {CAMERAS: _cameras, POSES: _poses, POINTS: _points, IMAGES: _images, BARS: _bars}
+    for suffix, reader in readers.items():
+        if (file := beside[suffix]) is not None:
+            reader(file, found)
+    return _project(images, found, wishes)
+
+
+def _lines(path: Path) -> Iterator[Card]:
+    return (each for each in cards(path) if each.words)
+
+
+def _cameras(path: Path, found: _Found) -> None:
+    lines = _lines(path)
+    for head in lines:
+        name = head.words[0]
+        c, xp, yp, a1, a2, r0 = head.numbers(2, "c xh yh A1 A2 R0").tolist()
+        values = {"c": -abs(c), "xp": xp, "yp": yp, "A1": a1, "A2": a2, "r0": r0}
+        for names in ("A3", "B1 B2", "C1 C2", "width height columns rows"):
+            card = next(lines, None)
+            if card is None:
+                raise head.place.error(f"ends before {names} of the camera {name}")
+            values |= zip(names.split(), card.numbers(0, names).tolist(), strict=True)
+        width, height, columns, rows = (values.pop(each) for each in names.split())
+        size = int(columns), int(rows)
+        if name in found.cameras or min(*size, width, height) <= 0 or size != (columns, rows):
+            raise head.place.error(f"the camera {name} is there twice, or its pictures have no size")
+        try:
+            found.cameras[name] = Camera("brown_forward", values, name=f"camera {name}")
+        except InputError as error:
+            raise head.place.error(error.message) from None
+        found.sizes[name] = size, width / columns
+        told = "as such files have it" if c < 0 else "where such files have the negative of it"
+        text = f"camera {name}: c stands there as {c:g}, {told}; the principal distance is {abs(c):g} mm"
+        found.messages.append(Message(text, path))
+    if not found.cameras:
+        raise InputError("holds no camera", file=path)
+
+
+def _once(card: Card, names: Collection[str], what: str) -> str:
+    """Return the name that a line begins with, which no line before had."""
+    name = card.words[0]
+    if name in names:
+        raise card.place.error(f"the {what} {name} is there twice")
+    return name
+
+
+def _poses(path: Path, found: _Found) -> None:
+    for card in _lines(path):
+        name = _once(card, found.photos, "photo")
+        order, active, state = card.numbers(8, "order active state").tolist()
+        if not active:
+            found.left["photos"].add(name)
+            continue
+        camera = card.words[1]
+        if camera not in found.cameras:
+            raise card.place.error(f"there is no camera {camera}")
+        found.photos[name] = camera
+        if state == _NOT_ORIENTED:
+            continue
+        if order != 0:
+            raise card.place.error(f"rotations in the order {order:g}: only 0, omega phi kappa, is known")
+        found.poses[name] = card.numbers(2, "X Y Z omega phi kappa")
+
+
+def _points(path: Path, found: _Found) -> None:
+    for card in _lines(path):
+        name = _once(card, found.points, "point")
+        if len(card.words) >= 9 and not card.number(8, "active"):
+            found.left["points"].add(name)
+            continue
+        found.points[name] = card.numbers(1, "X Y Z")
+        if len(card.words) >= 10 and not card.number(9, "new"):
+            found.held[name] = card.numbers(4, "sX sY sZ")
+            if (found.held[name] < 0).any():
+                raise card.place.error("a standard deviation is negative")
+
+
+def _images(path: Path, found: _Found) -> None:
+    lost = 0
+    only = next(iter(found.cameras)) if len(found.cameras) == 1 else None
+    for card in _lines(path):
+        values = card.numbers(2, "x y sx sy")
+        active = len(card.words) < 10 or card.number(9, "active") > 0
+        photo, point = card.words[0], card.words[1]
+        if not active or photo in found.left["photos"] or point in found.left["points"]:
+            lost += 1
+            continue
+        if photo not in found.photos:
+            if only is None:
+                raise card.place.error(f"nothing says which camera the photo {photo} has")
+            found.photos[photo] = only
+        found.images.append((photo, point))
+        values[2:] = np.where(values[2:] > 0, values[2:], np.nan)
+        found.values.append(values)
+    if not found.images:
+        raise InputError("has no photo coordinates that are active", file=path)
+    if lost:
+        found.messages.append(Message(f"{lost} photo coordinates are not active and are left out", path))
+
+
+def _bars(path: Path, found: _Found) -> None:
+    seen = {point for _, point in found.images}
+    for card in _lines(path):
+        # Names of bars may have blanks: what counts stands behind the quotation marks.
+        own = Card(card.place)
+        own.words = (card.place.text or "").rpartition('"')[2].split()
+        length, sd = own.numbers(2, "length sd").tolist()
+        if len(own.words) > 4 and not own.number(4, "active"):
+            continue
+        first, second = own.words[:2]
+        if not {first, second} <= seen:
+            found.messages.append(Message(f"scale bar {first} to {second}: an end has no image", path))
+            continue
+        if not (length > 0 and sd > 0) or first == second:
+            raise card.place.error("is no length with its standard deviation between two points")
+        found.bars.append(Distance(first, second, length, sd))
+
+
+def _project(path: Path, found: _Found, wishes: Wishes) -> Project:
+    photos, order = list(found.photos), {name: row for row, name in enumerate(found.cameras)}
+    points = list(dict.fromkeys([*(point for _, point in found.images), *found.held]))
+    rows, places = ({name: row for row, name in enumerate(each)} for each in (photos, points))
+    none = np.full(6, np.nan)
+    poses = np.array([found.poses.get(name, none) for name in photos])
+    matrices = np.full((len(photos), 3, 3), np.nan)
+    posed = np.isfinite(poses).all(axis=1)
+    if posed.any():
+        matrices[posed] = Attitudes.of("omega_phi_kappa", poses[posed, 3:]).matrices
+    starts = np.array([found.points.get(name, none[:3]) for name in points])
+    held = np.array([name in found.held for name in points])[:, np.newaxis]
+    sd = np.array([found.held.get(name, np.full(3, np.inf)) for name in points])
+    if held.any() and "control" in wishes.sd:
+        sd = np.where(held, wishes.sd["control"], np.inf)
+    values = np.array(found.values)
+    for kind, names in found.left.items():
+        if names:
+            found.messages.append(Message(f"{len(names)} {kind} are not active and are left out"))
+    return assembled(
+        path=path,
+        title=TITLE,
+        cameras=list(found.cameras.values()),
+        sizes=[size for size, _ in found.sizes.values()],
+        pixel_mm=[pixel for _, pixel in found.sizes.values()],
+        photo_ids=photos,
+        photo_cameras=[order[camera] for camera in found.photos.values()],
+        centres=poses[:, :3],
+        matrices=matrices,
+        point_ids=points,
+        starts=starts,
+        point_positions=np.where(held, starts, np.nan),
+        point_sd=sd,
+        image_photos=np.array([rows[photo] for photo, _ in found.images], dtype=np.int64),
+        image_points=np.array([places[point] for _, point in found.images], dtype=np.int64),
+        image_xy=values[:, :2],
+        image_sd=values[:, 2:] if np.isfinite(values[:, 2:]).all() else None,
+        observations=found.bars,
+        lacks=[] if held.any() else ["no control: a free network (--datum inner, or --control FILE)"],
+        messages=found.messages,
+        linear_unit="mm",
+    )
+
+
+FORMAT = Format(name="aicon", title=TITLE, recognises=_recognises, read=read)
