@@ -21,7 +21,7 @@ from photogram.formats.plain.transform import Transform
 from photogram.formats.plain.writing import attitude_matrices
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project
-from photogram.io.delimited import ColumnTable
+from photogram.io.delimited import ColumnTable, Names
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 
@@ -175,7 +175,8 @@ def _known_photos(project: Project, given: ControlList) -> ColumnTable:
             Message(f"measurements on other photos are left out: {listed(lost, 3)}", table.path)
         )
     known = _some_rows(table, rows)
-    return replace(known, cells={**known.cells, "photo": [names[row] for row in rows]})
+    ready = {column: each for column, each in known.ready.items() if column != "photo"}
+    return replace(known, cells={**known.cells, "photo": [names[row] for row in rows]}, ready=ready)
 
 
 def _new_images(project: Project, table: ColumnTable) -> ColumnTable:
@@ -200,8 +201,13 @@ def _new_images(project: Project, table: ColumnTable) -> ColumnTable:
 
 
 def _some_rows(table: ColumnTable, rows: Sequence[int]) -> ColumnTable:
-    cells = {column: [table.cells[column][row] for row in rows] for column in table.columns}
-    return replace(table, cells=cells, count=len(rows), records=[table.records[row] for row in rows])
+    cells = {column: [each[row] for row in rows] for column, each in table.cells.items()}
+    ready = {
+        column: Names(each.names, each.rows[rows]) if isinstance(each, Names) else each[rows]
+        for column, each in table.ready.items()
+    }
+    records = [table.records[row] for row in rows]
+    return replace(table, cells=cells, ready=ready, count=len(rows), records=records)
 
 
 def with_control(
@@ -319,7 +325,11 @@ def _similarity(model: Floats, targets: Floats) -> tuple[float, Floats, Floats, 
     """Return scale, rotation, shift and rms misfit of the similarity between points (Umeyama 1991)."""
     middle, aim = model.mean(axis=0), targets.mean(axis=0)
     a, b = model - middle, targets - aim
-    u, s, vt = np.linalg.svd(b.T @ a)
+    with np.errstate(over="ignore", invalid="ignore"):
+        products = b.T @ a
+    if not np.isfinite(products).all():
+        return 1.0, np.eye(3), np.zeros(3), np.inf
+    u, s, vt = np.linalg.svd(products)
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt)) or 1.0])
     if s[1] < 1e-9 * s[0] or not s[0] > 0:
         return 1.0, np.eye(3), np.zeros(3), np.inf

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import lzma
 import xml.parsers.expat
 import zipfile
 import zlib
@@ -23,8 +24,17 @@ __all__ = ["Element", "read_stream", "root_of"]
 
 PIECE = 1 << 16
 DEEPEST = 200
-_PACKED_BADLY = (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError)
+LONGEST = 1 << 20
+"""Bytes of a tag, characters of a text: the parser begins a long tag again with every piece."""
+MOST = 1_000_000
+"""Elements that are kept until what holds them is handed over; 64 characters of theirs count as another."""
+CHARACTERS = 64
+RATIO, SMALL = 250, 1 << 26
+"""A document of more bytes than the second is no larger than so many times its packed self."""
+_PACKED_BADLY = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError)
 """What archives that are damaged, or packed in other ways, end in."""
+_UNREADABLE = (*_PACKED_BADLY, ValueError, LookupError)
+"""And documents in encodings that are none, or none for a parser."""
 
 
 @dataclass
@@ -118,6 +128,14 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
             raise InputError(
                 f"is an archive with {len(names)} documents: one, or doc.xml, is read", file=path
             )
+        header = archive.getinfo(name)
+        # No more is unpacked than the header says.
+        if header.file_size > max(SMALL, RATIO * header.compress_size):
+            raise InputError(
+                f"holds {name}, which would grow from {header.compress_size} to {header.file_size} bytes: no"
+                " document does that",
+                file=path,
+            )
         with archive.open(name) as packed:
             yield packed
 
@@ -130,7 +148,7 @@ def root_of(path: Path) -> tuple[str, Mapping[str, str]]:
     try:
         with _opened(path) as file:
             parser.Parse(file.read(PIECE), False)
-    except (OSError, InputError, xml.parsers.expat.ExpatError, *_PACKED_BADLY):
+    except (OSError, InputError, xml.parsers.expat.ExpatError, *_UNREADABLE):
         pass
     return found[0] if found else ("", {})
 
@@ -150,12 +168,20 @@ def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: 
     Raises
     ------
     InputError
-        The file cannot be read, is no XML or one of another kind.
+        The file cannot be read, is no XML or one of another kind, or has more in one piece than is kept.
     """
     stack: list[Element] = []
+    before: list[int] = []
+    kept = 0
     first: list[Element] = []
     parser = xml.parsers.expat.ParserCreate()
     parser.buffer_text = True
+
+    def keep(element: Element, more: int) -> None:
+        nonlocal kept
+        kept += more
+        if kept > MOST:
+            raise element.error(f"more than {MOST} elements stand in one")
 
     def start(name: str, attributes: dict[str, str]) -> None:
         element = Element(name, attributes, path, parser.CurrentLineNumber)
@@ -164,17 +190,25 @@ def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: 
         if len(stack) >= DEEPEST:
             raise element.error("elements are nested too deep")
         first[:] = first or [element]
+        before.append(kept)
+        keep(element, 1 + sum(map(len, attributes.values())) // CHARACTERS)
         stack.append(element)
 
     def end(name: str) -> None:
-        element = stack.pop()
+        nonlocal kept
+        element, outside = stack.pop(), before.pop()
         if name in take:
+            kept = outside
             take[name](element)
         elif stack:
             stack[-1].children.append(element)
 
     def text(data: str) -> None:
-        stack[-1].text += data
+        element = stack[-1]
+        if len(element.text) > LONGEST:
+            raise element.error(f"has a text of more than {LONGEST} characters")
+        keep(element, len(data) // CHARACTERS)
+        element.text += data
 
     def declares(*_: Any) -> None:
         raise Place(path, parser.CurrentLineNumber).error("declares entities, which are not read")
@@ -183,8 +217,12 @@ def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: 
     parser.CharacterDataHandler, parser.EntityDeclHandler = text, declares
     try:
         with reading(path), _opened(path) as file:
+            fed = 0
             while piece := file.read(PIECE):
                 parser.Parse(piece, False)
+                fed += len(piece)
+                if fed - parser.CurrentByteIndex > LONGEST:
+                    raise Place(path, parser.CurrentLineNumber).error(f"a tag of more than {LONGEST} bytes")
             parser.Parse(b"", True)
     except _PACKED_BADLY as error:
         raise InputError(f"cannot be unpacked: {error}", file=path) from None

@@ -116,7 +116,7 @@ class ColumnTable:
         """
         found = self.ready.get(column)
         if not isinstance(found, Names):
-            found = _factorised(self.cells[column])
+            found = _factorised(self._cells(column))
         if _all_apart(found.names):
             return found
         for name in found.names:
@@ -163,7 +163,18 @@ class ColumnTable:
             return [found.names[row] or default for row in found.rows]
         if column not in self.columns:
             return [default] * self.count
-        return [cell or default for cell in self.cells[column]]
+        return [cell or default for cell in self._cells(column)]
+
+    def _cells(self, column: str) -> Sequence[str]:
+        """Return the cells of a column of text: none are numbers of a Parquet file, unless all are empty."""
+        numbers = self.ready.get(column)
+        if numbers is None:
+            return self.cells[column]
+        if not np.isnan(numbers).all():  # type: ignore[arg-type]
+            raise self.head.error(
+                f"the column {column} holds numbers with decimals: names and words are text or whole numbers"
+            )
+        return [""] * self.count
 
     def numbers(
         self,
@@ -193,7 +204,7 @@ class ColumnTable:
         """
         found = self.ready.get(column)
         if isinstance(found, np.ndarray):
-            return found if read is None else np.array([read(repr(each)) for each in found.tolist()])
+            return self._known(column, found, default, infinite=infinite, read=read)
         if column not in self.columns:
             return np.full(self.count, default)
         convert = finite_number if read is None else read
@@ -211,6 +222,22 @@ class ColumnTable:
             except ValueError as error:
                 raise self.error(row, f"column {column}: {error}") from None
         return values
+
+    def _known(
+        self,
+        column: str,
+        found: Floats,
+        default: float,
+        *,
+        infinite: bool,
+        read: Callable[[str], float] | None,
+    ) -> Floats:
+        """Return numbers that the file has as such, as :meth:`numbers` has them; NaN stands for empty."""
+        if not infinite and np.isinf(found).any():
+            raise self.error(int(np.argmax(np.isinf(found))), f"column {column}: is not a finite number")
+        if read is not None:
+            return np.array([default if np.isnan(each) else read(repr(each)) for each in found.tolist()])
+        return found if np.isnan(default) else np.where(np.isnan(found), default, found)
 
     def flags(self, column: str, default: bool = True) -> Bools:
         """Return (rows,) a column of true and false (yes, no, 1, 0).

@@ -19,7 +19,7 @@ def reading(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+        raise InputError(f"cannot be read: {error.strerror or error}", file=path) from None
 
 
 def read_bytes(path: Path) -> bytes:

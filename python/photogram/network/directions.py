@@ -6,6 +6,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
+from photogram.errors import InputError
 from photogram.network.block import Block
 
 __all__ = ["direction_deviations", "image_directions", "seen_without_lenses", "without_lenses"]
@@ -72,6 +73,10 @@ def _near_axis(block: Block) -> Floats:
         middle, right, up = camera.project([[0.0, 0.0, -1.0], [_SMALL, 0.0, -1.0], [0.0, _SMALL, -1.0]])
         linear = np.column_stack([right - middle, up - middle]) / _SMALL
         own = of_images == row
+        if not abs(np.linalg.det(linear)) > 0:
+            raise InputError(
+                f"the camera {camera.name} shows all that is near its axis in one point: its f or c is wrong"
+            )
         tangents[own] = np.linalg.solve(linear, (block.image_xy[own] - middle).T).T
     return tangents
 

@@ -60,8 +60,8 @@ def read(path: Path, wishes: Wishes) -> Project:
     for name, shot in shots.items():
         if not name.strip() or not name.isprintable():
             raise shot.error(f"{quoted(name)} is no name")
-        if shot["camera"].value not in camera_rows:
-            raise shot["camera"].error(f"there is no camera {quoted(str(shot['camera'].value))}")
+        if shot["camera"].text() not in camera_rows:
+            raise shot["camera"].error(f"there is no camera {quoted(shot['camera'].text())}")
     of_photo = np.array([camera_rows[shot["camera"].value] for shot in shots.values()], dtype=np.int64)
     rotations, translations = _poses(shots)
     points = dict(model.get("points", {}).items())
