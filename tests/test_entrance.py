@@ -48,7 +48,7 @@ def with_inputs(run, name, where):
         run("comparator", "--example", "--no-plots", "--quiet")
         where["former.json"] = Path("comparator-calibrated", "correction.json")
         where["points.csv"] = Path("points.csv")
-        where["points.csv"].write_text("point,x_um,y_um\n1,1000,2000\n")
+        where["points.csv"].write_text("point,x_um,y_um\n1,100000,200000\n")
         return ["out.csv"]
     return []
 

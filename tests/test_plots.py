@@ -191,7 +191,8 @@ def test_commands_write_all_pictures(run, tmp_path, command):
 
 
 def test_pictures_need_a_place(run):
-    result = run("collection", "--example", "--plots")
+    ring = files("photogram") / "examples" / "collection" / "ring.txt"
+    result = run("collection", str(ring), "--plots")
     assert result.exit_code == 2
     assert "goes with --out DIR" in result.stderr
 

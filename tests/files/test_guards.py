@@ -45,6 +45,10 @@ RUNS = {
     "perspective-center": (["perspective-center", "grid.deck"], ["grid.deck"]),
     "stellar-camera plate": (["stellar-camera", "plate.toml"], ["plate.toml", "stars.csv", "images.csv"]),
     "stellar-camera exposures": (["stellar-camera", "exposures", "night.toml"], ["night.toml", "images.csv"]),
+    "stellar-camera places": (
+        ["stellar-camera", "places", "--utc", "1966-03-01T21:03:05", "--catalogue", "catalogue.csv"],
+        ["catalogue.csv"],
+    ),
     "adjust": (["adjust", "project"], ["project/images.csv", "project/project.toml"]),
     "check": (["check", "project"], ["project/images.csv"]),
     "info": (["info", "project"], ["project/images.csv"]),
@@ -102,6 +106,9 @@ def place(tmp_path, request):
     shutil.copytree(EXAMPLES / "project", tmp_path / "project")
     (tmp_path / "former.json").write_text("{}")
     (tmp_path / "grid.csv").write_text("point,x_um,y_um\n1,0,0\n")
+    (tmp_path / "catalogue.csv").write_text(
+        "id,ra_deg,dec_deg,pm_ra_mas,pm_dec_mas,parallax_mas,magnitude\n1,10,20,0,0,0,1\n"
+    )
     return tmp_path
 
 

@@ -5,6 +5,8 @@ import os
 import shutil
 import subprocess
 import sys
+from importlib.resources import files
+from pathlib import Path
 from typing import get_args
 
 import pytest
@@ -100,7 +102,12 @@ def test_every_hidden_option_is_a_former_name():
 
 
 def test_pictures_without_a_place_are_refused(run, tmp_path):
-    for command in (["plan"], ["perspective-center", "--example"], ["absolute-orientation", "--example"]):
+    examples = Path(str(files("photogram") / "examples"))
+    for command in (
+        ["plan"],
+        ["perspective-center", str(examples / "perspective_center" / "grid.deck")],
+        ["absolute-orientation", str(examples / "absolute_orientation" / "stations.csv")],
+    ):
         refused = run(*command, "--plots")
         assert refused.exit_code == 2
         assert "goes with --out DIR" in refused.stderr

@@ -23,6 +23,7 @@ from photogram.cli.options import (
     Plots,
     Quiet,
     Strict,
+    example_out,
     out_option,
     picture_places,
 )
@@ -191,6 +192,7 @@ def absolute_orientation(
         target = points_out
         if file is None:
             directory = job.packaged(EXAMPLE)
+            out = example_out(out, plots, "example-oriented")
             file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
             if points is None:
                 points, target = directory / "points.csv", target or (out or Path()) / TRANSFORMED

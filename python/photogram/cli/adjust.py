@@ -17,6 +17,7 @@ from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.maps import CloudFile, CloudOrigin, Crs, MapFile, check_maps, drawn_maps, point_clouds
 from photogram.cli.options import (
+    KEPT,
     JsonFile,
     Ordering,
     OrderingName,
@@ -25,6 +26,7 @@ from photogram.cli.options import (
     PlotFormat,
     Plots,
     Quiet,
+    Snooping,
     Strict,
     Threads,
     as_data,
@@ -72,6 +74,7 @@ class LossName(StrEnum):
 
 @with_job
 @with_options("divided", Parts)
+@with_options("snooping", Snooping)
 @with_additions()
 def adjust(
     job: Job,
@@ -80,11 +83,7 @@ def adjust(
     out: Annotated[
         Path | None,
         Writes.DIRECTORY,
-        out_option(
-            "Directory for report.html, report.txt, the tables of the result, and the adjusted project in"
-            " `adjusted/`."
-            " Default: PATH-adjusted."
-        ),
+        out_option("Directory for reports, tables, and the adjusted project. Default: PATH-adjusted."),
     ] = None,
     json: JsonFile = None,
     html: HtmlFile = None,
@@ -100,8 +99,7 @@ def adjust(
     datum: Annotated[
         DatumName | None,
         typer.Option(
-            help="What coordinates refer to. Default: what PATH says, else control and other observations,"
-            " and minimum constraints where there are none.",
+            help="What coordinates refer to. Default: what PATH says, else control, or minimum constraints.",
             show_default=False,
         ),
     ] = None,
@@ -125,10 +123,7 @@ def adjust(
             show_default=False,
         ),
     ] = None,
-    snoop: Annotated[
-        bool,
-        typer.Option("--snoop", help="Take gross errors out, one after the other; removed.csv lists them."),
-    ] = False,
+    snooping: Snooping = KEPT,
     keep_all: Annotated[
         bool,
         typer.Option(
@@ -188,7 +183,7 @@ def adjust(
         for remark in started.messages if started is not None and not quiet else ():
             print_remark(str(remark))
         removed = None
-        if snoop:
+        if snooping.snoop:
             if divided.division.is_asked_for:
                 raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--snoop")
             if datum is not None or loss is not None or project.options.datum in ("inner", "minimum"):
@@ -197,7 +192,7 @@ def adjust(
             if started is not None and (started.set_aside.any() or started.missing):
                 first = _adjusted(job, project, started, datum, loss, ordering, threads, divided.division)
                 block, aside = first.block, first.set_aside
-            removed = _snooped(job, project, block, threads)
+            removed = _snooped(job, project, block, threads, snooping.options)
             result = removed.result
             assert isinstance(result, Result)
             result = replace(result, set_aside=aside)
@@ -268,7 +263,9 @@ def _started(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | 
     return found.usable(), found
 
 
-def _snooped(job: Job, project: Project, block: Block, threads: int | None) -> Snooped:
+def _snooped(
+    job: Job, project: Project, block: Block, threads: int | None, options: dict[str, Any]
+) -> Snooped:
     from photogram import snoop
 
     with job.status("adjusting and testing") as status:
@@ -276,6 +273,7 @@ def _snooped(job: Job, project: Project, block: Block, threads: int | None) -> S
             block,
             unit_variance=project.options.unit_variance,
             threads=threads,
+            **options,
             progress=shown(status, "weighted sum of squares", 1.0) if status is not None else None,
         )
 

@@ -38,6 +38,7 @@ from photogram.cli.options import (
     Threads,
     UnitWeight,
     as_data,
+    example_out,
     out_option,
 )
 from photogram.cli.pictures import Pictures
@@ -150,6 +151,7 @@ def collection(
 
         if problem is None:
             problem = job.packaged(*EXAMPLE)
+            out = example_out(out, plots, "example-adjusted")
             job.reads(problem)
         packing = problem.suffix if problem.suffix in PACKED else ""
         photos, found = recognised(problem)

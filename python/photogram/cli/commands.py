@@ -28,8 +28,15 @@ from photogram.cli import (
 )
 from photogram.cli.console import output
 from photogram.cli.groups import GroupWithMain
+from photogram.cli.panels import Command
 
 __all__ = ["app"]
+
+ADJUST = (
+    "Examples: `photogram adjust --example`,"
+    " `photogram adjust sparse/0 --control control.csv --control-crs EPSG:25832`,"
+    " `photogram adjust quarry --self-calibrate f,cx,cy,k1,k2 --map quarry.gpkg`"
+)
 
 app = typer.Typer(
     name="photogram",
@@ -40,39 +47,39 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 giant_app = typer.Typer(name="giant", cls=GroupWithMain, help="Adjust or check a GIANT project.")
-giant_app.command("adjust")(giant.giant)
-giant_app.command("check")(check.check)
+giant_app.command("adjust", cls=Command)(giant.giant)
+giant_app.command("check", cls=Command)(check.check)
 comparator_app = typer.Typer(
     name="comparator", cls=GroupWithMain, help="Calibrate a comparator, or correct measurements."
 )
-comparator_app.command("calibrate")(comparator.comparator)
-comparator_app.command("correct")(comparator.correct)
+comparator_app.command("calibrate", cls=Command)(comparator.comparator)
+comparator_app.command("correct", cls=Command)(comparator.correct)
 orientation_app = typer.Typer(
     name="absolute-orientation", cls=GroupWithMain, help="Orient a model absolutely, or transform its points."
 )
-orientation_app.command("orient")(absolute_orientation.absolute_orientation)
-orientation_app.command("transform")(absolute_orientation.transform)
+orientation_app.command("orient", cls=Command)(absolute_orientation.absolute_orientation)
+orientation_app.command("transform", cls=Command)(absolute_orientation.transform)
 stellar_app = typer.Typer(
     name="stellar-camera",
     cls=GroupWithMain,
     help="Calibrate a camera by a plate with stars, or by exposures of the sky.",
 )
-stellar_app.command("plate")(stellar_camera.stellar_camera)
-stellar_app.command("exposures")(stellar_camera.exposures)
-stellar_app.command("places")(stellar_camera.places)
-app.command()(adjust.adjust)
-app.command("check")(check_project.check_project)
-app.command()(info.info)
-app.command()(convert.convert)
-app.command()(new.new)
+stellar_app.command("plate", cls=Command)(stellar_camera.stellar_camera)
+stellar_app.command("exposures", cls=Command)(stellar_camera.exposures)
+stellar_app.command("places", cls=Command)(stellar_camera.places)
+app.command(cls=Command, epilog=ADJUST)(adjust.adjust)
+app.command("check", cls=Command)(check_project.check_project)
+app.command(cls=Command)(info.info)
+app.command(cls=Command)(convert.convert)
+app.command(cls=Command)(new.new)
 app.add_typer(giant_app)
 app.add_typer(orientation_app)
 app.add_typer(comparator_app)
-app.command("collection")(collection.collection)
-app.command("perspective-center")(perspective_center.perspective_center)
+app.command("collection", cls=Command)(collection.collection)
+app.command("perspective-center", cls=Command)(perspective_center.perspective_center)
 app.add_typer(stellar_app)
-app.command()(plan.plan)
-app.command()(simulate.simulate)
+app.command(cls=Command)(plan.plan)
+app.command(cls=Command)(simulate.simulate)
 
 
 def _version(asked: bool) -> None:

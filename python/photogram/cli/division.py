@@ -19,8 +19,7 @@ Cluster = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS|local",
-        help="Adjust in parts on a Dask cluster: the address of its scheduler, or `local` for workers on this"
-        " machine (needs the extra `distributed`).",
+        help="Adjust in parts on a Dask cluster: its scheduler, or `local` for workers on this machine.",
         show_default=False,
     ),
 ]
@@ -38,8 +37,7 @@ Memory = Annotated[
     str | None,
     typer.Option(
         metavar="SIZE",
-        help="Memory of a worker, or of this process without a cluster (4GB, 1.5GiB): a block that takes more"
-        " is adjusted in parts.",
+        help="Memory of a worker, or of this process (4GB, 1.5GiB): what takes more goes in parts.",
         show_default=False,
     ),
 ]
@@ -49,8 +47,7 @@ RunFolder = Annotated[
     typer.Option(
         "--run",
         metavar="DIR",
-        help="Keep parts and states there, on a disk that all workers see: the same command takes up a run"
-        " that died.",
+        help="Keep parts and states there, for all workers: the same command takes up a run that died.",
         show_default=False,
     ),
 ]

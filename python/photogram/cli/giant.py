@@ -25,6 +25,7 @@ from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.maps import CloudFile, CloudOrigin, MapFile, check_maps, drawn_maps, point_clouds
 from photogram.cli.options import (
+    KEPT,
     JsonFile,
     Ordering,
     OrderingName,
@@ -33,18 +34,16 @@ from photogram.cli.options import (
     PlotFormat,
     Plots,
     Quiet,
-    Snoop,
-    SnoopLevel,
-    SnoopRate,
+    Snooping,
     Strict,
     Threads,
-    UnitWeight,
     as_data,
     default_out,
     out_option,
 )
 from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
+from photogram.cli.projects import with_options
 from photogram.cli.refraction import AirModel, WaterModel
 
 if TYPE_CHECKING:
@@ -60,6 +59,7 @@ RESULTS = ("FRAMES", "GROUND", "RESTART", "report.txt")
 
 
 @with_job
+@with_options("snooping", Snooping)
 def giant(
     job: Job,
     directory: Annotated[
@@ -140,13 +140,7 @@ def giant(
         typer.Option(min=1, help="Refractive index of the water. Default: 1.340.", show_default=False),
     ] = None,
     threads: Threads = None,
-    snoop: Snoop = False,
-    level: SnoopLevel = 0.05,
-    fdr: SnoopRate = None,
-    unit_weight: Annotated[
-        UnitWeight,
-        typer.Option(help="With --snoop: whether standard deviations are right, or but for a common factor."),
-    ] = UnitWeight.KNOWN,
+    snooping: Snooping = KEPT,
     limits: Annotated[
         str | None,
         typer.Option(
@@ -192,10 +186,10 @@ def giant(
         )
         remarks = job.told([*project.messages, *plane_remarks(block, directory)])
         project = replace(project, messages=remarks)
-        if snoop and (as_published or project.common.intersection_only):
+        if snooping.snoop and (as_published or project.common.intersection_only):
             refused = "not with --as-published or an intersection"
             raise typer.BadParameter(refused, param_hint="--snoop")
-        options = {"level": level, "fdr": fdr, "unit_weight": unit_weight.value} if snoop else None
+        options = snooping.options if snooping.snoop else None
         try:
             result, log, made = _adjust(
                 job, project, block, as_published, unit_variance, ordering, threads, options, components

@@ -28,8 +28,7 @@ HtmlFile = Annotated[
     typer.Option(
         "--html",
         metavar="FILE",
-        help="Where the report for the browser goes (needs the extra `report`). Default: report.html in the"
-        " directory of results, if there is one.",
+        help="Where the report for the browser goes. Default: report.html in --out, if there is one.",
         show_default=False,
     ),
 ]

@@ -22,8 +22,7 @@ Crs = Annotated[
     str | None,
     typer.Option(
         metavar="CRS",
-        help="Coordinate reference system of results: photos, points and control go to `in_crs/` of --out,"
-        " with covariances in metres east, north, up, and maps are in it (EPSG:25832, ENU:lat,lon,h ...).",
+        help="Coordinate reference system of results in `in_crs/` and of maps (EPSG:25832 ...).",
         show_default=False,
     ),
 ]
@@ -33,8 +32,7 @@ MapFile = Annotated[
     typer.Option(
         "--map",
         metavar="FILE",
-        help="Write a map, .gpkg or .geojson: photos, footprints, points with error ellipses, residuals of"
-        " control, suspicious observations.",
+        help="Write a map, .gpkg or .geojson: photos, footprints, error ellipses, suspicious observations.",
         show_default=False,
     ),
 ]
@@ -53,7 +51,7 @@ CloudOrigin = Annotated[
     typer.Option(
         "--ply-origin",
         metavar="X Y Z",
-        help="Taken away from the coordinates of --ply, for viewers that want small ones; a comment says it.",
+        help="Taken away from the coordinates of --ply: viewers want small ones.",
         show_default=False,
     ),
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from photogram.results.network import AdjustedNetwork
 
 __all__ = [
+    "KEPT",
     "FormerPlot",
     "JsonFile",
     "Ordering",
@@ -28,11 +30,14 @@ __all__ = [
     "Snoop",
     "SnoopLevel",
     "SnoopRate",
+    "Snooping",
     "Strict",
     "Threads",
     "UnitWeight",
+    "UnitWeightOption",
     "as_data",
     "default_out",
+    "example_out",
     "out_option",
     "picture_places",
 ]
@@ -49,7 +54,7 @@ ParquetFolder = Annotated[
     typer.Option(
         "--parquet",
         metavar="DIR",
-        help="Write the whole result as data: tables in Parquet, which photogram.read_result reads again.",
+        help="Write the whole result as Parquet, which photogram.read_result reads.",
         show_default=False,
     ),
 ]
@@ -65,13 +70,17 @@ Snoop = Annotated[
 SnoopLevel = Annotated[
     float,
     typer.Option(
-        min=1e-9, max=0.5, help="With --snoop: chance that any good observation is taken out (Bonferroni)."
+        min=1e-9,
+        max=0.5,
+        metavar="P",
+        help="With --snoop: chance that any good observation is taken out (Bonferroni).",
     ),
 ]
 SnoopRate = Annotated[
     float | None,
     typer.Option(
         "--fdr",
+        metavar="P",
         min=1e-9,
         max=0.5,
         help="With --snoop: a false discovery rate in place of --level.",
@@ -85,6 +94,34 @@ class UnitWeight(StrEnum):
 
     KNOWN = "known"
     UNKNOWN = "unknown"
+
+
+UnitWeightOption = Annotated[
+    UnitWeight,
+    typer.Option(
+        metavar="known|unknown",
+        help="With --snoop: whether standard deviations are right, or but for a common factor.",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Snooping:
+    """Whether and how gross errors are taken out, with the options that say it."""
+
+    snoop: Snoop = False
+    level: SnoopLevel = 0.05
+    fdr: SnoopRate = None
+    unit_weight: UnitWeightOption = UnitWeight.KNOWN
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """As :func:`photogram.snoop` takes them."""
+        return {"level": self.level, "fdr": self.fdr, "unit_weight": self.unit_weight.value}
+
+
+KEPT = Snooping()
+"""Nothing is taken out."""
 
 
 class PictureFormat(StrEnum):
@@ -117,10 +154,17 @@ class OrderingName(StrEnum):
     GRAPH_DISSECTION = "graph-dissection"
 
 
-Ordering = Annotated[OrderingName, typer.Option(help="Order of the photographs in the normal equations.")]
+Ordering = Annotated[
+    OrderingName,
+    typer.Option(
+        metavar="NAME", help=f"Order of the photographs: {', '.join(each.value for each in OrderingName)}."
+    ),
+]
 Threads = Annotated[
     int | None,
-    typer.Option(min=1, help="Threads; the results do not depend on it. Default: all.", show_default=False),
+    typer.Option(
+        min=1, metavar="N", help="Threads; the results do not depend on it. Default: all.", show_default=False
+    ),
 ]
 
 
@@ -146,6 +190,11 @@ def picture_places(
         raise typer.BadParameter("goes with --out DIR", param_hint="--plots")
     places = [out / f"{name}.{ending.value}"] if plots and out else []
     return [*places, former] if former else places
+
+
+def example_out(out: Path | None, plots: bool, name: str) -> Path | None:
+    """Return the directory for results of a packaged example: one of its own where pictures need one."""
+    return out or (Path(name) if plots else None)
 
 
 def default_out(source: Path, ending: str) -> Path:

@@ -20,6 +20,7 @@ from photogram.cli.options import (
     Plots,
     Quiet,
     Strict,
+    example_out,
     out_option,
     picture_places,
 )
@@ -94,6 +95,7 @@ def perspective_center(
 
         if deck is None:
             deck = job.packaged(*EXAMPLE)
+            out = example_out(out, plots, "example-resected")
             job.reads(deck)
         listings = [path for path in (listing, out and out / "listing.txt") if path]
         pictures = picture_places("residuals", plots, plot_format, out, plot)

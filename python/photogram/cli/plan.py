@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from photogram.cli.check import EXAMPLE as GALVESTON
 from photogram.cli.console import output, print_remark
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
@@ -19,6 +20,7 @@ from photogram.cli.options import (
     PlotFormat,
     Plots,
     Quiet,
+    example_out,
     out_option,
     picture_places,
 )
@@ -46,6 +48,9 @@ def plan(
             show_default=False,
         ),
     ] = None,
+    packaged: Annotated[
+        bool, typer.Option("--example", help="Predict the packaged block of `photogram giant --example`.")
+    ] = False,
     against: Annotated[
         Control, typer.Option(help="Where the control points of the second pattern are.")
     ] = Control.CORNERS,
@@ -81,6 +86,11 @@ def plan(
         from photogram.planning import plan as predict
         from photogram.show.ways import page_of
 
+        if packaged:
+            if projects:
+                raise typer.BadParameter("goes without DIR", param_hint="--example")
+            projects = [job.packaged(GALVESTON)]
+            out = example_out(out, plots, "example-planned")
         report = out and out / "report.txt"
         pictures = picture_places("plan", plots, plot_format, out, plot)
         place = html_place(html, no_html, out)

@@ -81,8 +81,7 @@ ControlCrs = Annotated[
     typer.Option(
         "--control-crs",
         metavar="CRS",
-        help="Coordinate reference system of --control (EPSG:25832, ENU:lat,lon,h ...), where it is not that"
-        " of PATH; needs pyproj.",
+        help="Coordinate reference system of --control (EPSG:25832 ...), where it is not that of PATH.",
         show_default=False,
     ),
 ]
@@ -126,7 +125,10 @@ PixelOrigin = Annotated[
 Model = Annotated[
     int | None,
     typer.Option(
-        min=0, help="Which of several models of a file, from 0. Default: the largest.", show_default=False
+        min=0,
+        metavar="N",
+        help="Which of several models of a file, from 0. Default: the largest.",
+        show_default=False,
     ),
 ]
 Angles = Annotated[

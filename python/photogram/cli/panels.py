@@ -1,0 +1,59 @@
+"""How the help of a command looks: its options in panels, the same ones for all commands."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from typer.core import TyperCommand
+
+__all__ = ["Command"]
+
+PANELS = {
+    "Input": "example packaged file_format control control_crs columns images names camera sd pixel_origin"
+    " model angles grid hand against against_spacing against_position_sd catalogue utc epoch"
+    " faintest points point_sd decimals format zero_missing ground_unit model_unit restart"
+    " start reject",
+    "Results": "out overwrite json html no_html plots plot_format parquet crs map ply ply_origin listing"
+    " pdf to trace points_out date safe_csv",
+    "Adjustment": "datum datum_points loss scale tolerance max_iterations covariance unit_variance"
+    " self_calibrate keep_all keep_repeated as_published weights method polynomial"
+    " estimate_grid each_case lens common_scale without any_roll blind air_refraction"
+    " water_refraction water_level water_index limits invert extrapolate components",
+    "Gross errors": "snoop level fdr unit_weight",
+    "In parts": "cluster workers parts memory run plan",
+    "Simulated block": "strips photos_per_strip forward_overlap side_overlap principal_distance frame_size"
+    " flying_height relief points_per_photo crab tilt control_spacing control_sd image_sd"
+    " position_sd attitude_sd spheroid origin photo_to_ground check_points position_error"
+    " attitude_error blunders blunder_size seed",
+    "Run": "ordering threads strict quiet help",
+}
+"""Options by the names of their parameters; what is in none is under `Options`."""
+
+PANEL_OF = {option: panel for panel, options in PANELS.items() for option in options.split()}
+
+
+class Command(TyperCommand):
+    """A command whose help has panels, and says of a switch nothing but what it does."""
+
+    def __init__(self, *args: Any, **values: Any) -> None:
+        super().__init__(*args, **values)
+        # Lines of a docstring are lines of the source.
+        self.help = self.help and "\n\n".join(" ".join(each.split()) for each in self.help.split("\n\n"))
+        for each in self.params:
+            _arrange(each)
+
+    def get_help_option(self, ctx: Any) -> Any:
+        """Return --help in its panel."""
+        option = super().get_help_option(ctx)
+        if option is not None:
+            _arrange(option)
+        return option
+
+
+def _arrange(parameter: Any) -> None:
+    if parameter.param_type_name != "option":
+        return
+    parameter.rich_help_panel = PANEL_OF.get(parameter.name)
+    # typer shows the type of a switch, which is none that a user writes.
+    if parameter.is_flag and parameter.metavar is None:
+        parameter.metavar = ""
