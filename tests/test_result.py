@@ -41,6 +41,7 @@ def result(request: pytest.FixtureRequest) -> Result:
             "point_ids": [*block.point_ids, "SINGLE"],
             "point_positions": np.vstack([block.point_positions, np.full((1, 3), np.nan)]),
             "point_sd": np.vstack([block.point_sd, np.full((1, 3), np.inf)]),
+            "point_check_sd": None,
             "image_photos": np.append(block.image_photos, 2),
             "image_points": np.append(block.image_points, len(block.point_ids)),
             "image_xy": np.vstack([block.image_xy, [[1.0, 2.0]]]),
@@ -185,7 +186,7 @@ def test_section_14_check_table(result):
     differences = outward(result, result.point_differences[check])
     np.testing.assert_allclose(table.iloc[:, 1:4].to_numpy(), differences, rtol=1e-12)
     np.testing.assert_allclose(
-        table.iloc[:, 4:].to_numpy(), outward(result, result.point_sd[check]), rtol=1e-15
+        table.iloc[:, 4:7].to_numpy(), outward(result, result.point_sd[check]), rtol=1e-15
     )
     assert all(name.startswith("d_") for name in table.columns[1:4])
 
@@ -257,7 +258,7 @@ def test_every_quantity_of_the_report_has_a_unit(result):
     for line in parts["Residuals"]:
         if line.startswith("rms"):
             assert unit.search(line), line
-    assert len(unit.findall(parts["Check points: adjusted minus supplied"][0])) == 3
+    assert len(unit.findall(parts["Check points: adjusted minus given, standard deviations, test"][0])) == 3
     control = next(title for title in parts if title.startswith("Control as observations"))
     assert len(unit.findall(parts[control][0])) == 3
     # Values and deviations stand on two lines under two headings.

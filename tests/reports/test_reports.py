@@ -241,7 +241,7 @@ def test_figures_of_the_page_are_those_of_the_result():
     head, rows = Tables(section(text, "check-points")).of("Check points one by one")
     table = result.check_table().set_index("point")
     assert len(rows) == 3 * len(table)
-    difference, sd = head.index("Adjusted - known m"), head.index("sd adjusted m")
+    difference, sd = head.index("Adjusted - given m"), head.index("sd adjusted m")
     for row in rows:
         assert float(row[difference]) == pytest.approx(
             table.loc[row[0], f"d_{row[1]}"], abs=0.06 * float(row[sd])

@@ -274,6 +274,7 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
         point_ids=at_home.names,
         point_positions=at_home.point_positions,
         point_sd=at_home.point_sd,
+        point_check_sd=None,  # the whole block has them
         image_photos=new_photos[at_home.image_photos],
         image_points=at_home.image_points,
         image_xy=at_home.image_xy,

@@ -147,6 +147,7 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
             point_ids=[*block.point_ids, *new],
             point_positions=np.vstack([block.point_positions, fill]),
             point_sd=np.vstack([block.point_sd, np.full_like(fill, np.inf)]),
+            point_check_sd=None if block.point_check_sd is None else np.vstack([block.point_check_sd, fill]),
             image_photos=np.concatenate([block.image_photos, photos]),
             image_points=np.concatenate([block.image_points, points]),
             image_xy=np.vstack([block.image_xy, xy]),
@@ -270,12 +271,18 @@ def with_control(
     block = carried.block
     positions, deviation = block.point_positions.copy(), block.point_sd.copy()
     positions[targets], deviation[targets] = given.positions[rows], given.sd[rows]
+    before = block.point_check_sd
+    check_sd = np.full_like(positions, np.nan) if before is None else before.copy()
+    check_sd[targets] = given.check_sd[rows]
     full = [each for each in given.observed if each.points[0] in places]
     for each in full:
         positions[places[each.points[0]]] = np.nan
     found = carried.replace(
         block=block.replace(
-            point_positions=positions, point_sd=deviation, observations=[*block.observations, *full]
+            point_positions=positions,
+            point_sd=deviation,
+            point_check_sd=check_sd,
+            observations=[*block.observations, *full],
         ),
         messages=(*messages, *carried.messages[len(project.messages) :]),
     )

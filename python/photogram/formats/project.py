@@ -131,6 +131,7 @@ def assembled(
     pixel_mm: Sequence[float | None] | None = None,
     point_positions: Floats | None = None,
     point_sd: Floats | None = None,
+    point_check_sd: Floats | None = None,
     photo_position_sd: ArrayLike = np.inf,
     photo_attitude_sd: ArrayLike = np.inf,
     observations: Sequence[Observation] = (),
@@ -159,7 +160,8 @@ def assembled(
         Of the project.
     cameras, photo_ids, photo_cameras, point_ids, image_photos, image_points, image_xy, observations, mounts
         As in :class:`photogram.Block`.
-    point_positions, point_sd, photo_position_sd, photo_attitude_sd, linear_unit, spheroid, photo_to_ground
+    point_positions, point_sd, point_check_sd, photo_position_sd, photo_attitude_sd, linear_unit, spheroid,
+    photo_to_ground
         As there.
 
     Raises
@@ -200,6 +202,9 @@ def assembled(
             point_ids=point_ids,
             point_positions=np.full((count, 3), np.nan) if point_positions is None else point_positions,
             point_sd=np.full((count, 3), np.inf) if point_sd is None else point_sd,
+            point_check_sd=None
+            if point_check_sd is None or np.isnan(point_check_sd).all()
+            else point_check_sd,
             image_photos=image_photos[keep],
             image_points=image_points[keep],
             image_xy=image_xy[keep],

@@ -86,11 +86,14 @@ def project_of(
         lacks.append(
             f"no standard deviations of control: {len(held)} points are only compared (--sd control=..)"
         )
+    check_sd = np.full_like(positions, np.nan)
     for name, (position, used) in found.control.items():
         # What is not held of a control point is not known; a check point is known altogether.
         positions[places[name]] = np.where(used | ~used.any(), position, np.nan)
         if used.any() and "control" in wishes.sd:
             sd[places[name]] = np.where(used, wishes.sd["control"], np.inf)
+        elif not used.any():
+            check_sd[places[name]] = wishes.sd.get("check", wishes.sd.get("control", np.nan))
     cameras = {camera: row for row, camera in enumerate(found.cameras)}
     return assembled(
         path=path,
@@ -105,6 +108,7 @@ def project_of(
         starts=positions.copy(),
         point_positions=positions,
         point_sd=sd,
+        point_check_sd=check_sd,
         image_photos=np.array([rows[each[0]] for each in found.images], dtype=np.int64),
         image_points=np.array([places[each[1]] for each in found.images], dtype=np.int64),
         image_xy=np.array([each[2:] for each in found.images], dtype=float).reshape(-1, 2),

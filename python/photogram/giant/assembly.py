@@ -62,7 +62,7 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
     if limits.bandwidth is not None:
         structured = structure(image_photos[kept], image_points[kept])
         check_bandwidth(structured, frames, list(index), limits.bandwidth, common.intersection_only, messages)
-    position, sd = _control(project, index, messages)
+    position, sd, check_sd = _control(project, index, messages)
     block = Block(
         photo_ids=[frame.name for frame in frames],
         photo_positions=_longitudes(np.array([frame.position for frame in frames]), common.geographic),
@@ -77,6 +77,7 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
         photo_position_sd=_or_default([frame.position_sd for frame in frames], common.default_station_sd),
         photo_attitude_sd=_or_default([frame.attitude_sd for frame in frames], ATTITUDE_SD),
         point_sd=sd,
+        point_check_sd=check_sd,
         spheroid=_spheroid(common),
         photo_to_ground=common.photo_to_ground,
         title=common.title,
@@ -176,10 +177,15 @@ def _first_images(
     return np.delete(np.arange(len(pairs)), again)
 
 
-def _control(project: Contents, index: dict[str, int], messages: list[Message]) -> tuple[Floats, Floats]:
-    """Return positions and standard deviations of all points: those of GROUND where it has any."""
+def _control(
+    project: Contents, index: dict[str, int], messages: list[Message]
+) -> tuple[Floats, Floats, Floats | None]:
+    """Return positions and standard deviations of all points: those of GROUND where it has any.
+
+    The second standard deviations are those of check points; None where there are none.
+    """
     position = np.full((len(index), 3), np.nan)
-    sd = np.full((len(index), 3), np.inf)
+    sd, check_sd = np.full((len(index), 3), np.inf), None
     control: dict[int, GroundPoint] = {}
     placed: set[str] = set()
     alike = {plain_name(name): name for name in index}
@@ -207,11 +213,16 @@ def _control(project: Contents, index: dict[str, int], messages: list[Message]) 
         position[rows] = np.where(held | (values != 0), values, np.nan)
         weights = _or_default([point.sd for point in control.values()], project.common.default_control_sd)
         sd[rows] = np.where(held, weights, np.inf)
+        if not held.any(axis=1).all():
+            # The default of COMMON weights control; it says nothing of how good a check point is.
+            own = np.array([point.sd for point in control.values()])
+            check_sd = np.full_like(position, np.nan)
+            check_sd[rows] = np.where(held.any(axis=1, keepdims=True) | (own <= 0), np.nan, own)
     if not np.isfinite(sd).any():
         record = next((point.record for point in project.ground if point.record), None)
         path = record.source.path if record else project.directory
         messages.append(Message("GROUND holds no component of a photographed point", path))
-    return position, sd
+    return position, sd, check_sd
 
 
 def _or_default(values: ArrayLike, default: ArrayLike) -> Floats:

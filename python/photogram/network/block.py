@@ -83,6 +83,9 @@ class Block(Valued, Brief):
     point_sd
         (n, 3): finite for held components of control, 0 to fix them, infinite (the default) for pass points
         and unheld components. An unheld component with a finite position is a check on the adjustment.
+    point_check_sd
+        (n, 3) standard deviations of the given coordinates of check points: no part of the adjustment, but of
+        what differences are tested against. NaN where unknown (None: everywhere): as of control.
     spheroid
         None for rectangular space, else the ellipsoid of geographic space.
     photo_to_ground
@@ -145,6 +148,7 @@ class Block(Valued, Brief):
     photo_cameras: Indices | None = None
     mounts: Sequence[Mount] = ()
     frame: Frame = field(default_factory=Frame)
+    point_check_sd: Floats | None = None
 
     if TYPE_CHECKING:
         # What checkers of types are told: more can be given than what the fields then hold.
@@ -176,6 +180,7 @@ class Block(Valued, Brief):
             photo_cameras: ArrayLike | Sequence[str] | None = None,
             mounts: Sequence[Mount] = (),
             frame: Frame = ...,
+            point_check_sd: ArrayLike | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -205,6 +210,10 @@ class Block(Valued, Brief):
         for name in ("photo_positions_observed", "photo_attitudes_observed"):
             if getattr(self, name) is not None:
                 self._set(name, shaped(name, getattr(self, name), (photos, 3), missing=True))
+        if self.point_check_sd is not None:
+            self._set(
+                "point_check_sd", shaped("point_check_sd", self.point_check_sd, (points, 3), missing=True)
+            )
         for name, count in (("image_photos", photos), ("image_points", points)):
             self._set(name, indices(name, getattr(self, name), images, count))
         self._check_values()
@@ -241,6 +250,11 @@ class Block(Valued, Brief):
         self._refuse("point_positions", np.isinf(self.point_positions), "is infinite", self.point_ids)
         for name in ("photo_position_sd", "photo_attitude_sd", "point_sd"):
             self._refuse(name, ~(getattr(self, name) >= 0), "is not a standard deviation", owners[name[:5]])
+        if self.point_check_sd is not None:
+            bad = ~(np.isnan(self.point_check_sd) | (self.point_check_sd >= 0)) | np.isinf(
+                self.point_check_sd
+            )
+            self._refuse("point_check_sd", bad, "is not a finite standard deviation", self.point_ids)
         bad = ~((self.image_sd > 0) & np.isfinite(self.image_sd))
         self._refuse("image_sd", bad, "is not a positive, finite standard deviation", None)
         held_unknown = np.isfinite(self.point_sd) & np.isnan(self.point_positions)
@@ -463,6 +477,8 @@ class Block(Valued, Brief):
     def replace(self, **changes: Any) -> Self:
         """Return a block with some fields replaced, checked anew; the arrays of the others are shared.
 
+        With another number of points `point_check_sd` is not kept, unless it is replaced too.
+
         Raises
         ------
         InputError
@@ -471,6 +487,9 @@ class Block(Valued, Brief):
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         if unknown := changes.keys() - values.keys():
             raise InputError(f"a block has no {', '.join(sorted(unknown))}")
+        points = changes.get("point_ids")
+        if points is not None and len(points) != len(self.point_ids):
+            values["point_check_sd"] = None
         return type(self)(**{**values, **changes})
 
     def in_frame(self, frame: Frame) -> Self:

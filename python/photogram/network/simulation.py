@@ -70,7 +70,7 @@ class Simulation:
     block
         What would have been measured: noisy image coordinates, control and, where they are weighted,
         positions and attitudes of the photos; besides their coarse initial values. Check points have their
-        true positions, unheld; pass points have none.
+        true positions, unheld and known without error; pass points have none.
     truth
         The same block with true positions and attitudes everywhere and image coordinates free of errors.
     blunders
@@ -309,6 +309,7 @@ def simulate(
         photo_positions_observed=_observed(positions, truth.photo_position_sd, streams[6]),
         photo_attitudes_observed=_observed(attitudes, truth.photo_attitude_sd, streams[6]),
         point_positions=np.where(known, ground + np.where(held, control_noise, 0.0), np.nan),
+        point_check_sd=np.where(known & ~held, 0.0, np.nan) if len(checks) else None,
         image_xy=measured,
     )
     if taking := checked_cameras(cameras):

@@ -20,7 +20,8 @@ _PREFIXES = {
     "sd_": "standard deviation: ",
     "redundancy_": "redundancy number: ",
     "test_": "residual over its standard deviation, a priori unit weight: ",
-    "difference_": "adjusted minus supplied: ",
+    "difference_": "adjusted minus given: ",
+    "given_sd_": "standard deviation that was given, or is assumed: ",
 }
 _DESCRIPTIONS = {
     "photo": "name of the photo",
@@ -51,12 +52,15 @@ _DESCRIPTIONS = {
     "sd": "standard deviation",
     "residual": "observed minus adjusted",
     "redundancy": "redundancy number",
+    "assumed": "whether nothing was given: standard deviations of control are assumed",
+    "statistic": "of the test: T, or F where the unit weight is estimated",
+    "probability": "of a statistic as large where nothing is wrong",
     "test": "residual over its standard deviation, a priori unit weight",
 }
 _RENAMED = {"standardized": "test", "d": "difference"}
 _SUFFIXES = ("_deg", "_rad", "_px", "_mm")
 _TEXTS = ("photo", "point", "camera", "kind", "of", "unknown", "component", "parameter", "model", "unit")
-_PLAIN = ("redundancy", "test", "rays", "images")
+_PLAIN = ("redundancy", "test", "rays", "images", "assumed", "statistic", "probability")
 _OF_ROW = ("given", "sd_given", "value", "change", "sd", "residual")
 
 

@@ -326,9 +326,9 @@ def _stations(result: Result) -> list[dict[str, Any]]:
 
 
 def _check_points(result: Result) -> list[dict[str, Any]]:
-    check = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
-    differences = _outward(result, result.point_differences[check]).tolist()
-    return [
-        {"id": result.block.point_ids[point], "difference": difference}
-        for point, difference in zip(check, differences, strict=True)
-    ]
+    checks = result.check_points
+    arrays = (checks.differences, checks.sd, checks.given_sd)
+    columns = [_outward(result, each).tolist() for each in arrays]
+    names = ("id", "difference", "sd", "given_sd", "assumed", "statistic", "p")
+    rows = zip(checks.names, *columns, checks.assumed.tolist(), *checks.statistics, strict=True)
+    return [dict(zip(names, row, strict=True)) for row in rows]

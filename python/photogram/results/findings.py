@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.arrays import chosen, finite_rows
+from photogram.messages import counted
 from photogram.results.groups_tested import groups_tested
 from photogram.results.held import held_tested
 from photogram.results.kinds import tested_kind
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observed import tested
+from photogram.results.outward import outward
 from photogram.results.patterns import CameraImages, patterns
 from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
@@ -43,8 +45,9 @@ def block_findings(result: Result) -> Findings:
         global_test=None if result.loss else result.global_test,
         untested=ROBUST if result.loss else "no degrees of freedom",
         computed=has_redundancy(result),
+        checks=result.check_points.agreement,
         systematic=_patterns(result),
-        remarks=[*unseen(result), *_left_out(result)],
+        remarks=[*unseen(result), *_left_out(result), *_on_checks(result)],
         hints=result.hints,
         exchanged=result.exchanged,
         set_aside=_set_aside(result),
@@ -79,6 +82,25 @@ def _left_out(result: Result) -> list[str]:
     ]
 
 
+def _on_checks(result: Result) -> list[str]:
+    """Say which check points are tested with what nobody has given, and why they are not tested."""
+    checks, (_, units, factors) = result.check_points, outward(result.block)
+    if not len(checks.rows):
+        return []
+    if checks.agreement is None:
+        return [f"check points are not tested: {checks.untested}"]
+    if not checks.assumed.any():
+        return []
+    own = checks.given_sd[checks.assumed][0] * factors
+    assumed = " and ".join(
+        dict.fromkeys(f"{value:.2g} {unit}" for value, unit in zip(own.tolist(), units, strict=True))
+    )
+    return [
+        f"standard deviations of {checks.assumed.sum()} of {counted(len(checks.rows), 'check point')} are not"
+        f" given: those of control are assumed ({assumed}); --sd check=... says how good they are"
+    ]
+
+
 def _patterns(result: Result) -> list[Systematic]:
     block, photos = result.block, len(result.block.photo_ids)
     cameras = [CameraImages("the camera", np.ones(photos, dtype=bool), 0)]
@@ -109,7 +131,7 @@ def tested_observations(result: Result) -> list[Observations]:
 
 def axes(result: Result) -> tuple[str, str, str]:
     """Return what the coordinates are called."""
-    return ("longitude", "latitude", "height") if result.block.geographic else ("X", "Y", "Z")
+    return outward(result.block)[0]
 
 
 def has_redundancy(result: AdjustedNetwork) -> bool:

@@ -15,6 +15,7 @@ from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.kinds import kind_lines
 from photogram.results.observed import image_lines, observed_lines
+from photogram.results.outward import outward
 from photogram.results.result import Result
 from photogram.results.unknowns import unknown_lines
 from photogram.results.weakest import weakest_lines
@@ -51,7 +52,7 @@ def report(result: Result) -> str:
         ("Redundancy by kind of observation", _redundancy(result)),
         ("Reliability", _reliability(result)),
         ("Iterations", _iterations(result)),
-        ("Check points: adjusted minus supplied", _difference_table(result, _check_differences(result))),
+        ("Check points: adjusted minus given, standard deviations, test", _check_points(result)),
         (
             "Control as observations: observed minus adjusted, redundancy, standardized residual",
             _control(result),
@@ -261,6 +262,24 @@ def _difference_table(result: Result, differences: Floats) -> list[str]:
     return lines
 
 
+def _check_points(result: Result) -> list[str]:
+    """List differences with the standard deviations of both, T or F, and p."""
+    checks, (axes, units, factors) = result.check_points, outward(result.block)
+    statistic = "F" if result.unit_variance != "unity" else "T"
+    head = "".join(f"{f'd {axis} {unit}':>18}" for axis, unit in zip(axes, units, strict=True))
+    lines = [f"{'point':<10}{'':<14}{head}{statistic:>12}{'p':>10}"] if len(checks.rows) else []
+    for k, name in enumerate(checks.names):
+        value, p = (float(each[k]) for each in checks.statistics)
+        for first, what, values, rest in (
+            (name, "difference", checks.differences[k], f"{value:>12.2f}{p:>10.2g}"),
+            ("", "sd adjusted", checks.sd[k], ""),
+            ("", "sd assumed" if checks.assumed[k] else "sd given", checks.given_sd[k], ""),
+        ):
+            cells = "".join(f"{_number(each, 5):>18}" for each in values * factors)
+            lines.append(f"{first:<10}{what:<14}{cells}{rest}")
+    return lines
+
+
 def _control(result: Result) -> list[str]:
     columns = [f"{axis} {unit}" for axis, unit in zip(axes(result), _difference_units(result), strict=True)]
     return observed_lines("point", result.block.point_ids, columns, _outward(result), result.control)
@@ -373,12 +392,11 @@ def image_unit(result: Result) -> tuple[str, float]:
 
 def _outward(result: Result) -> Floats:
     """Return the factors from inner units to those of the report: arcsec for angles."""
-    return np.array([1.0 / ARCSEC, 1.0 / ARCSEC, 1.0] if result.block.geographic else [1.0, 1.0, 1.0])
+    return outward(result.block)[2]
 
 
 def _difference_units(result: Result) -> tuple[str, str, str]:
-    unit = result.block.linear_unit
-    return ("arcsec", "arcsec", unit) if result.block.geographic else (unit, unit, unit)
+    return outward(result.block)[1]
 
 
 def _differences(result: Result, values: Iterable[float]) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
@@ -17,6 +18,7 @@ from photogram.network.block import Block
 from photogram.network.core import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
+from photogram.results.check_points import CheckPoints, check_points
 from photogram.results.covariance import Covariances
 from photogram.results.datum import (
     ResultDatum,
@@ -371,6 +373,25 @@ class Result(AdjustedNetwork):
         if self.block.geographic:
             differences[:, 0] = _least_turns(differences[:, 0])
         return differences
+
+    @cached_property
+    def check_points(self) -> CheckPoints:
+        """Check points with their differences and standard deviations, tested one by one and together."""
+        known = self.unit_variance == "unity" or self.variance_of_unit_weight is None
+        untested = "" if self.converged else "the adjustment has not converged"
+        if not self.block.photo_position_sd.any() and not self.block.photo_attitude_sd.any():
+            untested = "all photos are fixed, and no standard deviation has their errors"
+        if self.datum.is_chosen:
+            untested = "the datum of the network is chosen, and theirs is another"
+        return check_points(
+            self,
+            self.block,
+            self.point_differences,
+            self.point_kinds,
+            second=math.inf if known else self.degrees_of_freedom,
+            untested=untested,
+            whole=self.WHOLE,
+        )
 
     def check_table(self) -> pd.DataFrame:
         """Return check points as a data frame: adjusted minus supplied coordinates, standard deviations."""

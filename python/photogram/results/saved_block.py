@@ -44,6 +44,7 @@ __all__ = ["KIND", "block_files", "read_block_result"]
 
 KIND = "block"
 _ANGLES = ("omega", "phi", "kappa")
+CHECK_SD = "standard deviation of the given {} of a check point; NaN where not known"
 _CLASSES = (
     AdjustedCamera,
     AdjustedUnknown,
@@ -179,7 +180,10 @@ def _parts_of(
     ]
     return {
         "photos": photos,
-        "points": point_parts("block", places, lengths, last=True),
+        "points": [
+            *point_parts("block", places, lengths, last=True),
+            Part("block.point_check_sd", places, lengths, CHECK_SD, prefix="check_sd_"),
+        ],
         "images": image_parts("block", image_unit),
     }
 

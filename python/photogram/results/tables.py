@@ -57,13 +57,17 @@ def _images(result: Result) -> dict[str, Any]:
 
 
 def _check_points(result: Result) -> dict[str, Any]:
-    """`d_`, adjusted minus supplied coordinates, and standard deviations (`sd_`)."""
-    check = result.used_points & (result.point_kinds == "check")
-    names = position_columns(result.block)
+    """`d_`, adjusted minus given; standard deviations of both (`sd_`, `given_sd_`); test and probability."""
+    checks, names = result.check_points, position_columns(result.block)
+    statistic, p = checks.statistics
     return {
-        "point": _ids(result.block.point_ids)[check],
-        **named(names, result.point_differences[check], "d_"),
-        **named(names, result.point_sd[check], "sd_"),
+        "point": _ids(checks.names),
+        **named(names, checks.differences, "d_"),
+        **named(names, checks.sd, "sd_"),
+        **named(names, checks.given_sd, "given_sd_"),
+        "assumed": checks.assumed,
+        "statistic": statistic,
+        "probability": p,
     }
 
 

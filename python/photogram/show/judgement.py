@@ -54,6 +54,16 @@ _NEXT = {
         "So many observations are not wrong by themselves. Look for what they have in common: a camera, a"
         " day, a wrong control system; {check}.",
     ),
+    "check-points": (
+        "Look at the check points that are named: their names, given coordinates, kind of heights, images. If"
+        " they are right, the block is wrong there, where its own residuals cannot show it: look for control"
+        " or a camera that bends it; {check}.",
+        "Do not hand over the standard deviations of this page before the cause is known.",
+    ),
+    "look-at-check-points": (
+        "Look at the check points that are named. Among good ones as many as these are rare: their given"
+        " coordinates, or what stands for their standard deviations, may be at fault.",
+    ),
     "weights": (
         "The covariances on this page are scaled by the unit variance already: they can be used.",
         "Give the observations standard deviations that are larger by the factor that is named, so that"

@@ -32,6 +32,9 @@ FEW = 5
 ENOUGH = 20
 """Tested observations that the median of their test values needs."""
 
+WITHHELD = 0.001
+"""Level of check points below which a result is withheld: one good block in a thousand."""
+
 MEDIAN = 0.6744897501960817
 """Of the absolute value of a standard normal variable."""
 
@@ -172,6 +175,24 @@ class Evidence:
         alike = NOTABLE_FACTOR <= robust <= self.factor <= NOTABLE_FACTOR * robust
         return self.factor if alike else max(robust, 1.0)
 
+    def disagreement(self, level: float) -> str:
+        """Say which check points disagree at a level, or that all together do; nothing where none does."""
+        checks = self.found.checks
+        if checks is None:
+            return ""
+        beyond = checks.points.beyond(bonferroni(level, self._count(checks.points)))
+        if beyond:
+            named = [f"{number}) {checks.said(place)}" for number, (_, place) in enumerate(sorted(beyond), 1)]
+            return listed(named, NAMED)
+        test = checks.together
+        if test is None or not test.probability_above < level / 2 or test.factor <= NOTABLE_FACTOR:
+            return ""
+        low, high = test.interval
+        return (
+            f"all together, their differences are {test.factor:.3g} (95 percent: {low:.3g} to {high:.3g})"
+            " times larger than predicted"
+        )
+
     @cached_property
     def pattern(self) -> bool:
         """Whether a pattern of residuals is significant and large."""
@@ -244,7 +265,12 @@ class Evidence:
     def tests(self) -> list[Test]:
         """Return the global test, the largest of every kind of observations, and those of patterns."""
         whole = [] if self.test is None else [_whole(self.test)]
-        largest = (_largest(each, self.level, self.number) for each in self.found.observations)
+        largest = [_largest(each, self.level, self.number) for each in self.found.observations]
+        if (checks := self.found.checks) is not None:
+            number = self._count(checks.points)
+            if checks.together is not None:
+                whole.append(replace(_whole(checks.together), name="check points together", statistic="T/m"))
+            largest.append(_largest(checks.points, bonferroni(self.found.level, number), number))
         patterns = [_of_pattern(each) for each in self.found.systematic]
         return [*whole, *(each for each in largest if each is not None), *patterns]
 

@@ -21,6 +21,7 @@ from photogram.statistics.limits import GlobalTest, externally_studentized
 from photogram.statistics.outliers import Observations
 
 __all__ = [
+    "Agreement",
     "Findings",
     "GroupFactor",
     "Removed",
@@ -156,6 +157,32 @@ def of_groups(
     return Tested(kind, tests.fisher, name, "F", dimension, freedom - dimension)
 
 
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """How n points with known values agree with an adjustment that they took no part in.
+
+    Attributes
+    ----------
+    points
+        The test of each point by itself, T_i = d_i' C_ii^-1 d_i.
+    together
+        The test of all with their cross covariances; None without these, or without points.
+    sd
+        (n, k) standard deviations of the differences: roots of C_ii.
+    apart
+        Says how far the point at a place is off, given its (k,) standard deviations.
+    """
+
+    points: Tested
+    together: GlobalTest | None
+    sd: Floats
+    apart: Callable[[tuple[int, ...], Floats], str]
+
+    def said(self, place: tuple[int, ...]) -> str:
+        """Name the point at a place, and say how far it is off."""
+        return f"{self.points.name(place)}, {self.apart(place, self.sd[place[0]])}"
+
+
 @dataclass(frozen=True)
 class Systematic:
     """A test of the pattern of residuals.
@@ -259,6 +286,8 @@ class Findings:
         Why gross errors make the result unusable, where the program has found that itself; a sentence.
     doubtful
         Stars: exposures whose identification is doubtful or rejected.
+    checks
+        How known values that took no part agree with the result; None where there are none, or untested.
     systematic, components, snooped
         What further computations have found, where they were made.
     set_aside
@@ -283,6 +312,7 @@ class Findings:
     exchanged: Sequence[str] = ()
     spoiled: str = ""
     doubtful: Sequence[str] = ()
+    checks: Agreement | None = None
     systematic: Sequence[Systematic] = ()
     components: Sequence[GroupFactor] = ()
     snooped: Removed | None = None

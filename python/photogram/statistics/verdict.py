@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from photogram.messages import counted, listed
-from photogram.statistics.evidence import NAMED, Evidence, Test
+from photogram.statistics.evidence import NAMED, WITHHELD, Evidence, Test
 from photogram.statistics.findings import Findings
 from photogram.statistics.limits import NOTABLE_FACTOR
 
@@ -96,6 +96,8 @@ def verdict(found: Findings) -> Verdict:
     """Judge an adjustment by all that was found about it."""
     evidence = Evidence(found)
     fitting = [line for condition in _CONDITIONS if (line := condition(evidence)) is not None]
+    # What forbids the use comes first: no green headline above a line that says so.
+    fitting.sort(key=lambda line: line.exit == 0)
     first, *others = fitting or [_Line(*evidence.accepted())]
     return Verdict(
         code=first.code,
@@ -209,6 +211,14 @@ def _set_aside(e: Evidence) -> _Line | None:
     return _Line("set-aside", f"{start[:1].upper()}{start[1:]}: {text}", warning=True)
 
 
+def _checks(e: Evidence) -> _Line | None:
+    if said := e.disagreement(WITHHELD):
+        return _Line("check-points", f"Check points disagree with the adjustment: {said}", EXIT_NOT_USABLE)
+    if said := e.disagreement(e.found.level):
+        return _Line("look-at-check-points", f"Look at the check points: {said}", warning=True)
+    return None
+
+
 def _common_factor(e: Evidence) -> _Line | None:
     if not e.high or e.gross or e.pattern or any(each.significant for each in e.found.components):
         return None
@@ -290,6 +300,7 @@ _CONDITIONS: tuple[Callable[[Evidence], _Line | None], ...] = (
     _gross_errors,
     _snooped,
     _set_aside,
+    _checks,
     _common_factor,
     _components,
     _model,

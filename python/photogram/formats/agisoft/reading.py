@@ -62,7 +62,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     given = _accuracies(chunk, wishes)
     names = [each.attributes["label"] for each in shots]
     observations, lacks = _gnss(positions, shots, names, given["gnss"])
-    points, starts, held, sd, full = _markers(positions, list(markers.values()), given["control"])
+    points, starts, held, sd, check_sd, full = _markers(positions, list(markers.values()), given["control"])
     rows = {each.attributes["id"]: row for row, each in enumerate(shots)}
     photos, owners, xy = _locations(chunk, rows, {key: row for row, key in enumerate(markers)})
     order = {key: row for row, key in enumerate(sensors)}
@@ -80,6 +80,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         starts=starts,
         point_positions=held,
         point_sd=sd,
+        point_check_sd=check_sd,
         image_photos=photos,
         image_points=owners,
         image_xy=xy,
@@ -360,11 +361,11 @@ def _gnss(
 
 def _markers(
     positions: _Positions, markers: list[Element], default: Floats
-) -> tuple[list[str], Floats, Floats, Floats, list[Observation]]:
+) -> tuple[list[str], Floats, Floats, Floats, Floats, list[Observation]]:
     names: list[str] = []
     count = len(markers)
     starts, sd = np.full((count, 3), np.nan), np.full((count, 3), np.inf)
-    held = starts.copy()
+    held, check_sd = starts.copy(), starts.copy()
     observed: list[Observation] = []
     for row, each in enumerate(markers):
         name = each.attributes.get("label") or f"marker {row}"
@@ -380,6 +381,7 @@ def _markers(
         found, turned = positions.carried(reference[0][np.newaxis], np.nan_to_num(reference[1])[np.newaxis])
         starts[row] = held[row] = found[0]
         if not enabled:
+            check_sd[row] = np.where(reference[1] > 0, np.sqrt(np.diag(turned[0])), np.nan)
             continue
         if (turned[0] == np.diag(np.diag(turned[0]))).all():
             sd[row] = np.sqrt(np.diag(turned[0]))
@@ -388,7 +390,7 @@ def _markers(
             observed.append(Control(name, found[0], covariance=(turned[0] + turned[0].T) / 2))
         else:
             raise each.error(f"the accuracies of the marker {name} cannot be")
-    return names, starts, held, sd, observed
+    return names, starts, held, sd, check_sd, observed
 
 
 def _locations(

@@ -194,13 +194,13 @@ def _shots(project: Project, world: _World, which: list[int]) -> list[str]:
     return [*lines, "</cameras>"]
 
 
-def _reference(position: Floats, sd: Floats | None) -> str:
-    """Return a reference; without standard deviations it is disabled, a check."""
+def _reference(position: Floats, sd: Floats, check: bool = False) -> str:
+    """Return a reference; that of a check point is disabled, and need not have standard deviations."""
     values = dict(zip("xyz", position.tolist(), strict=True))
-    if sd is not None:
+    if not check or (sd > 0).all():
         values |= dict(zip(("sx", "sy", "sz"), sd.tolist(), strict=True))
     attributes = " ".join(f'{name}="{value!r}"' for name, value in values.items())
-    return f'<reference {attributes} enabled="{"false" if sd is None else "true"}"/>'
+    return f'<reference {attributes} enabled="{"false" if check else "true"}"/>'
 
 
 def _full(project: Project) -> Mapping[str, Control]:
@@ -231,15 +231,17 @@ def _markers(project: Project, world: _World) -> list[str]:
         return []
     positions, sd = block.point_positions[rows].copy(), block.point_sd[rows]
     covariances = np.zeros((len(rows), 3, 3))
-    covariances[:, range(3), range(3)] = np.where(np.isfinite(sd), sd, 0.0) ** 2
     checks: Bools = np.asarray(~np.isfinite(sd).any(axis=1))
+    if block.point_check_sd is not None:
+        sd = np.where(checks[:, np.newaxis], block.point_check_sd[rows], sd)
+    covariances[:, range(3), range(3)] = np.where(np.isfinite(sd), sd, 0.0) ** 2
     for k, row in enumerate(rows):
         if (each := full.get(block.point_ids[row])) is not None:
             positions[k], covariances[k], checks[k] = each.observed, each.precision, False
     positions, deviations = world.references(positions, covariances)
     lines = [f'<markers next_id="{len(rows)}" next_group_id="0">']
     for k, row in enumerate(rows):
-        reference = _reference(positions[k], None if checks[k] else deviations[k])
+        reference = _reference(positions[k], deviations[k], bool(checks[k]))
         lines.append(f'<marker id="{k}" label={quoteattr(block.point_ids[row])}>{reference}</marker>')
     return [*lines, "</markers>", *_locations(project, {row: k for k, row in enumerate(rows)})]
 

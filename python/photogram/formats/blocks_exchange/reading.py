@@ -298,7 +298,7 @@ def _project(path: Path, found: _Found, srs: str) -> Project:
         if not name.strip() or not name.isprintable():
             raise photo.place.error("the ImagePath is no name")
     points = _names(found)
-    starts, positions, sd, observed = frames.points(found.points, points)
+    starts, positions, sd, check_sd, observed = frames.points(found.points, points)
     of_photo = np.array([each.group for each in photos], dtype=np.int64)
     image_photos = np.array([rows[each[0]] for each in images], dtype=np.int64)
     return assembled(
@@ -315,6 +315,7 @@ def _project(path: Path, found: _Found, srs: str) -> Project:
         starts=starts,
         point_positions=positions,
         point_sd=sd,
+        point_check_sd=check_sd,
         image_photos=image_photos,
         image_points=np.array([each[1] for each in images], dtype=np.int64),
         image_xy=_corner(found, images, of_photo[image_photos]),

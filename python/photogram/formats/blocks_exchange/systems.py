@@ -110,11 +110,14 @@ class Systems:
 
     def points(
         self, points: list[PointRecord], names: list[str]
-    ) -> tuple[Floats, Floats, Floats, list[Observation]]:
-        """Return starts, known positions and their standard deviations, and control with full covariances."""
+    ) -> tuple[Floats, Floats, Floats, Floats, list[Observation]]:
+        """Return starts, known positions and their standard deviations, and control with full covariances.
+
+        The second standard deviations are those of check points.
+        """
         count = len(points)
         starts, sd = np.full((count, 3), np.nan), np.full((count, 3), np.inf)
-        positions = starts.copy()
+        positions, check_sd = starts.copy(), starts.copy()
         observed: list[Observation] = []
         for srs in dict.fromkeys(each.srs for each in points):
             rows = [row for row, each in enumerate(points) if each.srs == srs]
@@ -139,13 +142,15 @@ class Systems:
                     continue
                 positions[row] = found[k]
                 if each.check:
+                    variances = np.diag(turned[k])
+                    check_sd[row] = np.where(variances > 0, np.sqrt(variances), np.nan)
                     continue
                 if (turned[k] == np.diag(np.diag(turned[k]))).all():
                     sd[row] = np.where(np.isnan(found[k]), np.inf, np.sqrt(np.diag(turned[k])))
                 else:
                     positions[row] = np.nan
                     observed.append(Control(names[row], found[k], covariance=(turned[k] + turned[k].T) / 2))
-        return starts, positions, sd, observed
+        return starts, positions, sd, check_sd, observed
 
     def gnss(self, photos: list[PhotoRecord], names: list[str], wishes: Wishes) -> list[Observation]:
         """Return positions that photos were given as observations, where there are standard deviations."""

@@ -138,7 +138,7 @@ def _points(project: Project) -> list[str]:
         images[point].append(f"<Measurement><PhotoId>{photo}</PhotoId><x>{x!r}</x><y>{y!r}</y></Measurement>")
     full = {each.point: each for each in block.observations if isinstance(each, Control)}
     control, ties = ["<ControlPoints>"], ["<TiePoints>"]
-    checks = set(project.checks)
+    checks, check_sd = set(project.checks), block.point_check_sd
     for row, name in enumerate(block.point_ids):
         position, sd = block.point_positions[row], block.point_sd[row]
         if name in full:
@@ -147,7 +147,9 @@ def _points(project: Project) -> list[str]:
             control += [
                 "<ControlPoint>",
                 f"<Name>{escape(name)}</Name>",
-                *_given(position, sd, row in checks),
+                *_given(
+                    position, sd if check_sd is None or row not in checks else check_sd[row], row in checks
+                ),
             ]
             control += [*images[row], "</ControlPoint>"]
             continue
@@ -167,7 +169,8 @@ def _given(position: Floats, sd: Floats, check: bool) -> list[str]:
     tags = {axis: float(value) for axis, value, own in zip("xyz", position, held, strict=True) if own}
     lines = [f"<Category>{category}</Category>", f"<Position>{_tags(tags)}</Position>"]
     if check:
-        return [*lines, "<CheckPoint>true</CheckPoint>"]
+        lines.append("<CheckPoint>true</CheckPoint>")
+        held = held & np.isfinite(sd)
     if held[:2].all():
         lines.append(f"<HorizontalAccuracy>{float(np.sqrt((sd[:2] ** 2).mean()))!r}</HorizontalAccuracy>")
     if held[2]:

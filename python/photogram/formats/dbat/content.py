@@ -118,8 +118,8 @@ class Content:
         Centre, and omega, phi, kappa in radians.
     control
         Position and standard deviations of control points.
-    checks, starts
-        Positions of check points, and of others as they were computed before.
+    checks, check_sd, starts
+        Positions of check points with their standard deviations, and of others as they were computed before.
     image_photos, image_points
         Of each measurement.
     pixels, image_sd
@@ -138,6 +138,7 @@ class Content:
     poses: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
     control: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
     checks: dict[int, Floats] = field(default_factory=dict)
+    check_sd: dict[int, Floats] = field(default_factory=dict)
     starts: dict[int, Floats] = field(default_factory=dict)
     image_photos: list[int] = field(default_factory=list)
     image_points: list[int] = field(default_factory=list)
@@ -171,12 +172,13 @@ def project_of(content: Content, wishes: Wishes) -> Project:
     points = list(dict.fromkeys([*content.image_points, *content.control, *content.checks]))
     places = {number: row for row, number in enumerate(points)}
     starts, positions = np.full((len(points), 3), np.nan), np.full((len(points), 3), np.nan)
-    sd = np.full((len(points), 3), np.inf)
+    sd, check_sd = np.full((len(points), 3), np.inf), np.full((len(points), 3), np.nan)
     for number, position in content.starts.items():
         if number in places:
             starts[places[number]] = position
     for number, position in content.checks.items():
         starts[places[number]] = positions[places[number]] = position
+        check_sd[places[number]] = content.check_sd.get(number, np.nan)
     for number, (position, deviations) in content.control.items():
         starts[places[number]] = positions[places[number]] = position
         sd[places[number]] = deviations
@@ -215,6 +217,7 @@ def project_of(content: Content, wishes: Wishes) -> Project:
         starts=starts,
         point_positions=positions,
         point_sd=sd,
+        point_check_sd=check_sd,
         image_photos=image_photos,
         image_points=np.array([places[number] for number in content.image_points], dtype=np.int64),
         image_xy=xy,

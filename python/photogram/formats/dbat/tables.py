@@ -161,7 +161,7 @@ def take_points(
     for row, number in enumerate(numbers):
         if wanted(number):
             if check:
-                content.checks[number] = positions[row]
+                content.checks[number], content.check_sd[number] = positions[row], deviations[row]
             else:
                 content.control[number] = positions[row], np.nan_to_num(deviations[row])
 

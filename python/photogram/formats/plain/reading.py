@@ -119,6 +119,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         starts=points.starts,
         point_positions=points.positions,
         point_sd=points.sd,
+        point_check_sd=points.check_sd,
         image_photos=images.photos,
         image_points=images.points,
         image_xy=xy,
@@ -366,6 +367,7 @@ class _Given:
     names: list[str]
     positions: Floats
     sd: Floats
+    check_sd: Floats
     observed: list[Observation]
 
 
@@ -389,7 +391,11 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     if stray.any():
         row, k = np.argwhere(stray)[0].tolist()
         raise table.error(row, f"column {_SD[k]}: there is a standard deviation, but no {AXES[k]}")
-    sd = tables.deviations(table, "control", _SD)
+    check = np.array([each == "check" for each in uses], dtype=bool)[:, np.newaxis]
+    if "check" in tables.settings.sd:
+        sd = np.where(check, tables.deviations(table, "check", _SD), tables.deviations(table, "control", _SD))
+    else:
+        sd = tables.deviations(table, "control", _SD)
     for row, use in enumerate(uses):
         if use not in _USES:
             raise table.error(row, f"column use: {quoted(use)} is none of {', '.join(_USES)}")
@@ -402,6 +408,10 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     sd = np.where(np.isnan(sd) | np.isnan(values), np.inf, sd)
     covariances = covariances_of(np.where(np.isinf(sd), 0.0, sd), table)
     values, turned = transform.positions("control", values, covariances, table)
+    # Along the axes of the frame; what is correlated there is not kept.
+    tilted = (turned != turned * np.eye(3)).any(axis=(1, 2))[:, np.newaxis]
+    own = np.where(tilted, np.sqrt(np.diagonal(turned, axis1=1, axis2=2)), sd)
+    check_sd = np.where(check & np.isfinite(sd), own, np.nan)
     observed: list[Observation] = []
     held = sd.copy()
     for row, use in enumerate(uses):
@@ -416,7 +426,7 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
             held[row] = np.inf
     off = {row for row, use in enumerate(uses) if use == "off"}
     values = np.where(np.array([row in off for row in range(len(uses))])[:, np.newaxis], np.nan, values)
-    return _Given(table, names, values, held, observed)
+    return _Given(table, names, values, held, check_sd, observed)
 
 
 def _isotropic(covariance: Floats) -> bool:
@@ -430,6 +440,7 @@ class _Points:
     starts: Floats
     positions: Floats
     sd: Floats
+    check_sd: Floats
     observed: list[Observation]
 
 
@@ -439,7 +450,7 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
     names = list(dict.fromkeys([*images.point_names, *(control.names if control else []), *own]))
     places = {name: row for row, name in enumerate(names)}
     starts = np.full((len(names), 3), np.nan)
-    positions, sd = starts.copy(), np.full((len(names), 3), np.inf)
+    positions, sd, check_sd = starts.copy(), np.full((len(names), 3), np.inf), starts.copy()
     if table is not None:
         rows = np.array([places[name] for name in own], dtype=np.int64)
         given = np.stack([table.numbers(axis) for axis in AXES], axis=1)
@@ -462,9 +473,9 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
                 row,
                 f"{control.names[row]} has another {AXES[k]} in the table points, by {apart[row, k]:.6g}",
             )
-        positions[rows], sd[rows] = control.positions, control.sd
+        positions[rows], sd[rows], check_sd[rows] = control.positions, control.sd, control.check_sd
         for each in control.observed:
             positions[places[each.points[0]]] = np.nan
         observed = control.observed
         starts[rows] = np.where(np.isnan(control.positions), starts[rows], control.positions)
-    return _Points(names, starts, positions, sd, observed)
+    return _Points(names, starts, positions, sd, check_sd, observed)

@@ -53,6 +53,7 @@ WITH_CRS = ("control", "gnss", "points", "photos")
 WITH_SD = (
     "images",
     "control",
+    "check",
     "points",
     "gnss",
     "photos",

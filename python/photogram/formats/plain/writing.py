@@ -231,6 +231,9 @@ def control_table(project: Project) -> dict[str, Any]:
         return {}
     positions, sd = block.point_positions[order].copy(), block.point_sd[order].copy()
     covariances = np.zeros((len(order), 3, 3))
+    if block.point_check_sd is not None:
+        own = block.point_check_sd[order]
+        sd = np.where(np.isinf(sd) & np.isfinite(own), own, sd)
     for k, row in enumerate(order):
         if (each := full.get(block.point_ids[row])) is not None:
             positions[k], covariances[k] = each.observed, each.precision

@@ -73,17 +73,16 @@ def check_section(result: Result) -> Section:
     intro = (
         "Points with known coordinates that took no part in the adjustment: the independent proof of"
         " its accuracy."
-        " The test value is the difference over the standard deviation of the adjusted coordinate; the"
-        " known ones"
-        " are taken as free of error."
+        " The test value is the difference over its standard deviation: that of the adjusted coordinate and"
+        " that of the given one together."
     )
     return Section("check-points", "Check points", parts, intro)
 
 
 def _check_summary(result: Result, check: np.ndarray) -> Table:
-    frame = block_frame(result)
-    points = np.flatnonzero(check.any(axis=1))
-    check, all_differences, sd = check[points], result.point_differences[points], result.point_sd[points]
+    frame, checks = block_frame(result), result.check_points
+    check, all_differences = check[checks.rows], checks.differences
+    sd = np.hypot(checks.sd, checks.given_sd)
     rows: list[Row] = []
     for k, (name, unit, factor) in enumerate(zip(frame.names, frame.units, frame.factors, strict=True)):
         own = check[:, k]
@@ -109,7 +108,7 @@ def _check_summary(result: Result, check: np.ndarray) -> Table:
         Column("Mean difference", figures=3),
         Column("rms difference", figures=3),
         Column("Largest", figures=3),
-        Column("rms of their sd", figures=3),
+        Column("rms of sd", figures=3),
         Column("rms of test values", decimals=2),
     )
     note = "Test values have an rms of about 1 where the standard deviations are right."
@@ -122,9 +121,11 @@ def _compared(result: Result, which: np.ndarray, caption: str) -> Table | None:
     if not len(places):
         return None
     block, frame = result.block, block_frame(result)
-    differences, sd = result.point_differences, result.point_sd
+    differences, sd, checks = result.point_differences, result.point_sd, result.check_points
+    given_sd = np.full_like(sd, np.nan)
+    given_sd[checks.rows] = checks.given_sd
     with np.errstate(all="ignore"):
-        tests = (differences / sd)[tuple(places.T)]
+        tests = (differences / np.hypot(sd, np.nan_to_num(given_sd)))[tuple(places.T)]
     chosen = np.sort(np.argsort(-np.nan_to_num(np.abs(tests), nan=-1.0), kind="stable")[:LISTED])
     own = np.where(which, sd, np.nan)
     values, few = frame.value_decimals(own), [count + 1 for count in frame.decimals(own)]
@@ -140,6 +141,7 @@ def _compared(result: Result, which: np.ndarray, caption: str) -> Table | None:
                 frame.cell(k, float(result.point_positions[point, k]), values[k]),
                 frame.difference(k, float(differences[point, k]), few[k]),
                 float(sd[point, k]) * factor,
+                float(given_sd[point, k]) * factor,
                 test,
             ]
         )
@@ -147,10 +149,11 @@ def _compared(result: Result, which: np.ndarray, caption: str) -> Table | None:
     columns = (
         Column("Point", text=True),
         Column("Component", text=True),
-        Column("Known", unit, decimals=max(values)),
+        Column("Given", unit, decimals=max(values)),
         Column("Adjusted", unit, decimals=max(values)),
-        Column("Adjusted - known", unit, decimals=max(few)),
+        Column("Adjusted - given", unit, decimals=max(few)),
         Column("sd adjusted", unit, figures=3),
+        Column("sd given", unit, figures=3),
         Column("Test value", decimals=2),
     )
     note = (

@@ -1,0 +1,163 @@
+"""Check points of an adjusted block: known coordinates that took no part in it, and how it agrees."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import AdjustmentError
+from photogram.network.block import Block
+from photogram.network.observations import Control
+from photogram.results.network import AdjustedNetwork
+from photogram.results.outward import outward
+from photogram.statistics.agreement import agreement
+from photogram.statistics.findings import Agreement
+
+__all__ = ["CheckPoints", "check_points"]
+
+MOST = 1000
+"""Check points that are tested together: of more every second, third ..."""
+
+
+@dataclass(frozen=True, eq=False)
+class CheckPoints:
+    """The k check points of a result.
+
+    Attributes
+    ----------
+    rows
+        (k,) among all points.
+    names
+        What they are called.
+    differences
+        (k, 3) adjusted minus given, in the units of the block; NaN where nothing is given.
+    sd
+        (k, 3) standard deviations of the adjusted coordinates.
+    given_sd
+        (k, 3) standard deviations of the given ones; where none were given, those that are assumed.
+    assumed
+        (k,) whether those of a point are assumed.
+    untested
+        Why there is no test; empty where there is one.
+    agreement
+        The tests; None where there are none.
+    """
+
+    rows: Indices
+    names: tuple[str, ...]
+    differences: Floats
+    sd: Floats
+    given_sd: Floats
+    assumed: Bools
+    untested: str
+    agreement: Agreement | None = None
+
+    @cached_property
+    def statistics(self) -> tuple[Floats, Floats]:
+        """(k,) test values T (F where the unit weight is estimated) and their probabilities."""
+        if self.agreement is None:
+            return np.full(len(self.rows), math.nan), np.full(len(self.rows), math.nan)
+        tested = self.agreement.points
+        return tested.values, np.exp(tested.log_probability())
+
+
+def check_points(
+    network: AdjustedNetwork,
+    block: Block,
+    differences: Floats,
+    kinds: np.ndarray,
+    *,
+    second: float,
+    untested: str = "",
+    whole: bool = True,
+) -> CheckPoints:
+    """Return the check points of an adjusted block with their tests.
+
+    Parameters
+    ----------
+    network, block
+        The result, and what was adjusted.
+    differences, kinds
+        (n, 3) adjusted minus given coordinates, and (n,) kinds of all points.
+    second
+        Degrees of freedom with which the variance of unit weight was estimated; infinite where it is known.
+    untested
+        Why nothing is tested.
+    whole
+        Whether the normal equations may be asked for the covariances of points with each other.
+    """
+    rows = np.flatnonzero(network.used_points & (kinds == "check"))
+    given, assumed = _given(block, rows, differences[rows])
+    found = CheckPoints(
+        rows=rows,
+        names=tuple(block.point_ids[row] for row in rows.tolist()),
+        differences=differences[rows],
+        sd=network.point_sd[rows],
+        given_sd=given,
+        assumed=assumed,
+        untested=untested,
+    )
+    if not len(rows):
+        return replace(found, untested="there are none")
+    if not np.isfinite(network.point_cofactors[rows]).all():
+        return replace(found, untested=untested or "covariances were not computed")
+    return found if untested else replace(found, agreement=_agreement(network, block, found, second, whole))
+
+
+def _agreement(
+    network: AdjustedNetwork, block: Block, found: CheckPoints, second: float, whole: bool
+) -> Agreement:
+    survey = np.zeros((len(found.rows), 3, 3))
+    survey[:, range(3), range(3)] = found.given_sd**2
+    asked = partial(agreement, scale=network.covariance_scale, second=second)
+    alone = asked(
+        found.differences,
+        network.point_cofactors[found.rows],
+        survey,
+        name=partial(_named, found.names),
+        apart=partial(_apart, found.differences, *outward(block)),
+    )
+    if not whole:
+        return alone
+    some = slice(None, None, -(-len(found.rows) // MOST))
+    try:
+        joint = network.covariance(("point", found.names[some])) / network.covariance_scale
+    except AdjustmentError:  # not enough memory, or singular by rounding: the single tests stand
+        return alone
+    return replace(alone, together=asked(found.differences[some], joint, survey[some]).together)
+
+
+def _named(names: tuple[str, ...], place: tuple[int, ...]) -> str:
+    return names[place[0]]
+
+
+def _apart(
+    differences: Floats,
+    axes: tuple[str, ...],
+    units: tuple[str, ...],
+    factors: Floats,
+    place: tuple[int, ...],
+    sd: Floats,
+) -> str:
+    """Say how far a point is off in the component of the largest difference over its standard deviation."""
+    own = differences[place[0]]
+    with np.errstate(all="ignore"):
+        k = int(np.nanargmax(np.abs(own) / np.where(sd > 0, sd, 1e-300)))
+    return f"{own[k] * factors[k]:+.3g} {units[k]} in {axes[k]} (sd {sd[k] * factors[k]:.2g})"
+
+
+def _given(block: Block, rows: Indices, differences: Floats) -> tuple[Floats, Bools]:
+    """Return standard deviations of given coordinates, and for which points those of control are assumed."""
+    own = np.full((len(rows), 3), math.nan)
+    if block.point_check_sd is not None:
+        own = block.point_check_sd[rows]
+    lacking: Bools = np.asarray((np.isnan(own) & np.isfinite(differences)).any(axis=1))
+    # Those of observations are lengths, in geographic blocks too.
+    observed = [] if block.geographic else [e for e in block.observations if isinstance(e, Control)]
+    every = np.vstack([block.point_sd, *(np.sqrt(np.diag(each.precision)) for each in observed)])
+    assumed = [np.median(held) if (held := column[np.isfinite(column)]).size else 0.0 for column in every.T]
+    return np.asarray(np.where(np.isnan(own), assumed, own)), lacking

@@ -1,0 +1,99 @@
+"""Whether known values that took no part in an adjustment agree with it: check points.
+
+Differences d (adjusted minus given) of n points have the covariance C = s^2 Q + S: Q the joint cofactors of
+the adjusted points, which share the errors of the block, cross blocks included, and S the covariance of the
+given values. T = d' C^-1 d is chi-square with as many degrees of freedom as values (Baarda 1968); T / m is
+F(m, f) where s^2 is estimated with f degrees of freedom and s^2 Q is most of C.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.statistics.distributions import LEVEL
+from photogram.statistics.findings import Agreement, Tested
+from photogram.statistics.limits import global_test
+
+__all__ = ["agreement"]
+
+SINGULAR = 1e-12
+"""Variance, in those of the components, below which a direction has none: known without error, and held."""
+
+
+def agreement(
+    differences: Floats,
+    cofactors: Floats,
+    given: Floats,
+    *,
+    scale: float = 1.0,
+    second: float = math.inf,
+    name: Callable[[tuple[int, ...]], str] = str,
+    apart: Callable[[tuple[int, ...], Floats], str] = "{} {}".format,
+    level: float = LEVEL,
+) -> Agreement:
+    """Test known values against an adjustment.
+
+    Parameters
+    ----------
+    differences
+        (n, k) adjusted minus given; NaN where nothing is known.
+    cofactors
+        (n k, n k) joint cofactors of the adjusted values, point by point; or (n, k, k) those of each point
+        alone: then there is no test of all together.
+    given
+        (n, k, k) covariances of the given values, in squares of the same units.
+    scale, second
+        The variance by which covariances are scaled, and the degrees of freedom with which it was estimated.
+    name, apart
+        Name the point at a place, and say how far it is off, given its (k,) standard deviations, C included.
+    level
+        Of the test of all together, both sides.
+    """
+    count, width = differences.shape
+    rows = np.isfinite(differences)
+    alone = cofactors.ndim == 3
+    own = cofactors if alone else _blocks(cofactors, width)
+    found, dimension = np.full(count, math.nan), np.full(count, math.nan)
+    sd = np.sqrt(np.diagonal(scale * own + given, axis1=1, axis2=2))
+    for point in np.flatnonzero(rows.any(axis=1)).tolist():
+        chosen = rows[point]
+        covariance = (scale * own[point] + given[point])[np.ix_(chosen, chosen)]
+        found[point], dimension[point] = _quadratic(differences[point, chosen], covariance)
+    together = None
+    if not alone and rows.any():
+        whole = scale * cofactors
+        for point in range(count):
+            place = slice(point * width, (point + 1) * width)
+            whole[place, place] += given[point]
+        flat = rows.ravel()
+        omega, rank = _quadratic(differences.ravel()[flat], whole[np.ix_(flat, flat)])
+        together = global_test(omega, rank, level, second)
+    if math.isinf(second):
+        points = Tested("check points", found, name, "T", dimension)
+    else:
+        points = Tested("check points", found / dimension, name, "F", dimension, second)
+    return Agreement(points, together, sd, apart)
+
+
+def _blocks(matrix: Floats, width: int) -> Floats:
+    """Return the (n, k, k) blocks on the diagonal."""
+    count = len(matrix) // width
+    return np.asarray(matrix.reshape(count, width, count, width)[range(count), :, range(count), :])
+
+
+def _quadratic(d: Floats, covariance: Floats) -> tuple[float, float]:
+    """Return d' C^+ d and the rank of C: (NaN, NaN) where C is not known, (NaN, 0) where all are exact."""
+    scale = np.sqrt(np.diag(covariance))
+    if not np.isfinite(covariance).all():
+        return math.nan, math.nan
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    free = values > SINGULAR
+    along = vectors.T @ (d / scale)
+    return (
+        (float((along[free] ** 2 / values[free]).sum()), float(free.sum())) if free.any() else (math.nan, 0.0)
+    )
