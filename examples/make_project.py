@@ -71,7 +71,7 @@ distances = 0.005
 [adjust]
 # datum = "control"                 # control | minimum | inner
 # loss = "none"                     # none | huber | cauchy
-# unit_variance = "free"            # free | constrained | unity
+# unit_variance = "constrained"     # constrained | unity | redundancy
 """
 
 COMMENTS = {

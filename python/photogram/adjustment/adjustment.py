@@ -122,10 +122,11 @@ def adjust(
     block
         The block.
     unit_variance
-        What the variance of unit weight is based on (GIANT guide, Appendix E): every weighted quantity
-        (`constrained`), image coordinates and ground control only (`free`), or 1 (`unity`); or on the
-        redundancy numbers of image coordinates, control and observations beside images (`redundancy`), right
-        whatever the weights of photos are (docs/weights.md). Covariances are scaled by it.
+        What the variance of unit weight is based on: every weighted quantity as the observation that it is
+        (`constrained`), 1 (`unity`), or the redundancy numbers of image coordinates, control and observations
+        beside images (`redundancy`, docs/weights.md). `free`, the default of the 1987 program (GIANT guide,
+        Appendix E), counts image coordinates and ground control only, and is too large where photos or
+        cameras are weighted. Covariances are scaled by it.
     max_iterations
         Iterations at the most. When None, 50 without a loss, and 200 with one: reweighting takes more of
         them.

@@ -34,7 +34,6 @@ COMPONENTS = "components.txt"
 class UnitVarianceName(StrEnum):
     """What the variance of unit weight is based on."""
 
-    FREE = "free"
     CONSTRAINED = "constrained"
     UNITY = "unity"
     REDUNDANCY = "redundancy"

@@ -112,8 +112,9 @@ def giant(
     unit_variance: Annotated[
         UnitVarianceName | None,
         typer.Option(
-            help="What the variance of unit weight is based on; `redundancy`: on redundancy numbers, whatever"
-            " the weights of the stations. Default: as COMMON says.",
+            help="What the variance of unit weight is based on: all weighted values (`constrained`), redundancy"
+            " numbers, or 1. Default: constrained or, where COMMON says so, unity; with --as-published as"
+            " COMMON says.",
             show_default=False,
         ),
     ] = None,
@@ -285,10 +286,12 @@ def _adjust(
     from photogram import AsPublished, Result, adjust, snoop
 
     common = project.common
+    said = common.unit_variance if as_published else common.unbiased_variance
+    basis = unit_variance.value if unit_variance else said
     with job.status("adjusting") as status:
         progress = shown(status, "weighted sum of squares", 1.0) if status is not None else None
         if snooping is not None:
-            snooping["unit_variance"] = unit_variance.value if unit_variance else common.unit_variance
+            snooping["unit_variance"] = basis
             snooping["progress"] = progress
             made = cleaned(block, components, threads, snooping) if components else None
             log = made.snooped if made else snoop(block, threads=threads, **snooping)
@@ -298,7 +301,7 @@ def _adjust(
             return result, replace(log, result=result), made
         result = adjust(
             block,
-            unit_variance=unit_variance.value if unit_variance else common.unit_variance,
+            unit_variance=basis,
             ordering=ordering.value,
             as_published=AsPublished(common.convergence_percent, common.max_iterations)
             if as_published

@@ -346,10 +346,10 @@ class Driver:
         observations, weighted, unknowns, stations, _ = self._unknowns
         freedom, kind = observations + weighted - unknowns, self.stop.unit_variance
         total = sum(sums)
-        if kind != "constrained":
-            freedom, total = freedom - stations, total - sums[0]
         if kind == "unity":
             return freedom, 1.0
+        if kind == "free":
+            freedom, total = freedom - stations, total - sums[0]
         return freedom, total / freedom if freedom > 0 else None
 
     def _counts(self) -> tuple[int, int, int, int, int]:

@@ -29,7 +29,7 @@ def _recognises(path: Path) -> bool:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read a project, with the refraction and the variance of unit weight that its COMMON asks for."""
+    """Read a project, with the refraction that its COMMON asks for."""
     del wishes
     found = read_project(path)
     block = found.to_block()
@@ -45,7 +45,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         frame=Frame("geographic", ellipsoid=(block.spheroid.a, block.spheroid.b))
         if block.spheroid
         else Frame(),
-        options=Options(unit_variance=found.common.unit_variance),
+        options=Options(unit_variance=found.common.unbiased_variance),
         messages=tuple(found.messages),
     )
 

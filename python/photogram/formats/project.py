@@ -40,7 +40,7 @@ class Options:
 
     datum: DatumName | None = None
     loss: Literal["huber", "cauchy"] | None = None
-    unit_variance: Literal["free", "constrained", "unity", "redundancy"] = "free"
+    unit_variance: Literal["constrained", "unity", "redundancy"] = "constrained"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

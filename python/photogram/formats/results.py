@@ -69,11 +69,7 @@ def _project(path: Path, wishes: Wishes) -> Project:
         raise InputError("holds the result of a collection, which photogram.read_result reads", file=path)
     datums: dict[str, DatumName] = {"inner constraints": "inner", "minimum constraints": "minimum"}
     losses: dict[str, Literal["huber", "cauchy"]] = {"huber": "huber", "cauchy": "cauchy"}
-    variances: dict[str, Literal["free", "constrained", "unity", "redundancy"]] = {
-        "free": "free",
-        "unity": "unity",
-        "redundancy": "redundancy",
-    }
+    variances: dict[str, Literal["unity", "redundancy"]] = {"unity": "unity", "redundancy": "redundancy"}
     count = len(result.block.cameras)
     return Project(
         block=result.restarted(),

@@ -67,7 +67,7 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
     block = project.to_block(limits)
     common = project.common
     why = "COMMON column 10 asks for intersection only" if common.intersection_only else ""
-    options = {"unit_variance": common.unit_variance, "threads": threads}
+    options = {"unit_variance": common.unbiased_variance, "threads": threads}
     sections, result = check_block(block, Manner(options, _GuideWords(), why))
     return Check(project.title, [_input(project, block, limits), *sections], result)
 

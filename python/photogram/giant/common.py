@@ -55,7 +55,8 @@ class Common:
     error_propagation
         Column 11: whether covariances are asked for.
     unit_variance
-        Column 12: cameras completely free, cameras constrained, or set to unity.
+        Column 12: cameras completely free, cameras constrained, or set to unity. `unbiased_variance` is what is
+        taken but for what is computed as published: `free` is too large where cameras are weighted.
     sort_points
         Column 13: points in ascending order.
     max_iterations
@@ -104,6 +105,11 @@ class Common:
     semi_major: float = 6378206.4
     semi_minor: float = 6356583.8
     control_sd: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def unbiased_variance(self) -> UnitVariance:
+        """The unit variance of today: every weighted quantity counts as an observation, or unity."""
+        return "unity" if self.unit_variance == "unity" else "constrained"
 
     @property
     def default_control_sd(self) -> tuple[float, float, float]:

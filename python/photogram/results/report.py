@@ -108,8 +108,8 @@ def _adjustment(result: Result) -> list[str]:
     counts = zip(axes(result), held.sum(axis=0), strict=True)
     components = ", ".join(f"{axis} {count}" for axis, count in counts)
     basis = {
-        "free": "photos free",
-        "constrained": "photos weighted",
+        "free": "rule of 1987",
+        "constrained": "all weighted values",
         "unity": "set to 1",
         "redundancy": "redundancy numbers",
     }[result.unit_variance]

@@ -306,18 +306,13 @@ class Result(AdjustedNetwork):
     def global_test(self) -> GlobalTest | None:
         """The test of all residuals together; None without degrees of freedom.
 
-        It takes the observations on which the variance of unit weight is based: with `constrained` cameras
-        all of them, else image coordinates, observations beside these and ground control. With `redundancy`
-        the degrees of freedom are those of Satterthwaite's approximation (docs/weights.md).
+        Every weighted quantity counts, whatever the variance of unit weight is based on: only the sum over
+        all of them is chi-square (docs/tests.md). None, too, with `free` where there are no covariances.
         """
-        sums, freedom = self.sums_of_squares, self.degrees_of_freedom
-        if self.unit_variance == "redundancy":
-            if self.variance_of_unit_weight is None:
-                return None
-            # q / c with c = s / r, which has r^2 / s degrees of freedom (Satterthwaite): s^2 is q / r.
-            return global_test(self.variance_of_unit_weight * freedom, freedom)
-        tested = sums.total if self.unit_variance == "constrained" else sums.measured
-        return global_test(tested, freedom)
+        freedom = self.degrees_of_freedom
+        if self.unit_variance in ("free", "redundancy"):  # which have other degrees of freedom than all have
+            freedom = 0 if self.redundancies is None else round(self.redundancies.total)
+        return global_test(self.sums_of_squares.total, freedom)
 
     @property
     def photo_residuals(self) -> Floats:

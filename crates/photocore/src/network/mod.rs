@@ -222,9 +222,10 @@ pub struct Network {
 /// What the variance of unit weight is based on (GIANT guide, Appendix E).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum UnitVariance {
-    /// Photos completely free: image coordinates and ground control count, weights of poses and cameras do not.
+    /// The rule of 1987, photos completely free: image coordinates and ground control count, weights of poses and cameras do not,
+    /// though what these determine is taken off. Its expectation is above 1 where these are strong.
     Free,
-    /// Photos constrained: every weighted quantity counts.
+    /// Every weighted quantity counts as the observation that it is: the expectation is 1 whatever the weights are.
     #[default]
     Constrained,
     /// Image coordinates, ground control and what was observed beside these, over the sum of their redundancy numbers: right whatever the

@@ -493,7 +493,7 @@ fn redundancies(
 }
 
 /// Degrees of freedom (GIANT guide, Appendix E): observations are the image coordinates and what was observed beside them, the
-/// held components of control and, with constrained photos, the weighted unknowns of these.
+/// held components of control and, but for free photos, every other weighted unknown: of photos, cameras, lever arms.
 fn degrees_of_freedom(
     unit_variance: UnitVariance,
     problem: &Problem<Bundle>,
@@ -503,8 +503,8 @@ fn degrees_of_freedom(
     let stations = problem.model.of_stations();
     let weighted_cameras = stations.filter(|&unknown| problem.is_weighted(unknown)).count();
     let weighted = match unit_variance {
-        UnitVariance::Constrained | UnitVariance::Redundancy => counts.weighted,
-        UnitVariance::Free | UnitVariance::Unity => counts.weighted - weighted_cameras,
+        UnitVariance::Free => counts.weighted - weighted_cameras,
+        UnitVariance::Constrained | UnitVariance::Redundancy | UnitVariance::Unity => counts.weighted,
     };
     (counts.observations + weighted) as i64 - counts.unknowns as i64
 }

@@ -91,7 +91,7 @@ _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("axes", "photo"): ("y_up", "y_down"),
     ("adjust", "datum"): ("control", "minimum", "inner"),
     ("adjust", "loss"): ("none", "huber", "cauchy"),
-    ("adjust", "unit_variance"): ("free", "constrained", "unity", "redundancy"),
+    ("adjust", "unit_variance"): ("constrained", "unity", "redundancy", "free"),
 }
 """Words that a key may have; the first is the default."""
 _KEYS: Mapping[str, tuple[str, ...]] = {
@@ -170,7 +170,8 @@ def read_settings(path: Path) -> Settings:
         options=Options(
             cast("DatumName | None", file.word("adjust", "datum") if file.has("adjust", "datum") else None),
             cast("Any", {"none": None}.get(loss := file.word("adjust", "loss"), loss)),
-            cast("Any", file.word("adjust", "unit_variance")),
+            # `free` is what earlier versions wrote where nobody had asked for anything.
+            cast("Any", {"free": "constrained"}.get(basis := file.word("adjust", "unit_variance"), basis)),
         ),
         length=file.word("units", "length"),
         angle=file.word("units", "angle"),

@@ -67,7 +67,9 @@ def listing(
     """
     space = Space(block.geographic, block.linear_unit)
     pages = [
-        options_page(project.common, space, block.refraction, as_published=as_published),
+        options_page(
+            project.common, space, block.refraction, result.unit_variance, as_published=as_published
+        ),
         *_input_pages(project, block, space),
         *warning_pages(error_warnings(project, block, limits)),
     ]
@@ -115,7 +117,11 @@ def _result_pages(
     project: Contents, block: Block, result: Result, space: Space, as_published: bool
 ) -> Iterator[Page]:
     common = project.common
-    closing = statistics(result.sums_of_squares, result.degrees_of_freedom, result.variance_of_unit_weight)
+    freedom = result.degrees_of_freedom
+    if result.unit_variance == "unity":  # as in 1987: those of free cameras
+        sd = result.photo_given_sd
+        freedom -= np.count_nonzero((sd > 0) & np.isfinite(sd))
+    closing = statistics(result.sums_of_squares, freedom, result.variance_of_unit_weight)
     yield from residual_pages(
         _residuals(block, result), common.residual_limit, closing, as_published=as_published
     )

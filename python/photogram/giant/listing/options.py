@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from photogram.giant.common import Common, UnitVariance
+from photogram.giant.common import Common
 from photogram.giant.listing.formats import Space
 from photogram.giant.listing.pages import Page
 from photogram.network.refraction import Refraction
 
 __all__ = ["options_page"]
 
-UNIT_VARIANCE: dict[UnitVariance, str] = {
+UNIT_VARIANCE: dict[str, str] = {
     "free": "UNIT VARIANCE WILL BE BASED ON COMPLETELY FREE CAMERA PARAMETERS",
     "constrained": "UNIT VARIANCE WILL BE BASED ON CONSTRAINED CAMERA PARAMETERS",
     "unity": "UNIT VARIANCE WILL BE SET TO UNITY",
+    "redundancy": "UNIT VARIANCE WILL BE BASED ON REDUNDANCY NUMBERS",
 }
 
 
 def options_page(
-    common: Common, space: Space, refraction: Refraction | None, *, as_published: bool = False
+    common: Common,
+    space: Space,
+    refraction: Refraction | None,
+    unit_variance: str | None = None,
+    *,
+    as_published: bool = False,
 ) -> Page:
     """Return the page of the options.
 
@@ -31,6 +37,8 @@ def options_page(
         The object space and its linear unit.
     refraction
         What is applied, which may be more than COMMON asks for.
+    unit_variance
+        What the unit variance is based on; as COMMON says when None.
     as_published
         Without the linear unit of a rectangular job.
     """
@@ -44,7 +52,7 @@ def options_page(
         f"ERROR PROPAGATION IS {'' if common.error_propagation else 'NOT '}REQUESTED",
     ]
     if common.error_propagation:
-        lines.append(UNIT_VARIANCE[common.unit_variance])
+        lines.append(UNIT_VARIANCE[unit_variance or common.unit_variance])
     for medium, applied in (("ATMOSPHERIC", air), ("WATER", water)):
         lines.append(f"{medium} REFRACTION WILL {'' if applied else 'NOT '}BE INCLUDED IN THE ADJUSTMENT")
     lines.append(_residuals(common.residual_limit))

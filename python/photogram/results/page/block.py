@@ -234,8 +234,8 @@ def _size_section(result: Result) -> Section:
 
 
 _BASIS = {
-    "free": "of all observations but those of photos",
-    "constrained": "of all observations, those of photos included",
+    "free": "rule of 1987: the weights of photos and cameras do not count",
+    "constrained": "of all weighted values, those of photos and cameras among them",
     "unity": "set to 1",
     "redundancy": "based on redundancy numbers",
 }
