@@ -408,6 +408,11 @@ def test_section_14_the_command_line_applies_what_common_and_options_say(run):
     assert refraction("--water-refraction", "snell") == asked | {"water": "snell"}
     options = ("--air-refraction", "standard", "--water-index", "1.341")
     assert refraction(*options) == asked | {"air": "standard", "refractive_index": 1.341}
+    # The guide's own record asks for both, and its listing says that neither is included.
+    assert job_refraction(common, water="none") == Refraction("giant")
+    none = ("--air-refraction", "none", "--water-refraction", "none")
+    run("giant", "block", "--json", "result.json", *none)  # rays that were bent do not meet
+    assert json.loads(Path("result.json").read_bytes())["refraction"] is None
 
 
 def test_options_apply_refraction_that_common_does_not_ask_for(run):

@@ -47,12 +47,6 @@ NOTABLE_RISE = 1e-3
 """Percent; less is rounding."""
 
 
-ROUNDING = 1e-9
-"""A sum of redundancy numbers below this is none."""
-SMALL_GROUP, VECTORS = 200, 32
-"""Weighted unknowns of photos up to which sums over them are exact, and vectors of random signs beyond."""
-
-
 @dataclass(frozen=True)
 class AsPublished:
     """The iteration of the 1987 program (GIANT guide, section 6).
@@ -285,7 +279,7 @@ def _adjusted(
             raise refused(block, network, None, error) from None
         raise hinted(named(block, *error.args), block) from None
     with turned("the adjusted block"):
-        freedom = _freedom(block, network, solution, options)
+        freedom = _freedom(solution, options)
         found = _result(block, solution, options, freedom, inner, as_published)
         return with_exchanges(with_hints(found))
 
@@ -309,40 +303,15 @@ def adjusted_again(
         solution = network.adjust(datum=None, threads=core_threads(threads), progress=None, start=start)
     except _photocore.BlockError as error:
         raise named(block, *error.args) from None
-    return _result(block, solution, options, _freedom(block, network, solution, options))
+    return _result(block, solution, options, _freedom(solution, options))
 
 
-def _freedom(
-    block: Block,
-    network: _photocore.BlockNetwork,
-    solution: _photocore.BlockSolution,
-    options: CoreOptions,
-) -> float:
-    """Return the degrees of freedom of the unit variance: counted, or r^2 / s (Satterthwaite).
-
-    s is the sum of R_ij^2 among what is measured; all of R sums to r there, so that only what is between it
-    and the weighted unknowns of photos and cameras is to be found.
-    """
+def _freedom(solution: _photocore.BlockSolution, options: CoreOptions) -> float:
+    """Return the degrees of freedom of the unit variance: counted, or the sum of redundancy numbers."""
     if options.unit_variance != "redundancy" or solution.redundancies is None:
         return solution.degrees_of_freedom
-    camera, *measured = solution.redundancies
-    r = sum(measured)
-    if not (r > ROUNDING and camera > ROUNDING):
-        return r
-    covariances = network.covariances(solution.state, threads=0, progress=None)
-    photos = (
-        1,
-        np.full(block.image_xy.shape, -1),
-        np.full(block.point_sd.shape, -1),
-        np.zeros((len(block.photo_ids), 6), dtype=np.int64),
-        [0] * len(block.core_cameras()[0]),
-        [0] * len(block.unknowns),
-        [-1] * len(block.observations),
-    )
-    _, found, _ = covariances.group_squares(
-        photos, classes=None, exact=SMALL_GROUP, vectors=VECTORS, seed=1, threads=0, progress=None
-    )
-    return float(r * r / max(r - found[1], ROUNDING))
+    _, *measured = solution.redundancies
+    return round(sum(measured), 6)
 
 
 def _result(

@@ -33,7 +33,8 @@ def key_numbers(edited: Edited, words: Words) -> Section:
         variance = result.variance_of_unit_weight
         shown = f"{variance:.4f}" if variance is not None else "undefined"
         section.figure(
-            f"variance of unit weight, {name}", f"{shown} ({result.degrees_of_freedom} degrees of freedom)"
+            f"variance of unit weight, {name}",
+            f"{shown} ({result.degrees_of_freedom:.6g} degrees of freedom)",
         )
     _variance(last, section)
     _squares(last, words, section)

@@ -110,8 +110,8 @@ def adjust(
     unit_variance: Annotated[
         UnitVarianceName | None,
         typer.Option(
-            help="What the variance of unit weight is based on: all weighted values (`constrained`), redundancy"
-            " numbers, or 1. Default: what PATH says, else constrained.",
+            help="What the variance of unit weight is based on: all weighted values (`constrained`),"
+            " redundancy numbers, or 1. Default: what PATH says, else constrained.",
             show_default=False,
         ),
     ] = None,

@@ -112,9 +112,9 @@ def giant(
     unit_variance: Annotated[
         UnitVarianceName | None,
         typer.Option(
-            help="What the variance of unit weight is based on: all weighted values (`constrained`), redundancy"
-            " numbers, or 1. Default: constrained or, where COMMON says so, unity; with --as-published as"
-            " COMMON says.",
+            help="What the variance of unit weight is based on: all weighted values (`constrained`),"
+            " redundancy numbers, or 1. Default: as COMMON says, with redundancy numbers for cameras that are"
+            " free; with --as-published the rule of 1987 for these.",
             show_default=False,
         ),
     ] = None,
@@ -123,16 +123,16 @@ def giant(
     air_refraction: Annotated[
         AirModel | None,
         typer.Option(
-            help="Refraction in air by the guide (to 9,000 m) or by a standard atmosphere; giving it"
-            " applies it even where COMMON does not ask for it. Default when it does: giant.",
+            help="Refraction in air by the guide (to 9,000 m), by a standard atmosphere, or none, whatever"
+            " COMMON asks for. Default where it does: giant.",
             show_default=False,
         ),
     ] = None,
     water_refraction: Annotated[
         WaterModel | None,
         typer.Option(
-            help="Refraction in water by the guide or by Snell's law, below the level in COMMON; giving it"
-            " applies it even where COMMON does not ask for it. Default when it does: giant.",
+            help="Refraction in water by the guide or by Snell's law, below the level in COMMON, or none,"
+            " whatever COMMON asks for. Default where it does: giant.",
             show_default=False,
         ),
     ] = None,

@@ -12,6 +12,7 @@ class AirModel(StrEnum):
 
     GIANT = "giant"
     STANDARD = "standard"
+    NONE = "none"
 
 
 class WaterModel(StrEnum):
@@ -19,3 +20,4 @@ class WaterModel(StrEnum):
 
     GIANT = "giant"
     SNELL = "snell"
+    NONE = "none"

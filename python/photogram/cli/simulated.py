@@ -107,10 +107,11 @@ class NetworkOptions:
         if arguments["spheroid"]:
             longitude, latitude, height = self.origin
             arguments["origin"] = (math.radians(longitude), math.radians(latitude), height)
-        air, water = arguments.pop("air_refraction"), arguments.pop("water_refraction")
+        asked = arguments.pop("air_refraction"), arguments.pop("water_refraction")
+        air, water = (None if model in (None, "none") else model.value for model in asked)
         level, index = arguments.pop("water_level"), arguments.pop("water_index")
         if air or water:
-            arguments["refraction"] = Refraction(air and air.value, water and water.value, level, index)
+            arguments["refraction"] = Refraction(air, water, level, index)
         return arguments
 
 

@@ -223,7 +223,10 @@ def check(options: CoreOptions) -> None:
         A unit variance based on redundancy numbers.
     """
     if options.unit_variance == "redundancy":
-        raise InputError("in parts the unit variance is not based on redundancy numbers")
+        raise InputError(
+            "in parts the unit variance is not based on redundancy numbers:"
+            " --unit-variance constrained (or unity)"
+        )
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -89,7 +89,11 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
 
 
 def job_refraction(
-    common: Common, *, air: Air | None = None, water: Water | None = None, index: float | None = None
+    common: Common,
+    *,
+    air: Air | Literal["none"] | None = None,
+    water: Water | Literal["none"] | None = None,
+    index: float | None = None,
 ) -> Refraction | None:
     """Return the refraction of a job: the guide's models where COMMON has the switch, or those named here.
 
@@ -98,18 +102,21 @@ def job_refraction(
     common
         Switches and water level (metres).
     air, water
-        Models applied whether or not COMMON asks for them; None: as COMMON says.
+        Models applied whether or not COMMON asks for them, or `none` though it does; None: as COMMON says.
     index
         Refractive index of the water; None for the default of :class:`photogram.Refraction`.
     """
-    air = air or ("giant" if common.air_refraction else None)
-    water = water or ("giant" if common.water_refraction else None)
-    if air is None and water is None:
-        return None
-    if water is None:
-        return Refraction(air)
+    asked = air or ("giant" if common.air_refraction else "none")
+    in_air = None if asked == "none" else asked
+    asked_below = water or ("giant" if common.water_refraction else "none")
+    if asked_below == "none":
+        return Refraction(in_air) if in_air else None
     level = common.water_level / metres_per_unit(_linear_unit(common))
-    return Refraction(air, water, level) if index is None else Refraction(air, water, level, index)
+    return (
+        Refraction(in_air, asked_below, level)
+        if index is None
+        else Refraction(in_air, asked_below, level, index)
+    )
 
 
 def _photos(project: Contents, messages: list[Message]) -> list[tuple[Frame, ImageFrame]]:

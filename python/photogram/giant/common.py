@@ -55,8 +55,8 @@ class Common:
     error_propagation
         Column 11: whether covariances are asked for.
     unit_variance
-        Column 12: cameras completely free, cameras constrained, or set to unity. `unbiased_variance` is what is
-        taken but for what is computed as published: `free` is too large where cameras are weighted.
+        Column 12: cameras completely free, cameras constrained, or set to unity. `unbiased_variance` is
+        taken but for what is computed as published: `free` is too large where cameras are well known.
     sort_points
         Column 13: points in ascending order.
     max_iterations
@@ -107,9 +107,10 @@ class Common:
     control_sd: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
-    def unbiased_variance(self) -> UnitVariance:
-        """The unit variance of today: every weighted quantity counts as an observation, or unity."""
-        return "unity" if self.unit_variance == "unity" else "constrained"
+    def unbiased_variance(self) -> Literal["redundancy", "constrained", "unity"]:
+        """What the unit variance is based on today: free cameras do not count, and leave no bias."""
+        # A blank standard deviation of a station is 60,000 units, which nobody has observed.
+        return "redundancy" if self.unit_variance == "free" else self.unit_variance
 
     @property
     def default_control_sd(self) -> tuple[float, float, float]:

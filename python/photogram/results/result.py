@@ -306,13 +306,15 @@ class Result(AdjustedNetwork):
     def global_test(self) -> GlobalTest | None:
         """The test of all residuals together; None without degrees of freedom.
 
-        Every weighted quantity counts, whatever the variance of unit weight is based on: only the sum over
-        all of them is chi-square (docs/tests.md). None, too, with `free` where there are no covariances.
+        With `constrained` of all observations, every weighted value among them. Otherwise the weights of
+        photos and cameras may be nominal: of all others, over the sum of their redundancy numbers, and None
+        where there are no covariances (docs/tests.md).
         """
-        freedom = self.degrees_of_freedom
-        if self.unit_variance in ("free", "redundancy"):  # which have other degrees of freedom than all have
-            freedom = 0 if self.redundancies is None else round(self.redundancies.total)
-        return global_test(self.sums_of_squares.total, freedom)
+        if self.unit_variance == "constrained":
+            return global_test(self.sums_of_squares.total, self.degrees_of_freedom)
+        if self.redundancies is None:
+            return None
+        return global_test(self.sums_of_squares.measured, self.redundancies.measured)
 
     @property
     def photo_residuals(self) -> Floats:
