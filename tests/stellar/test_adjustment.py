@@ -85,3 +85,12 @@ def test_stop_rules():
     assert stop_reason([1.0, 1.0005], 1e-3, 0) == SETTLED
     assert stop_reason([1, 2, 1, 2, 1, 2, 1, 2], 1e-3, 0) == DIVERGED
     assert stop_reason([3.0, 2.0, 1.0], 1e-3, 2) == "2 ITERATIONS COMPLETED"
+    assert stop_reason([1.0, np.inf], 1e-3, 0) == DIVERGED
+
+
+def test_discrepancies_whose_squares_are_beyond_all_numbers_end_without_a_warning(plate):
+    wrong = plate.initial.copy()
+    wrong[INDEX["K1"]] = 1e160
+    options = replace(plate.options, as_published=True)
+    with pytest.raises(AdjustmentError, match="beyond all numbers"):
+        calibrate(replace(plate, initial=wrong, options=options))

@@ -14,6 +14,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
+from photogram.errors import AdjustmentError
 from photogram.stellar.counts import degrees_of_freedom
 from photogram.stellar.failures import failure, singular
 from photogram.stellar.problem import Problem
@@ -41,6 +42,8 @@ def stop_reason(levels: Sequence[float], tolerance: float, limit: int) -> str | 
     limit
         Iterations at the most; 0 for none.
     """
+    if not np.isfinite(levels[-1]):
+        return DIVERGED
     if len(levels) < 2:
         return None
     rises = sum(after > before for before, after in pairwise(levels))
@@ -94,7 +97,9 @@ def iterate(
     while True:
         core = problem.core(parameters, problem.places_at(parameters, free), ~free)
         constant = core.published(**_tolerances(problem))["constant"]
-        levels.append(float(np.sqrt(np.sum(constant[known] ** 2) / dof)))
+        # What has diverged far enough has squares beyond all numbers.
+        with np.errstate(over="ignore"):
+            levels.append(float(np.sqrt(np.sum(constant[known] ** 2) / dof)))
         stop = stop_reason(levels, 0.0 if once else problem.options.tolerance, limit)
         if stop:
             break
@@ -108,6 +113,10 @@ def iterate(
             parameters[21] = np.mod(parameters[21], 2 * np.pi)
         if problem.options.common_scale:
             parameters[13] = parameters[12]
+    if not correction:
+        raise AdjustmentError(
+            "the initial values give discrepancies beyond all numbers: those of the camera are wrong"
+        )
     if correction["without_effect"]:
         raise singular(correction["without_effect"])
     # Covariance and determinant are those of the last correction; the equations after it serve the residuals.
