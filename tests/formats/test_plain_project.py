@@ -8,7 +8,7 @@ import pytest
 from block import check_adjustment, check_poses, same_blocks, sample, truth, with_control, with_noise
 from damaged import check_damaged
 
-from photogram import Attitudes, Camera, InputError, adjust, first_values, formats, simulate
+from photogram import Attitudes, Camera, InputError, Spheroid, adjust, first_values, formats, simulate
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
 from photogram.network.observations import Attitude, Control, Difference, Distance, Position
@@ -367,3 +367,23 @@ def test_tables_of_parquet_are_read_as_those_of_text(example):
     (example / "images.parquet").write_bytes(b"PAR1 and no more")
     with pytest.raises(InputError, match="cannot be read as Parquet"):
         formats.read(example)
+
+
+def test_a_geographic_block_whose_frame_nobody_has_said_is_written_in_degrees(tmp_path):
+    """Its coordinates must not be taken for metres when they are read again."""
+    block = simulate(strips=1, photos_per_strip=3, spheroid=Spheroid.wgs84(), origin=(0.15, 0.83, 0.0)).block
+    cameras = [Camera("perspective", {"c": float(block.principal_distances[0])}, name="camera")]
+    block = block.replace(principal_distances=None, cameras=cameras, photo_cameras=None)
+    starts = np.full(block.point_positions.shape, np.nan)
+    project = formats.Project(
+        block=block, path=tmp_path, title="made", sizes=(None,), pixel_mm=(None,), starts=starts
+    )
+    assert (project.frame.kind, project.block.frame) == ("geographic", project.frame)
+    found = formats.read(written(project, tmp_path / "there")).block
+    assert found.geographic
+    np.testing.assert_allclose(found.photo_positions, block.photo_positions, rtol=1e-12)
+    with pytest.raises(InputError, match="the frame is topocentric, but the block is geographic"):
+        project.replace(frame=formats.Frame("topocentric"))
+    flat = simulate(strips=1, photos_per_strip=3).block
+    with pytest.raises(InputError, match="the frame is geographic, but the block is rectangular"):
+        project.replace(block=flat, frame=formats.Frame("geographic"))

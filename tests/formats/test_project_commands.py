@@ -110,6 +110,30 @@ def test_without_control_the_datum_is_asked_for(run, tmp_path):
     assert run("adjust", "own").exit_code == 0
 
 
+def test_a_datum_on_three_points_is_held_as_asked_for(run, tmp_path):
+    """3-2-1: six coordinates, and the scale from the distances of the project; what was control checks it."""
+    run("new", "own")
+    (tmp_path / "own" / "gnss.csv").unlink()
+    control = pd.read_csv(tmp_path / "own" / "control.csv", comment="#")
+    a, b, c, d = control["point"].astype(str)[:4]
+    done = run("adjust", "own", "--hold", f"{a}=XYZ,{b}=YZ,{c}=z", "--out", "held")
+    assert done.exit_code == 0, done.output
+    assert "given by control that is exactly minimal" in (tmp_path / "held" / "report.txt").read_text()
+    points = (
+        pd.read_csv(tmp_path / "held" / "points.csv", comment="#").astype({"point": str}).set_index("point")
+    )
+    own = control.astype({"point": str}).set_index("point")
+    assert points.loc[a, ["X", "Y", "Z"]].tolist() == own.loc[a, ["x", "y", "z"]].tolist()
+    assert (points.loc[b, "Y"], points.loc[c, "Z"]) == (own.loc[b, "y"], own.loc[c, "z"])
+    assert (points.loc[[a, c], "sd_Z"] == 0).all()
+    assert points.loc[b, "sd_X"] > 0
+    assert points.loc[d, "kind"] == "check"
+    for wanted, said in (("nobody=XYZ", "no point of the block"), (f"{a}=XQ", "axes of X, Y and Z")):
+        refused = run("adjust", "own", "--hold", wanted)
+        assert refused.exit_code == 1
+        assert said in refused.stderr
+
+
 def test_a_user_adds_what_a_project_lacks(run, tmp_path):
     run("new", "own")
     whole = tmp_path / "own"

@@ -103,6 +103,15 @@ def adjust(
             show_default=False,
         ),
     ] = None,
+    hold: Annotated[
+        str | None,
+        typer.Option(
+            metavar="POINT=AXES,...",
+            help="Coordinates of points that are held, in the place of all control: A=XYZ,B=YZ,C=Z is a datum"
+            " on three points (3-2-1); the former control becomes check points.",
+            show_default=False,
+        ),
+    ] = None,
     loss: Annotated[
         LossName | None,
         typer.Option(help="Robust loss of image coordinates. Default: what PATH says.", show_default=False),
@@ -149,7 +158,7 @@ def adjust(
     place = html_place(html, no_html, target)
     with job:
         from photogram import Result
-        from photogram.formats.additions import self_calibrated
+        from photogram.formats.additions import held_points, self_calibrated
         from photogram.show.ways import page_of
 
         pictures = Pictures(job, plots, plot_format, target)
@@ -163,6 +172,7 @@ def adjust(
         check_maps(map)  # now that all inputs are known, which it must not be
         wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
         project = self_calibrated(project, wanted)
+        project = held_points(project, [each.strip() for each in hold.split(",")] if hold else [])
         if unit_variance is not None:
             project = project.replace(options=replace(project.options, unit_variance=unit_variance.value))
         sections = described(project)

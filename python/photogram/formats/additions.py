@@ -25,7 +25,7 @@ from photogram.io.delimited import ColumnTable, Names
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 
-__all__ = ["deviations", "self_calibrated", "with_control", "with_images", "with_sd"]
+__all__ = ["deviations", "held_points", "self_calibrated", "with_control", "with_images", "with_sd"]
 
 SAME = 1e-3
 """Pixels that two measurements of a point on a photo may be apart to be one."""
@@ -101,6 +101,44 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
         known = listed(sorted({name for each in project.block.cameras for name in each.names}), 40)
         raise InputError(f"no camera has the parameter {missing[0]}; there are {known}")
     return project.replace(block=project.block.replace(cameras=cameras))
+
+
+def held_points(project: Project, wanted: Sequence[str]) -> Project:
+    """Return a project whose datum is coordinates of chosen points, held: 3-2-1 over three of them.
+
+    What was held of points before checks the adjustment.
+
+    Parameters
+    ----------
+    wanted
+        `A=XYZ`, `B=YZ`, `C=Z` ...: a point and the coordinates of it; all three where none is named.
+
+    Raises
+    ------
+    InputError
+        A point that is not there or has no coordinates, what is no axis, a block in geographic space.
+    """
+    if not wanted:
+        return project
+    block = project.block
+    if block.geographic:
+        raise InputError("--hold: a datum of chosen coordinates needs rectangular space; this is geographic")
+    known, places = project.positions(), block.point_positions.copy()
+    sd = np.full(places.shape, np.inf)
+    for each in wanted:
+        name, _, axes = each.partition("=")
+        columns = ["XYZ".find(axis) for axis in (axes or "XYZ").upper()]
+        if name not in block.point_ids or -1 in columns:
+            raise InputError(
+                f"--hold: {each!r} is no point of the block with axes of X, Y and Z: A=XYZ,B=YZ,C=Z"
+            )
+        row = block.point_ids.index(name)
+        if not np.isfinite(known[row, columns]).all():
+            raise InputError(
+                f"--hold: the point {name} has no coordinates to be held at; --control FILE gives it some"
+            )
+        places[row, columns], sd[row, columns] = known[row, columns], 0.0
+    return project.replace(block=block.replace(point_positions=places, point_sd=sd))
 
 
 def _named(name: str, wanted: set[str]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.crs import axes_of, has_place, to_system
+from photogram.formats.project import frame_of
 from photogram.io.csv_text import csv_text
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
@@ -19,7 +20,7 @@ from photogram.network.geometry import Spheroid, lengths_of_units
 from photogram.results.ellipses import metric_covariances
 from photogram.results.result import Result
 
-__all__ = ["Placed", "check_place", "frame_of", "placed", "placed_files"]
+__all__ = ["Placed", "check_place", "placed", "placed_files"]
 
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("east", "north", "up")
@@ -103,13 +104,6 @@ class Placed:
         own = result.point_kinds[self.rows] == "check"
         rows = self.rows[own]
         return rows, _turned(self.point_turns[own], _metric(result, rows, result.point_differences[rows]))
-
-
-def frame_of(block: Block) -> Frame:
-    """Return the frame of a block, also where it is geographic and nobody has said so."""
-    if block.spheroid is not None and block.frame.kind == "cartesian":
-        return Frame("geographic", ellipsoid=(block.spheroid.a, block.spheroid.b))
-    return block.frame
 
 
 def check_place(block: Block, crs: str) -> Frame:

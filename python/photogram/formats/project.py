@@ -34,6 +34,13 @@ ASSUMED_SD = {"px": 1.0, "mm": 0.010}
 """Of image coordinates where nothing says how good they are."""
 
 
+def frame_of(block: Block) -> Frame:
+    """Return the frame of a block, also where it is geographic and nobody has said so."""
+    if block.spheroid is not None and block.frame.kind == "cartesian":
+        return replace(block.frame, kind="geographic", ellipsoid=(block.spheroid.a, block.spheroid.b))
+    return block.frame
+
+
 @dataclass(frozen=True)
 class Options:
     """How a project asks to be adjusted; None: it does not say."""
@@ -90,6 +97,11 @@ class Project(Brief):
     sd_taken: bool = False
 
     def __post_init__(self) -> None:
+        given = self.block.in_frame(self.frame)
+        object.__setattr__(self, "frame", frame_of(given))
+        if (self.frame.kind == "geographic") != given.geographic:
+            space = "geographic" if given.geographic else "rectangular: it has no spheroid"
+            raise InputError(f"the frame is {self.frame.kind}, but the block is {space}")
         if self.block.frame != self.frame:
             object.__setattr__(self, "block", self.block.in_frame(self.frame))
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
-from photogram.formats.placing import Placed, frame_of, placed
+from photogram.formats.placing import Placed, placed
+from photogram.formats.project import frame_of
 from photogram.results.ellipses import CONFIDENCE, ellipses, fitting_scale
 from photogram.results.findings import axes
 from photogram.results.footprints import footprints
