@@ -144,3 +144,38 @@ def test_exit_codes(run, tmp_path):
     over = run("--example", "--points", "points.csv", "--points-out", "points.csv")
     assert "would be written over" in over.output
     assert {path.name for path in tmp_path.iterdir()} == {"few.csv", "points.csv"}
+
+
+def test_step_12_goes_to_files_with_its_identification(run, tmp_path):
+    case = next(iter(cases("partial_mixed"))).values[0]
+    Path("cards.dat").write_text(cards_of(case["stations"]))
+    arguments = ["--part-two", "two.dat", "--restart-out", "next.dat", "--json", "result.json"]
+    first = run("cards.dat", *arguments, "--ident", "STRIP7")
+    assert first.exit_code == 0, first.output
+    two = [line.split() for line in Path("two.dat").read_text().splitlines()]
+    assert [len(words) for words in two] == [7, 8]
+    document = json.loads(Path("result.json").read_bytes())
+    np.testing.assert_array_equal(
+        np.array([*two[0][:6], *two[1][:3]], float).reshape(3, 3), document["rotation"]
+    )
+    words = Path("next.dat").read_text().split()
+    assert len(words) == 8
+    assert {two[0][-1], two[1][-1], words[-1]} == {"STRIP7"}
+    again = run("cards.dat", "--restart", "next.dat", "--json", "again.json", "--method", "report")
+    assert again.exit_code == 0, again.output
+    second = json.loads(Path("again.json").read_bytes())
+    assert (second["start"], second["scale"]) == ("restart", pytest.approx(document["scale"], rel=1e-8))
+    Path("points.dat").write_text("1.0 2.0 3.0 A\n")
+    for source in ("two.dat", "result.json"):
+        assert run("transform", source, "points.dat", f"{source}.csv").exit_code == 0
+    lines = [
+        Path(f"{source}.csv").read_text().splitlines()[1].split(",")[:4]
+        for source in ("two.dat", "result.json")
+    ]
+    assert lines[0] == lines[1]
+    # The identification of the cards is the default, and is one word.
+    assert run("cards.dat", "--part-two", "two.dat").exit_code == 0
+    refused = run("cards.dat", "--part-two", "no.dat", "--ident", "two words")
+    assert refused.exit_code == 1
+    assert "one word of a record" in refused.stderr
+    assert not Path("no.dat").exists()

@@ -25,6 +25,7 @@ from photogram.network.geometry import rotation_matrix
 __all__ = [
     "Deck",
     "read_cards",
+    "read_restart",
     "read_transformation",
     "restart_record",
     "transformation_records",
@@ -160,6 +161,20 @@ def _stations(
         raise InputError(error.message, file=path) from None
 
 
+def read_restart(path: Path, stations: Stations, messages: list[Message]) -> Similarity | None:
+    """Read the record of a restart (TB 19, step 12): eight words, for the stations of the new solution.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or holds something else; names file, record and text.
+    """
+    records = _records(path)
+    if len(records) != 1:
+        raise InputError("a restart is one record of eight words", file=path)
+    return _former(records[0], stations, messages)
+
+
 def _former(record: _Record, stations: Stations, messages: list[Message]) -> Similarity | None:
     """Read the parameters of a former result; None when all are zero."""
     words = record.words(7, 8, "parameters sin omega, sin phi, sin kappa, s, b1, b2, b3, identification")
@@ -202,6 +217,8 @@ def transformation_records(similarity: Similarity, identification: str) -> list[
 
 
 def _record(values: list[float] | Floats, identification: str) -> str:
+    if len(identification.replace(",", " ").split()) > 1:
+        raise InputError(f"an identification is one word of a record, not {quoted(identification)}")
     return " ".join([*(f"{value:.17g}" for value in values), identification or "0"])
 
 

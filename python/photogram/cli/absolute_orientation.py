@@ -29,9 +29,9 @@ from photogram.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from photogram.absolute_orientation import Orientation, Similarity, Stations
+    from photogram.absolute_orientation import Orientation, Similarity
+    from photogram.absolute_orientation.cards import Deck
     from photogram.io.writing import OutputSet
-    from photogram.messages import Message
 
 __all__ = ["absolute_orientation", "transform"]
 
@@ -140,7 +140,37 @@ def absolute_orientation(
     restart: Annotated[
         Path | None,
         Reads.FILE,
-        typer.Option(metavar="JSON", help="Start from a former result (its --json).", show_default=False),
+        typer.Option(
+            metavar="FILE",
+            help="Start from a former result: its --json, or its --restart-out.",
+            show_default=False,
+        ),
+    ] = None,
+    part_two: Annotated[
+        Path | None,
+        Writes.FILE,
+        typer.Option(
+            metavar="FILE",
+            help="Write the two records that part II reads (TB 19, step 12): A, s, B, identification.",
+            show_default=False,
+        ),
+    ] = None,
+    restart_out: Annotated[
+        Path | None,
+        Writes.FILE,
+        typer.Option(
+            metavar="FILE",
+            help="Write the record that a new solution starts from (step 12): sines, s, B, identification.",
+            show_default=False,
+        ),
+    ] = None,
+    ident: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WORD",
+            help="Identification on these records. Default: that of the cards.",
+            show_default=False,
+        ),
     ] = None,
     start: Annotated[
         Start | None,
@@ -184,7 +214,6 @@ def absolute_orientation(
         raise typer.BadParameter("goes with --method report or fill-in", param_hint="--trace")
     with job:
         from photogram import orient
-        from photogram.absolute_orientation.document import read_similarity
         from photogram.absolute_orientation.report import summary
         from photogram.messages import Message
         from photogram.show.ways import page_of
@@ -208,21 +237,23 @@ def absolute_orientation(
             *([place] if place else []),
             *([target] if target and target is not points_out else []),
         )
-        stations, former, messages = _read(file, format, zero_missing, ground_unit, model_unit)
+        deck = _read(file, format, zero_missing, ground_unit, model_unit)
         result = orient(
-            stations,
+            deck.stations,
             method=method.value,
             start=start.value if start else None,
-            former=read_similarity(restart) if restart else former,
+            former=_restart(restart, deck) if restart else deck.former,
             reject=reject or (),
             unit_variance=unit_variance.value,
             trace=trace is not None,
         )
-        result.messages[:0] = messages
+        result.messages[:0] = deck.messages
         if points and not result.usable:
             result.messages.append(Message("no points were transformed: the orientation is not to be used"))
             points = None
         made = _small_files(result, reports, pictures, trace, None if points else json)
+        name = deck.identification if ident is None else ident
+        made |= _records(result, part_two, restart_out, name)
         made |= html_files(
             job,
             "absolute-orientation",
@@ -286,22 +317,46 @@ def _former(path: Path) -> Similarity:
     """Read a former result in either of its forms."""
     from photogram.absolute_orientation.cards import read_transformation
     from photogram.absolute_orientation.document import read_similarity
-    from photogram.io.files import read_lines
 
-    document = any(line.lstrip().startswith("{") for line in read_lines(path)[:1])
-    return read_similarity(path, usable=True) if document else read_transformation(path)
+    return read_similarity(path, usable=True) if _is_document(path) else read_transformation(path)
 
 
-def _read(
-    file: Path, format_: Format, zero_missing: bool, ground_unit: str, model_unit: str
-) -> tuple[Stations, Similarity | None, list[Message]]:
+def _read(file: Path, format_: Format, zero_missing: bool, ground_unit: str, model_unit: str) -> Deck:
     from photogram.absolute_orientation import read_cards, read_csv
+    from photogram.absolute_orientation.cards import Deck
     from photogram.absolute_orientation.csv_files import is_csv
 
     if format_ is Format.CSV or (format_ is Format.AUTO and is_csv(file)):
-        return read_csv(file, ground_unit=ground_unit, model_unit=model_unit), None, []
-    deck = read_cards(file, zero_missing=zero_missing, ground_unit=ground_unit, model_unit=model_unit)
-    return deck.stations, deck.former, deck.messages
+        return Deck(read_csv(file, ground_unit=ground_unit, model_unit=model_unit), None, "")
+    return read_cards(file, zero_missing=zero_missing, ground_unit=ground_unit, model_unit=model_unit)
+
+
+def _restart(path: Path, deck: Deck) -> Similarity | None:
+    """Read a former result in either of its forms."""
+    from photogram.absolute_orientation.cards import read_restart
+    from photogram.absolute_orientation.document import read_similarity
+
+    return read_similarity(path) if _is_document(path) else read_restart(path, deck.stations, deck.messages)
+
+
+def _is_document(path: Path) -> bool:
+    from photogram.io.files import read_lines
+
+    return any(line.lstrip().startswith("{") for line in read_lines(path)[:1])
+
+
+def _records(
+    result: Orientation, part_two: Path | None, restart: Path | None, ident: str
+) -> dict[Path, bytes]:
+    """Make the files of step 12; of an orientation that is not to be used there is none for part II."""
+    from photogram.absolute_orientation.cards import restart_record, transformation_records
+
+    made = {}
+    if part_two and result.usable:
+        made[part_two] = "\n".join([*transformation_records(result.similarity, ident), ""]).encode()
+    if restart:
+        made[restart] = f"{restart_record(result.similarity, ident)}\n".encode()
+    return made
 
 
 def _small_files(
