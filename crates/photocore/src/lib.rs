@@ -16,3 +16,8 @@ pub mod normals;
 pub mod programs;
 
 pub use nalgebra;
+
+/// What the README shows is compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
