@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from photogram import Camera, adjust, simulate, snoop
+from photogram import Camera, adjust, first_values, simulate, snoop
+from photogram.adjustment import exchanges
 from photogram.results.exchanged import exchanged_names
 
 
@@ -151,3 +152,22 @@ def test_pairs_far_apart_in_a_larger_block_of_a_calibrated_camera():
     found = adjust(block.replace(image_xy=xy)).exchanged
     assert len(found) == 2
     assert all(any(all(name in each for name in pair) for each in found) for pair in names)
+
+
+def test_a_pair_of_a_large_block_is_found_among_some_of_its_images(monkeypatch):
+    """To orient photos by tens of thousands of images would take longer than their adjustment."""
+    asked = []
+
+    def counted(block):
+        asked.append(len(block.image_xy))
+        return first_values(block)
+
+    monkeypatch.setattr(exchanges, "first_values", counted)
+    block, names, photo = exchanged(block_of(2).block, 2)
+    [pair] = adjust(block).exchanged
+    monkeypatch.setattr(exchanges, "MOST_IMAGES", 100)
+    monkeypatch.setattr(exchanges, "EACH", 6)
+    assert adjust(block).exchanged == (pair,)
+    assert all(name in pair for name in names)
+    assert photo in pair
+    assert asked[-1] < 0.8 * asked[0]

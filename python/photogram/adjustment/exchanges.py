@@ -16,7 +16,7 @@ from photogram.adjustment.first_values import first_values
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
-from photogram.network.chosen import of_photos
+from photogram.network.chosen import kept_images, of_photos
 from photogram.results.exchanged import Exchange, exchanged_names
 from photogram.results.findings import HARMFUL
 from photogram.results.result import Result
@@ -28,6 +28,9 @@ CENTRES = 3
 """Photos around which names are looked at."""
 AROUND, SHARED = 24, 3
 """Photos around one, at the most; they share so many points with it, at the least."""
+MOST_IMAGES, EACH = 4000, 40
+"""Images of these photos up to which all take part; of more, those of so many points of each photo with the
+worst images, and of as many with the most images: to orient them by all takes longer than the adjustment."""
 MEDIAN_OF_LARGER = 1.05
 """Of the larger of two absolute normal variables."""
 
@@ -38,7 +41,8 @@ def with_exchanges(result: Result) -> Result:
     if not doubtful:
         return result
     found: dict[tuple[str, str], Exchange] = {}
-    for each in (pair for around in _around_worst(result) for pair in _among(result.block, around)):
+    sizes = _sizes(result)
+    for each in (pair for own in _around_worst(result, sizes) for pair in _among(result.block, own, sizes)):
         # Photos around one may leave open what those around another tell.
         known = found.setdefault(each.points, each)
         if len(each.photos) < len(known.photos):
@@ -46,9 +50,9 @@ def with_exchanges(result: Result) -> Result:
     return replace(result, exchanged=tuple(each.probable for each in found.values())) if found else result
 
 
-def _around_worst(result: Result) -> list[Indices]:
+def _around_worst(result: Result, sizes: Floats) -> list[Indices]:
     """Return groups of photos around those that have two images, or more, with gross errors."""
-    block, sizes = result.block, _sizes(result)
+    block = result.block
     bad = np.flatnonzero(sizes > 0)
     bad = bad[np.lexsort((-sizes[bad], block.image_photos[bad]))]
     photos, first, count = np.unique(block.image_photos[bad], return_index=True, return_counts=True)
@@ -95,17 +99,33 @@ def _neighbours(block: Block, photo: int) -> Indices:
     return chosen
 
 
-def _among(block: Block, photos: Indices) -> list[Exchange]:
+def _among(block: Block, photos: Indices, sizes: Floats) -> list[Exchange]:
     """Return exchanged names on some photos, which are oriented by their images alone."""
     kept = np.zeros(len(block.photo_ids), dtype=bool)
     kept[photos] = True
     try:
-        found = first_values(_images_alone(block, kept))
+        found = first_values(_images_alone(kept_images(block, _chosen(block, photos, sizes)), kept))
     except (AdjustmentError, InputError):
         return []
     started = np.array([name in found.sources for name in found.block.photo_ids])
     images: Bools = started[found.block.image_photos]
     return exchanged_names(of_photos(found.block, started), ~found.set_aside[images])
+
+
+def _chosen(block: Block, photos: Indices, sizes: Floats) -> Bools:
+    """(m,) the images of some photos by which these are oriented: all, or those of some points."""
+    own = np.isin(block.image_photos, photos)
+    if np.count_nonzero(own) <= MOST_IMAGES:
+        return own
+    worst = np.zeros(len(block.point_ids))
+    np.maximum.at(worst, block.image_points[own], sizes[own])
+    rays = np.bincount(block.image_points[own], minlength=len(worst))
+    points = np.zeros(len(worst), dtype=bool)
+    for photo in photos.tolist():
+        seen = block.image_points[block.image_photos == photo]
+        for order in (np.lexsort((-rays[seen], -worst[seen])), np.argsort(-rays[seen], kind="stable")):
+            points[seen[order[:EACH]]] = True
+    return np.asarray(own & points[block.image_points])
 
 
 def _images_alone(block: Block, kept: Bools) -> Block:

@@ -300,6 +300,7 @@ def _adjusted(
 ) -> Result:
     from photogram import FirstValues, InnerConstraints, InputError, MinimumConstraints, adjust_started
     from photogram import adjust as adjust_block
+    from photogram.formats.additions import repeated_remarks
 
     options = project.options
     chosen = datum.value if datum is not None else options.datum
@@ -326,7 +327,8 @@ def _adjusted(
             "control gives no datum: --control FILE adds it, --datum inner or minimum does without it",
             file=project.path,
         )
-    return replace(result, messages=[*project.messages, *result.messages])
+    again = repeated_remarks(project, result) if not isinstance(block, FirstValues) else []
+    return replace(result, messages=[*project.messages, *again, *result.messages])
 
 
 def _files(project: Project, result: Result, sections: list[tuple[str, list[str]]]) -> dict[str, bytes]:

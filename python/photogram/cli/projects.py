@@ -136,6 +136,15 @@ Angles = Annotated[
 ]
 
 
+KeepRepeated = Annotated[
+    bool,
+    typer.Option(
+        "--keep-repeated",
+        help="Take second images of a point on a photo in, as COLMAP does: their mean with the first.",
+    ),
+]
+
+
 @dataclass(frozen=True)
 class Additions:
     """What a user adds to a project, with the options that say it; see :func:`with_additions`."""
@@ -150,6 +159,7 @@ class Additions:
     pixel_origin: PixelOrigin = None
     model: Model = None
     angles: Angles = None
+    keep_repeated: KeepRepeated = False
 
 
 NOTHING = Additions()
@@ -193,7 +203,7 @@ def project_path(job: Job, path: Path | None) -> Path:
 def read_project(job: Job, path: Path, added: Additions) -> Project:
     """Read what lies at a path, with what a user adds; its files are inputs of the job from now on."""
     from photogram.formats import Wishes, read
-    from photogram.formats.additions import deviations, with_control, with_images, with_sd
+    from photogram.formats.additions import deviations, with_control, with_images, with_repeated, with_sd
     from photogram.formats.names import with_names
 
     if path.is_dir():
@@ -208,6 +218,8 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
         sd=sd,
     )
     project = with_sd(read(path, added.file_format, wishes), sd)
+    if added.keep_repeated:
+        project = with_repeated(project)
     if added.images is not None:
         project = with_images(project, added.images, origin)
     if added.names is not None:

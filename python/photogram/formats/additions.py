@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.adjustment.prediction import at_adjusted, computed_images
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.control_lists import ControlList, read_control_list
 from photogram.formats.images import from_corner, to_corner
@@ -20,12 +21,22 @@ from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.plain.writing import attitude_matrices
 from photogram.formats.planes import plane_remarks
-from photogram.formats.project import Frame, Project
+from photogram.formats.project import Frame, Project, Repeated
 from photogram.io.delimited import ColumnTable, Names
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
+from photogram.results.result import Result
 
-__all__ = ["deviations", "held_points", "self_calibrated", "with_control", "with_images", "with_sd"]
+__all__ = [
+    "deviations",
+    "held_points",
+    "repeated_remarks",
+    "self_calibrated",
+    "with_control",
+    "with_images",
+    "with_repeated",
+    "with_sd",
+]
 
 SAME = 1e-3
 """Pixels that two measurements of a point on a photo may be apart to be one."""
@@ -70,6 +81,75 @@ def with_sd(project: Project, sd: Mapping[str, tuple[float, ...]]) -> Project:
     own = np.broadcast_to(sd["images"], (len(project.block.image_xy), 2))
     lacks = tuple(each for each in project.lacks if "--sd images" not in each)
     return project.replace(block=project.block.replace(image_sd=own), lacks=lacks)
+
+
+def with_repeated(project: Project) -> Project:
+    """Return a project whose second images of a point on a photo take part: their mean with the first.
+
+    With the weights of all together it gives the same adjustment as all of them by themselves, for the sum of
+    squares of their differences from the mean does not depend on any unknown; the message says what it is.
+    """
+    block = project.block
+    first, second = _repeated_rows(project)
+    if not len(first):
+        return project
+    rows, place, again = np.unique(first, return_inverse=True, return_counts=True)
+    count = 1.0 + again[:, np.newaxis]
+    own, others = block.image_xy[rows], project.repeated.xy[second]
+    mean = own.copy()
+    np.add.at(mean, place, others)
+    mean /= count
+    sd = block.image_sd[rows]
+    spread = (((own - mean) / sd) ** 2).sum() + (((others - mean[place]) / sd[place]) ** 2).sum()
+    xy, deviations = block.image_xy.copy(), np.array(block.image_sd)
+    xy[rows], deviations[rows] = mean, sd / np.sqrt(count)
+    said = [each for each in project.messages if "--keep-repeated" not in each.text]
+    text = f"{len(second)} second images of a point on a photo are averaged with the first: the adjustment is"
+    said.append(
+        Message(
+            f"{text} that of all of them, whose weighted sum of squares is larger by {spread:.6f}"
+            f" (half of it: {spread / 2:.6f})"
+        )
+    )
+    block = block.replace(image_xy=xy, image_sd=deviations)
+    return project.replace(block=block, messages=tuple(said), repeated=Repeated())
+
+
+def repeated_remarks(project: Project, result: Result) -> list[Message]:
+    """Say what the sum of squares would be with second images of a point on a photo, where there are any."""
+    first, second = _repeated_rows(project)
+    used = result.used_images[first] if result.converged and len(result.used_images) else first[:0] > 0
+    if not used.any():
+        return []
+    block, sd = project.block, project.block.image_sd[first][used]
+    there = at_adjusted(result).replace(
+        image_photos=block.image_photos[first][used],
+        image_points=block.image_points[first][used],
+        image_xy=project.repeated.xy[second][used],
+        image_sd=sd,
+    )
+    more = float((((there.image_xy - computed_images(there)) / sd) ** 2).sum())
+    total = result.sums_of_squares.total
+    return [
+        Message(
+            f"with {int(used.sum())} second images of a point on a photo, which are left out, the weighted"
+            f" sum of squares would be {total + more:.6g} here and not {total:.6g}"
+            " (--keep-repeated takes them in)"
+        )
+    ]
+
+
+def _repeated_rows(project: Project) -> tuple[Indices, Indices]:
+    """Return rows of first images in the block, and those of their second ones among the repeated."""
+    block, again = project.block, project.repeated
+    if not again.points:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    ids = zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
+    place = {(block.photo_ids[i], block.point_ids[j]): row for row, (i, j) in enumerate(ids)}
+    pairs = [place.get(pair, -1) for pair in zip(again.photos, again.points, strict=True)]
+    rows = np.array(pairs, dtype=np.int64)
+    there = np.flatnonzero(rows >= 0)
+    return rows[there], there
 
 
 def self_calibrated(project: Project, names: Sequence[str]) -> Project:

@@ -50,6 +50,23 @@ class Options:
     unit_variance: Literal["constrained", "unity", "redundancy"] = "constrained"
 
 
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """Second images of points on photos, of which a block has one each.
+
+    Attributes
+    ----------
+    photos, points
+        Their k names.
+    xy
+        (k, 2) image coordinates, in the unit of the block.
+    """
+
+    photos: tuple[str, ...] = ()
+    points: tuple[str, ...] = ()
+    xy: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Project(Brief):
     """A block with what files say of it beyond.
@@ -81,6 +98,8 @@ class Project(Brief):
     sd_taken
         Whether the reader has taken the standard deviations of images that a user gives, in the unit of the
         files.
+    repeated
+        Second images of points on photos, which were left out.
     """
 
     block: Block
@@ -95,6 +114,7 @@ class Project(Brief):
     messages: tuple[Message, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
     sd_taken: bool = False
+    repeated: Repeated = field(default_factory=Repeated)
 
     def __post_init__(self) -> None:
         given = self.block.in_frame(self.frame)
@@ -186,7 +206,16 @@ def assembled(
         raise place.error("has no photos")
     _different(place, "photo", photo_ids)
     _different(place, "point", point_ids)
-    keep = _first_images(image_photos, image_points, photo_ids, point_ids, found)
+    keep, left = _first_images(image_photos, image_points, len(point_ids))
+    repeated = Repeated(
+        tuple(photo_ids[row] for row in image_photos[left].tolist()),
+        tuple(point_ids[row] for row in image_points[left].tolist()),
+        np.asarray(image_xy)[left],
+    )
+    if len(left):
+        names = [f"{point} on {photo}" for point, photo in zip(repeated.points, repeated.photos, strict=True)]
+        text = f"{len(left)} second images of a point on a photo are left out: {listed(names, 3)}"
+        found.append(Message(f"{text} (--keep-repeated takes them in)"))
     lacking = list(lacks)
     if image_sd is None:
         unit = cameras[0].unit or "px"
@@ -242,6 +271,7 @@ def assembled(
         lacks=tuple(lacking),
         messages=tuple(found),
         details=details or {},
+        repeated=repeated,
     )
 
 
@@ -251,23 +281,11 @@ def _different(place: Place, kind: str, names: Sequence[str]) -> None:
         raise place.error(f"the {kind} {twice} is there more than once")
 
 
-def _first_images(
-    photos: Indices,
-    points: Indices,
-    photo_ids: Sequence[str],
-    point_ids: Sequence[str],
-    messages: list[Message],
-) -> Indices:
-    """Return rows of images without second ones of a point on a photo, which a block does not take."""
-    pairs = np.asarray(photos, dtype=np.int64) * max(len(point_ids), 1) + points
+def _first_images(photos: Indices, points: Indices, count: int) -> tuple[Indices, Indices]:
+    """Return rows of the first image of each of so many points on a photo, and those of all others."""
+    pairs = np.asarray(photos, dtype=np.int64) * max(count, 1) + points
+    everything = np.arange(len(pairs))
     if len(pairs) < 2 or (np.diff(pairs) > 0).all():
-        return np.arange(len(pairs))
-    _, first = np.unique(pairs, return_index=True)
-    if len(first) == len(pairs):
-        return np.arange(len(pairs))
-    left = np.setdiff1d(np.arange(len(pairs)), first)
-    names = [f"{point_ids[points[row]]} on {photo_ids[photos[row]]}" for row in left[:20].tolist()]
-    messages.append(
-        Message(f"{len(left)} second images of a point on a photo are left out: {listed(names, 3)}")
-    )
-    return np.sort(first)
+        return everything, everything[:0]
+    first = np.sort(np.unique(pairs, return_index=True)[1])
+    return first, np.setdiff1d(everything, first)
