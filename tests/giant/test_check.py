@@ -85,6 +85,26 @@ def test_the_packaged_example_passes():
 # Step 1: intersection
 
 
+@pytest.mark.giant("13", "1 blunder edit by intersection")
+def test_section_13_the_first_run_of_appendix_h_accuses_nobody_on_the_clean_sample():
+    from importlib.resources import as_file, files
+
+    from photogram import adjust
+    from photogram.giant import read_project
+
+    with as_file(files("photogram") / "examples" / "galveston") as directory:
+        sample = read_project(directory).to_block()
+    clean = adjust(sample, fix_photos=True).verdict
+    assert (clean.code, clean.exit, clean.warning) == ("intersection", 0, True)
+    assert "none stands out" in clean.headline
+    row = image(sample, "SH9960", least_rays=3)
+    spoilt = adjust(changed(sample, "image_xy", row, 1, 0.5), fix_photos=True).verdict
+    assert (spoilt.code, spoilt.exit) == ("gross-errors", 4)
+    assert f"1) image of point {sample.point_ids[sample.image_points[row]]} on photo" in spoilt.headline
+    assert "held" not in spoilt.headline
+    assert "--snoop" not in spoilt.headline
+
+
 @pytest.mark.giant("13", "2 elevation check: sign of the principal distance, kappa")
 @pytest.mark.parametrize("space", [{}, GULF], ids=["rectangular", "geographic"])
 def test_section_13_the_sign_of_the_principal_distance(space):

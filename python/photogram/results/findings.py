@@ -38,20 +38,23 @@ HARMFUL = {
 @findings_of.register(Result)
 def block_findings(result: Result) -> Findings:
     """Return the tests of a block: standard deviations are given, so the unit weight is known."""
+    # Held to look for blunders before the photos are adjusted: nobody takes these places for true.
+    intersected = not (result.block.photo_position_sd.any() or result.block.photo_attitude_sd.any())
     return Findings(
         status=result.status,
-        observations=[*_tested(result), *held_tested(result)],
+        observations=[*_tested(result), *([] if intersected else held_tested(result))],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=None if result.loss else result.global_test,
         untested=ROBUST if result.loss else "no degrees of freedom",
         computed=has_redundancy(result),
         checks=result.check_points.agreement,
-        systematic=_patterns(result),
+        systematic=[] if intersected else _patterns(result),
+        intersected=intersected,
         remarks=[*unseen(result), *_left_out(result), *_on_checks(result)],
         hints=result.hints,
         exchanged=result.exchanged,
         set_aside=_set_aside(result),
-        snoop="--snoop (photogram.snoop)",
+        snoop="" if intersected else "--snoop (photogram.snoop)",
     )
 
 

@@ -292,6 +292,8 @@ class Findings:
         What further computations have found, where they were made.
     set_aside
         What a start has taken out and does not fit the adjusted network either; None for nothing.
+    intersected
+        Whether all photos are held where they are given, so that errors of these are in all residuals.
     computed
         Whether observations could be tested, that is, whether their redundancy numbers were computed.
     remarks
@@ -317,6 +319,7 @@ class Findings:
     components: Sequence[GroupFactor] = ()
     snooped: Removed | None = None
     set_aside: Removed | None = None
+    intersected: bool = False
     computed: bool = True
     remarks: Sequence[str] = ()
     snoop: str = ""

@@ -219,8 +219,19 @@ def _checks(e: Evidence) -> _Line | None:
     return None
 
 
+def _intersected(e: Evidence) -> _Line | None:
+    if not e.high or e.gross or not e.found.intersected:
+        return None
+    text = (
+        "Intersection only: photos stay where they are given, and residuals, which have the errors of that, are"
+        f" {e.interval()} times larger than images and control explain; none stands out from the others. The"
+        " adjustment of the photos judges"
+    )
+    return _Line("intersection", text, EXIT_NOT_USABLE if e.factor > LARGEST_FACTOR else 0, warning=True)
+
+
 def _common_factor(e: Evidence) -> _Line | None:
-    if not e.high or e.gross or e.pattern or any(each.significant for each in e.found.components):
+    if not e.high or e.gross or e.pattern or e.found.intersected or any(each.significant for each in e.found.components):
         return None
     if e.robust is not None and e.robust < e.factor / NOTABLE_FACTOR:
         return None
@@ -260,7 +271,7 @@ def _uncontrolled(e: Evidence) -> _Line | None:
 
 
 def _unexplained(e: Evidence) -> _Line | None:
-    explained = (_gross_errors, _snooped, _common_factor, _components, _model)
+    explained = (_gross_errors, _snooped, _intersected, _common_factor, _components, _model)
     if not e.high or any(condition(e) is not None for condition in explained):
         return None
     largest = [test for test in e.tests() if test.name != "global"]
@@ -301,6 +312,7 @@ _CONDITIONS: tuple[Callable[[Evidence], _Line | None], ...] = (
     _snooped,
     _set_aside,
     _checks,
+    _intersected,
     _common_factor,
     _components,
     _model,
