@@ -1,11 +1,16 @@
 """`photogram convert`: what the name of OUT says, and round trips through every format that is written."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from test_plain_project import EXAMPLE
 
-from photogram import InputError, formats
+import photogram
+from photogram import InputError, Spheroid, adjust, formats
+from photogram.formats.topocentric import in_topocentric, topocentric_remarks
 from photogram.network.directions import image_directions
+from photogram.network.geometry import lengths_of_units
 
 
 @pytest.mark.parametrize(
@@ -136,3 +141,19 @@ def test_nothing_is_written_over_the_input(run, tmp_path, out):
 def test_the_name_of_an_unknown_format_is_refused():
     with pytest.raises(InputError, match="format is one of plain, colmap"):
         formats.target(EXAMPLE / "other", "nothing")
+
+
+def test_a_geographic_project_keeps_its_rays_and_control_in_a_topocentric_frame():
+    sample = formats.read(Path(photogram.__file__).parent / "examples" / "galveston")
+    found = in_topocentric(sample)
+    assert "latitude 29." in topocentric_remarks(sample)[0]
+    assert found.block.frame.origin is None  # of Clarke 1866, whose datum nobody has said
+    given, made = adjust(sample.block, tolerance=1e-9), adjust(found.block, tolerance=1e-9)
+    held = np.isfinite(sample.block.point_sd)
+    np.testing.assert_array_equal(np.isfinite(found.block.point_sd), held)
+    assert (held.sum(axis=1) % 3 > 0).any()  # control in plan or height alone
+    assert made.sums_of_squares.plates == pytest.approx(given.sums_of_squares.plates, rel=1e-3)
+    lengths = lengths_of_units(given.point_positions, sample.block.spheroid)
+    np.testing.assert_allclose(made.point_sd, given.point_sd * lengths, rtol=0.01)
+    known = sample.block.replace(spheroid=Spheroid.wgs84())
+    assert in_topocentric(sample.replace(block=known)).block.frame.kind == "topocentric"

@@ -100,8 +100,14 @@ def test_geographic_blocks_have_a_place():
     # Axes of the ellipsoid at the point are those of the block itself.
     np.testing.assert_allclose(found.photo_turns, np.broadcast_to(np.eye(3), (8, 3, 3)), atol=1e-9)
     clarke = adjust(simulate(spheroid=Spheroid.clarke_1866(), **common).block)
-    with pytest.raises(InputError, match="nothing says where on the earth"):
+    with pytest.raises(InputError, match=r"nothing says of which datum; --crs .* EPSG:4267"):
         places.placed(clarke, "EPSG:4979")
+    # A system on their ellipsoid takes longitudes and latitudes as its own: no grid is asked for.
+    own = places.placed(clarke, "EPSG:4267")
+    expected = np.degrees(clarke.point_positions[own.rows, :2])
+    np.testing.assert_array_equal(own.points[:, :2], expected)
+    np.testing.assert_array_equal(own.photo_turns, np.broadcast_to(np.eye(3), (8, 3, 3)))
+    np.testing.assert_array_equal(own.carried(clarke.photo_positions), own.photos)
 
 
 @pytest.fixture

@@ -102,11 +102,9 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
     Raises
     ------
     InputError
-        Geographic coordinates; no photo with a pose that shows a point with a position.
+        No photo with a pose that shows a point with a position.
     """
     block = project.block
-    if block.geographic:
-        raise InputError("the format is cartesian: geographic coordinates have no place there")
     cameras, photo_cameras = known_cameras(block)
     sizes = project.sizes
     positions = complete_positions(project)

@@ -28,6 +28,7 @@ __all__ = [
     "from_frame",
     "geocentric",
     "has_place",
+    "is_on",
     "is_projected",
     "to_frame",
     "to_system",
@@ -231,6 +232,7 @@ def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
         (n, 3) in the frame; of a geographic one longitude and latitude in radians.
     frame
         Topocentric with an origin, geocentric, geographic, or cartesian with a system whose numbers it has.
+        Where the system is its own, nothing is transformed.
 
     Returns
     -------
@@ -243,8 +245,11 @@ def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
     InputError
         A frame that has no place on the earth, or as for :func:`geocentric`.
     """
-    if frame.kind == "cartesian" and frame.crs == crs and crs:
-        return xyz.copy(), np.broadcast_to(np.eye(3), (len(xyz), 3, 3)).copy()
+    if frame.kind in ("cartesian", "geographic") and frame.crs == crs and crs:
+        own = (
+            np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if frame.kind == "geographic" else xyz.copy()
+        )
+        return own, np.broadcast_to(np.eye(3), (len(xyz), 3, 3)).copy()
     earth, own = _on_earth(xyz, frame)
     if (local := enu_origin(crs)) is not None:
         found: Floats = (earth - _geocentric_of(local)) @ east_north_up(local).T
@@ -253,6 +258,15 @@ def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
         found = _transformed(GEOCENTRIC, target, earth) - _geoid(crs)
     turns: Floats = _axes(crs, found, earth) @ own.transpose(0, 2, 1)
     return found, turns
+
+
+def is_on(crs: str, ellipsoid: tuple[float, float]) -> bool:
+    """Whether a system has longitudes and latitudes on an ellipsoid of these semi-axes, metres."""
+    if enu_origin(crs) is not None or not _system(crs).is_geographic:
+        return False
+    own = _system(crs).ellipsoid
+    axes = (own.semi_major_metre, own.semi_minor_metre) if own is not None else (0.0, 0.0)
+    return bool(np.allclose(axes, ellipsoid, rtol=0, atol=0.01))  # the axes of cards have two decimals
 
 
 def has_place(frame: Frame) -> bool:

@@ -62,6 +62,8 @@ class Format:
         which a user may say the format; empty for a format that is a folder.
     pixels
         Whether its images are pixels: what is written is in pixels, whatever the project has.
+    geographic
+        Whether it holds longitudes and latitudes; what is written in others is in a topocentric frame.
     folders
         Names of folders that say the format, beside its own name.
     """
@@ -76,3 +78,4 @@ class Format:
     files: tuple[str, ...] = ()
     folders: tuple[str, ...] = ()
     pixels: bool = False
+    geographic: bool = False

@@ -72,5 +72,11 @@ def cannot_hold(project: Project) -> list[str]:
 
 
 FORMAT = Format(
-    name="giant", title=TITLE, recognises=_recognises, read=read, write=write, cannot_hold=cannot_hold
+    name="giant",
+    title=TITLE,
+    recognises=_recognises,
+    read=read,
+    write=write,
+    cannot_hold=cannot_hold,
+    geographic=True,
 )

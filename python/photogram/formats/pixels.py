@@ -216,4 +216,5 @@ FORMAT = Format(
     files=(FILE, "*.csv"),
     cannot_hold=cannot_hold,
     pixels=True,
+    geographic=True,
 )

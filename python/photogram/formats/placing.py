@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.crs import axes_of, has_place, to_system
+from photogram.formats.crs import axes_of, has_place, is_on, to_system
 from photogram.formats.project import frame_of
 from photogram.io.csv_text import csv_text
 from photogram.network.attitudes import Attitudes, Representation
@@ -78,7 +78,7 @@ class Placed:
 
     def carried(self, xyz: Floats) -> Floats:
         """Return (n, 3) other positions of the block in the system."""
-        return _carried(self.result.block, self.crs, frame_of(self.result.block), xyz)[0]
+        return _carried(self.result.block, self.crs, check_place(self.result.block, self.crs), xyz)[0]
 
     def moved(self, places: Floats, steps: Floats) -> Floats:
         """Return (n, 3) places of the system moved by (n, 3) steps to the east, north and up, metres."""
@@ -109,6 +109,9 @@ class Placed:
 def check_place(block: Block, crs: str) -> Frame:
     """Return the frame of a block whose results are to be brought to a system; nothing asks for none.
 
+    Longitudes and latitudes of which only the ellipsoid is known are those of a system on this ellipsoid that
+    is asked for: the block has no other datum.
+
     Raises
     ------
     InputError
@@ -118,6 +121,14 @@ def check_place(block: Block, crs: str) -> Frame:
     if not crs:
         return frame
     axes_of(crs)
+    if frame.kind == "geographic" and not has_place(frame):
+        if not is_on(crs, frame.ellipsoid):
+            raise InputError(
+                f"results cannot be brought to {crs}: the longitudes and latitudes are on the ellipsoid"
+                f" {frame.ellipsoid[0]:.12g}, {frame.ellipsoid[1]:.12g}, and nothing says of which datum;"
+                " --crs with a geographic system on it (of Clarke 1866, EPSG:4267) takes them as its own"
+            )
+        return replace(frame, crs=crs)
     if not has_place(frame):
         raise InputError(
             f"results cannot be brought to {crs}: nothing says where on the earth the frame ({frame}) is;"

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project
 from photogram.network.directions import image_directions
@@ -62,15 +61,8 @@ def reduced_images(project: Project, digits: int | None = None) -> ReducedImages
         The project.
     digits
         To which principal distances are rounded: coordinates are those of the rounded ones.
-
-    Raises
-    ------
-    InputError
-        Geographic coordinates.
     """
     block = project.block
-    if block.geographic:
-        raise InputError("the object space is cartesian: geographic coordinates have no place there")
     cameras, which = known_cameras(block)
     pixels = [*project.pixel_mm, *(None for _ in cameras[len(project.pixel_mm) :])]
     distances = np.array(

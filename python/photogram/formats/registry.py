@@ -12,6 +12,7 @@ from photogram.formats.format import Format, Wishes
 from photogram.formats.millimetres import in_pixels, nominal_pixels
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
+from photogram.formats.topocentric import in_topocentric, topocentric_remarks
 from photogram.io.files import reading
 from photogram.memory import turned
 from photogram.messages import listed
@@ -137,7 +138,13 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
     if chosen.write is None:
         writable = ", ".join(name for name, each in FORMATS.items() if each.write)
         raise InputError(f"{chosen.title} is only read; what can be written: {writable}")
-    return chosen.write(in_pixels(project) if chosen.pixels else project)
+    return chosen.write(_fitting(project, chosen))
+
+
+def _fitting(project: Project, chosen: Format) -> Project:
+    """Return a project in the coordinates that a format has: of the object space, and of the images."""
+    project = project if chosen.geographic else in_topocentric(project)
+    return in_pixels(project) if chosen.pixels else project
 
 
 @dataclass(frozen=True)
@@ -224,9 +231,11 @@ def target(path: Path, file_format: str | None = None) -> Target:
 def cannot_hold(project: Project, file_format: str) -> list[str]:
     """Return what of a project a format has no place for, in sentences."""
     chosen = _named(file_format)
-    if not chosen.pixels:
-        return chosen.cannot_hold(project)
-    return [*chosen.cannot_hold(in_pixels(project)), *nominal_pixels(project)]
+    return [
+        *([] if chosen.geographic else topocentric_remarks(project)),
+        *chosen.cannot_hold(_fitting(project, chosen)),
+        *(nominal_pixels(project) if chosen.pixels else []),
+    ]
 
 
 def _named(file_format: str) -> Format:

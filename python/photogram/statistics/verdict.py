@@ -223,15 +223,17 @@ def _intersected(e: Evidence) -> _Line | None:
     if not e.high or e.gross or not e.found.intersected:
         return None
     text = (
-        "Intersection only: photos stay where they are given, and residuals, which have the errors of that, are"
-        f" {e.interval()} times larger than images and control explain; none stands out from the others. The"
-        " adjustment of the photos judges"
+        "Intersection only: photos stay where they are given, and residuals, which have the errors of that,"
+        f" are {e.interval()} times larger than images and control explain; none stands out from the others."
+        " The adjustment of the photos judges"
     )
     return _Line("intersection", text, EXIT_NOT_USABLE if e.factor > LARGEST_FACTOR else 0, warning=True)
 
 
 def _common_factor(e: Evidence) -> _Line | None:
-    if not e.high or e.gross or e.pattern or e.found.intersected or any(each.significant for each in e.found.components):
+    if not e.high or e.gross or e.pattern or e.found.intersected:
+        return None
+    if any(each.significant for each in e.found.components):
         return None
     if e.robust is not None and e.robust < e.factor / NOTABLE_FACTOR:
         return None

@@ -53,11 +53,9 @@ def write(project: Project) -> Mapping[str, bytes]:
     Raises
     ------
     InputError
-        Cameras that Metashape does not have, pictures of unknown size, geographic coordinates, no poses.
+        Cameras that Metashape does not have, pictures of unknown size, no poses.
     """
     block = project.block
-    if block.geographic:
-        raise InputError("chunks are cartesian: geographic coordinates have no place there")
     if not _posed(project).any():
         raise InputError("no photo has a pose, and the file holds nothing but photos with one")
     world = _world(project.frame)

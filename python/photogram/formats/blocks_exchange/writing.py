@@ -41,13 +41,9 @@ def write(project: Project) -> Mapping[str, bytes]:
     Raises
     ------
     InputError
-        Cameras with more than K1, K2, K3, P1, P2; pictures of unknown size; geographic coordinates.
+        Cameras with more than K1, K2, K3, P1, P2; pictures of unknown size.
     """
     block = project.block
-    if block.geographic:
-        raise InputError(
-            "blocks are written in a cartesian frame: geographic coordinates have no place there"
-        )
     cameras, which = known_cameras(block)
     frame = project.frame
     definition = (

@@ -89,7 +89,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     Raises
     ------
     InputError
-        Cameras of other models than those of COLMAP, pictures of unknown size, geographic coordinates, no
+        Cameras of other models than those of COLMAP, pictures of unknown size, no
         poses.
     """
     found = made(project)
@@ -116,8 +116,6 @@ class Made:
 def made(project: Project) -> Made:
     """Return the model of a project; see :func:`write`."""
     block = project.block
-    if block.geographic:
-        raise InputError("a COLMAP model is cartesian: geographic coordinates have no place there")
     cameras, photo_cameras = known_cameras(block)
     numbers = numbered([each.name for each in cameras])
     sizes = sizes_of(project)

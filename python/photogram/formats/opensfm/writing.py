@@ -53,11 +53,9 @@ def write(project: Project) -> Mapping[str, bytes]:
     Raises
     ------
     InputError
-        Cameras that the package does not have, pictures of unknown size, geographic coordinates, no poses.
+        Cameras that the package does not have, pictures of unknown size, no poses.
     """
     block = project.block
-    if block.geographic:
-        raise InputError("a reconstruction is cartesian: geographic coordinates have no place there")
     cameras, which = known_cameras(block)
     sizes = sizes_of(project)
     rows = np.flatnonzero(np.isfinite(np.hstack([block.photo_positions, block.photo_attitudes])).all(axis=1))

@@ -23,4 +23,5 @@ FORMAT = Format(
     write=write,
     cannot_hold=cannot_hold,
     files=(SETTINGS, "*.toml"),
+    geographic=True,
 )
