@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from functools import cache
 from importlib.resources import as_file, files
+from textwrap import wrap
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from photogram.comparator.listing.joint import tests_page
 from photogram.comparator.listing.parameters import combined_linear_page
 from photogram.comparator.listing.summary import variance_lines
 from photogram.comparator.rigid import fit_rigid
+from photogram.comparator.years.example import simulated_years
 
 
 @cache
@@ -70,7 +72,14 @@ def grid_lines() -> list[str]:
     ]
 
 
+def years_lines() -> list[str]:
+    """Compare the simulated calibrations of the example of `comparator compare`."""
+    found = comparator.compare(simulated_years())
+    return [*wrap(found.verdict.headline, 118), "", *found.report().splitlines()]
+
+
 BLOCKS = {
+    "years": years_lines,
     "variance": lambda: variance_lines(calibration()),
     "linear": lambda: combined_linear_page(calibration())[2:],
     "tests": lambda: tests_page(calibration())[2:],

@@ -248,7 +248,7 @@ def test_every_exit_code_stands_in_the_table_of_the_docs():
     ("group", "others"),
     [
         ("giant", ["check"]),
-        ("comparator", ["correct"]),
+        ("comparator", ["correct", "compare"]),
         ("absolute-orientation", ["transform"]),
         ("stellar-camera", ["exposures"]),
     ],

@@ -41,6 +41,10 @@ RUNS = {
         ["comparator", "correct", "former.json", "points.csv"],
         ["former.json", "points.csv"],
     ),
+    "comparator compare": (
+        ["comparator", "compare", "former.json", "later.json"],
+        ["former.json", "later.json"],
+    ),
     "collection": (["collection", "ring.txt"], ["ring.txt"]),
     "perspective-center": (["perspective-center", "grid.deck"], ["grid.deck"]),
     "stellar-camera plate": (["stellar-camera", "plate.toml"], ["plate.toml", "stars.csv", "images.csv"]),
@@ -105,6 +109,7 @@ def place(tmp_path, request):
         shutil.copytree(EXAMPLES / "galveston", tmp_path / project)
     shutil.copytree(EXAMPLES / "project", tmp_path / "project")
     (tmp_path / "former.json").write_text("{}")
+    (tmp_path / "later.json").write_text("{}")
     (tmp_path / "grid.csv").write_text("point,x_um,y_um\n1,0,0\n")
     (tmp_path / "catalogue.csv").write_text(
         "id,ra_deg,dec_deg,pm_ra_mas,pm_dec_mas,parallax_mas,magnitude\n1,10,20,0,0,0,1\n"

@@ -50,10 +50,13 @@ giant_app = typer.Typer(name="giant", cls=GroupWithMain, help="Adjust or check a
 giant_app.command("adjust", cls=Command)(giant.giant)
 giant_app.command("check", cls=Command)(check.check)
 comparator_app = typer.Typer(
-    name="comparator", cls=GroupWithMain, help="Calibrate a comparator, or correct measurements."
+    name="comparator",
+    cls=GroupWithMain,
+    help="Calibrate a comparator, correct measurements, compare calibrations.",
 )
 comparator_app.command("calibrate", cls=Command)(comparator.comparator)
 comparator_app.command("correct", cls=Command)(comparator.correct)
+comparator_app.command("compare", cls=Command)(comparator.compare)
 orientation_app = typer.Typer(
     name="absolute-orientation", cls=GroupWithMain, help="Orient a model absolutely, or transform its points."
 )

@@ -18,12 +18,12 @@ from rich.markup import escape
 from photogram.cli.console import output, print_remark, print_withheld
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
-from photogram.cli.options import Quiet, default_out, out_option
+from photogram.cli.options import JsonFile, Quiet, default_out, out_option
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
 
-__all__ = ["comparator", "correct"]
+__all__ = ["comparator", "compare", "correct"]
 
 EXAMPLE = ("comparator", "comparator-3.txt")
 """The packaged example, a deck in photogram.examples."""
@@ -335,3 +335,64 @@ def correct(
         if not tables:
             typer.echo(made.decode(), nl=False)
         job.finish(dict.fromkeys(tables, made))
+
+
+@with_job
+def compare(
+    job: Job,
+    calibrations: Annotated[
+        list[Path] | None,
+        Reads.FILE,
+        typer.Argument(
+            metavar="JSON...", help="Documents of calibrations: what `--json` writes.", show_default=False
+        ),
+    ] = None,
+    example: Annotated[
+        bool,
+        typer.Option("--example", help="Compare six simulated calibrations instead: a scale steps."),
+    ] = False,
+    out: Annotated[
+        Path | None,
+        Writes.DIRECTORY,
+        out_option("Directory for report and grids. Default: FILE-compared beside the first FILE."),
+    ] = None,
+    json: JsonFile = None,
+    html: HtmlFile = None,
+    no_html: NoHtml = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compare calibrations over years: drift, steps, control charts; adjust their grids together.
+
+    Writes report.html and each plate with the coordinates that all calibrations give it. What has changed is
+    named, and the exit code is 4. Grids with which readings do not agree are withheld.
+    """
+    with job:
+        from photogram.comparator import compare as compared
+        from photogram.show.ways import page_of
+
+        if example:
+            from photogram.comparator.years.example import simulated_years
+
+            found = compared(simulated_years())
+            folder = out or Path("comparator-compared")
+        else:
+            paths = calibrations or []
+            found = compared(paths)
+            folder = out or default_out(paths[0], "-compared")
+        written = (
+            {folder / f"grid-{plate}.csv": grid.to_csv() for plate, grid in found.grids.items()}
+            if found.usable_grids
+            else {}
+        )
+        place = html_place(html, no_html, folder)
+        written |= html_files(job, "comparator compare", place, html is not None, partial(page_of, found))
+        documents = {json: found.to_json()} if json is not None else {}
+
+        def summarize() -> None:
+            output.print("[bold]Verdict[/]")
+            output.print(
+                escape("\n".join(f"  {line}" for line in (found.verdict.headline, *found.verdict.lines)))
+            )
+            output.print(escape(found.report()), end="")
+
+        job.finish(written, documents, summary=summarize, code=found.verdict.exit)

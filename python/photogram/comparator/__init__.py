@@ -21,12 +21,14 @@ from photogram.comparator.readings import Case, Reading, Session, collect_cases
 from photogram.comparator.simulation import Simulation, simulate_calibration
 from photogram.comparator.source import read
 from photogram.comparator.tables import read_csv, to_csv
+from photogram.comparator.years import Comparison, RecordedCalibration, RecordedCase, compare
 from photogram.io.places import Place
 
 __all__ = [
     "Calibration",
     "Case",
     "CaseResult",
+    "Comparison",
     "Correction",
     "Decomposition",
     "Frame",
@@ -38,11 +40,14 @@ __all__ = [
     "Pointing",
     "Polynomial",
     "Reading",
+    "RecordedCalibration",
+    "RecordedCase",
     "Session",
     "Simulation",
     "built_in_grid",
     "calibrate",
     "collect_cases",
+    "compare",
     "find_grid",
     "listing",
     "read",
@@ -62,12 +67,15 @@ check_arguments(
         "Calibration",
         "Case",
         "CaseResult",
+        "Comparison",
         "Decomposition",
         "Identity",
         "Place",
         "PlateResult",
         "Pointing",
         "Reading",
+        "RecordedCalibration",
+        "RecordedCase",
         "Session",
         "Simulation",
         "collect_cases",

@@ -244,6 +244,9 @@ def _plate(calibration: Calibration, result: PlateResult) -> dict[str, Any]:
     corrections = averages.corrections_um
     return {
         "plate": averages.plate,
+        "adopted": grid.adopted,
+        "temperature_c": grid.temperature_c,
+        "expansion_per_k": grid.expansion_per_k,
         "left_handed": averages.left_handed,
         "points": averages.points.tolist(),
         "cases": averages.counts.tolist(),

@@ -33,6 +33,11 @@ _NEXT = {
     ),
     "hint": ("Correct what is named above, and adjust again.",),
     "identification": ("Look at the exposures that are named, and leave out those that are wrong.",),
+    "changed": (
+        "Values of before a change hold for what was measured before it, those of after it for what came"
+        " after: one mean holds for neither.",
+        "Look for the cause (wear, repair, temperature), and for what was measured in between.",
+    ),
     "gross-errors": (
         "Look at the observations that are named: the first of them is the most likely, those after it"
         " often only follow from it. They are in the table of the worst observations.",

@@ -288,6 +288,8 @@ class Findings:
         Stars: exposures whose identification is doubtful or rejected.
     checks
         How known values that took no part agree with the result; None where there are none, or untested.
+    changed
+        What differs between occasions that should have the same values, as sentences.
     systematic, components, snooped
         What further computations have found, where they were made.
     set_aside
@@ -315,6 +317,7 @@ class Findings:
     spoiled: str = ""
     doubtful: Sequence[str] = ()
     checks: Agreement | None = None
+    changed: Sequence[str] = ()
     systematic: Sequence[Systematic] = ()
     components: Sequence[GroupFactor] = ()
     snooped: Removed | None = None

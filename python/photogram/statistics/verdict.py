@@ -156,6 +156,12 @@ def _identification(e: Evidence) -> _Line | None:
     return _Line("identification", f"The identification of stars is doubtful: {named}", EXIT_NOT_USABLE)
 
 
+def _changed(e: Evidence) -> _Line | None:
+    if not e.found.changed:
+        return None
+    return _Line("changed", f"Changed: {listed(list(e.found.changed), NAMED)}", EXIT_NOT_USABLE)
+
+
 def _gross_errors(e: Evidence) -> _Line | None:
     if e.found.spoiled:
         named = f": {e.named(e.single)}" if e.single else ""
@@ -310,6 +316,7 @@ _CONDITIONS: tuple[Callable[[Evidence], _Line | None], ...] = (
     _rank_defect,
     _hint,
     _identification,
+    _changed,
     _gross_errors,
     _snooped,
     _set_aside,

@@ -1,0 +1,45 @@
+"""What the verdict on a comparison rests on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.comparator.years.comparison import Comparison
+from photogram.messages import counted
+from photogram.show.ways import findings_of
+from photogram.statistics.findings import Findings, Tested
+
+__all__ = ["comparison_findings"]
+
+
+@findings_of.register(Comparison)
+def comparison_findings(comparison: Comparison) -> Findings:
+    """Return the tests of a comparison: of all readings, and of what should not have changed."""
+    places = [
+        (record.name, case.number, point, axis)
+        for record in comparison.calibrations
+        for case in record.cases
+        for point in case.points.tolist()
+        for axis in "xy"
+    ]
+    values = np.concatenate([own.ravel() for each in comparison.together.standardized for own in each])
+
+    def name(index: tuple[int, ...]) -> str:
+        record, case, point, axis = places[index[0]]
+        return f"{axis} of point {point} of case {case} of {record}"
+
+    test = comparison.together.test
+    return Findings(
+        status="converged",
+        observations=[Tested("readings of the grids", values, name, "w")],
+        degrees_of_freedom=test.degrees_of_freedom,
+        global_test=test,
+        changed=[f"{whose}: {text}" for whose, own in comparison.histories.items() for text in own.changed],
+        systematic=[own.systematic(whose) for whose, own in comparison.histories.items()],
+        remarks=[
+            f"{whose}: nothing changed between {own.occasions[0]} and {own.occasions[-1]}"
+            f" ({counted(len(own.occasions), 'calibration')}, {len(own.series)} quantities)"
+            for whose, own in comparison.histories.items()
+            if not own.changed
+        ],
+    )

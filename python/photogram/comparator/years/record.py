@@ -1,0 +1,255 @@
+"""One calibration as it takes part in a comparison: its JSON document, read again."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+
+from photogram.arguments.types import Floats, Indices
+from photogram.comparator.calibration import Calibration
+from photogram.comparator.correction import Correction
+from photogram.comparator.document import to_document
+from photogram.comparator.grid import Grid
+from photogram.errors import InputError
+from photogram.io.files import read_bytes
+from photogram.messages import quoted
+
+__all__ = ["RecordedCalibration", "RecordedCase"]
+
+ISO = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})$")
+OF_THE_REPORT = re.compile(r"(\d{1,2})/(\d{1,2})/(\d{2}|\d{4})$")
+FIRST_YEAR = 50
+"""Years of two digits from here on are of the 20th century, those before of the 21st."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedCase:
+    """Mean readings of a case, and how the plate lay.
+
+    Attributes
+    ----------
+    number, operator, plate, left_handed
+        Of the case.
+    points, counts
+        (n,) grid points, and how often each was read.
+    means_um
+        (n, 2) mean readings.
+    rotation_rad, translation_um
+        grid = M(rotation) corrected + translation, by the joint adjustment.
+    """
+
+    number: int
+    operator: int
+    plate: int
+    left_handed: bool
+    points: Indices
+    counts: Indices
+    means_um: Floats
+    rotation_rad: float
+    translation_um: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedCalibration:
+    """A calibration: what was measured, and its joint correction.
+
+    Attributes
+    ----------
+    name
+        Of its file, or its place among the calibrations.
+    day
+        On which it was measured.
+    correction
+        Of the joint adjustment, with its identity.
+    random_um, freedom
+        Standard deviation of the comparator itself, degrees of freedom of the joint adjustment.
+    pointing_um, pointing_covariance_um2, pointing_freedom
+        Standard deviations of a pointing in x and y, their covariance, degrees of freedom.
+    operators
+        For each operator variances of a pointing in x and y (um^2), and their degrees of freedom.
+    cases
+        The cases.
+    grids
+        The plates as they were taken, points that were measured.
+    """
+
+    name: str
+    day: date
+    correction: Correction
+    random_um: float
+    freedom: int
+    pointing_um: tuple[float, float]
+    pointing_covariance_um2: float
+    pointing_freedom: int
+    operators: Mapping[int, tuple[float, float, int]]
+    cases: tuple[RecordedCase, ...]
+    grids: Mapping[int, Grid]
+
+    @property
+    def comparator(self) -> str:
+        """What its comparator is called."""
+        identity = self.correction.identity
+        assert identity is not None
+        return f"comparator {identity.comparator}{', second stage' if identity.secondary else ''}"
+
+    @property
+    def temperature_c(self) -> float | None:
+        """Of the plates."""
+        return self.correction.identity.temperature_c if self.correction.identity else None
+
+    @classmethod
+    def read(cls, path: Path) -> list[RecordedCalibration]:
+        """Read what `photogram comparator --json` wrote: one calibration, or several.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or holds none; a calibration that was withheld, has no joint adjustment or
+            no date.
+        """
+        try:
+            found = orjson.loads(read_bytes(path))
+        except ValueError as error:
+            raise InputError(f"holds no calibration of a comparator: {error}", file=path) from None
+        many = found if isinstance(found, list) else [found]
+        names = [path.stem] if len(many) == 1 else [f"{path.stem}-{k + 1}" for k in range(len(many))]
+        try:
+            return [cls.from_document(each, name) for each, name in zip(many, names, strict=True)]
+        except InputError as error:
+            raise InputError(error.message, file=path) from None
+
+    @classmethod
+    def of(cls, calibration: Calibration, name: str) -> RecordedCalibration:
+        """Return a calibration as its document says it."""
+        # What the writer makes numbers of (names of members) is taken as a file would have it.
+        return cls.from_document(orjson.loads(orjson.dumps(to_document(calibration), option=_PLAIN)), name)
+
+    @classmethod
+    def from_document(cls, document: Any, name: str) -> RecordedCalibration:
+        """Return the calibration of a document.
+
+        Raises
+        ------
+        InputError
+            It is none that can be compared.
+        """
+        try:
+            return _from_document(document, name)
+        except KeyError as error:
+            raise InputError(f"holds no calibration of a comparator: {error} is missing") from None
+        except (ValueError, TypeError, AttributeError, IndexError) as error:
+            raise InputError(f"holds no calibration of a comparator: {error}") from None
+
+
+_PLAIN = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS
+
+
+def day_of(text: str) -> date:
+    """Return the day that a date says: 1972-07-17, or 7/17/72 as the report writes it.
+
+    Raises
+    ------
+    InputError
+        It says none.
+    """
+    written = text.strip()
+    if found := ISO.match(written):
+        year, month, day = (int(part) for part in found.groups())
+    elif found := OF_THE_REPORT.match(written):
+        month, day, year = (int(part) for part in found.groups())
+        if len(found[3]) == 2:
+            year += 1900 if year >= FIRST_YEAR else 2000
+    else:
+        raise InputError(
+            f"the date of the calibration is {quoted(text)}: '# date = 1972-07-17' or 7/17/72 (month first)"
+            " says it"
+        )
+    try:
+        return date(year, month, day)
+    except ValueError as error:
+        raise InputError(f"the date of the calibration is {quoted(text)}: {error}") from None
+
+
+def _from_document(document: Any, name: str) -> RecordedCalibration:
+    if document.get("usable") is False:
+        raise InputError("holds a calibration whose correction is withheld: see its messages")
+    joint = document["joint"]
+    if joint is None or joint["correction"] is None:
+        raise InputError("holds a calibration without a joint adjustment: nothing to compare")
+    correction = Correction.from_document(joint["correction"])
+    if correction.identity is None:
+        raise InputError("holds a calibration of an earlier version: calibrate again")
+    counts = {(each["case"], each["point"]): each["readings"] for each in document["pointing"]["points"]}
+    total = document["pointing"]["total"]
+    freedom = int(total["degrees_of_freedom"])
+    placed = {each["case"]: each for each in joint["cases"]}
+    return RecordedCalibration(
+        name=name,
+        day=day_of(str(document["date"])),
+        correction=correction,
+        random_um=float(joint["sigma_random_um"]),
+        freedom=int(joint["degrees_of_freedom"]),
+        pointing_um=_pair(total["sd_um"]) if freedom > 0 else (0.0, 0.0),
+        pointing_covariance_um2=float(total["covariance_um2"] or 0.0),
+        pointing_freedom=freedom,
+        operators=_operators(document["pointing"]["operators"]),
+        cases=tuple(_case(each, placed[each["case"]], counts) for each in document["cases"]),
+        grids={
+            plate["plate"]: _grid(plate, own)
+            for plate, own in zip(document["plates"], joint["plates"], strict=True)
+        },
+    )
+
+
+def _pair(values: Any) -> tuple[float, float]:
+    x, y = values
+    return float(x), float(y)
+
+
+def _operators(members: Iterable[Any]) -> dict[int, tuple[float, float, int]]:
+    found = {}
+    for each in members:
+        if (freedom := int(each["degrees_of_freedom"])) > 0:
+            x, y = _pair(each["sd_um"])
+            found[int(each["operator"])] = (x**2, y**2, freedom)
+    return found
+
+
+def _case(members: Any, placed: Any, counts: Mapping[tuple[int, int], int]) -> RecordedCase:
+    points = np.array(members["points"], dtype=np.int64)
+    means = np.array(members["means_um"], dtype=float)
+    if means.shape != (len(points), 2) or not np.isfinite(means).all():
+        raise ValueError(f"case {members['case']} has not two coordinates for each of its points")
+    return RecordedCase(
+        number=int(members["case"]),
+        operator=int(members["operator"]),
+        plate=int(members["plate"]),
+        left_handed=bool(members["left_handed"]),
+        points=points,
+        counts=np.array([counts[members["case"], point] for point in points.tolist()], dtype=np.int64),
+        means_um=means,
+        rotation_rad=float(placed["rotation_rad"]),
+        translation_um=np.array(_pair(placed["translation_um"])),
+    )
+
+
+def _grid(plate: Any, own: Any) -> Grid:
+    """Return a plate as it was taken: its corrected coordinates less the corrections."""
+    given = np.array(plate["corrected_plate_um"]) - np.array(plate["corrections_plate_um"])
+    sigma = plate["sigma_um"]["a_priori"]
+    return Grid(
+        number=int(plate["plate"]),
+        points=np.array(plate["points"], dtype=np.int64),
+        xy_um=given,
+        sigma_um=float(own["sigma_um"] if sigma is None else sigma),
+        adopted=str(plate["adopted"]),
+        temperature_c=plate["temperature_c"],
+        expansion_per_k=plate["expansion_per_k"],
+    )

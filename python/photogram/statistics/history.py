@@ -1,0 +1,377 @@
+"""Values with covariances that were determined on several occasions: whether they changed, and how.
+
+x(i) of the occasions i = 1 ... k have the covariance C. Where nothing changes they have one mean, and
+Omega = r' C^-1 r of the residuals about its estimate is chi-square with (k - 1) m degrees of freedom. For
+each of the m quantities alone, with the block of C that is its own, hypotheses add a column z to the mean:
+
+* drift: z(i) = t(i) - mean t;
+* a step between two occasions: z(i) = 0 before, 1 after;
+* a single occasion that is off: z(i) = 1 there;
+* a regressor, such as the temperature: z(i) = u(i) - mean u.
+
+With R = C^-1 - C^-1 A (A' C^-1 A)^-1 A' C^-1, A the columns that are in the model, the size of a hypothesis
+is s = z' R x / z' R z, its variance 1 / z' R z, and t = z' R x / sqrt(z' R z) standard normal where it does
+not hold (Student with the degrees of freedom from which C was estimated). The largest |t| of a quantity is
+accepted where its probability is below the level over the number of all tests (Bonferroni); it then stays in
+the model, and the others are tested anew. Nothing here knows what the values are of.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.statistics.distributions import (
+    LEVEL,
+    bonferroni,
+    critical_student,
+    log_chi_square,
+    log_fisher,
+)
+from photogram.statistics.findings import Systematic
+from photogram.statistics.limits import GlobalTest, global_test
+
+__all__ = ["Change", "History", "Series", "history"]
+
+MOST = 3
+"""Changes of one quantity that are told apart."""
+BLIND = 1e-8
+"""A hypothesis that the model explains up to this part of its length cannot be tested."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """An accepted hypothesis on one quantity.
+
+    Attributes
+    ----------
+    kind
+        `drift`, `step`, `single`, or the name of a regressor.
+    size, sd
+        In the unit of the quantity: a unit of time, after less before, off, a unit of the regressor.
+    statistic, log10_p
+        t, and the decimal logarithm of its probability.
+    at
+        The first occasion after a step, or the single one; None of others.
+    sentence
+        What it says.
+    """
+
+    kind: str
+    size: float
+    sd: float
+    statistic: float
+    log10_p: float
+    at: int | None
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One quantity on all occasions.
+
+    Attributes
+    ----------
+    name, unit
+        Of the quantity.
+    values, sd
+        (k,) as given.
+    mean, mean_sd
+        Weighted mean over all occasions.
+    model
+        (k,) what the accepted changes make of the mean.
+    off, off_sd
+        (k,) each value less the mean of the others, for a control chart.
+    drift, drift_sd
+        A unit of time, where nothing else changes; NaN where times are equal.
+    steps
+        (k - 1,) t of a step before occasions 2 ... k; NaN where there is none.
+    test
+        Chi-square of the residuals about the mean.
+    changes
+        What was accepted.
+    """
+
+    name: str
+    unit: str
+    values: Floats
+    sd: Floats
+    mean: float
+    mean_sd: float
+    model: Floats
+    off: Floats
+    off_sd: Floats
+    drift: float
+    drift_sd: float
+    steps: Floats
+    test: GlobalTest | None
+    changes: tuple[Change, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Values on several occasions, compared.
+
+    Attributes
+    ----------
+    occasions, times
+        What the occasions are called, and when they were (in the unit of time).
+    series
+        The quantities.
+    constancy
+        Test of all together, with all covariances: nothing changes.
+    tests, level, limit
+        Number of single tests, level of all together, and the |t| that is accepted.
+    """
+
+    occasions: tuple[str, ...]
+    times: Floats
+    series: tuple[Series, ...]
+    constancy: GlobalTest
+    tests: int
+    level: float
+    limit: float
+
+    @property
+    def sentences(self) -> list[str]:
+        """What changes, the most certain first."""
+        changes = [change for own in self.series for change in own.changes]
+        return [each.sentence for each in sorted(changes, key=lambda each: each.log10_p)]
+
+    @property
+    def changed(self) -> list[str]:
+        """What a verdict says: the changes, or that there are some where no single one is certain."""
+        failed = None if self.sentences else self.constancy.problem()
+        return [f"no single change explains it, but {failed}"] if failed else self.sentences
+
+    def systematic(self, whose: str) -> Systematic:
+        """Return the test of constancy as it stands in a verdict."""
+        test = self.constancy
+        known = math.isinf(test.reference_dof)
+        return Systematic(
+            name=f"{whose}: all values are the same on all occasions",
+            sentence=f"{whose}: values differ between occasions by more than their covariances allow",
+            statistic="s^2",
+            distribution="chi2/f" if known else "F",
+            dof=(test.degrees_of_freedom,) if known else (test.degrees_of_freedom, test.reference_dof),
+            value=test.variance,
+            probability=test.probability_above,
+            level=self.level,
+            large=False,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Hypotheses:
+    """Columns of what may change (k, c), and what each is."""
+
+    columns: Floats
+    kinds: tuple[tuple[str, int | None], ...]
+    words: tuple[str, ...]
+
+
+def history(
+    values: ArrayLike,
+    covariance: ArrayLike,
+    *,
+    times: ArrayLike | None = None,
+    occasions: Sequence[str] = (),
+    names: Sequence[str] = (),
+    units: Sequence[str] = (),
+    unit_of_time: str = "occasion",
+    regressors: Mapping[str, tuple[ArrayLike, str]] | None = None,
+    freedom: float = math.inf,
+    level: float = LEVEL,
+) -> History:
+    """Compare values that were determined on several occasions: constancy, drift, steps, single ones.
+
+    Parameters
+    ----------
+    values
+        (k, m) of m quantities on k occasions, in the order of time.
+    covariance
+        (k, m, m) of each occasion, or (k, m, k, m) of all where they have something in common.
+    times
+        (k,) that do not fall; None: 0, 1, 2 ...
+    occasions, names, units, unit_of_time
+        What occasions and quantities are called in sentences, units of quantities and of times.
+    regressors
+        Other causes by name: (k,) values and their unit.
+    freedom
+        Degrees of freedom from which the covariance was estimated; infinite where it is known.
+    level
+        Probability that anything is found where nothing changes: of the test of constancy, and of all single
+        tests together.
+
+    Raises
+    ------
+    InputError
+        Fewer than two occasions, shapes that do not fit, times that fall, a covariance that is none.
+    """
+    x = np.asarray(values, dtype=np.float64)
+    if x.ndim != 2 or len(x) < 2 or not np.isfinite(x).all():
+        raise InputError("values must be finite numbers (k, m) of two occasions at least")
+    k, m = x.shape
+    c = _together(np.asarray(covariance, dtype=np.float64), k, m)
+    t = np.arange(float(k)) if times is None else np.asarray(times, dtype=np.float64)
+    if t.shape != (k,) or not (np.diff(t) >= 0).all():
+        raise InputError("times must be k numbers that do not fall")
+    named = tuple(occasions) or tuple(f"occasion {i + 1}" for i in range(k))
+    hypotheses = _hypotheses(t, named, unit_of_time, regressors or {})
+    tests = m * len(hypotheses.kinds)
+    quantities = names or [f"value {j + 1}" for j in range(m)]
+    of_units = units or [""] * m
+    if (len(named), len(quantities), len(of_units)) != (k, m, m):
+        raise InputError(f"there are {k} occasions of {m} quantities: names or units are not as many")
+    series = tuple(
+        _series(
+            x[:, j], c[:, j, :, j], hypotheses, quantities[j], of_units[j], freedom, bonferroni(level, tests)
+        )
+        for j in range(m)
+    )
+    mean = np.tile(np.eye(m), (k, 1))
+    r = _Fit.of(x.ravel(), c.reshape(k * m, k * m), mean).residuals
+    constancy = global_test(float(r @ r), (k - 1) * m, level, freedom)
+    assert constancy is not None
+    limit = critical_student(bonferroni(level, tests), freedom)
+    return History(named, t, series, constancy, tests, level, limit)
+
+
+def _together(covariance: Floats, k: int, m: int) -> Floats:
+    """Return the covariance of all values (k, m, k, m)."""
+    whole = covariance
+    if covariance.shape == (k, m, m):
+        whole = np.zeros((k, m, k, m))
+        whole[np.arange(k), :, np.arange(k), :] = covariance
+    if whole.shape != (k, m, k, m) or not np.isfinite(whole).all():
+        raise InputError(f"covariance must be finite numbers ({k}, {m}, {m}) or ({k}, {m}, {k}, {m})")
+    return whole
+
+
+def _hypotheses(
+    t: Floats, named: Sequence[str], unit: str, regressors: Mapping[str, tuple[ArrayLike, str]]
+) -> _Hypotheses:
+    """Return what is tested; with two occasions a drift, a step and a single one are the same: a step."""
+    k = len(t)
+    found: list[tuple[Floats, tuple[str, int | None], str]] = []
+    for i in range(1, k):
+        if t[i] > t[i - 1]:
+            words = f"steps by {{}} between {named[i - 1]} and {named[i]}"
+            found.append(((np.arange(k) >= i).astype(float), ("step", i), words))
+    if k > 2 and t[-1] > t[0]:
+        found.append((t - t.mean(), ("drift", None), f"drifts by {{}} a {unit}"))
+        # The first and the last alone are steps.
+        found += [(np.eye(k)[i], ("single", i), f"of {named[i]} is off by {{}}") for i in range(1, k - 1)]
+    for name, (given, of_what) in regressors.items():
+        u = np.asarray(given, dtype=np.float64)
+        if u.shape != (k,) or not np.isfinite(u).all():
+            raise InputError(f"{name} must be {k} finite numbers")
+        if k > 2 and np.ptp(u) > 0:
+            found.append((u - u.mean(), (name, None), f"changes with the {name} by {{}} a {of_what}"))
+    if not found:
+        raise InputError("all occasions are at one time: nothing can have changed")
+    return _Hypotheses(
+        np.column_stack([column for column, _, _ in found]),
+        tuple(kind for _, kind, _ in found),
+        tuple(each for _, _, each in found),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """A weighted fit, whitened: x = A p + r."""
+
+    root: Floats
+    basis: Floats
+    residuals: Floats
+    parameters: Floats
+    cofactors: Floats
+
+    @classmethod
+    def of(cls, x: Floats, covariance: Floats, columns: Floats) -> _Fit:
+        scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        try:
+            root = scale[:, np.newaxis] * np.linalg.cholesky(covariance / np.outer(scale, scale))
+        except (np.linalg.LinAlgError, FloatingPointError):
+            raise InputError("the covariance is not positive definite") from None
+        a, y = np.linalg.solve(root, columns), np.linalg.solve(root, x)
+        q, upper = np.linalg.qr(a)
+        inverse = np.linalg.inv(upper)
+        return cls(root, q, y - q @ (q.T @ y), inverse @ (q.T @ y), inverse @ inverse.T)
+
+    def tested(self, columns: Floats) -> tuple[Floats, Floats]:
+        """Return sizes of more columns, one at a time, and their standard deviations; NaN of blind ones."""
+        z = np.linalg.solve(self.root, columns)
+        left = z - self.basis @ (self.basis.T @ z)
+        squares = (left**2).sum(axis=0)
+        squares[squares < BLIND * (z**2).sum(axis=0)] = math.nan
+        return left.T @ self.residuals / squares, 1 / np.sqrt(squares)
+
+
+def _log10_p(t: float, freedom: float) -> float:
+    log_p = log_chi_square(t**2, 1.0) if math.isinf(freedom) else log_fisher(t**2, 1.0, freedom)
+    return float(log_p) / math.log(10)
+
+
+def _series(
+    x: Floats,
+    covariance: Floats,
+    hypotheses: _Hypotheses,
+    name: str,
+    unit: str,
+    freedom: float,
+    level: float,
+) -> Series:
+    """Test one quantity, accept what is found, the most certain first, and fit all of it together."""
+    k = len(x)
+    with np.errstate(invalid="raise", divide="raise"):
+        first = fit = _Fit.of(x, covariance, np.ones((k, 1)))
+    sizes, deviations = fit.tested(hypotheses.columns)
+    t = sizes / deviations
+    steps, drift = np.full(k - 1, math.nan), (math.nan, math.nan)
+    for column, (kind, at) in enumerate(hypotheses.kinds):
+        if kind == "step":
+            assert at is not None
+            steps[at - 1] = t[column]
+        elif kind == "drift":
+            drift = float(sizes[column]), float(deviations[column])
+    off, off_sd = fit.tested(np.eye(k))
+    accepted: list[tuple[int, float]] = []
+    while len(accepted) < min(MOST, k - 1) and not np.isnan(t).all():
+        best = int(np.nanargmax(np.abs(t)))
+        if _log10_p(t[best], freedom) >= math.log10(level):
+            break
+        accepted.append((best, float(t[best])))
+        columns = hypotheses.columns[:, [column for column, _ in accepted]]
+        fit = _Fit.of(x, covariance, np.column_stack([np.ones(k), columns]))
+        sizes, deviations = fit.tested(hypotheses.columns)
+        t = sizes / deviations
+    changes = []
+    for row, (column, value) in enumerate(accepted, 1):
+        kind, at = hypotheses.kinds[column]
+        size, sd = float(fit.parameters[row]), math.sqrt(float(fit.cofactors[row, row]))
+        told = f"{size:.4g} ± {sd:.2g} {unit}".rstrip()
+        sentence = f"{name} {hypotheses.words[column].format(told)} (t = {value:.3g})"
+        changes.append(Change(kind, size, sd, value, _log10_p(value, freedom), at, sentence))
+    return Series(
+        name=name,
+        unit=unit,
+        values=x,
+        sd=np.sqrt(np.diag(covariance)),
+        mean=float(first.parameters[0]),
+        mean_sd=math.sqrt(float(first.cofactors[0, 0])),
+        model=x - fit.root @ fit.residuals,
+        off=off,
+        off_sd=off_sd,
+        drift=drift[0],
+        drift_sd=drift[1],
+        steps=steps,
+        test=global_test(float(first.residuals @ first.residuals), k - 1, reference_dof=freedom),
+        changes=tuple(changes),
+    )
