@@ -85,6 +85,25 @@ ControlCrs = Annotated[
         show_default=False,
     ),
 ]
+ControlColumns = Annotated[
+    str | None,
+    typer.Option(
+        "--columns",
+        metavar="COLUMN=HEADING,..",
+        help="What the columns of control are: point=Name,x=East[ft],y=-South, -=Heading for one that is not read;"
+        " point,y,x,z or PNEZD without a header.",
+        show_default=False,
+    ),
+]
+ControlRoles = Annotated[
+    str | None,
+    typer.Option(
+        "--roles",
+        metavar="WORD=ROLE,..",
+        help="What words of control mean: KP=check, PP=control, X=off.",
+        show_default=False,
+    ),
+]
 ImagesFile = Annotated[
     Path | None,
     Reads.FILE,
@@ -152,6 +171,8 @@ class Additions:
     file_format: FormatName = None
     control: ControlFile = None
     control_crs: ControlCrs = None
+    columns: ControlColumns = None
+    roles: ControlRoles = None
     images: ImagesFile = None
     names: NamesFile = None
     camera: CamerasFile = None
@@ -204,11 +225,13 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
     """Read what lies at a path, with what a user adds; its files are inputs of the job from now on."""
     from photogram.formats import Wishes, read
     from photogram.formats.additions import deviations, with_control, with_images, with_repeated, with_sd
+    from photogram.formats.columns import columns_given
     from photogram.formats.names import with_names
 
     if path.is_dir():
         job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))
     sd = deviations(added.sd or [])
+    columns = columns_given(added.columns, added.roles)
     origin = None if added.pixel_origin is None else added.pixel_origin.value
     wishes = Wishes(
         cameras=added.camera,
@@ -216,6 +239,7 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
         model=added.model,
         angles=None if added.angles is None else added.angles.value,
         sd=sd,
+        columns=columns,
     )
     project = with_sd(read(path, added.file_format, wishes), sd)
     if added.keep_repeated:
@@ -225,7 +249,7 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
     if added.names is not None:
         project = with_names(project, added.names)
     if added.control is not None:
-        project = with_control(project, added.control, sd, added.control_crs)
+        project = with_control(project, added.control, sd, added.control_crs, columns)
     return project.replace(path=job.shown(project.path), messages=tuple(job.told(project.messages)))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from photogram.adjustment.prediction import at_adjusted, computed_images
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.control_lists import ControlList, read_control_list
 from photogram.formats.images import from_corner, to_corner
 from photogram.formats.intersection import intersected
@@ -330,7 +331,11 @@ def _some_rows(table: ColumnTable, rows: Sequence[int]) -> ColumnTable:
 
 
 def with_control(
-    project: Project, path: Path, sd: Mapping[str, tuple[float, ...]], crs: str | None
+    project: Project,
+    path: Path,
+    sd: Mapping[str, tuple[float, ...]],
+    crs: str | None,
+    columns: Columns = PLAIN,
 ) -> Project:
     """Return a project with control and check points of a table, carried onto it where its frame is another.
 
@@ -344,6 +349,8 @@ def with_control(
         Standard deviations for tables without columns for them.
     crs
         Of the table, where it is not the frame of the project.
+    columns
+        What is said of its columns and roles.
 
     Raises
     ------
@@ -351,9 +358,15 @@ def with_control(
         A table at fault; none of its points has an image.
     """
     settings = bare_settings(
-        path, {"control": path}, frame=project.frame, length=project.block.linear_unit, sd=sd, crs=crs
+        path,
+        {"control": path},
+        frame=project.frame,
+        length=project.block.linear_unit,
+        sd=sd,
+        crs=crs,
+        columns=columns,
     )
-    tables = Tables(settings, [])
+    tables = Tables(settings, [], frozenset(project.block.point_ids))
     listed_control = read_control_list(path, project)
     if listed_control is None:
         table = tables.read("control")

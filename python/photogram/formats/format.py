@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.project import Project
 from photogram.results.result import Result
 
@@ -28,6 +29,8 @@ class Wishes:
         `deg`, `gon` or `rad` where a file has angles and does not say which.
     sd
         Standard deviations by table where files have none: one number or three.
+    columns
+        What the columns of the control of a plain project are.
     """
 
     cameras: Path | None = None
@@ -35,6 +38,7 @@ class Wishes:
     model: int | None = None
     angles: str | None = None
     sd: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    columns: Columns = PLAIN
 
 
 @dataclass(frozen=True)

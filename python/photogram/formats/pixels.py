@@ -53,7 +53,10 @@ def pixel_table(path: Path) -> ColumnTable:
         A column that is missing, or whatever a table refuses.
     """
     table = read_columns(
-        path, known=_NEEDED, numbers=_NUMBERS, spelling=lambda name: _SYNONYMS.get(name, name)
+        path,
+        known=_NEEDED,
+        numbers=_NUMBERS,
+        spelling=lambda names: [_SYNONYMS.get(name, name) for name in names],
     )
     table.require(*_NEEDED)
     return table

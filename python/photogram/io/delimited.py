@@ -12,8 +12,9 @@ import io
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -21,19 +22,28 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
-from photogram.io.files import read_bytes
+from photogram.io.files import read_text
+from photogram.io.marks import Marks, marks_of
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place
 from photogram.io.rows import LONGEST_RECORD
 from photogram.messages import listed, quoted
 
-__all__ = ["FALSE", "TRUE", "ColumnTable", "Names", "read_columns", "read_rows"]
+__all__ = ["FALSE", "NAMELESS", "TRUE", "ColumnTable", "Names", "Spelling", "read_columns", "read_rows"]
 
 DELIMITERS = ("\t", ";", ",", "|")
 """In this order; blanks where a header has none of them."""
 LARGE = 1 << 20
 """Bytes from which a table is worth the parser of pandas."""
 COMMENT = "#"
+TITLES = 30
+"""Lines in which a header is looked for below titles."""
+NAMELESS = "?"
+"""The first column where each row has a cell more than the header."""
+Spelling = Callable[[Sequence[str]], Sequence[str]]
+_SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)
+"""What Excel writes before a table."""
+_NUMBER = re.compile(r"[-+]?[\d.,'’ \u00a0\u202f]*(?:[eE][-+]?\d+)?")
 _BLANKS = re.compile(r'"([^"]*)"|(\S+)')
 TRUE, FALSE = frozenset({"true", "yes", "1", "t", "y"}), frozenset({"false", "no", "0", "f", "n"})
 
@@ -66,6 +76,10 @@ class ColumnTable:
         Columns that were read as numbers or names already.
     records
         Number of the record of each row.
+    numeric
+        Columns whose cells together show how the table writes numbers.
+    own
+        What the file calls the columns, in small letters; empty for one that it does not name.
     """
 
     path: Path
@@ -76,13 +90,20 @@ class ColumnTable:
     records: Sequence[int]
     delimiter: str = ","
     ready: Mapping[str, Floats | Names] = field(default_factory=dict)
+    numeric: frozenset[str] = frozenset()
+    own: tuple[str, ...] = ()
 
     def __contains__(self, column: str) -> bool:
         return column in self.columns
 
     @cached_property
     def _lines(self) -> list[str]:
-        return [] if self.path.suffix == ".parquet" else _text(self.path).split("\n")
+        return [] if self.path.suffix == ".parquet" else read_text(self.path).split("\n")
+
+    @cached_property
+    def _marks(self) -> Marks:
+        numbers = [cells for name, cells in self.cells.items() if name in self.numeric]
+        return marks_of((cell for column in numbers for cell in column), self.delimiter)
 
     def place(self, row: int) -> Place:
         """Return where a row stands."""
@@ -93,6 +114,15 @@ class ColumnTable:
     def error(self, row: int, message: str) -> InputError:
         """Return an error that names the place of a row."""
         return self.place(row).error(message)
+
+    def renamed(self, names: Mapping[str, str]) -> ColumnTable:
+        """Return the table with other names of some columns."""
+        columns = tuple(names.get(column, column) for column in self.columns)
+        cells, ready = (
+            {names.get(column, column): cells for column, cells in own.items()}
+            for own in (self.cells, self.ready)
+        )
+        return replace(self, columns=columns, cells=cells, ready=ready)
 
     def require(self, *columns: str) -> None:
         """Refuse a table without these columns.
@@ -208,8 +238,8 @@ class ColumnTable:
         if column not in self.columns:
             return np.full(self.count, default)
         convert = finite_number if read is None else read
+        marks = self._marks if column in self.numeric else marks_of(self.cells[column], self.delimiter)
         values = np.empty(self.count)
-        comma = self.delimiter != ","
         for row, cell in enumerate(self.texts(column)):
             if not cell:
                 values[row] = default
@@ -218,7 +248,7 @@ class ColumnTable:
                 values[row] = math.inf
                 continue
             try:
-                values[row] = convert(cell.replace(",", ".") if comma and "." not in cell else cell)
+                values[row] = convert(marks.plain(cell))
             except ValueError as error:
                 raise self.error(row, f"column {column}: {error}") from None
         return values
@@ -262,7 +292,8 @@ def read_columns(
     *,
     known: Collection[str] = (),
     numbers: Collection[str] = (),
-    spelling: Callable[[str], str] = str,
+    spelling: Spelling = tuple,
+    hint: Callable[[Sequence[str]], str] | None = None,
 ) -> ColumnTable:
     """Read a table.
 
@@ -275,7 +306,9 @@ def read_columns(
     numbers
         Columns that are numbers where they are there: for the parser of large tables.
     spelling
-        Gives the name of a column from what the file calls it, in small letters.
+        Gives the names of all columns from what the file calls them, in small letters.
+    hint
+        What is said of a first record that names no known column; None: that it does not.
 
     Raises
     ------
@@ -285,17 +318,24 @@ def read_columns(
     """
     if path.suffix == ".parquet":
         return _parquet(path, spelling, numbers)
-    text = _text(path)
-    head, delimiter = _head(path, text, known, spelling)
-    columns = tuple(spelling(cell.strip().lower()) for cell in _split(head, delimiter))
+    text = read_text(path)
+    head, delimiter = _head(path, text, known, spelling, hint)
+    own = _lowered(head, delimiter)
+    return _below(path, text, head, own, _named(head, own, spelling), delimiter, numbers)
+
+
+def _named(head: Place, own: Sequence[str], spelling: Spelling) -> tuple[str, ...]:
+    columns = tuple(spelling(own))
     for column in columns:
         if column and columns.count(column) > 1:
-            raise head.error(f"the column {quoted(column)} is there twice")
-    return _below(path, text, head, columns, delimiter, numbers)
+            both = [raw for raw, name in zip(own, columns, strict=True) if name == column]
+            what = f"is there twice: {listed(both)}" if set(both) != {column} else "is there twice"
+            raise head.error(f"the column {quoted(column)} {what}")
+    return columns
 
 
 def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = ()) -> ColumnTable:
-    """Read a table without a header, whose columns are known, after any comments.
+    """Read a table whose columns are known, after any comments, titles and headers.
 
     Parameters
     ----------
@@ -311,58 +351,83 @@ def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = 
     InputError
         The file cannot be read, or a row has more or fewer cells than there are columns.
     """
-    text = _text(path)
+    text = read_text(path)
     lines = text.split("\n")
+    filled = [row for row, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(COMMENT)]
     first = next(
-        (row for row, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(COMMENT)), 0
+        (row for row in filled[:TITLES] if _fits(Place(path, row + 1, lines[row]), columns, numbers)), 0
     )
+    first = first or (filled[0] if filled else 0)
     head = Place(path, first)
     sample = Place(path, first + 1, lines[first])
-    return _below(path, text, head, tuple(columns), _delimiter(sample), numbers)
+    return _below(path, text, head, tuple(columns), tuple(columns), _delimiter(sample), numbers)
 
 
 def _below(
-    path: Path, text: str, head: Place, columns: tuple[str, ...], delimiter: str, numbers: Collection[str]
+    path: Path,
+    text: str,
+    head: Place,
+    own: tuple[str, ...],
+    columns: tuple[str, ...],
+    delimiter: str,
+    numbers: Collection[str],
 ) -> ColumnTable:
     """Read what stands below the record of the header."""
     assert head.record is not None
     if len(text) > LARGE and delimiter != " ":
         fast = _by_pandas(path, text, head, columns, delimiter, numbers)
         if fast is not None:
-            return fast
-    rows, records = _by_lines(path, text.split("\n"), head.record, columns, delimiter)
+            return replace(fast, own=own)
+    rows, records = _by_lines(path, text.split("\n"), head.record, columns, delimiter, numbers)
+    if rows and len(rows[0]) > len(columns):
+        own, columns = ("", *own), (NAMELESS, *columns)
     cells = {name: [row[k] for row in rows] for k, name in enumerate(columns) if name}
-    return ColumnTable(path, head, columns, len(rows), cells, records, delimiter)
+    numeric = frozenset(numbers).intersection(columns)
+    return ColumnTable(path, head, columns, len(rows), cells, records, delimiter, {}, numeric, own)
 
 
-def _text(path: Path) -> str:
-    data = read_bytes(path)
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+def _head(
+    path: Path,
+    text: str,
+    known: Collection[str],
+    spelling: Spelling,
+    hint: Callable[[Sequence[str]], str] | None,
+) -> tuple[Place, str]:
+    """Find the header: the first line, or the last comment before it where only that names known columns.
 
-
-def _head(path: Path, text: str, known: Collection[str], spelling: Callable[[str], str]) -> tuple[Place, str]:
-    """Find the header: the first line, or the last comment before it where only that names known columns."""
+    Lines of titles may stand before it: then it is the first below them that names several known columns.
+    """
     comment: Place | None = None
     for record, line in enumerate(_lines(text), 1):
         if line.lstrip().startswith(COMMENT):
             comment = Place(path, record, line.lstrip()[1:])
             continue
-        if not line.strip(" \t,;|"):
+        if not line.strip(" \t,;|") or _SEPARATOR.fullmatch(line):
             continue
         head = Place(path, record, line)
         for place in (head, comment):
             if place is not None and known and _knows(place, known, spelling):
                 return place, _delimiter(place)
         if known and comment is None:
+            if (below := _below_titles(path, text, record, known, spelling)) is not None:
+                return below, _delimiter(below)
+            if hint is not None:
+                raise head.error(hint([cell.strip() for cell in _split(head, _delimiter(head))]))
             raise head.error(f"is no header: it names none of the columns {listed(sorted(known))}")
         return head, _delimiter(head)
     if comment is not None and _knows(comment, known, spelling):
         return comment, _delimiter(comment)
     raise Place(path).error("holds no table")
+
+
+def _below_titles(
+    path: Path, text: str, first: int, known: Collection[str], spelling: Spelling
+) -> Place | None:
+    for record, line in enumerate(islice(_lines(text), TITLES), 1):
+        place = Place(path, record, line)
+        if record > first and len(set(known).intersection(_spelled(place, spelling))) > 2:
+            return place
+    return None
 
 
 def _lines(text: str) -> Iterator[str]:
@@ -375,8 +440,16 @@ def _lines(text: str) -> Iterator[str]:
         yield text[start:]
 
 
-def _knows(place: Place, known: Collection[str], spelling: Callable[[str], str]) -> bool:
-    return any(spelling(cell.strip().lower()) in known for cell in _split(place, _delimiter(place)))
+def _lowered(place: Place, delimiter: str) -> tuple[str, ...]:
+    return tuple(cell.strip().lower() for cell in _split(place, delimiter))
+
+
+def _spelled(place: Place, spelling: Spelling) -> Sequence[str]:
+    return spelling(_lowered(place, _delimiter(place)))
+
+
+def _knows(place: Place, known: Collection[str], spelling: Spelling) -> bool:
+    return not set(known).isdisjoint(_spelled(place, spelling))
 
 
 def _delimiter(head: Place) -> str:
@@ -402,9 +475,18 @@ def _split(place: Place, delimiter: str) -> list[str]:
 
 
 def _by_lines(
-    path: Path, lines: Sequence[str], head: int, columns: Sequence[str], delimiter: str
+    path: Path,
+    lines: Sequence[str],
+    head: int,
+    columns: Sequence[str],
+    delimiter: str,
+    numbers: Collection[str],
 ) -> tuple[list[list[str]], list[int]]:
-    rows, records = [], []
+    """Split the lines below a header into rows, all as wide as the columns.
+
+    Where they have one cell more, the first has no name if the names would else stand over no numbers.
+    """
+    rows, records = list[list[str]](), list[int]()
     width = len(columns)
     for record in range(head + 1, len(lines) + 1):
         line = lines[record - 1]
@@ -416,11 +498,32 @@ def _by_lines(
             # A delimiter at the end of every line is one cell too many, and empty.
             if len(cells) == width + 1 and not cells[-1]:
                 cells.pop()
+            elif not rows and len(cells) == width + 1 and _shifted(cells, columns, numbers):
+                width += 1
             else:
                 raise place.error(f"there are {len(cells)} cells under {width} columns")
         rows.append(cells)
         records.append(record)
     return rows, records
+
+
+def _fits(place: Place, columns: Sequence[str], numbers: Collection[str]) -> bool:
+    """Whether a record has as many cells as there are columns, and numbers where they are numbers."""
+    cells = _split(place, _delimiter(place))
+    return len(cells) == len(columns) and all(
+        _NUMBER.fullmatch(cell) is not None
+        for column, cell in zip(columns, cells, strict=True)
+        if column in numbers
+    )
+
+
+def _shifted(cells: Sequence[str], columns: Sequence[str], numbers: Collection[str]) -> bool:
+    """Whether columns stand over numbers if the first cell has no column, and must: else they, or names, would not."""
+    numeric = [k for k, column in enumerate(columns) if column in numbers]
+    as_is, shifted = (
+        all(_NUMBER.fullmatch(cells[k + step]) or not cells[k + step] for k in numeric) for step in (0, 1)
+    )
+    return shifted and (not as_is or len(numeric) == len(columns))
 
 
 def _by_pandas(
@@ -510,7 +613,7 @@ def _factorised(cells: Sequence[str]) -> Names:
     return Names(list(places), rows)
 
 
-def _parquet(path: Path, spelling: Callable[[str], str], numbers: Collection[str]) -> ColumnTable:
+def _parquet(path: Path, spelling: Spelling, numbers: Collection[str]) -> ColumnTable:
     import pyarrow
     import pyarrow.compute
     import pyarrow.parquet
@@ -519,13 +622,12 @@ def _parquet(path: Path, spelling: Callable[[str], str], numbers: Collection[str
         table = pyarrow.parquet.read_table(path)
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"cannot be read as Parquet: {error}", file=path) from None
-    columns = tuple(spelling(name.strip().lower()) for name in table.column_names)
     head = Place(path)
+    own = tuple(name.strip().lower() for name in table.column_names)
+    columns = _named(head, own, spelling)
     ready: dict[str, Floats | Names] = {}
     cells: dict[str, Sequence[str]] = {}
     for name, column in zip(columns, table.columns, strict=True):
-        if columns.count(name) > 1:
-            raise head.error(f"the column {quoted(name)} is there twice")
         kind = column.type
         if pyarrow.types.is_integer(kind) and name not in numbers:
             # Names that are digits all of them.
@@ -545,4 +647,5 @@ def _parquet(path: Path, spelling: Callable[[str], str], numbers: Collection[str
             ready[name] = column.to_numpy().astype(float)
         else:
             cells[name] = ["" if each is None else str(each) for each in column.to_pylist()]
-    return ColumnTable(path, head, columns, table.num_rows, cells, range(1, table.num_rows + 1), ready=ready)
+    records = range(1, table.num_rows + 1)
+    return ColumnTable(path, head, columns, table.num_rows, cells, records, ready=ready, own=own)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from photogram.errors import InputError
+from photogram.io.sheets import sheet_text
 
-__all__ = ["read_bytes", "read_lines", "reading"]
+__all__ = ["read_bytes", "read_lines", "read_text", "reading"]
 
 
 @contextmanager
@@ -34,20 +36,42 @@ def read_bytes(path: Path) -> bytes:
         return path.read_bytes()
 
 
-def read_lines(path: Path) -> list[str]:
-    """Read the lines of a text file (UTF-8, else Latin-1; any line ends), without their ends.
+def read_text(path: Path) -> str:
+    """Read a text file: UTF-8, UTF-16 with its mark, else that of Windows; any line ends become line feeds.
+
+    The first sheet of an Excel workbook is text, too: a line a row, tabs between its cells.
 
     Raises
     ------
     InputError
         The file cannot be read.
     """
+    if path.suffix.lower() == ".xlsx":
+        return sheet_text(path)
     data = read_bytes(path)
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").removesuffix("\x1a").split("\n")
+    text = _decoded(data)
+    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+
+
+def _decoded(data: bytes) -> str:
+    wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    for encoding in ("utf-16" if wide else "utf-8-sig", "cp1252"):
+        try:
+            return data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+    return data.decode("latin-1")
+
+
+def read_lines(path: Path) -> list[str]:
+    """Read the lines of a text file as :func:`read_text` does, without their ends.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
+    lines = read_text(path).removesuffix("\x1a").split("\n")
     if lines[-1] == "":
         lines.pop()
     return lines

@@ -31,9 +31,9 @@ _NUMBERS = frozenset({"x", "y", "z", "omega", "phi", "kappa", *_DEVIATIONS})
 _RADIANS = {"degrees": math.pi / 180, "deg": math.pi / 180, "radians": 1.0, "rad": 1.0, "gon": math.pi / 200}
 
 
-def _spelled(column: str) -> str:
-    own = column.partition("(")[0].strip()
-    return _KNOWN.get(own, own)
+def _spelled(columns: Sequence[str]) -> list[str]:
+    own = [column.partition("(")[0].strip() for column in columns]
+    return [_KNOWN.get(column, column) for column in own]
 
 
 def titled(path: Path) -> ColumnTable:
@@ -43,7 +43,7 @@ def titled(path: Path) -> ColumnTable:
 
 def untitled(path: Path, columns: Sequence[str]) -> ColumnTable:
     """Read a table whose columns a script names."""
-    return read_rows(path, [_spelled(column.strip().lower()) for column in columns], numbers=_NUMBERS)
+    return read_rows(path, _spelled([column.strip().lower() for column in columns]), numbers=_NUMBERS)
 
 
 def _whole(table: ColumnTable, column: str) -> list[int]:

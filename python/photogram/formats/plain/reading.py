@@ -11,6 +11,7 @@ import numpy as np
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.columns import PLAIN
 from photogram.formats.format import Wishes
 from photogram.formats.images import from_corner
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
@@ -56,6 +57,8 @@ def read(path: Path, wishes: Wishes) -> Project:
     """
     settings = read_settings(path / SETTINGS if path.is_dir() else path)
     settings = replace(settings, sd={**settings.sd, **wishes.sd})
+    if wishes.columns != PLAIN:
+        settings = replace(settings, columns={**settings.columns, "control": wishes.columns})
     return read_tables(Tables(settings, unread_tables(settings)), wishes)
 
 
@@ -403,7 +406,8 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
             raise table.error(row, f"{names[row]} has no coordinates")
         if use == "control" and (np.isnan(sd[row]) & ~np.isnan(values[row])).any():
             raise table.error(
-                row, f"{names[row]} has no standard deviations: columns sd_x .., or control under [sd]"
+                row,
+                f"{names[row]} has no standard deviations: --sd control=0.01, columns sd_x .., or control under [sd]",
             )
     sd = np.where(np.isnan(sd) | np.isnan(values), np.inf, sd)
     covariances = covariances_of(np.where(np.isinf(sd), 0.0, sd), table)

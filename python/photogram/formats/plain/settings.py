@@ -7,11 +7,12 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn, cast
 
 from photogram.errors import InputError
+from photogram.formats.columns import PLAIN, Columns, columns_given
 from photogram.formats.project import DatumName, Frame, Options
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
@@ -102,7 +103,7 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
     "sd": WITH_SD,
     "tables": TABLES,
     "adjust": ("datum", "loss", "unit_variance"),
-    **dict.fromkeys(WITH_CRS, ("crs",)),
+    **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
 }
 
 
@@ -128,6 +129,8 @@ class Settings:
         The file of each table that is there.
     crs
         Of tables whose coordinates are not in the frame.
+    columns
+        What is said of the columns of tables of points, as `--columns` and `--roles` say it.
     """
 
     path: Path
@@ -145,6 +148,7 @@ class Settings:
     sd: Mapping[str, tuple[float, ...]]
     tables: Mapping[str, Path]
     crs: Mapping[str, str]
+    columns: Mapping[str, Columns] = field(default_factory=dict)
 
 
 def read_settings(path: Path) -> Settings:
@@ -186,6 +190,7 @@ def read_settings(path: Path) -> Settings:
         sd={name: file.deviations(name) for name in WITH_SD if file.has("sd", name)},
         tables=_tables(file),
         crs={name: file.text(name, "crs") for name in WITH_CRS if file.has(name, "crs")},
+        columns={name: file.columns(name) for name in WITH_CRS if name in file.content},
     )
 
 
@@ -198,6 +203,7 @@ def bare_settings(
     image: str = "px",
     sd: Mapping[str, tuple[float, ...]] | None = None,
     crs: str | None = None,
+    columns: Columns = PLAIN,
 ) -> Settings:
     """Return settings for tables that come without a file of them: all defaults, in pixels and degrees.
 
@@ -211,6 +217,8 @@ def bare_settings(
         As in :class:`Settings`.
     crs
         Of all these tables, where they are not in the frame.
+    columns
+        What is said of the columns of all these tables.
     """
     return Settings(
         path=path,
@@ -228,6 +236,7 @@ def bare_settings(
         sd=sd or {},
         tables=tables,
         crs=dict.fromkeys(tables, crs) if crs else {},
+        columns=dict.fromkeys(tables, columns),
     )
 
 
@@ -301,6 +310,13 @@ class _File:
         if not good or len(listed) not in counts:
             self.fail(key, f"{key} is {' or '.join(map(str, counts))} numbers, not {value!r}")
         return tuple(float(each) if abs(each) < 2**1023 else math.inf for each in listed)
+
+    def columns(self, table: str) -> Columns:
+        """Return what is said of the columns of a table."""
+        try:
+            return columns_given(self.text(table, "columns"), self.text(table, "roles"))
+        except InputError as error:
+            self.fail("columns" if "--columns" in error.message else "roles", error.message.replace("--", ""))
 
     def origin(self) -> tuple[float, float, float] | None:
         """Return latitude, longitude, height."""

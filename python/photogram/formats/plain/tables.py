@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.formats.plain.settings import Settings
-from photogram.io.delimited import ColumnTable, read_columns
+from photogram.formats.column_words import UNITS
+from photogram.formats.columns import PLAIN, check_unread, degrees, nameless, settled
+from photogram.formats.plain.settings import WITH_CRS, Settings
+from photogram.io.delimited import ColumnTable, read_columns, read_rows
 from photogram.messages import Message, listed, quoted
 from photogram.network.attitudes import Attitudes, Representation
 
@@ -194,17 +196,6 @@ REQUIRED: Mapping[str, tuple[str, ...]] = {
     "bases": ("rig", "from", "to", "distance"),
     "covariances": ("kind", "name", "first", "second", "covariance"),
 }
-SYNONYMS: Mapping[str, str] = {
-    "label": "point",
-    "easting": "x",
-    "northing": "y",
-    "longitude": "x",
-    "latitude": "y",
-    "height": "z",
-    "altitude": "z",
-    "elevation": "z",
-}
-"""Of tables of coordinates; tables of cameras have a height of their own."""
 _TEXTS = frozenset(
     {
         "camera",
@@ -237,26 +228,28 @@ _TEXTS = frozenset(
     }
 )
 
-_DMS = re.compile(r"([+-]?)(\d+)[\s:°d-]+(\d+)(?:[\s:'m-]+(\d+(?:\.\d*)?))?[\s\"s]*")
 
-
-def _spelled(column: str) -> str:
-    """Return what a column of coordinates is called here: `X/Easting` is x, `Accuracy_X (m)` is sd_x."""
-    own = column.partition("(")[0].strip()
-    first = own.partition("/")[0]
-    if first.startswith("accuracy_") and own.endswith(("_x", "_y", "_z")):
-        return f"sd_{own[-1]}"
-    if first in AXES and first != own:
-        return first
-    return SYNONYMS.get(own, own)
+def _labelled(columns: Sequence[str]) -> list[str]:
+    return ["point" if column == "label" else column for column in columns]
 
 
 @dataclass(frozen=True)
 class Tables:
-    """The tables of a project with its settings, read as they are asked for; collects remarks."""
+    """The tables of a project with its settings, read as they are asked for; collects remarks.
+
+    Attributes
+    ----------
+    settings
+        Of the project.
+    messages
+        Remarks.
+    names
+        Points that have images, where they are known before the tables are read.
+    """
 
     settings: Settings
     messages: list[Message]
+    names: Collection[str] = ()
 
     def read(self, name: str) -> ColumnTable | None:
         """Return a table that is there.
@@ -268,21 +261,25 @@ class Tables:
         """
         if name not in self.settings.tables:
             return None
-        known = COLUMNS[name]
-        spelled = _spelled if name != "cameras" else str
-        table = read_columns(
-            self.settings.tables[name],
-            known=known,
-            numbers=set(known) - _TEXTS,
-            spelling=spelled,
-        )
-        table.require(*REQUIRED[name])
-        if others := [each for each in table.columns if each and each not in known]:
-            remark = Message(
-                f"columns that the table {name} does not have are not read: {listed(others)}", table.path
+        known, path = COLUMNS[name], self.settings.tables[name]
+        numbers = set(known) - _TEXTS
+        if name not in WITH_CRS:
+            table = read_columns(
+                path, known=known, numbers=numbers, spelling=_labelled if name == "images" else tuple
             )
-            if remark not in self.messages:
-                self.messages.append(remark)
+            table.require(*REQUIRED[name])
+            check_unread(table, PLAIN, known, name, self.messages)
+            return table
+        given = self.settings.columns.get(name, PLAIN)
+        if given.order:
+            table = read_rows(path, ["" if each == "-" else each for each in given.order], numbers=numbers)
+        else:
+            table = read_columns(
+                path, known=known, numbers=numbers, spelling=partial(given.spelled, known), hint=nameless
+            )
+        metre = 1.0 / UNITS[self.settings.length]
+        table = settled(table, given, known, metre, self.names, name, self.messages)
+        table.require(*REQUIRED[name])
         return table
 
     def angle(self, text: str) -> float:
@@ -291,7 +288,7 @@ class Tables:
 
         unit = self.settings.angle
         if unit == "dms":
-            return math.radians(_degrees(text))
+            return math.radians(degrees(text))
         value = finite_number(text)
         return {"deg": math.radians(value), "gon": value * math.pi / 200, "rad": value}[unit]
 
@@ -464,14 +461,3 @@ def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind:
         row = int(np.flatnonzero(found.rows == missing)[0])
         raise table.error(row, f"column {column}: there is no {kind} {quoted(found.names[missing])}")
     return rows[found.rows]
-
-
-def _degrees(text: str) -> float:
-    match = _DMS.fullmatch(text.strip())
-    if match is None:
-        raise ValueError(f"{quoted(text)} is no angle in degrees, minutes and seconds")
-    sign, degrees, minutes, seconds = match.groups()
-    if int(minutes) >= 60 or float(seconds or 0) >= 60:
-        raise ValueError(f"{quoted(text)} has minutes or seconds of 60 or more")
-    value = int(degrees) + int(minutes) / 60 + float(seconds or 0) / 3600
-    return -value if sign == "-" else value

@@ -8,6 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.columns import is_geographic
 from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Frame
 from photogram.io.delimited import ColumnTable
@@ -55,6 +56,12 @@ class Transform:
         own = np.zeros((len(values), 3, 3)) if covariances is None else covariances
         crs = self.settings.crs.get(name, "")
         if not crs:
+            if self.frame.kind != "geographic" and is_geographic(table):
+                raise table.head.error(
+                    "its columns are latitudes and longitudes: --control-crs EPSG:4979 says that they are of WGS 84"
+                    " with heights above the ellipsoid, EPSG:4326+geoid=46.5 with heights above sea level where the"
+                    " geoid is 46.5 m above the ellipsoid; in a project [control] crs, [gnss] crs ... say it"
+                )
             if self.frame.kind == "geographic":
                 return np.column_stack(
                     [np.radians(values[:, 0]), np.radians(values[:, 1]), values[:, 2]]

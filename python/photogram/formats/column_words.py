@@ -1,0 +1,275 @@
+"""What columns of coordinates are called, language by language, and the words for control and check points.
+
+One table for all that reads points with coordinates. Words are without accents and marks (`hohe` is Höhe);
+a heading is known where it is one of them, or where all its words mean the same (`X/Easting`, `Punkt-Nr.`).
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping
+
+__all__ = ["ANGULAR", "ROLE", "UNITS", "column_of", "is_angular", "role_of", "unit_of", "words_of"]
+
+ROLE = "use"
+"""The column that says who is check and who is control."""
+_COLUMNS: Mapping[str, Mapping[str, str]] = {
+    "point": {
+        "en": "point, points, name, id, pid, number, no, nr, p, pt, pnt, label, marker, target, station, mark, ident",
+        "de": "punkt, punktnummer, punktname, punktnr, pktnr, pkt, nummer, bezeichnung, kennung",
+        "fr": "nom, numero, num, matricule, repere, cible",
+        "es/it/pt": "punto, nombre, nome, ponto, codigo",
+        "nl": "punt, puntnummer, naam",
+    },
+    "x": {
+        "en": "x, e, easting, eastings, east, xcoord",
+        "de": "rechtswert, rechts, rw, ostwert, ost",
+        "fr": "est, abscisse",
+        "es/it/pt": "este, leste",
+        "nl": "oost",
+    },
+    "y": {
+        "en": "y, n, northing, northings, north, ycoord",
+        "de": "hochwert, hoch, hw, nordwert",
+        "de/fr/it": "nord, ordonnee",
+        "es/pt": "norte",
+        "nl": "noord",
+    },
+    "z": {
+        "en": "z, h, height, elevation, elev, altitude, alt, level, rl, zcoord",
+        "de": "hohe, hoehe",
+        "fr": "hauteur, cote",
+        "es/it/pt": "cota, quota, altura, altitud, altezza, elevacion, elevacao",
+        "nl": "hoogte",
+    },
+    "longitude": {
+        "en": "longitude, lon, long, lng",
+        "de": "lange, laenge, langengrad, laengengrad",
+        "es/it/nl": "longitud, longitudine, lengte",
+    },
+    "latitude": {
+        "en": "latitude, lat",
+        "de": "breite, breitengrad",
+        "es/it/nl": "latitud, latitudine, breedte",
+    },
+    "sd": {
+        "en": "sd, s, sigma, std, stddev, stdev, dev, accuracy, acc, precision, uncertainty, rms, rmse, se",
+        "en/de": "deviation, standard deviation, std dev, standardabweichung, stdabw, streuung, genauigkeit",
+        "fr": "ecart type, ecart, incertitude",
+        "es/it/pt": "exactitud, desviacion, precisione, precisao, desvio, incertidumbre",
+        "nl": "nauwkeurigkeit",
+    },
+    ROLE: {
+        "en": "use, usage, used, type, role, kind, category, status, class",
+        "de": "art, typ, punktart, verwendung, funktion, rolle",
+        "fr": "nature, utilisation",
+        "es/it/pt": "tipo, uso, clase, classe, ruolo, papel",
+        "nl": "soort, gebruik",
+    },
+    "check": {"en": "check, checkpoint, check point, is check", "de": "kontrollpunkt, prufpunkt"},
+    "enabled": {"en": "enable, enabled"},
+    "": {
+        # What says nothing that an adjustment needs, though it may be numbers.
+        "en": "code, description, desc, comment, comments, remark, remarks, note, notes, d, feature, order, group,"
+        " date, time, epoch, age, fix, satellites, sats, pdop, hdop, vdop, gdop, antenna, antenna height,"
+        " instrument, operator, photo, image, images, projections, zone, crs, epsg, system, datum, unit",
+        "de": "bemerkung, bemerkungen, beschreibung, kommentar, datum, uhrzeit, zeit, zone, ordnung",
+        "fr": "description, remarque, remarques, commentaire, heure, fuseau",
+        "agisoft": "x est, y est, z est, error, x error, y error, z error, error pix, longitude est, latitude est,"
+        " altitude est, x error m, y error m, z error m",
+    },
+}
+_ROLES: Mapping[str, Mapping[str, str]] = {
+    "control": {
+        "en": "control, gcp, gcps, control point, ground control, ground control point, held, 3dgcp, full",
+        "de": "passpunkt, pp, pass, festpunkt",
+        "fr": "appui, point d appui, pa, calage",
+        "es/it/pt": "apoyo, punto de apoyo, appoggio, apoio",
+        "nl": "paspunt",
+    },
+    "check": {
+        "en": "check, chk, checkpoint, check point, ccp, icp, qc, validation, verification, independent",
+        "de": "kp, kontroll, kontrollpunkt, prufpunkt, pruefpunkt, pruf, vergleichspunkt",
+        "fr": "point de verification",
+        "es/it/pt": "chequeo, verificacion, comprobacion, verifica, verificacao, checagem",
+        "nl": "controlepunt",
+    },
+    "off": {
+        "en": "off, unused, ignore, disabled, none, not used, excluded",
+        "de": "aus, gesperrt",
+        "fr": "ignore",
+    },
+    # Control to some and check to others: what it is not beside the other one.
+    "?": {"en": "cp", "fr": "controle, point de controle, pc", "es/pt/it": "controllo, punto de control"},
+}
+UNITS: Mapping[str, float] = {
+    "m": 1.0,
+    "meter": 1.0,
+    "metre": 1.0,
+    "meters": 1.0,
+    "metres": 1.0,
+    "km": 1000.0,
+    "cm": 0.01,
+    "mm": 0.001,
+    "ft": 0.3048,
+    "feet": 0.3048,
+    "foot": 0.3048,
+    "ift": 0.3048,
+    "us-ft": 1200 / 3937,
+    "usft": 1200 / 3937,
+    "ftus": 1200 / 3937,
+    "sft": 1200 / 3937,
+    "us survey ft": 1200 / 3937,
+    "us survey feet": 1200 / 3937,
+}
+"""Units of length in headings, in metres."""
+ANGULAR: Mapping[str, str] = {"longitude": "x", "latitude": "y"}
+_FILLERS = frozenset(
+    [
+        "coordinate",
+        "coordinates",
+        "coord",
+        "koordinate",
+        "coordonnee",
+        "the",
+        "of",
+        "de",
+        "du",
+        "la",
+        "des",
+        "in",
+        "value",
+        "wert",
+        "point",
+        "utm",
+        "gk",
+        "wgs84",
+        "etrs89",
+        "etrs",
+        "gauss",
+        "kruger",
+        "krueger",
+        "lokal",
+        "local",
+        "map",
+        "grid",
+        "ellipsoidal",
+        "ellipsoid",
+        "ellips",
+        "ellipsoidische",
+        "orthometric",
+        "geographic",
+        "geographische",
+        "geogr",
+        "nn",
+        "nhn",
+        "nap",
+        "u",
+        "uber",
+        "ueber",
+        "msl",
+        "above",
+        "over",
+        "sea",
+        "gcp",
+        "decimal",
+        "deg",
+        "degrees",
+        "dd",
+    ]
+)
+_BRACKETS = re.compile(r"[(\[{]([^)\]}]*)[)\]}]")
+
+
+def _looked_up(table: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+    found = dict[str, str]()
+    for meaning, languages in table.items():
+        for words in languages.values():
+            for word in words.split(","):
+                found.setdefault(" ".join(word.split()), meaning)
+    return found
+
+
+_KNOWN, _KNOWN_ROLES = _looked_up(_COLUMNS), _looked_up(_ROLES)
+
+
+def words_of(text: str) -> list[str]:
+    """Return the words of a heading or cell: small letters without accents, marks and what stands in brackets."""
+    bare = unicodedata.normalize("NFKD", _BRACKETS.sub(" ", text).casefold().replace("σ", " sigma "))
+    plain = "".join(each for each in bare if not unicodedata.combining(each))
+    return re.sub(r"[^0-9a-z]+", " ", plain).split()
+
+
+def _meaning(words: list[str]) -> str | None:
+    """Return what words mean together: as they stand, or all of them that are no fillers the same."""
+    if (whole := _KNOWN.get(" ".join(words))) is not None:
+        return whole
+    found = {
+        _KNOWN.get(word) for word in words if word not in _FILLERS and not re.fullmatch(r"utm\d*[ns]?", word)
+    } or {_KNOWN[word] for word in words if word in _KNOWN}
+    found = {ANGULAR[each] if each in ANGULAR and len(found) > 1 else each for each in found}
+    return found.pop() if len(found) == 1 else None
+
+
+_GLUED = re.compile(r"(?:sigma|sd|std|s|m|rms)(xyz|xy|[xyzenh])")
+_TOGETHER = {
+    "xyz": "sd",
+    "xy": "sd_xy",
+    "3d": "sd",
+    "2d": "sd_xy",
+    "horizontal": "sd_xy",
+    "hz": "sd_xy",
+    "planimetric": "sd_xy",
+    "lage": "sd_xy",
+    "lagegenauigkeit": "sd_xy",
+    "planimetrique": "sd_xy",
+    "vertical": "sd_z",
+    "hohengenauigkeit": "sd_z",
+    "hoehengenauigkeit": "sd_z",
+}
+
+
+def column_of(heading: str) -> str | None:
+    """Return the column of ours that a heading means; nothing for one that needs no reading, None if unknown."""
+    words = words_of(heading)
+    if len(words) > 1 and words[-1] in UNITS:
+        words.pop()
+    if not words:
+        return None
+    if (whole := _KNOWN.get(" ".join(words))) is not None:
+        return whole
+    if len(words) == 1 and (glued := _GLUED.fullmatch(words[0])):
+        words = ["sd", glued[1]]
+    if words[0] in ("lagegenauigkeit", "hohengenauigkeit", "hoehengenauigkeit"):
+        return _TOGETHER[words[0]]
+    for cut in range(1, len(words)):
+        for deviation, rest in ((words[:cut], words[cut:]), (words[-cut:], words[:-cut])):
+            if _KNOWN.get(" ".join(deviation)) == "sd":
+                own = _TOGETHER.get(" ".join(rest)) or _meaning(rest)
+                own = ANGULAR.get(own or "", own or "")
+                if own.startswith("sd"):
+                    return own
+                if own in ("x", "y", "z"):
+                    return f"sd_{own}"
+    return _meaning(words)
+
+
+def is_angular(heading: str) -> bool:
+    """Whether a heading names a longitude or latitude."""
+    return any(_KNOWN.get(word) in ANGULAR for word in words_of(heading))
+
+
+def unit_of(heading: str) -> str | None:
+    """Return the unit of length that a heading has in brackets or at its end, as :data:`UNITS` has it; else None."""
+    inside = _BRACKETS.findall(heading.casefold())
+    words = re.sub(r"[^0-9a-z-]+", " ", heading.casefold()).split()
+    for each in (*inside, words[-1] if len(words) > 1 else ""):
+        if (own := " ".join(each.replace("_", " ").split())) in UNITS:
+            return own
+    return None
+
+
+def role_of(text: str) -> str | None:
+    """Return `control`, `check`, `off`, or `?` for a word that is one of the first two; None for another."""
+    return _KNOWN_ROLES.get(" ".join(words_of(text)))

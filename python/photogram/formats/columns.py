@@ -1,0 +1,471 @@
+"""Headings that people give to tables of points, and the roles of these, as the tables of a project have them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from photogram.errors import InputError
+from photogram.formats.column_words import (
+    ANGULAR,
+    ROLE,
+    UNITS,
+    column_of,
+    is_angular,
+    role_of,
+    unit_of,
+    words_of,
+)
+from photogram.io.delimited import FALSE, NAMELESS, TRUE, ColumnTable
+from photogram.io.numbers import finite_number
+from photogram.messages import Message, listed, quoted
+
+__all__ = [
+    "PLAIN",
+    "Columns",
+    "check_unread",
+    "columns_given",
+    "degrees",
+    "guess",
+    "is_geographic",
+    "nameless",
+    "settled",
+]
+
+ROLES = ("control", "check", "off")
+OURS = (
+    "point",
+    "photo",
+    "x",
+    "y",
+    "z",
+    "sd",
+    "sd_x",
+    "sd_y",
+    "sd_z",
+    "cov_xy",
+    "cov_xz",
+    "cov_yz",
+    "use",
+    "time",
+    "group",
+)
+"""Columns that a user may name."""
+STRICT = ("control", "gnss")
+"""Tables of which no number may go unread."""
+SHORT: Mapping[str, str] = {
+    "p": "point",
+    "n": "y",
+    "e": "x",
+    "z": "z",
+    "d": "-",
+    "x": "x",
+    "y": "y",
+    "h": "z",
+}
+"""Letters of orders of columns, as PNEZD."""
+_FLAGS = {"check": "check", "enabled": "enabled"}
+_LENGTHS = ("x", "y", "z", "sd", "sd_x", "sd_y", "sd_z")
+_MARKED = frozenset({"x", "xx", "ja", "oui", "si", "sim"})
+_DMS = re.compile(
+    r"([NSEW]?)\s*([+-]?)(\d+(?:[.,]\d*)?)"
+    r"(?:[\s:°ºd-]+(\d+(?:[.,]\d*)?)(?:[\s:'′’m-]+(\d+(?:[.,]\d*)?))?)?[\s\"″”s'′’°m]*([NSEW]?)"
+)
+
+
+def degrees(text: str) -> float:
+    """Return degrees from `47.37`, `47 22 12.3`, `47°22.205'`, `8°32'24.5" W` or `S 8:32:24.5`.
+
+    Raises
+    ------
+    ValueError
+        Another text; minutes or seconds of 60 or more.
+    """
+    match = _DMS.fullmatch(text.strip())
+    before, sign, *parts, behind = match.groups() if match else ("", "", "", "")
+    values = [float(part.replace(",", ".")) for part in parts if part]
+    # What is followed by smaller units is whole.
+    if not match or (before and behind) or not all(each.is_integer() for each in values[:-1]):
+        raise ValueError(f"{quoted(text)} is no angle in degrees, minutes and seconds")
+    if any(each >= 60 for each in values[1:]):
+        raise ValueError(f"{quoted(text)} has minutes or seconds of 60 or more")
+    value = sum(each / 60**k for k, each in enumerate(values))
+    return -value if (sign == "-") != (before + behind in ("S", "W")) else value
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What a user says of the columns of a table.
+
+    Attributes
+    ----------
+    headings
+        Which heading each column of ours has; `-` before it: with the other sign, `[ft]` behind it: the unit.
+    order
+        Our columns in the order of the table, for one without a header; `-` is not read.
+    ignored
+        Headings that are not read.
+    roles
+        What words of the column `use` mean: control, check, off.
+    """
+
+    headings: Mapping[str, str] = field(default_factory=dict)
+    order: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+    roles: Mapping[str, str] = field(default_factory=dict)
+
+    def spelled(self, known: Collection[str], own: Sequence[str]) -> list[str]:
+        """Return the names of all columns of a table, that knows some, from what the file calls them."""
+        names = [""] * len(own)
+        for column, heading in self.headings.items():
+            for place in _places(heading, own):
+                names[place] = column
+        for heading in self.ignored:
+            for place in _places(heading, own):
+                names[place] = heading
+        taken = {*names, *(each for each in own if each in known)}
+        for k, heading in enumerate(own):
+            if names[k] or not heading:
+                continue
+            if heading in known and heading not in self.headings:
+                names[k] = heading
+                continue
+            column = column_of(heading)
+            column = ANGULAR.get(column or "", column)
+            column = "photo" if column == "point" and "point" not in known else column
+            fits = (column in known and (column != ROLE or "cov_xz" in known)) or (
+                column == "sd_xy" and "sd_x" in known
+            )
+            first = column not in taken or column not in ("point", ROLE)
+            asked_for = column is not None and column in self.headings
+            names[k] = column if column and fits and first and not asked_for else heading
+            taken.add(names[k])
+        return names
+
+
+PLAIN = Columns()
+
+
+def _places(heading: str, own: Sequence[str]) -> list[int]:
+    """Return the place of a column that a user names: as it is written, else by its words; none, or one."""
+    plain = heading.strip().lower()
+    for given in (plain, plain.removeprefix("-").strip(), plain.removeprefix("-").partition("[")[0].strip()):
+        found = [k for k, each in enumerate(own) if each == given] or [
+            k for k, each in enumerate(own) if each and words_of(each) == words_of(given)
+        ]
+        if len(found) == 1:
+            return found
+    return []
+
+
+def columns_given(columns: str | None, roles: str | None) -> Columns:
+    """Return what `point=Name,x=Rechtswert`, `point,x,y,z,-` or `PNEZD` say, and `KP=check` of roles.
+
+    Raises
+    ------
+    InputError
+        Columns or roles that there are not.
+    """
+    headings, ignored, order = dict[str, str](), list[str](), list[str]()
+    words = [each.strip() for each in (columns or "").split(",") if each.strip()]
+    if len(words) == 1 and set(words[0].lower()) <= set(SHORT) and len(words[0]) > 2:
+        order = [SHORT[letter] for letter in words[0].lower()]
+        words = []
+    for word in words:
+        name, equals, heading = (each.strip() for each in word.partition("="))
+        if name.lower() != "-" and name.lower() not in OURS:
+            raise InputError(
+                f"--columns {word}: there is no column {quoted(name)}, but {listed(list(OURS), 40)}"
+            )
+        if not equals:
+            order.append(name.lower())
+        elif name == "-":
+            ignored.append(heading)
+        else:
+            headings[name.lower()] = heading
+    if order and (headings or ignored):
+        raise InputError("--columns: either all columns in their order, or COLUMN=HEADING for some")
+    meanings = dict[str, str]()
+    for word in (each.strip() for each in (roles or "").split(",") if each.strip()):
+        own, _, role = (each.strip() for each in word.rpartition("="))
+        if role not in ROLES or not own:
+            raise InputError(f"--roles {word}: WORD=control, WORD=check or WORD=off")
+        meanings[own.casefold()] = role
+    return Columns(headings, tuple(order), tuple(ignored), meanings)
+
+
+def settled(
+    table: ColumnTable,
+    columns: Columns,
+    known: Collection[str],
+    length: float,
+    names: Collection[str],
+    name: str,
+    messages: list[Message],
+) -> ColumnTable:
+    """Return a table of points with its columns in our units, and roles in our words.
+
+    Parameters
+    ----------
+    table
+        The table, its columns named.
+    columns
+        What a user says of it.
+    known
+        Columns that such a table may have.
+    length
+        What a metre is in the unit of lengths.
+    names
+        Points that have images: they say which of several columns has the names; empty if not known.
+    name
+        Of the table.
+    messages
+        Where remarks go.
+
+    Raises
+    ------
+    InputError
+        A column that looks like a role, a coordinate or a standard deviation, and nothing says which.
+    """
+    missing = [*(own for column, own in columns.headings.items() if column not in table)]
+    missing += [own for own in columns.ignored if own not in table]
+    if missing:
+        raise table.head.error(
+            f"--columns: there is no column {quoted(missing[0])}, but {listed(list(table.own))}"
+        )
+    table = _with_points(table, names, messages)
+    if name == "control" and "point" in table:
+        table = _with_roles(table, columns, messages)
+    ready = dict(table.ready)
+    for column, own in zip(table.columns, table.own or table.columns, strict=True):
+        heading = columns.headings.get(column, own)
+        factor = -1.0 if heading.startswith("-") and heading.lower() != own else 1.0
+        unit = unit_of(heading) or unit_of(own)
+        if unit is not None and column in (*_LENGTHS, "sd_xy"):
+            factor *= UNITS[unit] * length
+        if column in ("x", "y") and is_angular(own):
+            letters = "NS" if column == "x" else "EW"
+            ready[column] = table.numbers(column, read=lambda text, no=letters: _on_axis(text, no))
+        if column == "sd_xy":
+            ready["sd_x"] = ready["sd_y"] = table.numbers(column, infinite=True) * abs(factor)
+        elif factor != 1.0 and column in _LENGTHS:
+            ready[column] = table.numbers(column, infinite=column.startswith("sd")) * (
+                abs(factor) if column.startswith("sd") else factor
+            )
+    wide = tuple(each for each in ("sd_x", "sd_y") if each in ready and each not in table.columns)
+    check_unread(table, columns, known, name, messages)
+    return replace(
+        table,
+        ready=ready,
+        columns=(*table.columns, *wide),
+        own=(*(table.own or table.columns), *("" for _ in wide)),
+    )
+
+
+def is_geographic(table: ColumnTable) -> bool:
+    """Whether the columns x and y of a table are longitudes and latitudes."""
+    headings = dict(zip(table.columns, table.own, strict=True)) if table.own else {}
+    return all(is_angular(headings.get(axis, "")) for axis in ("x", "y"))
+
+
+def _on_axis(text: str, other: str) -> float:
+    if any(letter in text for letter in other):
+        raise ValueError(f"{quoted(text)} is of the other axis")
+    return degrees(text)
+
+
+def _with_points(table: ColumnTable, names: Collection[str], messages: list[Message]) -> ColumnTable:
+    """Take the column with the names that have images, where several could have the names."""
+    found = [
+        column
+        for column, own in zip(table.columns, table.own or table.columns, strict=True)
+        if column in ("point", NAMELESS) or column_of(own) == "point"
+    ]
+    if not found or found == ["point"]:
+        return table
+    first = "point" if "point" in found else found[0]
+    hits = {column: len(set(table.texts(column)).intersection(names)) for column in found}
+    best = max(found, key=lambda column: (hits[column], column == first))
+    if best == "point":
+        return table
+    if "point" in table:
+        heading = dict(zip(table.columns, table.own, strict=True))[best] or "without a heading"
+        messages.append(
+            Message(f"names of points are those of the column {heading}, which have images", table.path)
+        )
+    return table.renamed(
+        {"point": dict(zip(table.columns, table.own, strict=True)).get("point", ""), best: "point"}
+    )
+
+
+def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -> ColumnTable:
+    """Return a table whose column `use` says control, check and off, whatever says it there."""
+    headings = dict(zip(table.columns, table.own or table.columns, strict=True))
+    words = {
+        column: [_role(cell, columns) for cell in table.texts(column)]
+        for column in _role_columns(table, columns)
+    }
+    for column in list(words):
+        own, meaning = headings[column], column_of(headings[column])
+        sure = column == ROLE and (own == ROLE or ROLE in columns.headings)
+        if meaning in _FLAGS and not any(words[column]):
+            words[column] = [_flag(table, column, row, meaning) for row in range(table.count)]
+        elif not sure and not any(words[column]):
+            del words[column]  # types of something else
+    if len(words) > 1:
+        several = [headings[column] for column in words]
+        raise table.head.error(
+            f"the columns {listed(several)} may all say who is check and who is control:"
+            f" --columns use={several[0]}, or -={several[0]} for one that is not read"
+        )
+    if not words:
+        return table.renamed({ROLE: headings[ROLE]}) if ROLE in table and headings[ROLE] != ROLE else table
+    ((column, found),) = words.items()
+    uses = _settled_roles(table, column, found)
+    if headings[column] != ROLE:
+        counts = ", ".join(f"{uses.count(role)} {role}" for role in ROLES if role in uses)
+        messages.append(
+            Message(
+                f"the column {headings[column]} says who is check and who is control: {counts}", table.path
+            )
+        )
+    table = table.renamed({column: ROLE})
+    return replace(
+        table, cells={**table.cells, ROLE: uses}, ready={k: v for k, v in table.ready.items() if k != ROLE}
+    )
+
+
+def _role_columns(table: ColumnTable, columns: Columns) -> list[str]:
+    """Return columns of roles: by their names, else those of texts that are the words for check points."""
+    found = [
+        column
+        for column, own in zip(table.columns, table.own or table.columns, strict=True)
+        if column not in columns.ignored and (column == ROLE or column_of(own) in (ROLE, *_FLAGS))
+    ]
+    if found:
+        return found
+    return [
+        column
+        for column in table.columns
+        if column and column not in columns.ignored and column != "point" and column in table.cells
+        if "check" in {_role(cell, columns) for cell in table.texts(column)}
+    ]
+
+
+def _role(cell: str, columns: Columns) -> str | None:
+    if not cell:
+        return ""
+    return columns.roles.get(cell.casefold()) or role_of(cell)
+
+
+def _flag(table: ColumnTable, column: str, row: int, meaning: str) -> str:
+    word = table.texts(column)[row].lower()
+    if word in TRUE | _MARKED:
+        return "check" if meaning == "check" else "control"
+    if word in FALSE or not word:
+        return "control" if meaning == "check" or not word else "check"
+    raise table.error(row, f"{quoted(word)} is neither true nor false")
+
+
+def _settled_roles(table: ColumnTable, column: str, found: Sequence[str | None]) -> list[str]:
+    texts = table.texts(column)
+    sure = set(found) & {"control", "check"}
+    uses = []
+    for row, role in enumerate(found):
+        if role is None:
+            raise table.error(
+                row,
+                f"column {column}: {quoted(texts[row])} is none of {', '.join(ROLES)};"
+                f' --roles "{texts[row]}=check" says what it is',
+            )
+        if role == "?" and len(sure) != 1:
+            raise table.error(
+                row,
+                f"column {column}: {quoted(texts[row])} may be control or check:"
+                f' --roles "{texts[row]}=check" or "{texts[row]}=control"',
+            )
+        other = "check" if "control" in sure else "control"
+        uses.append(other if role == "?" else role or "control")
+    return uses
+
+
+def check_unread(
+    table: ColumnTable, columns: Columns, known: Collection[str], name: str, messages: list[Message]
+) -> None:
+    """Refuse columns of numbers that nobody reads, where points are known by them; tell of others."""
+    others = _unread(table, known)
+    numbers = [
+        own
+        for column, own in others
+        if column not in columns.ignored
+        and column_of(own) not in ("", "point")
+        and _is_numeric(table, column)
+    ]
+    if numbers and name in STRICT:
+        raise table.head.error(
+            f"numbers under {listed([quoted(own) for own in numbers])}, perhaps coordinates or standard deviations,"
+            f" and nothing says of what: {guess(table, known)},"
+            f" or --columns {','.join(f'-={own}' for own in numbers)} to leave them out"
+        )
+    if others:
+        text = (
+            f"columns that the table {name} does not have are not read: {listed([own for _, own in others])}"
+        )
+        if (remark := Message(text, table.path)) not in messages:
+            messages.append(remark)
+
+
+def _unread(table: ColumnTable, known: Collection[str]) -> list[tuple[str, str]]:
+    """Return columns that nobody reads, by their names here and in the file."""
+    return [
+        (column, own or column)
+        for column, own in zip(table.columns, table.own or table.columns, strict=True)
+        if column and column not in known and column not in ("sd_xy", NAMELESS)
+    ]
+
+
+def _is_numeric(table: ColumnTable, column: str) -> bool:
+    if column not in table.cells:
+        return isinstance(table.ready.get(column), np.ndarray)
+    cells = {cell for cell in table.texts(column) if cell}
+    return bool(cells) and all(_is_number(cell) for cell in cells)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        finite_number(re.sub(r"(?<=\d)[.,'’ \u00a0\u202f](?=\d)", "", cell))
+    except ValueError:
+        return False
+    return True
+
+
+def guess(table: ColumnTable, known: Collection[str]) -> str:
+    """Return the option that says what columns are, guessed from their cells."""
+    free = [own for column, own in _unread(table, known) if column_of(own) != ""]
+    numeric = [own for column, own in _unread(table, known) if own in free and _is_numeric(table, column)]
+    found = []
+    if "point" in known and "point" not in table:
+        texts = [own for own in free if own not in numeric] or numeric
+        found += [f"point={own}" for own in texts[:1]]
+        numeric = [own for own in numeric if own not in texts[:1]]
+    axes = [axis for axis in ("x", "y", "z") if axis not in table] or ["sd_x"]
+    found += [f"{axis}={own}" for axis, own in zip(axes, numeric, strict=False)]
+    return f"--columns {','.join(found) or 'point=...,x=...,y=...,z=...'} (a guess)"
+
+
+def nameless(cells: Sequence[str]) -> str:
+    """Return what is said of a record that should name columns, and names none that is known."""
+    numbers = [k for k, cell in enumerate(cells) if _is_number(cell)]
+    if len(numbers) < 2:
+        guessed = ",".join(
+            f"{column}={own}" for column, own in zip(("point", "x", "y", "z"), cells, strict=False)
+        )
+        return f"names no column that is known: --columns {guessed} (a guess) says what they are"
+    rest = "D" * (len(cells) - 4)
+    return (
+        f"is no header: --columns PNEZ{rest} says that its cells are point, northing, easting, height"
+        f"{' and what is not read' if rest else ''}; PENZ{rest} has the easting first; or point,x,y,z,sd ..."
+    )

@@ -1,0 +1,56 @@
+"""Sheets of Excel as text: one table, read by what reads all others (extra `excel`)."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from photogram.errors import InputError
+
+__all__ = ["sheet_text"]
+
+LARGEST = 1 << 29
+"""Bytes that a workbook may unpack to: beyond, it is no table of a person but an attack."""
+
+
+def sheet_text(path: Path) -> str:
+    """Return the first sheet of a workbook: a line a row, tabs between its cells, values of formulas.
+
+    Raises
+    ------
+    InputError
+        The file is no workbook, or the library is not installed.
+    """
+    try:
+        import openpyxl
+    except ImportError:
+        raise InputError("Excel workbooks need openpyxl: pip install photogram[excel]", file=path) from None
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if sum(each.file_size for each in archive.infolist()) > LARGEST:
+                raise InputError(f"unpacks to more than {LARGEST >> 20} MiB", file=path)
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        try:
+            rows = list(book.worksheets[0].iter_rows(values_only=True))
+        finally:
+            book.close()
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", file=path) from None
+    except Exception as error:  # whatever a damaged archive makes the library raise
+        raise InputError(f"is no workbook of Excel: {error}", file=path) from None
+    width = max((k + 1 for row in rows for k, cell in enumerate(row) if cell is not None), default=0)
+    return "".join("\t".join(_cell(cell) for cell in row[:width]) + "\n" for row in rows)
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float) and value.is_integer() and abs(value) < 2**53:
+        return str(int(value))  # names that are numbers
+    text = " ".join(str(value).split())
+    return f'"{text.replace(chr(34), chr(34) * 2)}"' if '"' in text else text
