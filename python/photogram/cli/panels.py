@@ -9,8 +9,8 @@ from typer.core import TyperCommand
 __all__ = ["Command"]
 
 PANELS = {
-    "Input": "example packaged file_format control control_crs columns images names camera sd pixel_origin"
-    " model angles grid hand against against_spacing against_position_sd catalogue utc epoch"
+    "Input": "example packaged file_format control control_crs columns roles images names camera sd"
+    " pixel_origin model angles grid hand against against_spacing against_position_sd catalogue utc epoch"
     " faintest points point_sd decimals format zero_missing ground_unit model_unit restart"
     " start reject",
     "Results": "out overwrite json html no_html plots plot_format parquet crs map ply ply_origin listing"

@@ -16,7 +16,8 @@ ROLE = "use"
 """The column that says who is check and who is control."""
 _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "point": {
-        "en": "point, points, name, id, pid, number, no, nr, p, pt, pnt, label, marker, target, station, mark, ident",
+        "en": "point, points, name, id, pid, number, no, nr, p, pt, pnt, label, marker, target,"
+        " station, mark, ident",
         "de": "punkt, punktnummer, punktname, punktnr, pktnr, pkt, nummer, bezeichnung, kennung",
         "fr": "nom, numero, num, matricule, repere, cible",
         "es/it/pt": "punto, nombre, nome, ponto, codigo",
@@ -71,13 +72,14 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "enabled": {"en": "enable, enabled"},
     "": {
         # What says nothing that an adjustment needs, though it may be numbers.
-        "en": "code, description, desc, comment, comments, remark, remarks, note, notes, d, feature, order, group,"
-        " date, time, epoch, age, fix, satellites, sats, pdop, hdop, vdop, gdop, antenna, antenna height,"
-        " instrument, operator, photo, image, images, projections, zone, crs, epsg, system, datum, unit",
+        "en": "code, description, desc, comment, comments, remark, remarks, note, notes, d, feature, order,"
+        " group, date, time, epoch, age, fix, satellites, sats, pdop, hdop, vdop, gdop, antenna,"
+        " antenna height, instrument, operator, photo, image, images, projections, zone, crs, epsg,"
+        " system, datum, unit",
         "de": "bemerkung, bemerkungen, beschreibung, kommentar, datum, uhrzeit, zeit, zone, ordnung",
         "fr": "description, remarque, remarques, commentaire, heure, fuseau",
-        "agisoft": "x est, y est, z est, error, x error, y error, z error, error pix, longitude est, latitude est,"
-        " altitude est, x error m, y error m, z error m",
+        "agisoft": "x est, y est, z est, error, x error, y error, z error, error pix, longitude est,"
+        " latitude est, altitude est, x error m, y error m, z error m",
     },
 }
 _ROLES: Mapping[str, Mapping[str, str]] = {
@@ -125,60 +127,14 @@ UNITS: Mapping[str, float] = {
 }
 """Units of length in headings, in metres."""
 ANGULAR: Mapping[str, str] = {"longitude": "x", "latitude": "y"}
-_FILLERS = frozenset(
-    [
-        "coordinate",
-        "coordinates",
-        "coord",
-        "koordinate",
-        "coordonnee",
-        "the",
-        "of",
-        "de",
-        "du",
-        "la",
-        "des",
-        "in",
-        "value",
-        "wert",
-        "point",
-        "utm",
-        "gk",
-        "wgs84",
-        "etrs89",
-        "etrs",
-        "gauss",
-        "kruger",
-        "krueger",
-        "lokal",
-        "local",
-        "map",
-        "grid",
-        "ellipsoidal",
-        "ellipsoid",
-        "ellips",
-        "ellipsoidische",
-        "orthometric",
-        "geographic",
-        "geographische",
-        "geogr",
-        "nn",
-        "nhn",
-        "nap",
-        "u",
-        "uber",
-        "ueber",
-        "msl",
-        "above",
-        "over",
-        "sea",
-        "gcp",
-        "decimal",
-        "deg",
-        "degrees",
-        "dd",
-    ]
+_SMALL = (
+    "coordinate coordinates coord koordinate coordonnee the of de du la des in value wert point"
+    " utm gk wgs84 etrs89 etrs gauss kruger krueger lokal local map grid ellipsoidal ellipsoid ellips"
+    " ellipsoidische nn nhn nap orthometric geographic geographische geogr u uber ueber"
+    " msl above over sea gcp decimal"
+    " deg degrees dd"
 )
+_FILLERS = frozenset(_SMALL.split())
 _BRACKETS = re.compile(r"[(\[{]([^)\]}]*)[)\]}]")
 
 
@@ -195,7 +151,7 @@ _KNOWN, _KNOWN_ROLES = _looked_up(_COLUMNS), _looked_up(_ROLES)
 
 
 def words_of(text: str) -> list[str]:
-    """Return the words of a heading or cell: small letters without accents, marks and what stands in brackets."""
+    """Return the words of a heading or cell: small letters without accents, marks and what is in brackets."""
     bare = unicodedata.normalize("NFKD", _BRACKETS.sub(" ", text).casefold().replace("σ", " sigma "))
     plain = "".join(each for each in bare if not unicodedata.combining(each))
     return re.sub(r"[^0-9a-z]+", " ", plain).split()
@@ -208,7 +164,7 @@ def _meaning(words: list[str]) -> str | None:
     found = {
         _KNOWN.get(word) for word in words if word not in _FILLERS and not re.fullmatch(r"utm\d*[ns]?", word)
     } or {_KNOWN[word] for word in words if word in _KNOWN}
-    found = {ANGULAR[each] if each in ANGULAR and len(found) > 1 else each for each in found}
+    found = {ANGULAR.get(each or "", each) if len(found) > 1 else each for each in found}
     return found.pop() if len(found) == 1 else None
 
 
@@ -231,7 +187,7 @@ _TOGETHER = {
 
 
 def column_of(heading: str) -> str | None:
-    """Return the column of ours that a heading means; nothing for one that needs no reading, None if unknown."""
+    """Return our column that a heading means; nothing for one that needs no reading, None if unknown."""
     words = words_of(heading)
     if len(words) > 1 and words[-1] in UNITS:
         words.pop()
@@ -261,7 +217,7 @@ def is_angular(heading: str) -> bool:
 
 
 def unit_of(heading: str) -> str | None:
-    """Return the unit of length that a heading has in brackets or at its end, as :data:`UNITS` has it; else None."""
+    """Return the unit of length that a heading has in brackets or at its end, a key of :data:`UNITS`."""
     inside = _BRACKETS.findall(heading.casefold())
     words = re.sub(r"[^0-9a-z-]+", " ", heading.casefold()).split()
     for each in (*inside, words[-1] if len(words) > 1 else ""):

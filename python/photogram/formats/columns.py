@@ -1,10 +1,11 @@
-"""Headings that people give to tables of points, and the roles of these, as the tables of a project have them."""
+"""Headings that people give to tables of points, and their roles, as the tables of a project have them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -61,12 +62,14 @@ SHORT: Mapping[str, str] = {
     "n": "y",
     "e": "x",
     "z": "z",
-    "d": "-",
+    "d": "d",
     "x": "x",
     "y": "y",
     "h": "z",
 }
 """Letters of orders of columns, as PNEZD."""
+_PLAIN_ROLES = frozenset({"use", "used", "usage", "role", "rolle", "verwendung", "ruolo", "papel", "uso"})
+"""Headings of roles and nothing else; a type or a status may be of something else."""
 _FLAGS = {"check": "check", "enabled": "enabled"}
 _LENGTHS = ("x", "y", "z", "sd", "sd_x", "sd_y", "sd_z")
 _MARKED = frozenset({"x", "xx", "ja", "oui", "si", "sim"})
@@ -92,7 +95,7 @@ def degrees(text: str) -> float:
         raise ValueError(f"{quoted(text)} is no angle in degrees, minutes and seconds")
     if any(each >= 60 for each in values[1:]):
         raise ValueError(f"{quoted(text)} has minutes or seconds of 60 or more")
-    value = sum(each / 60**k for k, each in enumerate(values))
+    value = sum((each / 60.0**k for k, each in enumerate(values)), 0.0)
     return -value if (sign == "-") != (before + behind in ("S", "W")) else value
 
 
@@ -130,18 +133,18 @@ class Columns:
         for k, heading in enumerate(own):
             if names[k] or not heading:
                 continue
-            if heading in known and heading not in self.headings:
-                names[k] = heading
+            if heading in known:
+                # Where a user says that another is this column, this is none.
+                names[k] = "" if heading in self.headings else heading
                 continue
-            column = column_of(heading)
-            column = ANGULAR.get(column or "", column)
+            meaning = column_of(heading) or ""
+            column = ANGULAR.get(meaning, meaning)
             column = "photo" if column == "point" and "point" not in known else column
             fits = (column in known and (column != ROLE or "cov_xz" in known)) or (
                 column == "sd_xy" and "sd_x" in known
             )
             first = column not in taken or column not in ("point", ROLE)
-            asked_for = column is not None and column in self.headings
-            names[k] = column if column and fits and first and not asked_for else heading
+            names[k] = column if fits and first and column not in self.headings else heading
             taken.add(names[k])
         return names
 
@@ -202,6 +205,7 @@ def settled(
     columns: Columns,
     known: Collection[str],
     length: float,
+    required: Collection[str],
     names: Collection[str],
     name: str,
     messages: list[Message],
@@ -218,6 +222,8 @@ def settled(
         Columns that such a table may have.
     length
         What a metre is in the unit of lengths.
+    required
+        Columns that it must have.
     names
         Points that have images: they say which of several columns has the names; empty if not known.
     name
@@ -230,14 +236,19 @@ def settled(
     InputError
         A column that looks like a role, a coordinate or a standard deviation, and nothing says which.
     """
-    missing = [*(own for column, own in columns.headings.items() if column not in table)]
-    missing += [own for own in columns.ignored if own not in table]
-    if missing:
+    missing = [
+        each for each in (*columns.headings.values(), *columns.ignored) if not _places(each, table.own)
+    ]
+    if missing and not columns.order:
         raise table.head.error(
             f"--columns: there is no column {quoted(missing[0])}, but {listed(list(table.own))}"
         )
     table = _with_points(table, names, messages)
-    if name == "control" and "point" in table:
+    if lacking := [each for each in required if each not in table]:
+        raise table.head.error(
+            f"the column {lacking[0]} is missing; there are {listed(list(table.own))}: {guess(table, known)}"
+        )
+    if name == "control":
         table = _with_roles(table, columns, messages)
     ready = dict(table.ready)
     for column, own in zip(table.columns, table.own or table.columns, strict=True):
@@ -248,7 +259,7 @@ def settled(
             factor *= UNITS[unit] * length
         if column in ("x", "y") and is_angular(own):
             letters = "NS" if column == "x" else "EW"
-            ready[column] = table.numbers(column, read=lambda text, no=letters: _on_axis(text, no))
+            ready[column] = table.numbers(column, read=partial(_on_axis, letters))
         if column == "sd_xy":
             ready["sd_x"] = ready["sd_y"] = table.numbers(column, infinite=True) * abs(factor)
         elif factor != 1.0 and column in _LENGTHS:
@@ -271,7 +282,7 @@ def is_geographic(table: ColumnTable) -> bool:
     return all(is_angular(headings.get(axis, "")) for axis in ("x", "y"))
 
 
-def _on_axis(text: str, other: str) -> float:
+def _on_axis(other: str, text: str) -> float:
     if any(letter in text for letter in other):
         raise ValueError(f"{quoted(text)} is of the other axis")
     return degrees(text)
@@ -310,7 +321,7 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
     }
     for column in list(words):
         own, meaning = headings[column], column_of(headings[column])
-        sure = column == ROLE and (own == ROLE or ROLE in columns.headings)
+        sure = column == ROLE and (ROLE in columns.headings or not _PLAIN_ROLES.isdisjoint(words_of(own)))
         if meaning in _FLAGS and not any(words[column]):
             words[column] = [_flag(table, column, row, meaning) for row in range(table.count)]
         elif not sure and not any(words[column]):
@@ -373,13 +384,14 @@ def _flag(table: ColumnTable, column: str, row: int, meaning: str) -> str:
 def _settled_roles(table: ColumnTable, column: str, found: Sequence[str | None]) -> list[str]:
     texts = table.texts(column)
     sure = set(found) & {"control", "check"}
+    rest = "" if column == ROLE else f", --columns -={column} that the column is something else"
     uses = []
     for row, role in enumerate(found):
         if role is None:
             raise table.error(
                 row,
                 f"column {column}: {quoted(texts[row])} is none of {', '.join(ROLES)};"
-                f' --roles "{texts[row]}=check" says what it is',
+                f' --roles "{texts[row]}=check" says what it is{rest}',
             )
         if role == "?" and len(sure) != 1:
             raise table.error(
@@ -406,8 +418,8 @@ def check_unread(
     ]
     if numbers and name in STRICT:
         raise table.head.error(
-            f"numbers under {listed([quoted(own) for own in numbers])}, perhaps coordinates or standard deviations,"
-            f" and nothing says of what: {guess(table, known)},"
+            f"numbers under {listed([quoted(own) for own in numbers])}, perhaps coordinates or standard"
+            f" deviations, and nothing says of what: {guess(table, known)},"
             f" or --columns {','.join(f'-={own}' for own in numbers)} to leave them out"
         )
     if others:
@@ -447,10 +459,11 @@ def guess(table: ColumnTable, known: Collection[str]) -> str:
     free = [own for column, own in _unread(table, known) if column_of(own) != ""]
     numeric = [own for column, own in _unread(table, known) if own in free and _is_numeric(table, column)]
     found = []
-    if "point" in known and "point" not in table:
-        texts = [own for own in free if own not in numeric] or numeric
-        found += [f"point={own}" for own in texts[:1]]
-        numeric = [own for own in numeric if own not in texts[:1]]
+    key = "point" if "point" in known else "photo"
+    if key not in table:
+        different = [own for own in free if len(set(table.texts(own))) == table.count] or free
+        found += [f"{key}={own}" for own in different[:1]]
+        numeric = [own for own in numeric if own not in different[:1]]
     axes = [axis for axis in ("x", "y", "z") if axis not in table] or ["sd_x"]
     found += [f"{axis}={own}" for axis, own in zip(axes, numeric, strict=False)]
     return f"--columns {','.join(found) or 'point=...,x=...,y=...,z=...'} (a guess)"
@@ -464,8 +477,9 @@ def nameless(cells: Sequence[str]) -> str:
             f"{column}={own}" for column, own in zip(("point", "x", "y", "z"), cells, strict=False)
         )
         return f"names no column that is known: --columns {guessed} (a guess) says what they are"
-    rest = "D" * (len(cells) - 4)
+    rest = "D" * (len(cells) > 4)
     return (
         f"is no header: --columns PNEZ{rest} says that its cells are point, northing, easting, height"
-        f"{' and what is not read' if rest else ''}; PENZ{rest} has the easting first; or point,x,y,z,sd ..."
+        f"{' and a description' if rest else ''}; PENZ{rest} has the easting first; or point,x,y,z,sd ...;"
+        " --sd control=0.01 where there are no standard deviations"
     )

@@ -118,10 +118,8 @@ class ColumnTable:
     def renamed(self, names: Mapping[str, str]) -> ColumnTable:
         """Return the table with other names of some columns."""
         columns = tuple(names.get(column, column) for column in self.columns)
-        cells, ready = (
-            {names.get(column, column): cells for column, cells in own.items()}
-            for own in (self.cells, self.ready)
-        )
+        cells = {names.get(column, column): own for column, own in self.cells.items()}
+        ready = {names.get(column, column): own for column, own in self.ready.items()}
         return replace(self, columns=columns, cells=cells, ready=ready)
 
     def require(self, *columns: str) -> None:
@@ -518,7 +516,7 @@ def _fits(place: Place, columns: Sequence[str], numbers: Collection[str]) -> boo
 
 
 def _shifted(cells: Sequence[str], columns: Sequence[str], numbers: Collection[str]) -> bool:
-    """Whether columns stand over numbers if the first cell has no column, and must: else they, or names, would not."""
+    """Whether columns stand over numbers if the first cell has no column, and must, for they would not."""
     numeric = [k for k, column in enumerate(columns) if column in numbers]
     as_is, shifted = (
         all(_NUMBER.fullmatch(cells[k + step]) or not cells[k + step] for k in numeric) for step in (0, 1)

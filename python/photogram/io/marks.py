@@ -32,7 +32,7 @@ class Marks:
     thousands: bool
 
     def plain(self, text: str) -> str:
-        """Return a number as it is spelled here: a decimal point, no marks of thousands where they stand right.
+        """Return a number as it is spelled here: a decimal point, no marks of thousands.
 
         Anything else comes back as it is, for whoever reads numbers to refuse.
 
@@ -51,8 +51,8 @@ class Marks:
             groups = _GROUPS.fullmatch(head)
             if groups is None or groups["mark"] != other or not self.thousands:
                 raise ValueError(
-                    f"{quoted(text)}: {self.decimal!r} divides decimals elsewhere in the table, and nothing says"
-                    f" that {other!r} divides thousands"
+                    f"{quoted(text)}: {self.decimal!r} divides decimals elsewhere in the table, and nothing"
+                    f" says that {other!r} divides thousands"
                 )
             head = head.replace(other, "")
         return f"{head}.{tail}" if mark else head

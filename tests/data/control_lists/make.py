@@ -1,9 +1,10 @@
 """Make the lists of control and the block that they belong to: all numbers are invented.
 
 `photogram simulate blk --strips 2 --photos-per-strip 3 --points-per-photo 20 --flying-height 120 --relief 12
---control-sd 0.01 --control corners --check-points 3 --position-error 1 --image-sd 0.003`, then `photogram convert
-blk plain`; `python tests/data/control_lists/make.py plain` makes a block without control of it, and its control
-as eleven people would send it: in a plane of large numbers, or as positions on the earth (needs pyproj).
+--control-sd 0.01 --control corners --check-points 3 --position-error 1 --image-sd 0.003`, then `photogram
+convert blk plain`; `python tests/data/control_lists/make.py plain` makes a block without control of it,
+and its control as eleven people would send it: in a plane of large numbers, or as positions on the earth
+(needs pyproj).
 """
 
 import sys
@@ -86,8 +87,8 @@ def lists(ids: list[str], xyz: np.ndarray, check: list[bool]) -> None:
         ),
         "wider.txt": table("Easting\tNorthing\tHeight\tsd", lambda k: [ids[k], *three(k), "0.01"], "\t"),
         "lat_lon.csv": table(
-            "name,lat,lon,ellipsoidal height,type",
-            lambda k: [ids[k], f"{lat[k]:.9f}", f"{lon[k]:.9f}", f"{height[k]:.4f}", role[k]["gcp"]],
+            "name,lat,lon,ellipsoidal height,accuracy,type",
+            lambda k: [ids[k], f"{lat[k]:.9f}", f"{lon[k]:.9f}", f"{height[k]:.4f}", "0.01", role[k]["gcp"]],
             ",",
         ),
         "degrees_minutes.csv": table(
@@ -98,7 +99,7 @@ def lists(ids: list[str], xyz: np.ndarray, check: list[bool]) -> None:
                 angle(lon[k], "EW"),
                 f"{height[k]:.4f}",
                 "0.01",
-                "0.02",
+                "0.01",
                 "yes" if check[k] else "",
             ],
         ),

@@ -407,7 +407,8 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
         if use == "control" and (np.isnan(sd[row]) & ~np.isnan(values[row])).any():
             raise table.error(
                 row,
-                f"{names[row]} has no standard deviations: --sd control=0.01, columns sd_x .., or control under [sd]",
+                f"{names[row]} has no standard deviations: --sd control=0.01, columns sd_x .., or control"
+                " under [sd]",
             )
     sd = np.where(np.isnan(sd) | np.isnan(values), np.inf, sd)
     covariances = covariances_of(np.where(np.isinf(sd), 0.0, sd), table)

@@ -278,9 +278,7 @@ class Tables:
                 path, known=known, numbers=numbers, spelling=partial(given.spelled, known), hint=nameless
             )
         metre = 1.0 / UNITS[self.settings.length]
-        table = settled(table, given, known, metre, self.names, name, self.messages)
-        table.require(*REQUIRED[name])
-        return table
+        return settled(table, given, known, metre, REQUIRED[name], self.names, name, self.messages)
 
     def angle(self, text: str) -> float:
         """Return an angle in radians from a cell in the unit of the project."""

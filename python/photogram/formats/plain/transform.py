@@ -58,9 +58,9 @@ class Transform:
         if not crs:
             if self.frame.kind != "geographic" and is_geographic(table):
                 raise table.head.error(
-                    "its columns are latitudes and longitudes: --control-crs EPSG:4979 says that they are of WGS 84"
-                    " with heights above the ellipsoid, EPSG:4326+geoid=46.5 with heights above sea level where the"
-                    " geoid is 46.5 m above the ellipsoid; in a project [control] crs, [gnss] crs ... say it"
+                    "its columns are latitudes and longitudes: --control-crs EPSG:4979 says that they are of"
+                    " WGS 84 with heights above the ellipsoid, EPSG:4326+geoid=46.5 with heights above sea"
+                    " level where the geoid is 46.5 m above the ellipsoid; in a project [control] crs says it"
                 )
             if self.frame.kind == "geographic":
                 return np.column_stack(
