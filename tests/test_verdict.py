@@ -3,16 +3,18 @@
 import json
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from photogram import adjust, resect
 from photogram.geometry import project
+from photogram.show.judgement import advice, judged
 from photogram.show.sections import verdict_section
 from photogram.simulation import simulate
 from photogram.statistics import Findings, Removed, global_test, group_tests, verdict
-from photogram.statistics.findings import GroupFactor, Systematic, by_t, by_w, of_groups
+from photogram.statistics.findings import Agreement, GroupFactor, Systematic, by_t, by_w, of_groups
 from photogram.statistics.outliers import Observations
 from photogram.statistics.verdict import worst
 
@@ -346,3 +348,115 @@ def test_a_resection():
     assert wrong.code == "gross-errors"
     assert "of point E" in wrong.headline
     assert resect(ground[:3], xy[:3], -152.0).verdict.code == "uncontrolled"
+
+
+# Situations that come together: no two sentences of a page contradict each other.
+
+
+def lens(fall=1e9):
+    return Systematic(
+        "over the frame", "the lens model is incomplete", "B", "chi2", (40.0,), 99.0, 1e-9, 0.001, True, fall
+    )
+
+
+def checks(*, error=0.0, together=1.0):
+    """Return check points of which the second is wrong by so many standard deviations."""
+    values = np.array([1.0, 3.0 + error**2, 2.0])
+    own = by_w(Observations("check points", values, lambda place: f"K{place[0]}"))
+    points = replace(own, statistic="T", dimension=np.full(3, 3.0))
+    return Agreement(
+        points, global_test(9 * together, 9), np.ones((3, 3)), lambda place, sd: f"off by {sd[0]:g} m in Z"
+    )
+
+
+SITUATIONS = {
+    "nothing": {},
+    "blunder": {"observations": findings(with_blunder).observations, "global_test": global_test(2 * F, F)},
+    "single": {"observations": findings(with_blunder).observations},
+    "factor 2": {
+        "observations": findings(good(factor=2.0)).observations,
+        "global_test": global_test(4 * F, F),
+    },
+    "factor 9": {
+        "observations": findings(good(factor=9.0)).observations,
+        "global_test": global_test(81 * F, F),
+    },
+    "too small": {
+        "observations": findings(good(factor=0.5)).observations,
+        "global_test": global_test(F / 4, F),
+    },
+    "unexplained": {"global_test": global_test(2 * F, F)},
+    "untested": {"global_test": None},
+    "no freedom": {"degrees_of_freedom": 0, "global_test": None, "observations": []},
+    "pattern": {"systematic": [pattern()]},
+    "lens": {"systematic": [lens()]},
+    "groups": {"components": [component(2.0)]},
+    "groups far": {"components": [component(5.0)]},
+    "few out": {"snooped": Removed([{"name": "a"}])},
+    "many out": {"snooped": Removed([{"name": "a"}], images=0.3)},
+    "few aside": {"set_aside": Removed([{"name": "a"}])},
+    "many aside": {"set_aside": Removed([{"name": "a"}], images=0.3)},
+    "check wrong": {"checks": checks(error=9.0)},
+    "check to look at": {"checks": checks(error=3.6)},
+    "checks together": {"checks": checks(together=6.0)},
+    "checks good": {"checks": checks()},
+    "hint": {"hints": ["probably feet"]},
+    "stars": {"doubtful": ["exposure 2"]},
+    "spoiled": {"spoiled": "it changes"},
+    "exchanged": {"exchanged": ["1 and 2 are exchanged on photo 7"]},
+    "diverged": {"status": "diverged"},
+    "open": {"undetermined": ["kappa of photo 3"]},
+}
+PRAISE = ("usable", "accepted", "can be used", "nothing needs", "residuals agree", "is good")
+BLAME = (
+    "not to be used",
+    "do not use",
+    "do not hand over",
+    "are no results",
+    "model or identification is wrong",
+)
+EXCLUSIVE = (
+    (("too optimistic",), ("too pessimistic",)),
+    (("residuals agree",), ("not tested as a whole", "too optimistic", "too pessimistic", "gross errors")),
+    (("--snoop",), ("observations are not to be taken out",)),
+    (("nothing is checked",), ("residuals agree", "accepted")),
+)
+"""Of each two, no phrase of one stands on a page with one of the other."""
+
+
+def page_words(made):
+    """Return all sentences that a page says of a verdict, small letters."""
+    told = judged(made)
+    snooping, calibration = "`--snoop` takes them out", "`--self-calibrate all`"
+    told_next = advice(made, check="`photogram check`", snoop=snooping, calibrate=calibration)
+    _, lines = verdict_section(made)
+    text = [line for line in lines if not line.startswith("test ") and "  " not in line.strip()]
+    return told, told_next, " | ".join([told.mark, told.headline, *told.lines, *told_next, *text]).lower()
+
+
+@pytest.mark.parametrize("first", SITUATIONS)
+def test_no_two_sentences_contradict_each_other(first):
+    for second, third in [
+        (each, other) for each in SITUATIONS for other in ("nothing", "check wrong", "lens")
+    ]:
+        situation = {**SITUATIONS[first], **SITUATIONS[second], **SITUATIONS[third]}
+        base = {**vars(findings(good())), "snoop": "--snoop", "calibrate": "--self-calibrate all"}
+        made = verdict(Findings(**{**base, **situation}))
+        told, told_next, words = page_words(made)
+        case = (first, second, third, words)
+        if made.exit:
+            assert told.tone == "bad", case
+            assert not any(each in words.replace("not to be used", "") for each in PRAISE), case
+        else:
+            assert told.tone != "bad", case
+            assert not any(each in words for each in BLAME), case
+            assert (told.tone == "good") == (told.mark == "Usable") == (not made.warning and "global" in
+                   {test.name for test in made.tests}), case  # fmt: skip
+        for one, other in EXCLUSIVE:
+            assert not (any(each in words for each in one) and any(each in words for each in other)), case
+        assert made.code in ("accepted", "hint") or told_next, case
+        # The headline is of the gravest.
+        assert made.exit or "model is likely wrong" not in words, case
+        if made.code == "model" and situation.get("systematic") == SITUATIONS["lens"]["systematic"]:
+            assert "--self-calibrate" in told_next[0], case
+            assert "--snoop" not in words, case

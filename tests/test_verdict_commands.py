@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from photogram import adjust, check, simulate
+from photogram import Camera, adjust, check, simulate
 from photogram.cli import app
 from photogram.giant import Project, read_project, write_project
+from photogram.show.ways import page_of
 
 
 @pytest.fixture
@@ -122,3 +123,46 @@ def test_stars_have_a_verdict(run):
     document = json.loads(Path("result.json").read_bytes())["verdict"]
     names = [test["name"].partition(":")[0] for test in document["tests"]]
     assert {"plate coordinates", "places of stars"} <= set(names)
+
+
+def test_a_lens_pattern_asks_for_a_calibration_and_not_for_snooping(run, tmp_path):
+    """Sixty observations look gross where one lens is wrong; snooping ends as the command that says so."""
+    lens = Camera("brown", {"c": -152.74, "K1": 1e-7})
+    nominal = Camera("brown", {"c": -152.74})
+    block = simulate(
+        strips=3, photos_per_strip=5, cameras=[lens], start_cameras=[nominal], position_sd=0.1, seed=5
+    ).block
+    found = adjust(block)
+    assert (found.verdict.code, found.verdict.exit) == ("model", 4)
+    assert "--self-calibrate c,xp,yp,K1,K2,P1,P2 estimates it" in found.verdict.headline
+    page = page_of(found)
+    assert "--self-calibrate c,xp,yp,K1,K2,P1,P2" in page.advice[0]
+    words = " ".join([found.verdict.headline, *found.verdict.lines, *page.advice])
+    assert "--snoop" not in words
+    assert "gross" not in words.lower()
+    # A wrong observation is still one, and no lens.
+    good = block.replace(cameras=[lens])
+    xy = good.image_xy.copy()
+    xy[int(np.argmax(adjust(good).redundancy[:, 0])), 0] += 2.0
+    assert adjust(good.replace(image_xy=xy)).verdict.code == "gross-errors"
+    positions = good.point_positions.copy()
+    held = np.flatnonzero(np.isfinite(good.point_sd).all(axis=1))
+    positions[held[1]] += [30.0, 0.0, 10.0]
+    assert adjust(good.replace(point_positions=positions)).verdict.code == "gross-errors"
+
+
+def test_snooping_ends_by_the_verdict_that_it_prints(run, project):
+    block = read_project(project).to_block()
+    xy = block.image_xy.copy()
+    xy[::9] += np.random.default_rng(2).normal(scale=0.4, size=xy[::9].shape)
+    write_project(Project.from_block(block.replace(image_xy=xy, image_sd=2 * block.image_sd)), Path("spoilt"))
+    done = run("adjust", "spoilt", "--snoop", "--json", "result.json", "--out", "o")
+    document = json.loads(Path("result.json").read_bytes())["verdict"]
+    assert document["code"] == "too-much-removed"
+    assert done.exit_code == document["exit"] == 4, done.output
+    assert done.output.count("\nVerdict\n") == 1
+    text = Path("o", "report.txt").read_text()
+    assert text.count("\nVerdict\n") == 1
+    page = Path("o", "report.html").read_text()
+    assert "Not to be used as it is" in page
+    assert "they can be used" not in page

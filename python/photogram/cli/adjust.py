@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -203,15 +203,15 @@ def adjust(
                 first = _adjusted(job, project, started, datum, loss, ordering, threads, divided.division)
                 block, aside = first.block, first.set_aside
             removed = _snooped(job, project, block, threads, snooping.options)
-            result = removed.result
-            assert isinstance(result, Result)
-            result = replace(result, set_aside=aside)
-            removed = replace(removed, result=result)
+            assert isinstance(removed.result, Result)
+            removed = replace(removed, result=replace(removed.result, set_aside=aside))
+            result = cast("Result", removed.judged)
         else:
             result = _adjusted(
                 job, project, started or block, datum, loss, ordering, threads, divided.division
             )
-        files = _files(project, result, sections)
+        told = removed or result
+        files = _files(project, result, told.report(), sections)
         if crs is not None:
             from photogram.formats.placing import placed, placed_files
 
@@ -219,16 +219,15 @@ def adjust(
             files |= {f"in_crs/{name}": content for name, content in found.items()}
         if removed is not None:
             files["removed.csv"] = removed.table().to_csv(index=False).encode()
-            files["report.txt"] += removed.report().encode()
-        taken = [] if removed is None else removed.sections()
-        page = html_files(job, "adjust", place, html is not None, lambda: page_of(removed or result))
+        taken = [] if removed is None else removed.sections()[1:]
+        page = html_files(job, "adjust", place, html is not None, lambda: page_of(told))
         job.finish(
             {target / name: content for name, content in files.items()} | pictures.of(result) | page,
-            {} if json is None else {json: result.to_json()},
+            {} if json is None else {json: told.to_json()},
             as_data(result, parquet),
             drawn_maps(result, map, crs, _sizes(project), quiet=quiet),
             point_clouds(result, ply, ply_origin, crs),
-            summary=lambda: print_sections([*taken, *_summary(result)], "report.txt"),
+            summary=lambda: print_sections(_summary(result, taken), "report.txt"),
             code=result.verdict.exit_code(strict=strict),
         )
 
@@ -331,13 +330,15 @@ def _adjusted(
     return replace(result, messages=[*project.messages, *again, *result.messages])
 
 
-def _files(project: Project, result: Result, sections: list[tuple[str, list[str]]]) -> dict[str, bytes]:
+def _files(
+    project: Project, result: Result, report: str, sections: list[tuple[str, list[str]]]
+) -> dict[str, bytes]:
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.formats import FORMATS, to_files
     from photogram.formats.adjusted import adjusted, table_files
 
     read = "\n".join(line for title, lines in sections for line in (title, *(f"  {each}" for each in lines)))
-    files = {"report.txt": f"{result.report()}\n{read}\n".encode(), **table_files(result)}
+    files = {"report.txt": f"{report}\n{read}\n".encode(), **table_files(result)}
     after = adjusted(project, result)
     files |= {f"adjusted/{name}": content for name, content in to_files(after, "plain").items()}
     own = next((name for name, each in FORMATS.items() if each.title == project.title), None)
@@ -370,7 +371,8 @@ def _same_format(project: Project, name: str) -> dict[str, bytes]:
         return {}
 
 
-def _summary(result: Result) -> list[tuple[str, list[str]]]:
+def _summary(result: Result, taken: list[tuple[str, list[str]]]) -> list[tuple[str, list[str]]]:
     from photogram.results.report import summary
 
-    return [each for each in summary(result) if each[1]]
+    verdict, *others = summary(result)
+    return [each for each in (verdict, *taken, *others) if each[1]]

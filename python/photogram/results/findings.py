@@ -9,6 +9,7 @@ from photogram.messages import counted
 from photogram.results.groups_tested import groups_tested
 from photogram.results.held import held_tested
 from photogram.results.kinds import tested_kind
+from photogram.results.lenses import fall_by_lens, how_to_calibrate
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observed import tested
 from photogram.results.outward import outward
@@ -55,6 +56,7 @@ def block_findings(result: Result) -> Findings:
         exchanged=result.exchanged,
         set_aside=_set_aside(result),
         snoop="" if intersected else "--snoop (photogram.snoop)",
+        calibrate=how_to_calibrate(result.block),
     )
 
 
@@ -121,6 +123,7 @@ def _patterns(result: Result) -> list[Systematic]:
         block.photo_ids,
         ("um", 1000.0) if block.image_unit == "mm" else ("px", 1.0),
         axes(result),
+        lambda own: fall_by_lens(result, own),
     )
 
 

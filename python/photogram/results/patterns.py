@@ -7,8 +7,8 @@ test values: what is left of them would be taken for a pattern.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,10 +67,11 @@ def patterns(
     image_photos: Indices,
     xy: Floats,
     sd: Floats,
-    cameras: Iterable[CameraImages],
+    cameras: Sequence[CameraImages],
     photos: Sequence[str],
     unit: tuple[str, float],
     axes: Sequence[str] = (),
+    fall: Callable[[Bools], float] = lambda _: 0.0,
 ) -> list[Systematic]:
     """Return the tests of patterns of a network, where there is enough to test.
 
@@ -87,6 +88,9 @@ def patterns(
     axes
         What the coordinates of stations and points are called, the height last; none where they mean nothing
         on the ground.
+    fall
+        By how much the weighted sum of squares would fall with a lens for (m,) images of a camera; asked for
+        where the pattern is large.
     """
     used = chosen(result.used_images & finite_rows(result.redundancy))
     w = np.where(result.redundancy > TESTABLE, result.standardized, math.nan)[used]
@@ -99,10 +103,13 @@ def patterns(
     redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
     residuals = np.nan_to_num(np.clip(w / factor, -CLIPPED, CLIPPED)) * np.sqrt(redundancy)
     scale = factor * np.asarray(sd[used]).mean(axis=0) * unit[1]
-    found = [
+    found: list[Systematic | None] = [
         _of_camera(each, image_photos[used], xy[used], residuals, redundancy, scale, unit[0])
         for each in cameras
     ]
+    for row, (each, camera) in enumerate(zip(found, cameras, strict=True)):
+        if each is not None and each.significant and each.large:
+            found[row] = replace(each, fall=fall(camera.photos[image_photos]))
     found.append(_of_photos(image_photos[used], photos, xy[used], residuals, redundancy))
     found.append(_distribution(result, used))
     if axes:

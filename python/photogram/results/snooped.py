@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import orjson
@@ -59,6 +60,13 @@ class Snooped(Brief, Judged):
             ("removed", few([entry.name for entry in self.removed])),
         ]
         return f"{title}, without gross errors", [*own, *(row for row in rows if row[0] != "verdict")]
+
+    @cached_property
+    def judged(self) -> AdjustedNetwork:
+        """The result as its reports show it: with the verdict that knows what was taken out."""
+        own = replace(self.result)
+        vars(own)["verdict"] = self.verdict
+        return own
 
     @property
     def log(self) -> list[Removal]:
@@ -129,8 +137,8 @@ class Snooped(Brief, Judged):
 
     def to_json(self) -> bytes:
         """Return the whole result with its verdict and the log, `snooping`, as one JSON document (UTF-8)."""
-        own = {"verdict": self.verdict.document(), "snooping": self.document()}
-        return json.to_json({**orjson.loads(self.result.to_json()), **own})
+        own = {"snooping": self.document()}
+        return json.to_json({**orjson.loads(self.judged.to_json()), **own})
 
     def to_html(self) -> bytes:
         """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
@@ -148,8 +156,8 @@ class Snooped(Brief, Judged):
         ]
 
     def report(self) -> str:
-        """Return the report: what was taken out, then the report of the network without it."""
-        return composed(headline("data snooping"), self.sections()) + "\n" + self.result.report()
+        """Return the report: that of the network without what was taken out, then the log of that."""
+        return self.judged.report() + "\n" + composed(headline("data snooping"), self.sections()[1:])
 
     def _head(self) -> list[str]:
         outcome, settings = self.outcome, self.settings

@@ -16,6 +16,7 @@ __all__ = ["advice", "judged", "remarks_section", "tests_section", "verdict_tabl
 MARKS: dict[Tone, str] = {
     "good": "Usable",
     "look": "Usable, but look first",
+    "": "Not tested as a whole",
     "bad": "Not to be used as it is",
 }
 """What stands above a verdict: colours alone say nothing."""
@@ -70,7 +71,7 @@ _NEXT = {
         " coordinates, or what stands for their standard deviations, may be at fault.",
     ),
     "weights": (
-        "The covariances on this page are scaled by the unit variance already: they can be used.",
+        "The covariances on this page are scaled by the unit variance already.",
         "Give the observations standard deviations that are larger by the factor that is named, so that"
         " their tests are right too.",
     ),
@@ -79,9 +80,10 @@ _NEXT = {
         " again.",
     ),
     "model": (
-        "Look at the residuals over the frame: what is alike in all photos is the camera, what is alike in"
-        " one is the photo or its control.",
         "{calibrate}",
+        "Look at the residuals over the frame: what is alike in all photos is the camera, what is alike in"
+        " one is the photo or its control. Do not take out observations before: where the model is wrong,"
+        " good ones look bad.",
     ),
     "uncontrolled": (
         "Nothing checks these values. Measure more than is needed: more rays, control or distances.",
@@ -100,7 +102,11 @@ _NEXT = {
         " deviations, unless values were smoothed or used twice.",
     ),
     "accepted": (),
-    "not-tested": (),
+    "not-tested": (
+        "No test says whether the standard deviations are right: compare with what took no part (known"
+        " values, a second measurement), or give the observations standard deviations where the program takes"
+        " them.",
+    ),
 }
 """What follows from the condition that gave the headline, in the words of a program."""
 
@@ -129,8 +135,13 @@ def advice(
 
 def judged(verdict: Verdict, on: str = "") -> Judgement:
     """Return a verdict as it stands on a page."""
-    tone: Tone = "bad" if verdict.exit else "look" if verdict.warning else "good"
-    return Judgement(MARKS[tone], verdict.headline, verdict.lines, tone, on)
+    tested = any(test.name == "global" for test in verdict.tests)
+    if verdict.exit or verdict.warning:
+        tone: Tone = "bad" if verdict.exit else "look"
+    else:
+        tone = "good" if tested else ""
+    mark = "Look first" if tone == "look" and not tested else MARKS[tone]
+    return Judgement(mark, verdict.headline, verdict.lines, tone, on)
 
 
 def verdict_table(verdict: Verdict, of: str = "") -> Table:

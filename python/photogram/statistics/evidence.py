@@ -32,6 +32,9 @@ FEW = 5
 ENOUGH = 20
 """Tested observations that the median of their test values needs."""
 
+EXPLAINED = 0.5
+"""Of what residuals are too large by: a lens that explains more is the cause."""
+
 WITHHELD = 0.001
 """Level of check points below which a result is withheld: one good block in a thousand."""
 
@@ -199,6 +202,21 @@ class Evidence:
         return any(each.significant and each.large for each in self.found.systematic)
 
     @cached_property
+    def lens(self) -> bool:
+        """Whether a lens explains most of what is too much, and more than any single observation.
+
+        Then it is no gross error that is seen, but what a wrong lens does to good observations.
+        """
+        fall = max(
+            (each.fall for each in self.found.systematic if each.significant and each.large), default=0
+        )
+        if not fall or not self.high or self.test is None:
+            return False
+        single = max((_as_fall(each, place) for _, each, place in self.gross), default=0.0)
+        too_much = self.test.weighted_sum_of_squares - self.test.degrees_of_freedom
+        return fall > max(single, EXPLAINED * too_much)
+
+    @cached_property
     def factor(self) -> float:
         """By how much residuals are larger than expected; NaN where that is not known."""
         return self.test.factor if self.test is not None else math.nan
@@ -273,6 +291,12 @@ class Evidence:
             largest.append(_largest(checks.points, bonferroni(self.found.level, number), number))
         patterns = [_of_pattern(each) for each in self.found.systematic]
         return [*whole, *(each for each in largest if each is not None), *patterns]
+
+
+def _as_fall(tested: Tested, place: tuple[int, ...]) -> float:
+    """Return by how much the weighted sum of squares would fall without an observation; 0 of t and F."""
+    value = float(tested.values[place])
+    return {"w": value**2, "T": value}.get(tested.statistic, 0.0)
 
 
 def _relative(tested: Tested) -> Floats:

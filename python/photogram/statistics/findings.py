@@ -197,6 +197,8 @@ class Systematic:
         Its p-value and the level it is compared with.
     large
         Whether the pattern is large enough to matter: with a small probability the model is likely wrong.
+    fall
+        By how much the weighted sum of squares would fall without it, where that was asked for.
     """
 
     name: str
@@ -208,6 +210,7 @@ class Systematic:
     probability: float
     level: float
     large: bool
+    fall: float = 0.0
 
     @property
     def significant(self) -> bool:
@@ -300,8 +303,9 @@ class Findings:
         Whether observations could be tested, that is, whether their redundancy numbers were computed.
     remarks
         Sentences that stand below the headline.
-    snoop
-        How gross errors are taken out with this program; nothing where it cannot.
+    snoop, calibrate
+        How gross errors are taken out, and how cameras are estimated, with this program; nothing where it
+        cannot.
     level
         Of the global test, and of all single tests together.
     """
@@ -326,4 +330,5 @@ class Findings:
     computed: bool = True
     remarks: Sequence[str] = ()
     snoop: str = ""
+    calibrate: str = ""
     level: float = LEVEL

@@ -86,10 +86,17 @@ class Verdict:
 
 @dataclass(frozen=True)
 class _Line:
+    """A sentence of a condition; `praise` goes before it where nothing forbids the use."""
+
     code: str
     text: str
     exit: int = 0
     warning: bool = False
+    praise: str = ""
+
+    def said(self, usable: bool) -> str:
+        text = f"{self.praise} {self.text}" if usable and self.praise else self.text
+        return f"{text[:1].upper()}{text[1:]}"
 
 
 def verdict(found: Findings) -> Verdict:
@@ -99,13 +106,14 @@ def verdict(found: Findings) -> Verdict:
     # What forbids the use comes first: no green headline above a line that says so.
     fitting.sort(key=lambda line: line.exit == 0)
     first, *others = fitting or [_Line(*evidence.accepted())]
+    usable = first.exit == 0
     return Verdict(
         code=first.code,
-        headline=first.text,
+        headline=first.said(usable),
         exit=first.exit,
         warning=first.warning or any(line.warning or line.exit for line in others),
         lines=(
-            *(line.text for line in others),
+            *(line.said(usable) for line in others),
             *evidence.remarks(),
             *found.remarks,
             *_exchanged(found, fitting),
@@ -166,7 +174,7 @@ def _gross_errors(e: Evidence) -> _Line | None:
     if e.found.spoiled:
         named = f": {e.named(e.single)}" if e.single else ""
         return _Line("gross-errors", f"Gross errors: {e.found.spoiled}{named}", EXIT_NOT_USABLE)
-    if not e.rejected or e.found.snooped or not e.gross:
+    if not e.rejected or e.found.snooped or not e.gross or e.lens:
         return None
     # A few gross errors make s larger than the median says; a wrong model spoils all residuals alike.
     if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
@@ -197,8 +205,8 @@ def _snooped(e: Evidence) -> _Line | None:
         return None
     names = listed([str(each.get("name", "")) for each in found.removed], NAMED)
     removed = counted(count, "observation")
-    text = "; ".join([f"Usable after removal of {removed}: {names}", *found.exchanged])
-    return _Line("usable-after-removal", text)
+    text = "; ".join([f"after removal of {removed}: {names}", *found.exchanged])
+    return _Line("usable-after-removal", text, praise="Usable")
 
 
 def _set_aside(e: Evidence) -> _Line | None:
@@ -212,9 +220,8 @@ def _set_aside(e: Evidence) -> _Line | None:
         return _Line(
             "too-much-set-aside", f"{share}: model or identification is wrong: {text}", EXIT_NOT_USABLE
         )
-    whole = "" if e.high else "Usable, but "
-    start = f"{whole}without {len(found.removed)} that fit neither the start nor the adjusted block"
-    return _Line("set-aside", f"{start[:1].upper()}{start[1:]}: {text}", warning=True)
+    start = f"without {len(found.removed)} that fit neither the start nor the adjusted block"
+    return _Line("set-aside", f"{start}: {text}", warning=True, praise="" if e.high else "Usable, but")
 
 
 def _checks(e: Evidence) -> _Line | None:
@@ -264,9 +271,12 @@ def _components(e: Evidence) -> _Line | None:
 
 def _model(e: Evidence) -> _Line | None:
     wrong = [each.sentence for each in e.found.systematic if each.significant and each.large]
-    return (
-        _Line("model", f"The model is likely wrong: {'; '.join(wrong)}", EXIT_NOT_USABLE) if wrong else None
-    )
+    if not wrong:
+        return None
+    text = f"The model is likely wrong: {'; '.join(wrong)}"
+    if e.lens and e.found.calibrate and not e.found.spoiled:
+        text += f". {e.found.calibrate} estimates it; observations are not to be taken out before"
+    return _Line("model", text, EXIT_NOT_USABLE)
 
 
 def _uncontrolled(e: Evidence) -> _Line | None:
@@ -296,8 +306,8 @@ def _unexplained(e: Evidence) -> _Line | None:
 def _look_at(e: Evidence) -> _Line | None:
     if e.high or not e.single or _gross_errors(e) is not None:
         return None
-    whole = "Accepted" if e.test is not None else f"Not tested as a whole ({e.found.untested})"
-    return _Line("look-at", f"{whole}, but look at: {e.named(e.single)}", warning=True)
+    whole = "Accepted, but" if e.test is not None else f"Not tested as a whole ({e.found.untested}), but"
+    return _Line("look-at", f"look at: {e.named(e.single)}", warning=True, praise=whole)
 
 
 def _too_low(e: Evidence) -> _Line | None:
@@ -319,12 +329,12 @@ _CONDITIONS: tuple[Callable[[Evidence], _Line | None], ...] = (
     _changed,
     _gross_errors,
     _snooped,
+    _model,
     _set_aside,
     _checks,
     _intersected,
     _common_factor,
     _components,
-    _model,
     _uncontrolled,
     _unexplained,
     _look_at,

@@ -10,6 +10,7 @@ import numpy as np
 from photogram.results.findings import axes, tested_observations
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
+from photogram.results.lenses import how_to_calibrate
 from photogram.results.page.cameras import cameras_section
 from photogram.results.page.frame import block_frame, degrees
 from photogram.results.page.observed import Images, worst_images, worst_of
@@ -111,7 +112,11 @@ def _advice(result: Result) -> list[str]:
         check="`photogram check` (`photogram.check`)",
         snoop="`--snoop` (`photogram.snoop`) takes gross errors out one after the other, and says which"
         " cannot be told apart.",
-        calibrate="Let the parameters of the cameras be estimated: `photogram adjust --self-calibrate all`.",
+        calibrate=f"Let the cameras be estimated: `photogram adjust ... {how}`."
+        if (how := how_to_calibrate(result.block)).startswith("--")
+        else f"Give it {how}."
+        if how
+        else "",
         others=others,
     )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from photogram.results.snooped import Snooped
-from photogram.show.judgement import advice, judged
 from photogram.show.page import Cell, Column, Fact, Page, Part, Remarks, Section, Table
 from photogram.show.ways import page_of
 from photogram.statistics.snooping.log import Removal
@@ -15,13 +14,11 @@ __all__ = ["snooped_page"]
 
 def snooped_page(found: Snooped) -> Page:
     """Return the page of the network without what was taken out."""
-    page = page_of(found.result)
+    page = page_of(found.judged)
     gone = Fact("Taken out", f"{len(found.removed)}", note=f"of {len(found.suspects)} groups of observations")
-    own = advice(found.verdict, check="`photogram check` (`photogram.check`)")
     return replace(
         page,
-        judgements=[judged(found.verdict)],
-        advice=[*own, *(each for each in page.advice if each not in own and "--snoop" not in each)],
+        advice=[each for each in page.advice if "--snoop" not in each],
         highlights=[gone, *page.highlights],
         sections=[_log(found), *page.sections],
     )
