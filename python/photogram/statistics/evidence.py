@@ -32,8 +32,8 @@ FEW = 5
 ENOUGH = 20
 """Tested observations that the median of their test values needs."""
 
-EXPLAINED = 0.5
-"""Of what residuals are too large by: a lens that explains more is the cause."""
+EXPLAINED, SINGLE = 0.8, 0.2
+"""Of what residuals are too large by: what a lens explains at least, and one observation at most."""
 
 WITHHELD = 0.001
 """Level of check points below which a result is withheld: one good block in a thousand."""
@@ -203,18 +203,19 @@ class Evidence:
 
     @cached_property
     def lens(self) -> bool:
-        """Whether a lens explains most of what is too much, and more than any single observation.
+        """Whether a lens explains nearly all that is too much, and no single observation much of it.
 
-        Then it is no gross error that is seen, but what a wrong lens does to good observations.
+        Then it is no gross error that is seen, but what a wrong lens does to good observations. Huge errors of
+        a few bend all residuals, and what they leave looks like a lens, too.
         """
         fall = max(
             (each.fall for each in self.found.systematic if each.significant and each.large), default=0
         )
-        if not fall or not self.high or self.test is None:
+        if not fall or not self.high or self.test is None or self.found.exchanged:
             return False
         single = max((_as_fall(each, place) for _, each, place in self.gross), default=0.0)
         too_much = self.test.weighted_sum_of_squares - self.test.degrees_of_freedom
-        return fall > max(single, EXPLAINED * too_much)
+        return fall > EXPLAINED * too_much and single < SINGLE * too_much
 
     @cached_property
     def factor(self) -> float:
