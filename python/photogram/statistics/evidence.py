@@ -205,8 +205,8 @@ class Evidence:
     def lens(self) -> bool:
         """Whether a lens explains nearly all that is too much, and no single observation much of it.
 
-        Then it is no gross error that is seen, but what a wrong lens does to good observations. Huge errors of
-        a few bend all residuals, and what they leave looks like a lens, too.
+        Then no gross error is seen, but what a wrong lens does to good observations. Huge errors of a few
+        bend all residuals, and what they leave looks like a lens, too.
         """
         fall = max(
             (each.fall for each in self.found.systematic if each.significant and each.large), default=0
