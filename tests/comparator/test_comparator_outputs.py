@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plates import QUICK, STRAIGHT, bent, case_2, noisy, printed_correction
+from plates import PRINTED, QUICK, STRAIGHT, bent, case_2, case_2_session, noisy, printed_correction
 
 from photogram.comparator import (
     Correction,
@@ -486,6 +486,24 @@ def test_feature_23_the_program_of_1971_by_name():
     assert calibration.variance.after_linear.x == pytest.approx(
         round(calibration.variance.after_linear.x, 3), abs=1e-12
     )
+
+
+def test_feature_23_published_pages_have_nothing_of_ours():
+    """No problems, tests, joint adjustment, or paths: only what the program printed itself."""
+    session = noisy(2, left_handed=True, cases=3)
+    own = listing(calibrate(session))
+    published = listing(calibrate(session, Options.as_published()))
+    for words in ("PROBLEMS", "TESTS OF SIGNIFICANCE", "JOINT ADJUSTMENT"):
+        assert words in own
+        assert words not in published
+    assert "GRID CALIBRATION CORRECTIONS ARE VALID ONLY IF" in published
+    assert "CALIBRATION SUMMARY" in published.rsplit("\f", 1)[-1]
+    # The remark on one place of identical readings is the program's own; where we read it is not.
+    assert str(PRINTED) in listing(case_2())
+    printed = listing(calibrate(case_2_session(), Options.as_published()))
+    assert str(PRINTED) not in printed
+    title = printed.split("\f", 1)[0]
+    assert ("ARE IDENTICAL" in title) == any("IDENTICAL" in each.text for each in case_2().messages)
 
 
 # Joint adjustment and tests of significance

@@ -34,6 +34,9 @@ class Options:
         which changes them by 1e-5 of themselves) or `exact`.
     order
         Points in the order `measured`, or in that of the listing's subroutine GROUP (`listing`).
+    pages
+        Pages of the listing: `all`, or only those that the program printed (`published`), without problems,
+        tests and joint adjustment.
     polynomial
         Whether to fit polynomials.
     joint
@@ -49,13 +52,14 @@ class Options:
     nanometres: Literal["exact", "truncated"] = "exact"
     free_residuals: Literal["report", "exact"] = "report"
     order: Literal["measured", "listing"] = "measured"
+    pages: Literal["all", "published"] = "all"
     polynomial: bool = True
     joint: bool = True
     estimate_grid: bool = False
 
     @classmethod
     def as_published(cls) -> Options:
-        """Return the choices that give the figures of the program of 1971."""
+        """Return the choices that give the figures and pages of the program of 1971."""
         return cls(
             pointing_dof="listing",
             grid_sigma="listing",
@@ -63,4 +67,5 @@ class Options:
             case_polynomial_residuals="listing",
             nanometres="truncated",
             order="listing",
+            pages="published",
         )

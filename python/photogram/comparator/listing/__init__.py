@@ -34,6 +34,8 @@ STAGES = {
 def listing(calibration: Calibration, run_date: str = "") -> str:
     """Return the listing of a calibration; pages begin with a form feed, but for the first.
 
+    Where the options ask for the pages of the program, what goes beyond these is left out.
+
     Parameters
     ----------
     calibration
@@ -59,8 +61,11 @@ def listing(calibration: Calibration, run_date: str = "") -> str:
             for case, fit in zip(calibration.cases, calibration.nonlinear.cases, strict=True)
         ]
     pages += _averages(calibration, "linear", "nonlinear")
-    pages += [summary_page(calibration), tests_page(calibration)]
-    if calibration.joint:
+    pages.append(summary_page(calibration))
+    ours = calibration.options.pages == "all"
+    if ours:
+        pages.append(tests_page(calibration))
+    if ours and calibration.joint:
         pages.append(joint_page(calibration, calibration.joint))
     return "\f\n".join("\n".join(line.rstrip() for line in page) + "\n" for page in pages)
 

@@ -17,10 +17,12 @@ __all__ = ["input_page", "title_page"]
 
 COLUMNS = 3
 """Readings in a line of the input listing."""
+ROTATIONS = "EXACTLY 90 DEGREE ROTATION CASES"
+"""How the remark ends that stands below the average residuals."""
 
 
 def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
-    """Return the title page: plates, options, problems."""
+    """Return the title page: plates, options, and problems where not only published pages are wanted."""
     session = calibration.session
     left_handed = calibration.cases[0].placed.orientation.left_handed
     lines = centred(f"COMPARATOR CALIBRATION - photogram {_photocore.__version__}")
@@ -40,9 +42,18 @@ def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
         ("DATE OF RUN", run_date or "-"),
     ]
     lines += [f"  {name:<30}{value}" for name, value in settings]
+    if calibration.options.pages == "published":
+        return lines + _printed(calibration)
     lines += ["", "PROBLEMS"]
     remarks = [line for message in calibration.messages for line in str(message).splitlines()]
     return lines + [f"  {line}" for line in remarks or ["NONE"]]
+
+
+def _printed(calibration: Calibration) -> list[str]:
+    """Return the remarks of the program itself, which are in capitals; that on placements has its page."""
+    remarks = [each.text for each in calibration.messages if not each.text.endswith(ROTATIONS)]
+    found = [text.upper() for text in remarks if (own := text.split(": ", 1)[-1]) == own.upper()]
+    return ["", *(f"  {text}" for text in found)] if found else []
 
 
 def _yes(value: bool) -> str:
