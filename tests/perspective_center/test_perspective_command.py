@@ -20,7 +20,7 @@ EXAMPLE = files("photogram") / "examples" / "perspective_center" / "grid.deck"
 SET = {
     "title", "data_set", "perspective_center", "attitude_minutes", "standard_errors", "sigma0_plate",
     "sigma0_model", "covariance", "converged", "iterations", "points",
-    "test", "verdict",
+    "test", "verdict", "interior", "interior_standard_errors",
 }  # fmt: skip
 POINT = {
     "id",

@@ -81,6 +81,18 @@ def perspective_center(
         Weights,
         typer.Option(help="Of the points: equal, number of readings, or standard deviations of readings."),
     ] = Weights.EQUAL,
+    together: Annotated[
+        bool,
+        typer.Option("--together", help="All sets of a job in one solution: one projector, several heights."),
+    ] = False,
+    calibrate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="c,xp,yp",
+            help="Principal distance and principal point, or some of them, are unknowns; all sets together.",
+            show_default=False,
+        ),
+    ] = None,
     strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
@@ -101,7 +113,14 @@ def perspective_center(
         pictures = picture_places("residuals", plots, plot_format, out, plot)
         place = html_place(html, no_html, out)
         job.writes(*listings, *pictures, *([place] if place else []))
-        run = run_deck(deck, as_published=as_published, weights=weights.value)
+        unknown = [name.strip() for name in calibrate.split(",")] if calibrate else []
+        run = run_deck(
+            deck,
+            as_published=as_published,
+            weights=weights.value,
+            together=together or bool(unknown),
+            unknown=unknown,
+        )
         stopped = run.stop is not None
         job.finish(
             _files(run, json, listings, pictures),

@@ -4,7 +4,7 @@ from photogram.arguments.annotations import check_arguments
 from photogram.perspective_center import findings, html  # noqa: F401  (verdict and page)
 from photogram.perspective_center.batch import Run, Stop, run_deck
 from photogram.perspective_center.deck import read_deck
-from photogram.perspective_center.grid import Coordinatograph, Grid, reduce
+from photogram.perspective_center.grid import Coordinatograph, Grid, joined, reduce
 from photogram.perspective_center.solution import Cycle, PerspectiveCenter, determine
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "Run",
     "Stop",
     "determine",
+    "joined",
     "read_deck",
     "reduce",
     "run_deck",

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from photogram.errors import PhotogramError
+from photogram.errors import InputError, PhotogramError
 from photogram.messages import Message
 from photogram.perspective_center.deck import Deck
-from photogram.perspective_center.grid import Grid
+from photogram.perspective_center.grid import Grid, joined
 from photogram.perspective_center.solution import PerspectiveCenter, Weights, determine
 from photogram.show.brief import Brief
 from photogram.show.ways import html_of
@@ -67,7 +68,14 @@ class Run(Brief):
         return self.stop is None and all(result.converged for result in self.results)
 
 
-def run_deck(path: Path, *, as_published: bool = False, weights: Weights = "equal") -> Run:
+def run_deck(
+    path: Path,
+    *,
+    as_published: bool = False,
+    weights: Weights = "equal",
+    together: bool = False,
+    unknown: Sequence[str] = (),
+) -> Run:
     """Run through a deck as the program does: it stops at the first set that cannot be read or solved.
 
     A set that does not converge stops nothing. What was solved before the stop is kept.
@@ -76,23 +84,39 @@ def run_deck(path: Path, *, as_published: bool = False, weights: Weights = "equa
     ----------
     path
         The deck.
-    as_published, weights
+    as_published, weights, unknown
         As in :func:`photogram.perspective_center.determine`.
+    together
+        Whether all sets of a job are of one projector, at several heights, and solved as one.
 
     Raises
     ------
     InputError
-        The deck cannot be read at all.
+        The deck cannot be read at all; sets together as published.
     """
+    if together and as_published:
+        raise InputError("the program solves every set by itself: as_published or together")
     deck = Deck(path)
     run = Run()
     grid: Grid | None = None
     try:
-        for grid in deck.grids():
-            result = determine(grid, as_published=as_published, weights=weights)
+        for grid in _jobs(deck.grids()) if together else deck.grids():
+            result = determine(grid, as_published=as_published, weights=weights, unknown=unknown)
             run.results.append(result)
             grid = None
     except PhotogramError as error:
         run.stop = Stop(error, deck.title, deck.number, grid)
     run.messages = [*deck.messages, *(message for result in run.results for message in result.messages)]
     return run
+
+
+def _jobs(grids: Iterable[Grid]) -> Iterator[Grid]:
+    """Join the sets of each job."""
+    job: list[Grid] = []
+    for grid in grids:
+        if grid.number == 1 and job:
+            yield joined(job)
+            job = []
+        job.append(grid)
+    if job:
+        yield joined(job)

@@ -8,7 +8,7 @@ from typing import Any
 from photogram import _photocore
 from photogram.io import json
 from photogram.perspective_center.batch import Run
-from photogram.perspective_center.solution import PerspectiveCenter
+from photogram.perspective_center.solution import INTERIOR, PerspectiveCenter
 
 __all__ = ["to_json"]
 
@@ -23,7 +23,8 @@ def to_json(run: Run) -> bytes:
             "standard_errors": "unit of the model; minutes of arc",
             "sigma0_plate": "mm",
             "sigma0_model": "unit of the model",
-            "covariance": "omega, phi, kappa in rad, X, Y, Z in the unit of the model; products",
+            "covariance": "omega, phi, kappa in rad, X, Y, Z in the unit of the model, mm; products",
+            "interior": "principal distance c, principal point xp, yp, mm; errors of the unknown ones",
             "mean": "unit of the model",
             "residual": "measured minus projected, unit of the model",
             "radial_distortion": "mm on the plate, positive outward",
@@ -46,6 +47,10 @@ def _set(result: PerspectiveCenter) -> dict[str, Any]:
         "perspective_center": result.position.tolist(),
         "attitude_minutes": result.attitude_minutes.tolist(),
         "standard_errors": dict(zip(names, errors, strict=True)),
+        "interior": dict(zip(INTERIOR, result.interior.tolist(), strict=True)),
+        "interior_standard_errors": {}
+        if result.interior_errors is None
+        else dict(zip(result.unknown, result.interior_errors.tolist(), strict=True)),
         "sigma0_plate": result.sigma0_plate,
         "sigma0_model": result.sigma0_model,
         "covariance": None if result.covariance is None else result.covariance.tolist(),

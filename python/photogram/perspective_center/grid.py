@@ -14,7 +14,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.show.brief import Brief
 
-__all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "reduce"]
+__all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "joined", "reduce"]
 
 
 MINUTES_PER_RADIAN = 3437.7468
@@ -116,6 +116,31 @@ class Grid(Brief):
         object.__setattr__(self, "readings", readings.astype(np.int64))
         if not 0 < number("principal_distance", self.principal_distance) < math.inf:
             raise InputError(f"the principal distance must be positive, not {self.principal_distance}")
+
+
+def joined(grids: Sequence[Grid]) -> Grid:
+    """Return the sets of one projector, at several heights, as one; points bear the number of their set.
+
+    Raises
+    ------
+    InputError
+        No set, or sets of several principal distances.
+    """
+    if not grids or len({each.principal_distance for each in grids}) != 1:
+        raise InputError("sets that are joined are of one projector: one principal distance")
+    first = grids[0]
+    return Grid(
+        ids=[f"{name}/{each.number}" for each in grids for name in each.ids],
+        plate_xy=np.vstack([each.plate_xy for each in grids]),
+        model=np.vstack([each.model for each in grids]),
+        principal_distance=first.principal_distance,
+        initial=first.initial,
+        tolerance=first.tolerance,
+        readings=np.concatenate([each.readings for each in grids]),
+        reading_sd=np.vstack([each.reading_sd for each in grids]),
+        corrected=any(each.corrected for each in grids),
+        title=first.title,
+    )
 
 
 def reduce(

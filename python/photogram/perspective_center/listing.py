@@ -137,7 +137,7 @@ def _errors(result: PerspectiveCenter) -> list[str]:
         f" STANDARD ERROR OF UNIT WEIGHT OF PLATE GRID COORDINATES ={_f(result.sigma0_plate, 8, 5)}",
         "",
         f"{'':5}VARIANCE-COVARIANCE MATRIX",
-        *(_MATRIX_ROW.write([number, *row.tolist()]) for number, row in enumerate(covariance, 1)),
+        *(_MATRIX_ROW.write([number, *row.tolist()]) for number, row in enumerate(covariance[:6, :6], 1)),
         "",
         " STANDARD ERRORS OF THE PERSPECTIVE CENTER PARAMETERS",
         "",

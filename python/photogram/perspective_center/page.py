@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.perspective_center.batch import Run
 from photogram.perspective_center.plot import figure
-from photogram.perspective_center.solution import PerspectiveCenter
+from photogram.perspective_center.solution import INTERIOR, PerspectiveCenter
 from photogram.show.judgement import advice, judged, remarks_section
 from photogram.show.page import (
     Cell,
@@ -95,6 +95,18 @@ def _parameters(result: PerspectiveCenter) -> Table:
         [name, Cell(f"{value:.{decimals_of(np.array([error]))}f}", sorts=float(value)), float(error)]
         for name, value, error in zip(names, values, errors, strict=True)
     ]
+    errors_of = dict(
+        zip(result.unknown, () if result.interior_errors is None else result.interior_errors, strict=False)
+    )
+    for name, value in zip(INTERIOR, result.interior, strict=True):
+        if name in result.unknown:
+            rows.append(
+                [
+                    f"{name}, mm",
+                    Cell(f"{value:.4f}", sorts=float(value)),
+                    float(errors_of.get(name, math.nan)),
+                ]
+            )
     grid = result.grid
     how = "as published" if result.as_published else "least squares"
     note = (

@@ -8,7 +8,8 @@ the covariance and the test values follow from the residuals of the adjustment i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -40,6 +41,10 @@ plate."""
 SINGULAR = "NORMAL EQUATIONS MATRIX IS SINGULAR"
 REPORT_ORDER = [3, 4, 5, 0, 1, 2]
 """Omega, phi, kappa before X, Y, Z."""
+INTERIOR = ("c", "xp", "yp")
+"""Principal distance and principal point."""
+STEEPEST = 1e-10
+"""Ratio of singular values of scaled columns below which they are dependent."""
 TESTABLE = 1e-10
 """A redundancy number below this is the rounding error of zero."""
 
@@ -71,13 +76,18 @@ class PerspectiveCenter(Judged, Brief):
         The iteration.
     position, attitude
         (3,) Xc, Yc, Zc; (3,) in radians.
+    interior
+        (3,) principal distance and principal point on the plate, millimetres: as given, or determined.
+    unknown
+        Which of `c`, `xp`, `yp` were determined, k of them.
     cofactors
-        (6, 6) of omega, phi, kappa, Xc, Yc, Zc for a unit weight of one millimetre on the plate.
+        (6 + k, 6 + k) of omega, phi, kappa, Xc, Yc, Zc and these for a unit weight of one millimetre on the
+        plate.
     sigma0_plate, sigma0_model
         Standard error of unit weight of plate coordinates (mm) and of projected coordinates in the model (its
         unit); None without redundancy.
     degrees_of_freedom
-        2 n - 6.
+        2 n - 6 - k.
     weights
         (n,) weights of the points, 1 in the mean.
     residual, projected
@@ -102,6 +112,8 @@ class PerspectiveCenter(Judged, Brief):
     cycles: list[Cycle]
     position: Floats
     attitude: Floats
+    interior: Floats
+    unknown: tuple[str, ...]
     cofactors: Floats
     sigma0_plate: float | None
     sigma0_model: float | None
@@ -136,7 +148,7 @@ class PerspectiveCenter(Judged, Brief):
 
     @property
     def covariance(self) -> Floats | None:
-        """(6, 6) variance-covariance matrix of omega, phi, kappa (rad), Xc, Yc, Zc, if any."""
+        """(6 + k, 6 + k) variance-covariance matrix of omega, phi, kappa (rad), Xc, Yc, Zc ..., if any."""
         return None if self.sigma0_plate is None else self.cofactors * self.sigma0_plate**2
 
     @property
@@ -145,8 +157,13 @@ class PerspectiveCenter(Judged, Brief):
         if self.covariance is None:
             return None
         deviations = np.sqrt(np.diagonal(self.covariance))
-        errors: Floats = np.concatenate([deviations[3:], deviations[:3] * MINUTES_PER_RADIAN])
+        errors: Floats = np.concatenate([deviations[3:6], deviations[:3] * MINUTES_PER_RADIAN])
         return errors
+
+    @property
+    def interior_errors(self) -> Floats | None:
+        """(k,) standard errors of what was determined of the interior, mm; None without redundancy."""
+        return None if self.covariance is None else np.sqrt(np.diagonal(self.covariance)[6:])
 
 
 def determine(
@@ -155,6 +172,7 @@ def determine(
     as_published: bool = False,
     weights: Weights = "equal",
     model_sd: ArrayLike | None = None,
+    unknown: Sequence[str] = (),
 ) -> PerspectiveCenter:
     """Determine the perspective centre and the attitude of a projector.
 
@@ -175,6 +193,10 @@ def determine(
     model_sd
         (n,) standard deviations of the mean model coordinates; their reciprocal squares are the weights
         instead.
+    unknown
+        Which of principal distance and principal point, `c`, `xp`, `yp`, are unknowns, too. One height hardly
+        determines them: a level grid gives one scale for c and the height of the projector together. Points
+        at several heights do (:func:`joined`).
 
     Raises
     ------
@@ -186,15 +208,26 @@ def determine(
         Weights that cannot be formed.
     """
     weight = _weights(grid, weights, model_sd)
-    observed = Observed.checked(
+    unknown = tuple(dict.fromkeys(unknown))
+    for name in unknown:
+        one_of("unknown", name, INTERIOR)
+    if unknown and as_published:
+        raise InputError("the program holds principal distance and principal point: as_published or unknown")
+    try:
+        if unknown:
+            return _result(grid, weight, *_calibrated(grid, weight, unknown), unknown)
+        solution, messages = (_as_published if as_published else _strictly)(grid, _observed(grid, weight))
+    except RankError as error:
+        raise RankError(f"{SINGULAR}: {error}", [], error.points) from None
+    joint = solution.partials, solution.cofactors
+    return _result(grid, weight, grid, solution, messages, *joint, as_published=as_published)
+
+
+def _observed(grid: Grid, weight: Floats) -> Observed:
+    return Observed.checked(
         grid.model, 0.0, grid.plate_xy, np.repeat(weight[:, np.newaxis] ** -0.5, 2, axis=1),
         -grid.principal_distance, [str(each) for each in grid.ids],
     )  # fmt: skip
-    try:
-        solution, messages = (_as_published if as_published else _strictly)(grid, observed)
-    except RankError as error:
-        raise RankError(f"{SINGULAR}: {error}", [], error.points) from None
-    return _result(grid, weight, solution, messages, as_published)
 
 
 def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats:
@@ -253,12 +286,66 @@ def _as_published(grid: Grid, observed: Observed) -> Solved:
     return solution, []
 
 
+def _calibrated(
+    grid: Grid, weight: Floats, unknown: tuple[str, ...]
+) -> tuple[Grid, _photocore.ResectionSolution, list[Message], Floats, Floats]:
+    """Determine pose and interior together: the pose is solved anew wherever the interior has gone.
+
+    Returns
+    -------
+    The grid with the interior that was found, the pose there, remarks; (n, 2, 6 + k) partials by all unknowns
+    and their (6 + k, 6 + k) cofactors.
+    """
+    chosen = [INTERIOR.index(name) for name in unknown]
+    interior = np.array([grid.principal_distance, 0.0, 0.0])
+    own = grid
+    root = np.sqrt(weight)[:, np.newaxis]
+    for _ in range(STRICT_CYCLES):
+        solution, messages = _strictly(own, _observed(own, weight))
+        of_c = (own.plate_xy - solution.residuals) / own.principal_distance
+        of_point = np.broadcast_to(np.eye(2), (len(grid.ids), 2, 2))
+        columns = np.concatenate([of_c[:, :, np.newaxis], of_point], axis=2)[:, :, chosen]
+        partials: Floats = np.concatenate([solution.partials, columns], axis=2)
+        rows = (partials * root[:, :, np.newaxis]).reshape(-1, 6 + len(chosen))
+        scale = np.linalg.norm(rows, axis=0)
+        _, sizes, turn = np.linalg.svd(rows / scale, full_matrices=False)
+        if len(rows) < len(scale) or sizes[-1] < STEEPEST * sizes[0]:
+            raise _open(unknown, grid)
+        cofactors: Floats = (turn.T / sizes**2) @ turn / np.outer(scale, scale)
+        step = (cofactors @ rows.T @ (solution.residuals * root).ravel())[6:]
+        if (np.abs(step) <= STRICT_FRACTION * np.sqrt(np.diagonal(cofactors)[6:])).all():
+            return own, solution, messages, partials, cofactors
+        interior[chosen] += step
+        if not 0.5 < interior[0] / grid.principal_distance < 2.0:
+            raise _open(unknown, grid)
+        own = replace(grid, plate_xy=grid.plate_xy - interior[1:], principal_distance=float(interior[0]))
+    raise AdjustmentError(
+        f"{', '.join(unknown)} and the projector do not come to rest in {STRICT_CYCLES} steps"
+    )
+
+
+def _open(unknown: tuple[str, ...], grid: Grid) -> RankError:
+    heights = len(np.unique(grid.model[:, 2]))
+    where = "one height" if heights == 1 else f"{heights} heights"
+    return RankError(
+        f"the points at {where} do not tell {', '.join(unknown)} from the place of the projector: readings at"
+        " several heights in one solution do",
+        [],
+        [str(each) for each in grid.ids],
+    )
+
+
 def _result(
     grid: Grid,
     weight: Floats,
+    own: Grid,
     solution: _photocore.ResectionSolution,
     messages: list[Message],
-    as_published: bool,
+    partials: Floats,
+    cofactors: Floats,
+    unknown: Sequence[str] = (),
+    *,
+    as_published: bool = False,
 ) -> PerspectiveCenter:
     history = np.vstack([solution.start, solution.history])
     corrections = np.diff(history, axis=0)
@@ -271,18 +358,19 @@ def _result(
         residual = scale * on_plate
     else:
         on_plate = -solution.residuals
-        projected, to_model = _projection(grid, position, attitude)
+        projected, to_model = _projection(own, position, attitude)
         residual = grid.model[:, :2] - projected
-    freedom = solution.degrees_of_freedom
+    freedom = solution.degrees_of_freedom - len(unknown)
+    order = [*REPORT_ORDER, *range(6, len(cofactors))]
     sigma0, sigma0_model = (
         math.sqrt(float((weight[:, np.newaxis] * v**2).sum() / freedom)) if freedom > 0 else None
         for v in (on_plate, residual)
     )
-    redundancy, reduced = _tests(solution, weight, to_model, residual)
+    redundancy, reduced = _tests(partials, cofactors, weight, to_model, residual)
     standardized = reduced / (sigma0 or math.nan)
     squares = float((weight[:, np.newaxis] * on_plate**2).sum())
-    observed_radius = np.hypot(*(grid.plate_xy - solution.residuals).T)
-    fixed_radius = np.hypot(*grid.plate_xy.T)
+    observed_radius = np.hypot(*(own.plate_xy - solution.residuals).T)
+    fixed_radius = np.hypot(*own.plate_xy.T)
     result = PerspectiveCenter(
         grid=grid,
         as_published=as_published,
@@ -293,7 +381,9 @@ def _result(
         ],
         position=position,
         attitude=attitude,
-        cofactors=solution.cofactors[np.ix_(REPORT_ORDER, REPORT_ORDER)],
+        interior=np.array([own.principal_distance, *(grid.plate_xy - own.plate_xy)[0]]),
+        unknown=tuple(unknown),
+        cofactors=cofactors[np.ix_(order, order)],
         sigma0_plate=sigma0,
         sigma0_model=sigma0_model,
         degrees_of_freedom=freedom,
@@ -347,7 +437,8 @@ def _projection(grid: Grid, position: Floats, attitude: Floats) -> tuple[Floats,
 
 
 def _tests(
-    solution: _photocore.ResectionSolution,
+    partials: Floats,
+    cofactors: Floats,
     weight: Floats,
     to_model: Floats,
     residual: Floats,
@@ -357,9 +448,8 @@ def _tests(
     The residuals on the plate have the cofactors P^-1 - A Q A^T; both sides turned into the model, the
     quotient of their diagonals is the part of an error of X or Y that shows in its residual.
     """
-    partials = solution.partials
     observed = np.eye(2) / weight[:, np.newaxis, np.newaxis]
-    residuals = observed - partials @ solution.cofactors @ partials.transpose(0, 2, 1)
+    residuals = observed - partials @ cofactors @ partials.transpose(0, 2, 1)
     turned = [to_model @ each @ to_model.transpose(0, 2, 1) for each in (residuals, observed)]
     of_residuals, of_observed = (np.diagonal(each, axis1=1, axis2=2) for each in turned)
     redundancy: Floats = of_residuals / of_observed

@@ -8,7 +8,19 @@ from photogram.messages import listed
 from photogram.perspective_center.listing import NOT_CONVERGED
 from photogram.perspective_center.solution import PerspectiveCenter
 
-__all__ = ["summary"]
+__all__ = ["interior", "summary"]
+
+
+def interior(result: PerspectiveCenter) -> str:
+    """Return what was determined of the interior with its standard errors, mm."""
+    names = {"c": "principal distance", "xp": "principal point x", "yp": "principal point y"}
+    values = dict(zip(names, result.interior.tolist(), strict=True))
+    errors = [math.nan] * len(result.unknown) if result.interior_errors is None else result.interior_errors
+    found = [
+        f"{names[name]} {values[name]:.4f} (standard error {error:.4f})"
+        for name, error in zip(result.unknown, errors, strict=True)
+    ]
+    return f"{', '.join(found)} mm"
 
 
 def summary(result: PerspectiveCenter) -> list[str]:
@@ -29,6 +41,8 @@ def summary(result: PerspectiveCenter) -> list[str]:
         rows.append(("standard error", errors.tolist(), 5))
     for name, values, decimals in rows:
         lines.append(f"  {name:<16}" + "".join(f"{value:>12.{decimals}f}" for value in values))
+    if result.unknown:
+        lines.append(f"  {interior(result)}")
     if result.sigma0_plate is None or result.sigma0_model is None:
         return [*lines, "  no redundancy: no standard errors"]
     lines.append(
