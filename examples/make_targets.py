@@ -1,8 +1,9 @@
-"""Write a close-range survey as tables: targets on a flange, two scale bars, no control, an unknown lens.
+"""Build the packaged example `flange`, which `photogram new --kind metrology` writes.
 
-python examples/make_targets.py DIRECTORY
+    python examples/make_targets.py [DIRECTORY]
 
-Sixteen photos from 1.6 m, convergent, every other one turned by 90 degrees. What is left to do is
+A close-range survey as tables: targets on a flange, two scale bars, no control, an unknown lens. Sixteen
+photos from 1.6 m, convergent, every other one turned by 90 degrees. What is left to do is
 docs/tutorials/metrology.md.
 """
 
@@ -36,7 +37,12 @@ IMAGE_SD, BAR_SD = 0.06, 5e-6
 """Pixels; metres, of the calibrated lengths of the bars."""
 DIAMETER = 0.40006
 """Of the circle of holes, metres."""
+EXAMPLE = Path(__file__).resolve().parents[1] / "python" / "photogram" / "examples" / "flange"
 PROJECT = """\
+# Targets on a part, photographed from all around; scale bars, no control. Replace the tables by your own:
+# `photogram adjust .` adjusts it; docs/tutorials/metrology.md goes on to a diameter, docs/formats.md has all.
+# cameras.csv: sd_NAME = inf makes a parameter of the lens unknown. photos.csv: nothing need be known of them.
+# images.csv: centres of targets in pixels. distances.csv: the certified lengths of the bars.
 [project]
 format = 1
 name = "a flange"
@@ -75,7 +81,7 @@ def targets() -> tuple[list[str], np.ndarray]:
 
 def main(arguments: list[str]) -> None:
     """Write the tables."""
-    folder = Path(arguments[0])
+    folder = Path(arguments[0]) if arguments else EXAMPLE
     random = np.random.default_rng(SEED)
     names, points = targets()
     positions, matrices = stations()

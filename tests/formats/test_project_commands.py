@@ -1,12 +1,38 @@
 """`photogram new`, `adjust`, `info`, `convert`."""
 
 import json
+import runpy
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from photogram import adjust, formats
+from photogram.stellar.night_file import inputs
+
+
+@pytest.mark.parametrize("kind", ["metrology", "night"])
+def test_new_begins_a_metrology_job_or_a_night(run, tmp_path, kind):
+    assert run("new", "own", "--kind", kind).exit_code == 0
+    refused = run("new", "own")
+    assert refused.exit_code == 1
+    assert "--overwrite" in refused.stderr
+    if kind == "metrology":
+        done = run("adjust", "own", "--no-html")
+        assert done.exit_code == 0, done.output
+        assert "976 images of 61 points" in done.output
+    else:
+        night = tmp_path / "own" / "night.toml"
+        assert inputs(night) == [night, night.with_name("images.csv")]
+        assert all(path.is_file() for path in inputs(night))
+
+
+def test_the_metrology_example_is_what_its_script_makes(tmp_path):
+    script = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "make_targets.py"))
+    script["main"]([str(tmp_path)])
+    made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert made == {path.name: path.read_bytes() for path in script["EXAMPLE"].iterdir()}
 
 
 def test_a_new_project_is_adjusted_in_one_command(run, tmp_path):

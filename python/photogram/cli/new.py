@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +15,18 @@ from photogram.cli.projects import EXAMPLE
 __all__ = ["new"]
 
 
+class Kind(StrEnum):
+    """What a project begins with."""
+
+    BLOCK = "block"
+    METROLOGY = "metrology"
+    NIGHT = "night"
+
+
+SOURCES = {Kind.BLOCK: EXAMPLE, Kind.METROLOGY: ("flange",), Kind.NIGHT: ("exposures",)}
+"""Packaged examples, directories of photogram.examples."""
+
+
 @with_job
 def new(
     job: Job,
@@ -22,6 +35,13 @@ def new(
         Writes.DIRECTORY,
         typer.Argument(metavar="DIR", help="Folder for the project; it is made if need be."),
     ],
+    kind: Annotated[
+        Kind,
+        typer.Option(
+            help="block: photos of a drone with control. metrology: targets and scale bars, no control."
+            " night: exposures of stars."
+        ),
+    ] = Kind.BLOCK,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a project that is there already.")
     ] = False,
@@ -29,13 +49,14 @@ def new(
 ) -> None:
     """Write a small real project as tables, with comments that say what may stand there.
 
-    Replace the tables by your own; `photogram adjust DIR` adjusts it.
+    Replace the tables by your own; `photogram adjust DIR` adjusts it, `photogram stellar-camera exposures
+    DIR/night.toml` a night.
     """
     with job:
         from photogram.errors import InputError
 
-        if (out / "project.toml").exists() and not overwrite:
+        if any((out / name).exists() for name in ("project.toml", "night.toml")) and not overwrite:
             raise InputError("holds a project; --overwrite allows it to be replaced", file=out)
-        source = job.packaged(*EXAMPLE)
+        source = job.packaged(*SOURCES[kind])
         files = {out / each.name: each.read_bytes() for each in sorted(source.iterdir()) if each.is_file()}
         job.finish(files)
