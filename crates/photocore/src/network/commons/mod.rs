@@ -302,12 +302,18 @@ impl CommonState {
         self.base + self.attitude * self.offset
     }
 
-    /// Its unknowns with rotations about its own axes (rows) by its unknowns.
+    /// Its unknowns with rotations about its own axes (rows) by its unknowns. Offsets of a line that turns turn with its axes: rows of these are
+    /// how its place moves along them.
     pub(super) fn about_own_axes(&self) -> DMatrix<f64> {
         let components: Vec<usize> = self.kind.components().collect();
-        DMatrix::from_fn(components.len(), components.len(), |i, j| match components[i].checked_sub(3) {
-            Some(turn) if components[j] > 2 => self.turns[(turn, components[j] - 3)],
-            _ => f64::from(u8::from(i == j)),
+        DMatrix::from_fn(components.len(), components.len(), |i, j| {
+            match (components[i].checked_sub(3), components[j].checked_sub(3)) {
+                (Some(turn), Some(by)) => self.turns[(turn, by)],
+                (None, Some(by)) if self.kind.is_axis() => {
+                    self.turns.column(by).cross(&self.offset)[components[i]]
+                }
+                _ => f64::from(u8::from(i == j)),
+            }
         })
     }
 
