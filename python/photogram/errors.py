@@ -66,12 +66,20 @@ class RankError(AdjustmentError):
         Identifiers of the photos and points concerned.
     cameras
         Names of the cameras concerned.
+    what
+        What is undetermined, in one line; nothing where it is the message.
     """
 
     def __init__(
-        self, message: str, photos: list[str], points: list[str], cameras: list[str] | None = None
+        self,
+        message: str,
+        photos: list[str],
+        points: list[str],
+        cameras: list[str] | None = None,
+        what: str = "",
     ) -> None:
         super().__init__(message)
         self.photos = photos
         self.points = points
         self.cameras = cameras or []
+        self.what = what or message

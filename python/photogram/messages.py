@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Message"]
+__all__ = ["Message", "Undetermined"]
 
 MOST_NAMES = 12
 """Names that a message lists at most."""
@@ -86,3 +86,16 @@ class Message:
 
     def __str__(self) -> str:
         return locate(self.text, self.file, self.record, self.record_text)
+
+
+@dataclass(frozen=True)
+class Undetermined(Message):
+    """A remark on unknowns that adjusted values leave undetermined, or so nearly that others fit as well.
+
+    Attributes
+    ----------
+    what
+        The unknowns, and what that is.
+    """
+
+    what: str = ""

@@ -18,7 +18,7 @@ from photogram.adjustment.exchanges import with_exchanges
 from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.started import started
-from photogram.adjustment.undetermined import undetermined_combinations
+from photogram.adjustment.undetermined import one_place, undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import threads_that_fit, turned
@@ -426,6 +426,7 @@ def named(
         seen = sorted({int(p) for p in block.image_photos[np.isin(block.image_points, points)]})
         photo_names = [block.photo_ids[p] for p in seen]
         text = f"the rays on photos {listed(photo_names)} do not determine the points {listed(point_names)}"
+        text += one_place(block, seen)
         return RankError(text, photo_names, point_names)
     if kind == "undetermined photos":
         return undetermined_combinations(block, combinations)

@@ -8,8 +8,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.undetermined import weak_in_words
-from photogram.errors import AdjustmentError
-from photogram.messages import Message, listed
+from photogram.errors import AdjustmentError, RankError
+from photogram.messages import Message, Undetermined, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 
 __all__ = [
@@ -36,7 +36,8 @@ def undetermined(
     """Remark on what the adjusted values leave undetermined, `error`, or determine only weakly."""
     messages = []
     if error is not None:
-        messages.append(Message(f"there are no covariances: {error}"))
+        what = error.what if isinstance(error, RankError) else str(error)
+        messages.append(Undetermined(f"there are no covariances: {error}", what=what))
     weak = _unknowns(block, solution.weak, solution.weak_cameras, solution.weak_unknowns)
     if weak:
         messages.append(hardly_determined(solution.status, weak, weak_in_words(block, solution)))
@@ -54,9 +55,10 @@ def hardly_determined(status: str, weak: str, words: str = "") -> Message:
         The unknowns that it moves, and what that is, if anybody knows.
     """
     ends = "stands still, but" if status == "converged" else "creeps:"
-    return Message(
+    return Undetermined(
         f"the sum of squares {ends} the observations hardly determine a combination of"
-        f" unknowns that moves {weak}: other values along it fit as well" + (f" ({words})" if words else "")
+        f" unknowns that moves {weak}: other values along it fit as well" + (f" ({words})" if words else ""),
+        what=weak + (f" ({words})" if words else ""),
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,16 +11,24 @@ import numpy as np
 from photogram.errors import RankError
 from photogram.messages import listed
 from photogram.network.block import Block
-from photogram.network.geometry import viewing_directions
+from photogram.network.geometry import rotation_matrix, viewing_directions
 
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["in_words", "undetermined_combinations", "weak_in_words"]
+__all__ = ["Setting", "in_words", "undetermined_combinations", "weak_in_words"]
+
+_Combination = tuple[
+    tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[tuple[int, int], ...], tuple[str, ...]
+]
+"""Photos, cameras, common unknowns, parameters of cameras and parts of poses that move together."""
 
 _DISTANCES = frozenset({"c", "f", "fx", "fy"})
 _POINTS = frozenset({"xp", "yp", "cx", "cy"})
 _DECENTRING = frozenset({"P1", "P2", "p1", "p2", "B1", "B2"})
+_AFFINITY = frozenset({"b1", "b2"})
+_OF_RING = frozenset({"b1", "yp", "cy", "fx", "fy"})
+"""What photos on a ring that are not turned about their axes leave open, with c or each other."""
 _ALONG = 0.8
 """Cosine of the angle between the view and an axis that is moved along it."""
 _PARTS = {
@@ -27,6 +37,83 @@ _PARTS = {
     "tilt": "tilts",
     "swing": "turns about the view",
 }
+
+
+_PARALLEL = 0.99
+"""Cosine of the angle between views that are about parallel."""
+_UPRIGHT = 0.05
+"""Photos whose x axes are across one direction to this sine are not turned about their axes."""
+_ONE_PLACE = 1e-9
+"""Stations that differ by less than this part of their coordinates are one."""
+_ON_LINE = 1e-3
+"""Places whose spread across a line is less than this part of that along it are on it."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How the photos of a block stand, as far as their words depend on it.
+
+    Attributes
+    ----------
+    photos
+        How many there are.
+    parallel
+        Whether all look in about the same direction.
+    upright
+        Whether none is turned about its axis: the x axes, or the y axes, of all are across one direction.
+    control
+        Whether something is known of points.
+    heights
+        Whether a height of a point or photo is known.
+    on_line
+        Whether all places that are known, of points and photos, are on one straight line.
+    """
+
+    photos: int = 0
+    parallel: bool = False
+    upright: bool = False
+    control: bool = False
+    heights: bool = True
+    on_line: bool = False
+
+
+def setting_of(block: Block) -> Setting:
+    """Return how the photos of a block stand at their initial values."""
+    photos = len(block.photo_ids)
+    control = bool(np.isfinite(block.point_sd).any())
+    if photos < 2 or block.geographic or not np.isfinite(block.photo_attitudes).all():
+        return Setting(photos, control=control)
+    axes = rotation_matrix(block.photo_attitudes)
+    axes = axes.transpose(0, 2, 1) if block.photo_to_ground else axes
+    across = [float(np.linalg.svd(axes[:, k], compute_uv=False)[-1]) for k in (0, 1)]
+    known = np.concatenate(
+        [
+            block.point_positions[np.isfinite(block.point_sd).all(axis=1)],
+            block.photo_positions[np.isfinite(block.photo_position_sd).all(axis=1)],
+        ]
+    )
+    spread = np.linalg.svd(known - known.mean(axis=0), compute_uv=False) if len(known) > 1 else np.zeros(2)
+    return Setting(
+        photos,
+        parallel=bool((axes[:, 2] @ axes[0, 2]).min() > _PARALLEL),
+        upright=min(across) < _UPRIGHT * photos**0.5,
+        control=control,
+        heights=bool(
+            np.isfinite(block.point_sd[:, 2]).any() or np.isfinite(block.photo_position_sd[:, 2]).any()
+        ),
+        on_line=bool(spread[0] > 0 and spread[1] < _ON_LINE * spread[0]),
+    )
+
+
+def one_place(block: Block, photos: Sequence[int]) -> str:
+    """Return what it means that photos were all taken from one place; nothing where they were not."""
+    stations = block.photo_positions[list(photos)]
+    if len(stations) < 2 or np.ptp(stations, axis=0).max() > _ONE_PLACE * max(1.0, np.abs(stations).max()):
+        return ""
+    return (
+        ": all photos were taken from one place, directions are determined, distances of points are not; a"
+        " base between the photos, or depths from control or distances, point by point, would determine them"
+    )
 
 
 def undetermined_combinations(block: Block, combinations: list[_photocore.CombinationRow]) -> RankError:
@@ -42,12 +129,14 @@ def undetermined_combinations(block: Block, combinations: list[_photocore.Combin
     points = np.unique(block.image_points[np.isin(block.image_photos, concerned)])
     point_names = [block.point_ids[point] for point in points]
     lines = [f"the observations leave {len(rows)} combinations of unknowns undetermined:"]
-    for each in sorted(set(rows)):
-        of, by, others, moved, poses = each
-        lines.append(f"  {rows.count(each)} moving {_moved(block, of, by, others)}")
-        if moved:
-            lines.append(f"    {_said(block, moved, poses)}")
-    if not np.isfinite(block.point_sd).any():
+    at = setting_of(block)
+    words = [_said(block, each, at) for each in sorted(set(rows))]
+    moving = [_moved(block, *each[:3]) for each in sorted(set(rows))]
+    for each, said, moved in zip(sorted(set(rows)), words, moving, strict=True):
+        lines.append(f"  {rows.count(each)} moving {moved}")
+        if said:
+            lines.append(f"    {said}")
+    if not np.isfinite(block.point_sd).any() and not any(words):
         weighted = np.isfinite(block.photo_position_sd).any()
         remedy = (
             "the standard deviations of the photos are too large to give a datum in double precision"
@@ -55,7 +144,8 @@ def undetermined_combinations(block: Block, combinations: list[_photocore.Combin
             else "standard deviations for the positions and attitudes of photos would give a datum"
         )
         lines.append(f"  there is no control; {remedy}")
-    return RankError("\n".join(lines), names, point_names, camera_names)
+    what = "; ".join(said or moved for said, moved in zip(words, moving, strict=True))
+    return RankError("\n".join(lines), names, point_names, camera_names, what)
 
 
 def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unknowns: tuple[int, ...]) -> str:
@@ -79,15 +169,43 @@ def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unkn
     return f"{moved}, which {held}"
 
 
-def _said(block: Block, moved: tuple[tuple[int, int], ...], poses: tuple[str, ...]) -> str:
-    """Name parameters and parts of poses, then what that is."""
+def _said(block: Block, combination: _Combination, at: Setting) -> str:
+    """Name parameters and parts of poses, then what that is; nothing where it has no name."""
+    photos, cameras, others, moved, poses = combination
+    if not moved:
+        return "" if cameras else _of_unknowns({block.unknowns[row].KIND for row in others}, len(photos), at)
     by_camera: dict[int, list[str]] = {}
     for camera, k in moved:
         by_camera.setdefault(camera, []).append(block.cameras[camera].names[k])
     parts = [f"{', '.join(names)} of {block.camera_names[camera]}" for camera, names in by_camera.items()]
     parts += [_PARTS[part] for part in poses]
-    words = in_words({name for names in by_camera.values() for name in names}, set(poses))
+    words = in_words({name for names in by_camera.values() for name in names}, set(poses), at)
     return " with ".join(parts) + (f": {words}" if words else "")
+
+
+def _of_unknowns(kinds: set[str], photos: int, at: Setting) -> str:
+    """Say what positions with shifts and drifts, or control on a line, leave open."""
+    if kinds == {"lever arm", "shift"}:
+        return (
+            "lever arm and shift move together, all photos having the same attitude: the lever arm measured"
+            " (to 1 or 2 cm), the shift held where base and datum are sure, strips in opposite headings (for"
+            " its parts along and across them) or tilted photos"
+        )
+    if "drift" in kinds:
+        return (
+            "the drift of a strip takes whatever scale and turn control does not fix: control at both ends,"
+            " two points each, no free drift for short strips, or one shift and drift for the whole flight"
+            " and a cross strip"
+        )
+    if photos == at.photos > 0 and not kinds and at.control and not at.heights:
+        return "height and tilts of the whole: no height is known; heights of control, or positions of photos"
+    if photos == at.photos > 0 and at.on_line:
+        return (
+            "roll of the strip about the line of its control: heights beside the line are not determined; one"
+            " height aside of it, GNSS and control whose lines do not coincide, or roll from an IMU with a"
+            " known boresight"
+        )
+    return ""
 
 
 def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
@@ -108,10 +226,19 @@ def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
             poses.add("along" if abs(views[photo, unknown]) > _ALONG else "across")
         elif unknown < 6:
             poses.add("swing" if unknown == 5 else "tilt")
-    return in_words(names, poses)
+    # Far along it others hardly move: what is free and fits it belongs to it.
+    named = [camera for camera in block.cameras if names & set(camera.names)]
+    free = {
+        name
+        for each in named
+        for name, sd in zip(each.names, each.deviations, strict=True)
+        if np.isinf(sd) and name in _OF_RING
+    }
+    at = setting_of(block)
+    return _of_setting(names | free, at) or in_words(names, poses, at)
 
 
-def in_words(names: set[str], poses: set[str]) -> str:
+def in_words(names: set[str], poses: set[str], setting: Setting | None = None) -> str:
     """Return what parameters of cameras and parts of poses cannot be told apart, and what would help.
 
     Parameters
@@ -120,25 +247,33 @@ def in_words(names: set[str], poses: set[str]) -> str:
         The parameters.
     poses
         `along`, `across`, `tilt`, `swing`.
+    setting
+        How the photos stand; None where that is not known.
 
     Returns
     -------
     Nothing for what has no name.
     """
+    at = setting or Setting()
     radial = {name for name in names if name[0] in "KkA" and name[1:].isdigit()}
     if radial and radial == names and not poses:
         return "radial terms among each other, which is harmless: the curve is determined; fewer terms do"
-    if names <= _DISTANCES and poses == {"along"}:
+    if names and names <= _DISTANCES | _POINTS | _AFFINITY and (words := _of_setting(names, at)):
+        return words
+    if names <= _DISTANCES and (poses == {"along"} or (at.parallel and at.control)):
         return (
-            "principal distance and flying height of all photos: convergent photos, relief, observed"
-            " positions or a second flying height tell them apart"
+            "principal distance and flying height of all photos: a longer camera higher up gives the same"
+            " pictures of a flat field; the principal distance given, convergent photos, observed heights of"
+            " the photos (GNSS without a free shift) or relief with known heights tell them apart"
         )
     if names <= _DISTANCES and poses >= {"along", "across"}:
         return "principal distance and scale of the network: a distance or control tells them apart"
     if names <= _POINTS and poses & {"across", "tilt"}:
+        turned = "" if at.parallel and at.control else ", photos turned by 90 or 180 degrees about their axes"
         return (
-            "principal point and position or tilt of all photos: relief, convergent photos or, where points"
-            " are unknown, photos turned by 90 or 180 degrees about their axes tell them apart"
+            "principal point and position or tilt of all photos: the principal point given, convergent"
+            f" photos, relief of known heights{turned} or positions observed without a free shift tell them"
+            " apart"
         )
     if names <= _POINTS | _DECENTRING and names & _DECENTRING and names & _POINTS:
         return "decentring and principal point, as with long lenses: leave the decentring out"
@@ -148,4 +283,30 @@ def in_words(names: set[str], poses: set[str]) -> str:
         return "affinity and scale: photos turned by 90 degrees tell them apart"
     if names == {"b2"} and "swing" in poses:
         return "shear and kappa of all photos: photos turned by 90 degrees tell them apart"
+    return ""
+
+
+def _of_setting(names: set[str], at: Setting) -> str:
+    """Return what the way the photos stand leaves open of their camera."""
+    if at.photos == 2:
+        return (
+            "two photos determine at most two numbers of the camera, and not even the principal distance"
+            " when their axes are parallel or meet at equal distances, or the object is flat: the camera"
+            " given, a third photo from aside, inclined and turned, or three control points at different"
+            " depths, not on a line"
+        )
+    if at.parallel and not at.control:
+        return (
+            "all photos look in the same direction, and the pictures fit an object stretched along the view"
+            " or sheared across it: a photo that is tilted, the camera given, or four control points not on a"
+            " plane; a photo turned by 90 degrees about its axis settles the principal point, not the"
+            " principal distance"
+        )
+    if at.upright and not at.parallel and names & _OF_RING:
+        return (
+            "no photo is turned about its axis: the ratio of the two image scales cannot be separated from a"
+            " stretch of the object along the axis of the ring, nor yp from its growing towards one end:"
+            " every second photo turned by 90 degrees, b1 held at 0 and yp or c given, or distances along"
+            " and across the axis"
+        )
     return ""

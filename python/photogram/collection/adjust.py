@@ -17,7 +17,7 @@ from photogram.collection.collection import Collection
 from photogram.collection.core import CollectionOptions, collection_network
 from photogram.collection.failures import named
 from photogram.errors import InputError
-from photogram.messages import Message, listed
+from photogram.messages import Message, Undetermined, listed
 
 __all__ = ["adjust", "adjusted"]
 
@@ -134,7 +134,7 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
     messages = []
     if solution.undetermined is not None:
         error = named(*solution.undetermined)
-        messages.append(Message(f"there are no covariances: {error}"))
+        messages.append(Undetermined(f"there are no covariances: {error}", what=str(error)))
     # A point far off on parallel rays creeps alone, and is named itself.
     if solution.weak and not solution.weak_points:
         messages.append(hardly_determined(solution.status, _unknowns(solution.weak, collection)))

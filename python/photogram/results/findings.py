@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.arrays import chosen, finite_rows
-from photogram.messages import counted
+from photogram.messages import Undetermined, counted
 from photogram.results.groups_tested import groups_tested
 from photogram.results.held import held_tested
 from photogram.results.kinds import tested_kind
@@ -36,6 +36,12 @@ HARMFUL = {
 """Why a point was left out because of which the others would be wrong, and what that says of its images."""
 
 
+DISTANCES = frozenset({"c", "f", "fx", "fy"})
+"""What principal distances are called."""
+UNKNOWN = 1 / 3
+"""A principal distance whose standard deviation is a larger part of it might be any."""
+
+
 @findings_of.register(Result)
 def block_findings(result: Result) -> Findings:
     """Return the tests of a block: standard deviations are given, so the unit weight is known."""
@@ -47,6 +53,7 @@ def block_findings(result: Result) -> Findings:
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=None if result.loss else result.global_test,
         untested=ROBUST if result.loss else "no degrees of freedom",
+        undetermined=left_open(result),
         computed=has_redundancy(result),
         checks=result.check_points.agreement,
         systematic=[] if intersected else _patterns(result),
@@ -58,6 +65,18 @@ def block_findings(result: Result) -> Findings:
         snoop="" if intersected else "--snoop (photogram.snoop)",
         calibrate=how_to_calibrate(result.block),
     )
+
+
+def left_open(result: AdjustedNetwork) -> list[str]:
+    """Name what the adjusted values leave undetermined, or determine no better than that it is there."""
+    said = [each.what for each in result.messages if isinstance(each, Undetermined)]
+    lengths = [
+        f"{name} of {camera.name}, {value:.6g} with a standard deviation of {sd:.3g}"
+        for camera in getattr(result, "cameras", ())
+        for name, value, sd in zip(camera.names, camera.values, camera.sd, strict=True)
+        if name in DISTANCES and sd > UNKNOWN * abs(value)
+    ]
+    return said or lengths
 
 
 def _tested(result: Result) -> list[Tested]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.io.parquet import Column, Repeated, Sheet
 from photogram.io.writing import Content
-from photogram.messages import Message
+from photogram.messages import Message, Undetermined
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.core import CoreOptions
@@ -60,6 +60,7 @@ _CLASSES = (
     ResultDatum,
     Spheroid,
     SumsOfSquares,
+    Undetermined,
 )
 _TABLES = {
     "control": "control",

@@ -437,8 +437,9 @@ impl Network {
                 (start, before) = (None, None);
                 continue;
             }
-            let named = |error| self.name(NetworkError::new(error, &assembled), &assembled, pool);
-            let mut adjusted = adjusted.map_err(named)?;
+            let named = |error, values: &[f64]| self.name(error, &assembled, values, pool);
+            let mut adjusted = adjusted
+                .map_err(|error| named(NetworkError::new(error, &assembled), &assembled.problem.initial))?;
             let earlier = before.take();
             adjusted.go_on_from(earlier.map(|(adjustment, _)| adjustment));
             if adjusted.collapsed.is_empty() {
@@ -451,6 +452,8 @@ impl Network {
                 let minimal = datum.is_none() && assembled.is_minimal(&adjusted.unknowns, pool);
                 let (mut solution, found) =
                     pool.install(|| Solution::with_tried(self, options, &assembled, adjusted, collapsed));
+                let undetermined = solution.undetermined.take();
+                solution.undetermined = undetermined.map(|error| named(error, &solution.state.unknowns));
                 solution.minimal_control = minimal;
                 solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
                 solution.lost_digits = lost;

@@ -16,18 +16,19 @@ const NOTABLE: f64 = 0.01;
 
 impl Network {
     /// Adds to undetermined combinations which parameters of cameras and parts of poses they move. Nothing where cameras are known, or
-    /// where the normal equations of the initial values cannot be had again.
+    /// where the normal equations of these values cannot be had again.
     pub(super) fn name(
         &self,
         mut error: NetworkError,
         assembled: &Assembled,
+        values: &[f64],
         pool: &ThreadPool,
     ) -> NetworkError {
         let NetworkError::Undetermined(combinations) = &mut error else { return error };
         if self.cameras.iter().all(super::Camera::is_held) || self.poses == PoseNumbers::Vectors {
             return error;
         }
-        let (problem, values) = (&assembled.problem, &assembled.problem.initial);
+        let problem = &assembled.problem;
         let held = problem.to_hold(values, pool);
         let between = &mut |_| ControlFlow::Continue(());
         let Ok(equations) = NormalEquations::form(problem, values, &held, pool, between) else {
@@ -35,18 +36,27 @@ impl Network {
         };
         let named = equations.combinations();
         if named.len() == combinations.len() {
-            combinations.iter_mut().zip(named).for_each(|(one, moved)| self.describe(one, &moved, assembled));
+            combinations
+                .iter_mut()
+                .zip(named)
+                .for_each(|(one, moved)| self.describe(one, &moved, assembled, values));
         }
         error
     }
 
     /// Sums up the shares n x^2 of the unknowns, given with x and n, by parameters of cameras and parts of poses.
-    fn describe(&self, combination: &mut Combination, moved: &[(usize, f64, f64)], assembled: &Assembled) {
-        let (problem, model) = (&assembled.problem, &assembled.problem.model);
-        let mut all = vec![[0.0; 2]; problem.initial.len()];
+    fn describe(
+        &self,
+        combination: &mut Combination,
+        moved: &[(usize, f64, f64)],
+        assembled: &Assembled,
+        values: &[f64],
+    ) {
+        let model = &assembled.problem.model;
+        let mut all = vec![[0.0; 2]; values.len()];
         moved.iter().for_each(|&(unknown, x, n)| all[unknown] = [x, n]);
         let share = |unknown: usize| all[unknown][1] * all[unknown][0].powi(2);
-        let photos = model.photos(&problem.initial[model.of_stations()]);
+        let photos = model.photos(&values[model.of_stations()]);
         let mut parts = [0.0; 4];
         let mut parameters: Vec<Vec<f64>> =
             self.cameras.iter().map(|camera| vec![0.0; camera.sd.len()]).collect();

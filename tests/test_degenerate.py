@@ -1,0 +1,198 @@
+"""Set-ups that leave something open are named, with what would help; none is accepted."""
+
+import re
+
+import numpy as np
+import pytest
+
+import degenerate as of
+from photogram import Camera, RankError, adjust, read_result
+from photogram.network.observations import EqualHeight, OnPlumbLine, Position
+from photogram.network.unknowns import Drift, LeverArm, PlumbLine, Shift
+
+STRIP = np.array([[200.0 * k, 0.0, of.HEIGHT] for k in range(6)])
+BELOW = np.array([[200.0 * k, y, 40 * np.sin(3 * k + y)] for k in range(-1, 8) for y in (-400.0, 0.0, 400.0)])
+LINE = (4, 13, 22)
+BELOW[list(LINE)] = [[0.0, 0.0, 0.0], [500.0, 0.0, 0.0], [1000.0, 0.0, 0.0]]
+SURE = (0.05, 0.05, 0.05)
+ALIKE = of.drawn(9).uniform(-4, 4, (6, 3)) + np.array([0.0, 0.0, 12.0]), np.tile([0.1, -0.2, 0.3], (6, 1))
+PAIR = np.array([[-2.0, 0.0, 10.0], [2.0, 0.0, 10.0]])
+
+
+def strip(control, observations=()):
+    return of.block(
+        STRIP, np.zeros((6, 3)), BELOW, (), dict.fromkeys(control, SURE), observations=observations
+    )
+
+
+def gnss(centres, arm=(0.0, 0.0, 0.0), drift=None):
+    shift = Shift("s")
+    return [
+        Position(f"p{k}", at, lever_arm=arm, shift=shift, drift=drift, time=float(k), sd=0.02)
+        for k, at in enumerate(centres)
+    ]
+
+
+def flight(turns=0.0):
+    centres, angles = of.vertical(turns)
+    observed = gnss(centres, LeverArm("l"))
+    return of.block(centres, angles, of.flat_field(200.0), (), of.IN_SPACE, observations=observed)
+
+
+def one_place():
+    random, stations = of.drawn(4), np.zeros((5, 3))
+    views = [0.0, 0.0, 1.0] + 0.3 * random.standard_normal((5, 3))
+    angles = of.looking(views, [0.0, 0.0, 0.0], random.uniform(-3, 3, 5))
+    return of.block(stations, angles, of.cloud(15, 0.5) - [0.0, 0.0, 5.0])
+
+
+def vertical(free, control, relief=0.0):
+    return of.block(*of.vertical(), of.flat_field(relief), free, control)
+
+
+def ring(free, elevation=0.0):
+    return of.block(*of.ring(elevation), of.cloud(), free)
+
+
+def pair(free, meeting=True):
+    angles = of.looking(PAIR, [0.0, 0.0, 0.0]) if meeting else np.zeros((2, 3))
+    return of.block(PAIR, angles, of.cloud(25), free)
+
+
+HIGHER = "principal distance and flying height of all photos.*convergent photos, observed heights"
+POINT = "principal point and position or tilt of all photos: the principal point given, convergent"
+SAME_WAY = "all photos look in the same direction.*a photo that is tilted.*four control points not on a plane"
+ROLL = "roll of the strip about the line of its control.*one height aside"
+NOT_TURNED = "no photo is turned about its axis.*every second photo turned by 90 degrees, b1 held at 0"
+TOGETHER = "lever arm and shift move together.*the lever arm measured"
+TAKES = "the drift of a strip takes.*control at both ends, two points each"
+TWO = "two photos determine at most two numbers of the camera.*a third photo from aside, inclined and turned"
+SET_UPS = {
+    "1 flat field, plan": (lambda: vertical(["c"], of.IN_PLAN), 4, [HIGHER, "no height is known"]),
+    "1 with heights": (lambda: vertical(["c"], of.IN_SPACE), 1, ["c of camera with flying heights", HIGHER]),
+    "1 relief, plan": (lambda: vertical(["c"], of.IN_PLAN, 200.0), 2, ["c of camera", HIGHER]),
+    "2 c, xp, yp": (lambda: vertical(["c", "xp", "yp"], of.IN_SPACE), 3, [HIGHER, f"xp of.*{POINT}"]),
+    "3 translation, c": (lambda: of.block(*ALIKE, of.cloud(), ["c"]), 1, [f"c of camera.*{SAME_WAY}"]),
+    "3 c, xp, yp": (lambda: of.block(*ALIKE, of.cloud(), ["c", "xp", "yp"]), 3, [f"yp of.*{SAME_WAY}"]),
+    "3 all": (lambda: of.block(*ALIKE, of.cloud(), ["c", "xp", "yp", "b1", "b2"]), 5, [SAME_WAY]),
+    "4 control": (lambda: strip(LINE), 1, ["moving all 6 photos", ROLL]),
+    "4 positions": (lambda: of.block(STRIP, np.zeros((6, 3)), BELOW, positions_sd=0.05), 1, [ROLL]),
+    "5 one place": (one_place, None, ["all photos were taken from one place.*a base between the photos"]),
+    "6 c, b1": (lambda: ring(["c", "b1"]), 1, [f"c, b1 of camera: {NOT_TURNED}"]),
+    "6 yp": (lambda: ring(["yp"]), 1, [f"yp of camera.*{NOT_TURNED}"]),
+    "6 from above": (lambda: ring(["c", "yp", "b1"], 0.6), 2, [NOT_TURNED]),
+    "6 from above, two": (lambda: ring(["yp", "b1"], 0.6), 1, [NOT_TURNED]),
+    "7 one heading": (flight, 3, ["moving lever arm l, shift s", TOGETHER]),
+    "7 two headings": (lambda: flight([0, 0, 0, np.pi, np.pi, np.pi]), 1, [TOGETHER]),
+    "8 one point": (lambda: strip((13,), gnss(STRIP, drift=Drift("d"))), 4, ["shift s, drift d", TAKES]),
+    "8 two across": (lambda: strip((12, 14), gnss(STRIP, drift=Drift("d"))), 1, [TAKES]),
+    "8 two along": (lambda: strip((4, 22), gnss(STRIP, drift=Drift("d"))), 1, [ROLL]),
+    "11 parallel": (lambda: pair(["c"], meeting=False), 1, [f"c of camera: {TWO}"]),
+    "11 meeting": (lambda: pair(["c"]), 1, [f"c of camera.*{TWO}"]),
+    "11 c, xp, yp": (lambda: pair(["c", "xp", "yp"]), 2, [TWO]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SET_UPS)
+def test_what_is_open_is_counted_and_named_with_what_helps(name):
+    make, count, words = SET_UPS[name]
+    with pytest.raises(RankError) as caught:
+        adjust(make())
+    said = " ".join(str(caught.value).split())
+    if count is not None:
+        assert f"the observations leave {count} combinations" in said
+    assert all(re.search(each, said) for each in words), said
+    assert "second flying height" not in said
+
+
+REMEDIES = {
+    "1 relief with heights": lambda: vertical(["c"], of.IN_SPACE, 200.0),
+    "3 one photo tilted": lambda: of.block(
+        ALIKE[0], ALIKE[1] + np.eye(6)[:, :1] * [0.3, 0.0, 0.0], of.cloud(), ["c", "xp", "yp"]
+    ),
+    "4 a height aside": lambda: strip((*LINE, 0)),
+    "6 turned": lambda: of.block(*of.ring(turned=True), of.cloud(), ["c", "xp", "yp", "b1", "b2"]),
+    "6 b1 alone": lambda: ring(["b1"]),
+    "8 corners": lambda: strip((0, 2, 24, 26), gnss(STRIP, drift=Drift("d"))),
+}
+
+
+@pytest.mark.parametrize("name", REMEDIES)
+def test_the_remedies_help(name):
+    assert adjust(REMEDIES[name]()).converged
+
+
+def plumb(known):
+    points = of.cloud()
+    points[1] = points[0] + [0.0, 0.0, 2.5]
+    line = PlumbLine("l", [*points[0, :2], 0.0], sd=0.0 if known else np.inf)
+    return of.block(*of.around(), points, observations=[OnPlumbLine(f"P{k}", line, 0.001) for k in (0, 1)])
+
+
+def level(pairs):
+    points = of.cloud()
+    for a, b in pairs:
+        points[b, 2] = points[a, 2]
+    return of.block(
+        *of.around(), points, observations=[EqualHeight(f"P{a}", f"P{b}", sd=0.001) for a, b in pairs]
+    )
+
+
+@pytest.mark.parametrize(
+    ("make", "count"),
+    [
+        (lambda: plumb(known=False), 5),
+        (lambda: plumb(known=True), 3),
+        (lambda: level([(0, 1)]), 6),
+        (lambda: level([(0, 1), (2, 3)]), 5),
+        (lambda: strip((), gnss(STRIP, drift=Drift("d"))), 7),
+    ],
+)
+def test_free_networks_hold_what_is_open(make, count):
+    """Set-ups 9 and 10, and 8 without control."""
+    assert len(adjust(make()).datum.held) == count
+
+
+def with_errors(block, seed=0, start=2.0, tilt=0.002):
+    """Return a block with errors of images, control and the start, its points intersected."""
+    random = of.drawn(seed)
+    control = np.isfinite(block.point_sd)
+    points = block.point_positions + 0.05 * random.standard_normal(block.point_positions.shape)
+    return block.replace(
+        image_xy=block.image_xy + of.SD * random.standard_normal(block.image_xy.shape),
+        photo_positions=block.photo_positions + start * random.standard_normal(block.photo_positions.shape),
+        photo_attitudes=block.photo_attitudes + tilt * random.standard_normal(block.photo_attitudes.shape),
+        point_positions=np.where(control, points, np.nan),
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("free", [["c"], ["c", "xp", "yp"]])
+def test_a_flat_field_with_errors_is_not_accepted(free, seed, tmp_path):
+    """Its principal distance might be any."""
+    for control in (of.IN_SPACE, of.IN_PLAN):
+        try:
+            result = adjust(with_errors(vertical(free, control), seed))
+        except RankError:
+            continue
+        verdict = result.verdict
+        assert (verdict.code, verdict.exit) == ("undetermined", 3), verdict
+        assert "c of camera" in verdict.headline
+        result.to_parquet(tmp_path / f"{free}{len(control)}")
+        assert read_result(tmp_path / f"{free}{len(control)}").verdict.code == "undetermined"
+
+
+def test_a_ring_with_errors_ends_with_words():
+    result = adjust(with_errors(ring(["c", "yp", "b1"], 0.6), 1, 0.05, 0.005))
+    said = " ".join(str(each) for each in result.messages)
+    assert "no photo is turned about its axis" in said
+    assert result.verdict.exit == 3
+
+
+def test_a_principal_distance_that_might_be_any_is_no_result():
+    """With weights on everything else the equations are regular; the answer is none all the same."""
+    block = vertical(["c"], of.IN_SPACE)
+    camera = Camera("brown", {"c": of.C}, {"c": 100.0}, unit="mm", name="camera")
+    result = adjust(with_errors(block).replace(cameras=[camera]))
+    assert result.cameras[0].sd[0] > abs(result.cameras[0].values[0]) / 3
+    assert result.verdict.code == "undetermined"
