@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::problem::{Linearized, Model, Motions, Problem};
 use super::walk::Buffers;
-use crate::normals::{Equations, Layout};
+use crate::normals::{Equations, Layout, TieRows};
 
 /// The combinations of motions that are open at some values of the unknowns.
 pub(super) struct Open {
@@ -21,8 +21,9 @@ pub(super) struct Open {
 }
 
 /// What a combination may change of the observations, as the square of a share of what its parts change, and be rounding: the eigenvalues
-/// of a matrix of ones are good to 1e-15. Positions of photos that are observed to a hundred metres change 1e4 times as much.
-const NULL: f64 = 1e-14;
+/// of a matrix of ones are good to 1e-15. Positions of photos that are observed to a hundred metres change a hundred times as much; the
+/// verticals of an ellipsoid, which attitudes to a thousandth tell apart over kilometres only, 2e-14, which a factor cannot tell from nothing.
+const NULL: f64 = 1e-12;
 /// An unknown holds a combination when that moves it by more than this share of what its parts do.
 const HOLDS: f64 = 1e-6;
 /// Local blocks that are added up one after the other.
@@ -114,6 +115,35 @@ impl<'a> Candidates<'a> {
     /// Adds one row of partials. A fixed unknown is an observation of the weight that this row gives it.
     pub fn add_row(&self, sums: &mut Sums, row: impl Iterator<Item = (usize, f64)>) {
         sums.along.fill([0.0; LANES]);
+        self.add_to_row(sums, row);
+    }
+
+    /// Adds the rows of a tie, without what the motions make of the displacement that it misses by (see [`Model::carried`]).
+    pub fn add_tie<M: Model>(
+        &self,
+        sums: &mut Sums,
+        equations: &Linearized<'_, M>,
+        tie: usize,
+        rows: &mut TieRows<'_>,
+    ) {
+        equations.write_tie(tie, rows);
+        let (problem, layout) = (equations.problem(), equations.problem().layout());
+        let carried = problem.model.carried(equations.at(), tie);
+        let first = layout.groups() * layout.rows() + layout.tie_rows(tie).start;
+        let width = layout.tie_columns(tie).count();
+        for (k, row) in rows.coefficients.chunks_exact(width.max(1)).enumerate() {
+            sums.along.fill([0.0; LANES]);
+            if let Some((motion, carried)) = &carried {
+                let along = sums.along.as_flattened_mut()[*motion..].iter_mut();
+                let sd = equations.deviation(first + k);
+                along.zip(&carried[k]).for_each(|(along, by)| *along = by / sd);
+            }
+            self.add_to_row(sums, layout.tie_columns(tie).zip(row.iter().copied()));
+        }
+    }
+
+    /// Adds a row to what the candidates make of it already.
+    fn add_to_row(&self, sums: &mut Sums, row: impl Iterator<Item = (usize, f64)>) {
         for (unknown, coefficient) in row {
             let moved = self.of(unknown);
             for ((along, apart), moved) in sums.along.iter_mut().zip(&mut sums.apart).zip(moved) {
@@ -240,11 +270,7 @@ impl<M: Model> Problem<M> {
         pool.install(|| chunks.map(chunk).collect::<Vec<Sums>>()).iter().for_each(|part| sums.add(part));
         sums.multiply(stride as f64);
         self.for_ties(|tie, rows| {
-            equations.write_tie(tie, rows);
-            let width = layout.tie_columns(tie).count();
-            for row in rows.coefficients.chunks_exact(width.max(1)) {
-                candidates.add_row(&mut sums, layout.tie_columns(tie).zip(row.iter().copied()));
-            }
+            candidates.add_tie(&mut sums, &equations, tie, rows);
         });
         let mut together = self.weighted(values);
         together.retain(|own| own.unknowns().all(|unknown| stays(&unknown)));

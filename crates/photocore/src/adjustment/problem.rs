@@ -98,6 +98,14 @@ pub trait Model: Sync {
         None
     }
 
+    /// What motions make of observed minus computed of a tie, in unit weight, where that is a displacement in the space that moves: the number of
+    /// the first of the motions that can move it, then a row for each equation. A displacement turns and grows with everything else; that
+    /// changes the equations, but not what they sum up to where all directions weigh the same, and it tells nothing of the motion where
+    /// they do not.
+    fn carried(&self, _prepared: &Self::Prepared, _tie: usize) -> Option<(usize, Vec<[f64; 7]>)> {
+        None
+    }
+
     /// Whether what is observed of groups is known to leave all motions open, where none of the unknowns is fixed. They are then tried on some
     /// groups only.
     fn groups_leave_open(&self) -> bool {

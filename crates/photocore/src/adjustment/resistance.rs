@@ -5,7 +5,6 @@ use rayon::ThreadPool;
 use super::motions::{Candidates, Sums};
 use super::problem::{Linearized, Model, Problem};
 use super::walk::Buffers;
-use crate::normals::Equations;
 
 /// Kinds of observations, by their numbers: groups are of the first.
 #[derive(Debug, Clone, Copy)]
@@ -37,12 +36,7 @@ impl<M: Model> Problem<M> {
             }
         }
         self.for_ties(|tie, rows| {
-            equations.write_tie(tie, rows);
-            let width = layout.tie_columns(tie).count();
-            for row in rows.coefficients.chunks_exact(width.max(1)) {
-                let own = &mut sums[classes.of_ties[tie]];
-                candidates.add_row(own, layout.tie_columns(tie).zip(row.iter().copied()));
-            }
+            candidates.add_tie(&mut sums[classes.of_ties[tie]], &equations, tie, rows);
         });
         let weighted = self.weighted(values);
         let mut shares: Vec<f64> = sums.iter().map(|own| own.share(count)).collect();

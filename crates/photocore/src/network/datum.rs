@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use nalgebra::Vector6;
+use nalgebra::{Matrix4, Vector6};
 use rayon::ThreadPool;
 
 use super::commons::Motion;
@@ -10,7 +10,7 @@ use super::model::Bundle;
 use super::parts::{Joined, MOST_PARTS, Part, Parts};
 use super::precision::median;
 use super::problem::Assembled;
-use super::stations::Placed;
+use super::stations::{Placed, Stations};
 use crate::adjustment::{Datum, Motions};
 use crate::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Point, PoseNumbers, Vector3, angle_axis::rotation_angle_axis,
@@ -34,7 +34,7 @@ pub struct InnerConstraints {
 }
 
 /// Shifts along, rotations about the axes of cartesian space, and scale.
-const MOTIONS: usize = 7;
+pub(super) const MOTIONS: usize = 7;
 const SCALE: usize = 6;
 /// A photo so many times as far from the central one as the others has left the network.
 const LEFT: f64 = 10.0;
@@ -46,6 +46,16 @@ fn displacement(k: usize, from: &Vector3) -> Vector3 {
         3..6 => Vector3::ith(k - 3, 1.0).cross(from),
         _ => *from,
     }
+}
+
+/// V e: where the origin comes to in the time of one when it moves by e and turns and grows about itself meanwhile, the last column of
+/// exp [s + [w]x, e; 0, 0].
+fn along(shift: Vector3, rotation: &Vector3, scale: f64) -> Vector3 {
+    let mut rates = Matrix4::zeros();
+    let turning = rotation.cross_matrix() + Matrix3::from_diagonal_element(scale);
+    rates.fixed_view_mut::<3, 3>(0, 0).copy_from(&turning);
+    rates.fixed_view_mut::<3, 1>(0, 3).copy_from(&shift);
+    rates.exp().fixed_view::<3, 1>(0, 3).into_owned()
 }
 
 impl Bundle {
@@ -170,6 +180,23 @@ impl Bundle {
         Some(Motions { vectors, preferred })
     }
 
+    /// The first of the motions of an observation's part, and what each makes of the displacement that it misses by (see [`Model::carried`]).
+    pub(super) fn carried_by_motions(
+        &self,
+        stations: &Stations,
+        observation: usize,
+    ) -> Option<(usize, Vec<[f64; MOTIONS]>)> {
+        let (own, parts) = (&self.observations[observation], self.parts());
+        let of_points = own.touches.points.iter().map(|&point| parts.of_point[point]);
+        let of_photos = own.touches.photos.iter().map(|&photo| parts.of_photo[photo]);
+        let part = of_points.chain(of_photos).next()??;
+        let turned = |missed: &Vector3| {
+            std::array::from_fn(|k| if k < 3 { Vector3::zeros() } else { displacement(k, missed) })
+        };
+        let rows = self.with_tied(stations, |model| own.carried(model, turned))?;
+        Some((MOTIONS * part, rows))
+    }
+
     /// Has common unknowns moved, those of one part only.
     fn move_commons_of(
         &self,
@@ -185,7 +212,8 @@ impl Bundle {
         kept.into_iter().for_each(|(range, values)| unknowns[range].copy_from_slice(&values));
     }
 
-    /// Moves each part as a whole, exactly: P -> o + e^s Exp(w) (P - o) + e, o being the centre of its central photo.
+    /// Moves each part as a whole, exactly: along the motion that e, w and s are the rates of, for the time of one. A turn about any place so
+    /// leaves this place where it is. P -> o + e^s Exp(w) (P - o) + V e, o being the centre of its central photo.
     pub(super) fn move_rigidly(&self, unknowns: &mut [f64], amounts: &[f64]) {
         let (parts, placed) = (self.parts(), self.placed(&unknowns[self.of_stations()]));
         for (part, amounts) in amounts.chunks_exact(MOTIONS).take(parts.all.len()).enumerate() {
@@ -199,6 +227,7 @@ impl Bundle {
         let shift = Vector3::new(amounts[0], amounts[1], amounts[2]);
         let rotation = Vector3::new(amounts[3], amounts[4], amounts[5]);
         let (turn, scale) = (angle_axis_rotation(&rotation), amounts[SCALE].exp());
+        let shift = along(shift, &rotation, amounts[SCALE]);
         let moved = |place: Vector3| origin + scale * (turn * (place - origin)) + shift;
         let displacement = |place: &Vector3| moved(*place) - place;
         let motion = Motion { displacement: &displacement, turn: rotation, scale };

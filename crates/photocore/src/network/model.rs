@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
+use super::datum::MOTIONS;
 use super::in_lanes::{FEWEST, Sight, write_in_lanes};
 use super::mounts::{Mount, mounted};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
@@ -195,6 +196,34 @@ impl Bundle {
             together[3..3 + width].copy_from_slice(&kept[width * row..][..width]);
             together[3 + width..].copy_from_slice(&common[shared * row..][..shared]);
         }
+    }
+
+    /// Hands over what observations are computed from, at given values of the unknowns.
+    pub(super) fn with_tied<T>(&self, stations: &Stations, take: impl FnOnce(&TiedModel<'_>) -> T) -> T {
+        let point = |point: usize| PointSite {
+            point: stations.points[point],
+            coordinates: stations.tied[point - self.locals],
+            block: self.block_of_point(point),
+        };
+        let mounted = |photo: usize| {
+            let own = stations.bent.as_ref()?.mounted.get(photo)?.as_ref()?;
+            Some((own, self.blocks_of_pose(photo).nth(1)))
+        };
+        let photo = |photo: usize| PhotoSite {
+            orientation: &stations.photos[photo].orientation,
+            block: self.carrier(photo),
+            mounted: mounted(photo),
+        };
+        let common =
+            |common: usize| CommonSite { state: &stations.commons[common], block: self.common_block[common] };
+        take(&TiedModel {
+            space: self.space,
+            origin: self.origin,
+            point: &point,
+            photo: &photo,
+            common: &common,
+            width: &|block| self.width(block),
+        })
     }
 
     /// Photos and common unknowns at given values of the unknowns of photos, shared cameras and common unknowns.
@@ -423,31 +452,8 @@ impl Model for Bundle {
         let Some(observation) = tie.checked_sub(self.tied_images()) else {
             return self.observe_tied_image(stations, self.start[self.locals] + tie, rows);
         };
-        let point = |point: usize| PointSite {
-            point: stations.points[point],
-            coordinates: stations.tied[point - self.locals],
-            block: self.block_of_point(point),
-        };
-        let mounted = |photo: usize| {
-            let own = stations.bent.as_ref()?.mounted.get(photo)?.as_ref()?;
-            Some((own, self.blocks_of_pose(photo).nth(1)))
-        };
-        let photo = |photo: usize| PhotoSite {
-            orientation: &stations.photos[photo].orientation,
-            block: self.carrier(photo),
-            mounted: mounted(photo),
-        };
-        let common =
-            |common: usize| CommonSite { state: &stations.commons[common], block: self.common_block[common] };
-        let model = TiedModel {
-            space: self.space,
-            origin: self.origin,
-            point: &point,
-            photo: &photo,
-            common: &common,
-            width: &|block| self.width(block),
-        };
-        self.observations[observation].write(&model, rows.constant, rows.coefficients);
+        let own = &self.observations[observation];
+        self.with_tied(stations, |model| own.write(model, rows.constant, rows.coefficients));
     }
 
     fn collapsed(&self, before: &[f64], after: &Stations) -> Vec<usize> {
@@ -469,6 +475,10 @@ impl Model for Bundle {
 
     fn all_motions(&self, unknowns: &[f64]) -> Option<Motions> {
         self.rigid_motions(unknowns)
+    }
+
+    fn carried(&self, stations: &Stations, tie: usize) -> Option<(usize, Vec<[f64; MOTIONS]>)> {
+        self.carried_by_motions(stations, tie.checked_sub(self.tied_images())?)
     }
 
     fn move_along(&self, unknowns: &mut [f64], amounts: &[f64]) {

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Named, ObservationModel, Precision, Rows, Sites, Touches, three};
+use super::{Named, ObservationModel, Precision, Rows, Sites, Touches, rows_of, three};
 
 /// The position of a point with its full covariance, from an adjustment of its own.
 ///
@@ -41,6 +41,10 @@ impl ObservationModel for Control {
         let (observed, axes) = sites.observed(self.coordinates);
         rows.residual(0, (axes * (observed - sites.position(0))).as_slice());
         rows.by_position(0, 0, &axes);
+    }
+
+    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        rows_of(&sites.observed(self.coordinates).1)
     }
 }
 

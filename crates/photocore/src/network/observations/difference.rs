@@ -55,6 +55,11 @@ impl ObservationModel for Difference {
             rows.by_position(row, 1, &axis);
         }
     }
+
+    fn axes(&self, _: &Sites<'_>) -> Option<DMatrix<f64>> {
+        let observed: Vec<usize> = (0..3).filter(|&k| self.components[k].is_some()).collect();
+        Some(DMatrix::from_fn(observed.len(), 3, |row, k| f64::from(u8::from(observed[row] == k))))
+    }
 }
 
 #[cfg(test)]

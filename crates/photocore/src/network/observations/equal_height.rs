@@ -42,6 +42,10 @@ impl ObservationModel for EqualHeight {
         rows.by_height(0, 0, -1.0);
         rows.by_height(0, 1, 1.0);
     }
+
+    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        sites.up()
+    }
 }
 
 #[cfg(test)]

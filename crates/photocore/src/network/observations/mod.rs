@@ -41,6 +41,12 @@ pub trait ObservationModel: Sized {
     /// Writes observed minus computed, and the partials of the computed values.
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>);
 
+    /// The axes, as rows, in which observed minus computed is a displacement of a place; None where it is none. A displacement turns and
+    /// grows with a network that moves as a whole, and says nothing about that (see [`crate::adjustment::Model::carried`]).
+    fn axes(&self, _sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        None
+    }
+
     /// Refuses what cannot be observed.
     ///
     /// # Errors
@@ -115,6 +121,12 @@ macro_rules! kinds {
             fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
                 match self {
                     $(Self::$name(own) => own.write(sites, rows),)*
+                }
+            }
+
+            fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+                match self {
+                    $(Self::$name(own) => own.axes(sites),)*
                 }
             }
 
@@ -324,6 +336,16 @@ fn in_own_axes<const N: usize>(
     rows.by_position(0, 0, &(selected * common.attitude().transpose()));
     rows.by_offset(0, 0, &-selected);
     rows.by_turn(0, 0, &(selected * own.cross_matrix()));
+}
+
+/// What [`ObservationModel::axes`] are of a point in some of the own axes of a plane or line.
+fn own_axes<const N: usize>(sites: &Sites<'_>, selected: &SMatrix<f64, N, 3>) -> Option<DMatrix<f64>> {
+    rows_of(&(selected * sites.common(0).attitude().transpose()))
+}
+
+/// Axes as rows.
+fn rows_of<const N: usize>(axes: &SMatrix<f64, N, 3>) -> Option<DMatrix<f64>> {
+    Some(DMatrix::from_iterator(N, 3, axes.iter().copied()))
 }
 
 /// Refuses a matrix that is not a rotation to six digits.

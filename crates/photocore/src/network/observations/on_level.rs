@@ -45,6 +45,10 @@ impl ObservationModel for OnLevel {
         rows.by_height(0, 0, 1.0);
         rows.by_offset(0, 0, &RowVector3::new(0.0, 0.0, -1.0));
     }
+
+    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        sites.up()
+    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,9 @@
 
 use nalgebra::{DMatrix, RowVector3};
 
-use super::{CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation, in_own_axes};
+use super::{
+    CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation, in_own_axes, own_axes,
+};
 
 /// A point on a plane, or at a distance from it: the standard deviation is how flat that is.
 ///
@@ -42,6 +44,10 @@ impl ObservationModel for OnPlane {
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
         in_own_axes(sites, rows, &RowVector3::new(0.0, 0.0, 1.0), &[self.distance]);
+    }
+
+    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        own_axes(sites, &RowVector3::new(0.0, 0.0, 1.0))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix2x3};
 
-use super::{CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, in_own_axes};
+use super::{CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, in_own_axes, own_axes};
 
 /// A point on a plumb line.
 ///
@@ -39,6 +39,10 @@ impl ObservationModel for OnPlumbLine {
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
         in_own_axes(sites, rows, &Matrix2x3::identity(), &[0.0; 2]);
+    }
+
+    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        own_axes(sites, &Matrix2x3::identity())
     }
 }
 

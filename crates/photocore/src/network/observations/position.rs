@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{CommonKind, Named, ObservationModel, Precision, Quantity, Rows, Sites, Touches, three};
+use super::{CommonKind, Named, ObservationModel, Precision, Quantity, Rows, Sites, Touches, rows_of, three};
 use crate::geometry::Vector3;
 
 /// The position of the antenna of a photo.
@@ -97,6 +97,11 @@ impl ObservationModel for Position {
             place += 1;
         }
         rows.residual(0, (axes * (observed - computed)).as_slice());
+    }
+
+    /// What a drift takes up depends on where all antennas are.
+    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        self.drift.is_none().then(|| sites.observed(self.coordinates).1).and_then(|axes| rows_of(&axes))
     }
 }
 

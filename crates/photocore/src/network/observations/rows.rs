@@ -1,6 +1,6 @@
 //! What an observation is computed from, and the one place where partials by positions and rotations become those by unknowns.
 
-use nalgebra::SMatrix;
+use nalgebra::{DMatrix, SMatrix};
 
 use crate::geometry::{Matrix3, ObjectSpace, Orientation, Point, Pose, Vector3, local_vertical};
 use crate::network::commons::CommonState;
@@ -49,6 +49,12 @@ impl Sites<'_> {
     /// The height of a point: its Z in rectangular space, that above the ellipsoid in geographic space.
     pub fn height(&self, point: usize) -> f64 {
         self.points[point].coordinates[2]
+    }
+
+    /// Up, the axis of heights, as a row; None in geographic space, where it is another everywhere.
+    pub(super) fn up(&self) -> Option<DMatrix<f64>> {
+        let up = || DMatrix::from_row_slice(1, 3, &[0.0, 0.0, 1.0]);
+        matches!(self.space, ObjectSpace::Rectangular).then(up)
     }
 
     /// The pose of a photo.

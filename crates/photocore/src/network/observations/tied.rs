@@ -1,10 +1,10 @@
 //! An observation that takes part in an adjustment: a tie of unit weight.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::rows::{CommonSite, PhotoSite, PointSite};
 use super::{Observation, Rows, Sites, Touches};
-use crate::geometry::ObjectSpace;
+use crate::geometry::{ObjectSpace, Vector3};
 
 /// An observation of points, photos and common unknowns of a model.
 #[derive(Debug)]
@@ -34,13 +34,7 @@ pub struct TiedModel<'a> {
 impl TiedObservation {
     /// Writes L^-1 (observed - computed) and L^-1 times the partials, in columns block by block.
     pub fn write(&self, model: &TiedModel<'_>, constant: &mut [f64], coefficients: &mut [f64]) {
-        let sites = Sites {
-            space: model.space,
-            origin: model.origin,
-            points: self.touches.points.iter().map(|&point| (model.point)(point)).collect(),
-            photos: self.touches.photos.iter().map(|&photo| (model.photo)(photo)).collect(),
-            commons: self.touches.commons.iter().map(|&(common, _)| (model.common)(common)).collect(),
-        };
+        let sites = self.sites(model);
         let mut width = 0;
         let column = |&block: &usize| {
             let first = width;
@@ -54,6 +48,36 @@ impl TiedObservation {
         self.observation.write(&sites, &mut rows);
         self.whiten(constant, 1);
         self.whiten(coefficients, width);
+    }
+
+    /// L^-1 E m(E^T r), row by row, for what motions m make of a displacement: r is observed minus computed in the axes E that it is told in. None
+    /// where it is no displacement.
+    pub fn carried<const N: usize>(
+        &self,
+        model: &TiedModel<'_>,
+        motions: impl Fn(&Vector3) -> [Vector3; N],
+    ) -> Option<Vec<[f64; N]>> {
+        let axes = self.observation.axes(&self.sites(model))?;
+        let rows = self.root.nrows();
+        let width: usize = self.blocks.iter().map(|&block| (model.width)(block)).sum();
+        let mut constant = vec![0.0; rows];
+        self.write(model, &mut constant, &mut vec![0.0; rows * width]);
+        let missed = axes.tr_mul(&(&self.root * DVector::from_vec(constant)));
+        let moved = motions(&Vector3::new(missed[0], missed[1], missed[2]));
+        let mut found: Vec<[f64; N]> =
+            axes.row_iter().map(|axis| moved.map(|moved| axis.transpose().dot(&moved))).collect();
+        self.whiten(found.as_flattened_mut(), N);
+        Some(found)
+    }
+
+    fn sites<'a>(&self, model: &TiedModel<'a>) -> Sites<'a> {
+        Sites {
+            space: model.space,
+            origin: model.origin,
+            points: self.touches.points.iter().map(|&point| (model.point)(point)).collect(),
+            photos: self.touches.photos.iter().map(|&photo| (model.photo)(photo)).collect(),
+            commons: self.touches.commons.iter().map(|&(common, _)| (model.common)(common)).collect(),
+        }
     }
 
     /// Multiplies a matrix of so many columns by L^-1: forward substitution, row by row.
