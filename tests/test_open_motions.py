@@ -267,7 +267,7 @@ def test_a_line_far_from_where_it_started_has_the_covariance_of_one_that_starts_
 
 @pytest.mark.parametrize(("seed", "number"), [(3, 148), (2, 652)])
 def test_verticals_of_an_ellipsoid_do_not_say_where_a_network_is(seed, number):
-    """Attitudes and differences together tell its place to kilometres: less than rounding leaves of the equations."""
+    """Attitudes and differences together tell its place to kilometres: rounding takes that."""
     network = random_network(seed, number)
     assert network.block.geographic
     assert {"attitude", "difference"} <= set(network.kinds)
