@@ -34,7 +34,7 @@ def undetermined(
     block: Block, solution: _photocore.BlockSolution, error: AdjustmentError | None
 ) -> list[Message]:
     """Remark on what the adjusted values leave undetermined, `error`, or determine only weakly."""
-    messages = []
+    messages: list[Message] = []
     if error is not None:
         what = error.what if isinstance(error, RankError) else str(error)
         messages.append(Undetermined(f"there are no covariances: {error}", what=what))

@@ -131,7 +131,7 @@ def adjusted(
 
 def _messages(solution: _photocore.CollectionSolution, collection: Collection) -> list[Message]:
     """Collect remarks that did not stop the adjustment, the gravest first."""
-    messages = []
+    messages: list[Message] = []
     if solution.undetermined is not None:
         error = named(*solution.undetermined)
         messages.append(Undetermined(f"there are no covariances: {error}", what=str(error)))
