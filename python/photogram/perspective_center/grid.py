@@ -14,11 +14,19 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.show.brief import Brief
 
-__all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "joined", "reduce"]
+__all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "joined", "reduce", "single"]
 
 
 MINUTES_PER_RADIAN = 3437.7468
 """CONV of the program, too large by 8.5e-9 of itself; all its angles in minutes are meant by it."""
+
+
+def single(values: Floats) -> Floats:
+    """Return numbers as REAL*4 words of the System/360 hold them: six hexadecimal digits, no rounding."""
+    _, binary = np.frexp(values)
+    step = 2.0 ** (4.0 * np.ceil(binary / 4.0) - 24.0)
+    found: Floats = np.trunc(values / step) * step
+    return found
 
 
 @dataclass(frozen=True)

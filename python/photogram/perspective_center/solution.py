@@ -23,7 +23,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message, listed
 from photogram.network.geometry import rotation_matrix
-from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid
+from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid, single
 from photogram.show.brief import Brief
 from photogram.show.ways import Judged
 from photogram.statistics.limits import externally_studentized, studentized_limit
@@ -216,11 +216,11 @@ def determine(
     try:
         if unknown:
             return _result(grid, weight, *_calibrated(grid, weight, unknown), unknown)
-        solution, messages = (_as_published if as_published else _strictly)(grid, _observed(grid, weight))
+        course, messages = (_as_published if as_published else _strictly)(grid, _observed(grid, weight))
     except RankError as error:
         raise RankError(f"{SINGULAR}: {error}", [], error.points) from None
-    joint = solution.partials, solution.cofactors
-    return _result(grid, weight, grid, solution, messages, *joint, as_published=as_published)
+    joint = course.partials, course.solution.cofactors
+    return _result(grid, weight, grid, course, messages, *joint, as_published=as_published)
 
 
 def _observed(grid: Grid, weight: Floats) -> Observed:
@@ -250,7 +250,31 @@ def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats
     return weight
 
 
-Solved = tuple[_photocore.ResectionSolution, list[Message]]
+@dataclass(frozen=True, eq=False)
+class _Iterated:
+    """The course of an iteration of k cycles, and what holds at its end.
+
+    Attributes
+    ----------
+    solution
+        The last solution of the core: cofactors, degrees of freedom, points behind.
+    history, corrections
+        (k + 1, 6) poses, the start first, and (k, 6) what was added to them: X, Y, Z, angles in radians.
+    residuals, partials
+        (n, 2) given minus computed plate coordinates, and (n, 2, 6), at the last pose.
+    converged
+        Whether the criterion was met.
+    """
+
+    solution: _photocore.ResectionSolution
+    history: Floats
+    corrections: Floats
+    residuals: Floats
+    partials: Floats
+    converged: bool
+
+
+Solved = tuple[_Iterated, list[Message]]
 
 
 def _strictly(grid: Grid, observed: Observed) -> Solved:
@@ -267,28 +291,48 @@ def _strictly(grid: Grid, observed: Observed) -> Solved:
             if start is None or (solution.status == "converged" and not solution.points_behind.size):
                 break
         messages = [Message("the initial approximations lead to no solution; a direct one was taken instead")]
-    return solution, messages
+    history: Floats = np.vstack([solution.start, solution.history])
+    return _Iterated(
+        solution,
+        history,
+        np.diff(history, axis=0),
+        solution.residuals,
+        solution.partials,
+        solution.status == "converged",
+    ), messages
 
 
 def _as_published(grid: Grid, observed: Observed) -> Solved:
     if grid.initial is None:
         raise InputError("the program needs initial approximations")
-    solution = solve(
-        observed,
-        start=grid.initial,
-        criterion="position",
-        limit=grid.tolerance,
-        max_iterations=MOST_CYCLES,
-        at_measured=True,
-    )
-    if solution.status == "diverged":
-        raise RankError("the iteration has led to where the points do not determine it", [], observed.names)
-    return solution, []
+    # Parameters are REAL*4 words, angles in minutes: what is cut off comes back as a last correction.
+    units = np.array([1.0, 1.0, 1.0, *[MINUTES_PER_RADIAN] * 3])
+    history, corrections = [single(grid.initial * units) / units], []
+    converged = False
+    while not converged and len(corrections) < MOST_CYCLES:
+        solution = solve(
+            observed,
+            start=history[-1],
+            criterion="position",
+            limit=grid.tolerance,
+            max_iterations=1,
+            at_measured=True,
+        )
+        if solution.status == "diverged":
+            raise RankError(
+                "the iteration has led to where the points do not determine it", [], observed.names
+            )
+        corrections.append(solution.pose - history[-1])
+        history.append(single(solution.pose * units) / units)
+        converged = bool(np.linalg.norm(corrections[-1][:3]) < grid.tolerance)
+    residuals: Floats = solution.residuals + solution.partials @ (solution.pose - history[-1])
+    course = np.array(history), np.array(corrections)
+    return _Iterated(solution, *course, residuals, solution.partials, converged), []
 
 
 def _calibrated(
     grid: Grid, weight: Floats, unknown: tuple[str, ...]
-) -> tuple[Grid, _photocore.ResectionSolution, list[Message], Floats, Floats]:
+) -> tuple[Grid, _Iterated, list[Message], Floats, Floats]:
     """Determine pose and interior together: the pose is solved anew wherever the interior has gone.
 
     Returns
@@ -301,20 +345,20 @@ def _calibrated(
     own = grid
     root = np.sqrt(weight)[:, np.newaxis]
     for _ in range(STRICT_CYCLES):
-        solution, messages = _strictly(own, _observed(own, weight))
-        of_c = (own.plate_xy - solution.residuals) / own.principal_distance
+        course, messages = _strictly(own, _observed(own, weight))
+        of_c = (own.plate_xy - course.residuals) / own.principal_distance
         of_point = np.broadcast_to(np.eye(2), (len(grid.ids), 2, 2))
         columns = np.concatenate([of_c[:, :, np.newaxis], of_point], axis=2)[:, :, chosen]
-        partials: Floats = np.concatenate([solution.partials, columns], axis=2)
+        partials: Floats = np.concatenate([course.partials, columns], axis=2)
         rows = (partials * root[:, :, np.newaxis]).reshape(-1, 6 + len(chosen))
         scale = np.linalg.norm(rows, axis=0)
         _, sizes, turn = np.linalg.svd(rows / scale, full_matrices=False)
         if len(rows) < len(scale) or sizes[-1] < STEEPEST * sizes[0]:
             raise _open(unknown, grid)
         cofactors: Floats = (turn.T / sizes**2) @ turn / np.outer(scale, scale)
-        step = (cofactors @ rows.T @ (solution.residuals * root).ravel())[6:]
+        step = (cofactors @ rows.T @ (course.residuals * root).ravel())[6:]
         if (np.abs(step) <= STRICT_FRACTION * np.sqrt(np.diagonal(cofactors)[6:])).all():
-            return own, solution, messages, partials, cofactors
+            return own, course, messages, partials, cofactors
         interior[chosen] += step
         if not 0.5 < interior[0] / grid.principal_distance < 2.0:
             raise _open(unknown, grid)
@@ -339,7 +383,7 @@ def _result(
     grid: Grid,
     weight: Floats,
     own: Grid,
-    solution: _photocore.ResectionSolution,
+    course: _Iterated,
     messages: list[Message],
     partials: Floats,
     cofactors: Floats,
@@ -347,17 +391,16 @@ def _result(
     *,
     as_published: bool = False,
 ) -> PerspectiveCenter:
-    history = np.vstack([solution.start, solution.history])
-    corrections = np.diff(history, axis=0)
-    position, attitude = solution.pose[:3], solution.pose[3:]
+    solution, history, corrections = course.solution, course.history, course.corrections
+    position, attitude = history[-1, :3], history[-1, 3:]
     if as_published:
         # v = A d - L with the last correction d, although it has been applied already (specification, 3.2).
-        on_plate = np.einsum("nij,j->ni", solution.partials, corrections[-1]) - solution.residuals
+        on_plate = np.einsum("nij,j->ni", course.partials, corrections[-1]) - course.residuals
         scale = (grid.model[-1, 2] - position[2]) / -grid.principal_distance
         to_model = np.tile(scale * np.eye(2), (len(grid.ids), 1, 1))
         residual = scale * on_plate
     else:
-        on_plate = -solution.residuals
+        on_plate = -course.residuals
         projected, to_model = _projection(own, position, attitude)
         residual = grid.model[:, :2] - projected
     freedom = solution.degrees_of_freedom - len(unknown)
@@ -369,12 +412,12 @@ def _result(
     redundancy, reduced = _tests(partials, cofactors, weight, to_model, residual)
     standardized = reduced / (sigma0 or math.nan)
     squares = float((weight[:, np.newaxis] * on_plate**2).sum())
-    observed_radius = np.hypot(*(own.plate_xy - solution.residuals).T)
+    observed_radius = np.hypot(*(own.plate_xy - course.residuals).T)
     fixed_radius = np.hypot(*own.plate_xy.T)
     result = PerspectiveCenter(
         grid=grid,
         as_published=as_published,
-        converged=solution.status == "converged",
+        converged=course.converged,
         cycles=[
             Cycle(values[:3], correction[:3], values[3:] * MINUTES_PER_RADIAN)
             for values, correction in zip(history[1:], corrections, strict=True)
