@@ -196,3 +196,10 @@ def test_a_principal_distance_that_might_be_any_is_no_result():
     result = adjust(with_errors(block).replace(cameras=[camera]))
     assert result.cameras[0].sd[0] > abs(result.cameras[0].values[0]) / 3
     assert result.verdict.code == "undetermined"
+
+
+def test_a_strip_that_hardly_knows_its_roll_says_so():
+    """Its control is off the line by its errors only, which must not give heights beside the line."""
+    result = adjust(with_errors(strip(LINE)))
+    assert result.verdict.code == "undetermined"
+    assert re.search(ROLL, result.verdict.headline)

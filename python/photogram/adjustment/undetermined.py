@@ -215,8 +215,10 @@ def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
         cameras = block.photo_cameras.tolist()
         own = [(cameras[photo], unknown - 6) for photo, unknown in solution.weak if unknown >= 6]
         names |= {block.cameras[camera].names[k] for camera, k in own}
+    at = setting_of(block)
     if not names:
-        return ""
+        kinds = {block.unknowns[row].KIND for row, _ in solution.weak_unknowns}
+        return _of_unknowns(kinds, len({photo for photo, _ in solution.weak}), at)
     views = viewing_directions(
         solution.photo_positions, solution.photo_attitudes, photo_to_ground=block.photo_to_ground
     )
@@ -234,7 +236,6 @@ def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
         for name, sd in zip(each.names, each.deviations, strict=True)
         if np.isinf(sd) and name in _OF_RING
     }
-    at = setting_of(block)
     return _of_setting(names | free, at) or in_words(names, poses, at)
 
 
