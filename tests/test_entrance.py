@@ -4,6 +4,7 @@ import inspect
 import re
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -115,3 +116,13 @@ def test_help_of_parents_names_their_commands(run):
         for command in group.typer_instance.registered_commands[1:]:
             assert f"photogram {parent} {command.name}:" in said
     assert run("giant").exit_code == 2
+
+
+def test_progress_is_told_in_words():
+    from photogram.adjustment.adjustment import Progress
+    from photogram.cli.progress import shown
+
+    lines = []
+    tell = shown(SimpleNamespace(update=lines.append), "weighted sum of squares", 1.0)
+    tell(Progress("form", 61, 100, None))
+    assert lines == ["normal equations 61 %"]

@@ -232,3 +232,38 @@ def test_the_example_writes_all_pictures(tmp_path, monkeypatch):
         "side-by-side.png",
         *(f"{name}.svg" for name in PICTURES),
     }
+
+
+def test_what_weighs_nothing_is_no_spike_among_test_values():
+    """Stations whose standard deviations are kilometres are all at 0, and test nothing."""
+    options = {"strips": 2, "photos_per_strip": 4, "seed": 5}
+    plain = adjust(simulate(**options).block)
+    block = simulate(**options).block
+    loose = adjust(block.replace(photo_position_sd=1e6, photo_attitude_sd=1e3))
+    counts = []
+    for each in (plain, loose):
+        axes = each.plot.tests()
+        counts.append(axes[0].get_legend().get_texts()[0].get_text())
+    assert counts[0] == counts[1]
+
+
+def test_names_of_photos_can_be_read():
+    from photogram.show.style import SOFT
+
+    channel = [int(SOFT[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channel]
+    luminance = float(np.dot([0.2126, 0.7152, 0.0722], linear))
+    assert 1.05 / (luminance + 0.05) > 4.5
+    axes = adjust(simulate(strips=2, photos_per_strip=4, seed=5).block).plot.network()
+    colours = {each.get_color() for each in np.ravel(axes)[0].texts if each.get_text().startswith("010")}
+    assert colours == {SOFT}
+
+
+def test_the_repr_of_a_result_has_all_of_its_verdict():
+    block = simulate(strips=2, photos_per_strip=4, seed=5).block
+    xy = block.image_xy.copy()
+    xy[40:44] += 1.0
+    result = adjust(block.replace(image_xy=xy))
+    assert len(result.verdict.headline) > 110
+    assert result.verdict.headline in " ".join(repr(result).split())
+    assert max(map(len, repr(result).splitlines())) <= 110

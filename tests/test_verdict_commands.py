@@ -140,6 +140,9 @@ def test_a_lens_pattern_asks_for_a_calibration_and_not_for_snooping(run, tmp_pat
     words = " ".join([found.verdict.headline, *found.verdict.lines, *page.advice])
     assert "--snoop" not in words
     assert "gross" not in words.lower()
+    looked = check(block)
+    assert [each.kind for each in looked.grave] == ["lens"]
+    assert "--self-calibrate c,xp,yp,K1,K2,P1,P2 estimates it" in looked.grave[0].text
     # A wrong observation is still one, and no lens.
     good = block.replace(cameras=[lens])
     xy = good.image_xy.copy()

@@ -3,6 +3,7 @@
 import re
 import sys
 from html.parser import HTMLParser
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -348,3 +349,13 @@ def test_the_run_of_a_job_lists_options_that_are_not_their_defaults(made):
         ["--self-calibrate", "f,k1"],
         ["--snoop", "True"],
     ]
+
+
+def test_on_a_phone_the_verdict_stands_before_the_links_and_pictures_keep_their_size():
+    style = files("photogram.show").joinpath("templates/style.css").read_text()
+    narrow = re.search(r"@media \(max-width: 66rem\) \{\n(.*?)\n\}", style, re.DOTALL)[1]
+    order = dict(re.findall(r"(header, #verdict|main > \*|nav) \{ order: (\d)", narrow))
+    assert order["header, #verdict"] < order["nav"] < order["main > *"]
+    assert re.search(
+        r"max-width: 44rem\) \{ figure \{ overflow-x: auto; \} figure svg, .*width: 44rem", style
+    )

@@ -28,7 +28,7 @@ from photogram.checks.gross import Suspects, disproved, gross, without
 from photogram.checks.heights import two_ray_heights
 from photogram.checks.key_numbers import key_numbers
 from photogram.checks.left_out import held_values, points_left_out
-from photogram.checks.lenses import half_pixel, lenses_put_right
+from photogram.checks.lenses import half_pixel, lenses_estimated, lenses_put_right
 from photogram.checks.orientation import orientation, spare_explained
 from photogram.checks.positions import Wrong, wrong_positions
 from photogram.checks.residuals import residuals
@@ -156,7 +156,8 @@ def _started(block: Block) -> tuple[Block | None, Section]:
 def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     words, adjusted = manner.words, Adjuster(manner.options)
     lens: list[Finding] = []
-    sets, view, exact = conventions(View.of(lenses_put_right(block, lens, adjusted)))
+    upright_lenses = lenses_put_right(block, lens, adjusted)
+    sets, view, exact = conventions(View.of(lenses_estimated(upright_lenses, lens, adjusted)))
     sets.findings[:0] = lens
     upright, seen = orientation(view.seen, words, view.unit)
     oriented = view.of_seen(seen)

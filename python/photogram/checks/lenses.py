@@ -13,10 +13,13 @@ from photogram.checks.adjusting import Adjuster
 from photogram.checks.findings import Finding
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.results.lenses import usual_parameters
 from photogram.results.result import Result
+from photogram.show.ways import findings_of
+from photogram.statistics.evidence import Evidence
 from photogram.statistics.likelihood import judged
 
-__all__ = ["half_pixel", "lenses_put_right"]
+__all__ = ["half_pixel", "lenses_estimated", "lenses_put_right"]
 
 RADIAL = re.compile(r"[Kk]([1-6])")
 SIGNIFICANT = 5.0
@@ -58,6 +61,33 @@ def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) 
     said = f"probably {text}: residuals would be {verdict.fall:.3g} times smaller"
     findings.append(Finding("lens", "grave", said, values=values))
     return changed
+
+
+def lenses_estimated(block: Block, findings: list[Finding], adjusted: Adjuster) -> Block:
+    """Return a block whose lenses are unknown, as they come out, where that explains the residuals.
+
+    Good observations look gross where the lens is wrong, those of the positions of photos and control first.
+    """
+    names = [usual_parameters(camera) for camera in block.cameras]
+    first = adjusted.tried(block) if any(names) else None
+    if first is None or not first.converged or first.global_test is None or not first.global_test.problem():
+        return block
+    found = findings_of(first)
+    if not Evidence(found).lens:
+        return block
+    cameras = []
+    for camera, own in zip(block.cameras, names, strict=True):
+        held = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
+        sd = {name: value for name, value in held.items() if value} | dict.fromkeys(own, math.inf)
+        cameras.append(replace(camera, sd=sd, covariance=None))
+    freed = adjusted.tried(block.replace(cameras=cameras))
+    if freed is None or not freed.converged or freed.global_test is None:
+        return block
+    times = first.global_test.factor / freed.global_test.factor
+    largest = max((each for each in found.systematic if each.large), key=lambda each: each.fall)
+    text = f"{largest.sentence}; {found.calibrate} estimates it: residuals would be {times:.3g} times smaller"
+    findings.append(Finding("lens", "grave", text, values={"times_smaller": times}))
+    return block.replace(cameras=[each.restarted() for each in freed.cameras])
 
 
 def _fits(result: Result) -> bool:

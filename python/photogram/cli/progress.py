@@ -13,6 +13,14 @@ if TYPE_CHECKING:
 __all__ = ["shown"]
 
 
+_PHASES = {
+    "form": "normal equations",
+    "solve": "solution",
+    "invert": "standard deviations",
+}
+"""What the phases of the core are for."""
+
+
 def shown(status: Status, name: str, factor: float) -> Callable[[Progress], None]:
     """Return a function that keeps the status line at the phase and the last iteration.
 
@@ -26,6 +34,7 @@ def shown(status: Status, name: str, factor: float) -> Callable[[Progress], None
             size = factor * progress.iteration.weighted_sum_of_squares
             last = f"iteration {progress.iteration.number}: {name} {size:.6g}; "
         elif progress.total:
-            status.update(f"{last}{progress.phase} {100 * progress.done // progress.total} %")
+            phase = _PHASES.get(progress.phase, progress.phase)
+            status.update(f"{last}{phase} {100 * progress.done // progress.total} %")
 
     return show

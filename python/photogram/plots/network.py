@@ -11,7 +11,7 @@ from photogram.errors import InputError
 from photogram.plots.panels import NOWHERE, Where, labels, note, panels, scale_bars
 from photogram.plots.pictured import Pictured, Plan, pictured
 from photogram.show.pictures import round_length
-from photogram.show.style import BLUE, FAINT, INK, ORDERED, PURPLE, VERMILION
+from photogram.show.style import BLUE, FAINT, INK, ORDERED, PURPLE, SOFT, VERMILION
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -431,6 +431,6 @@ def _names(axes: Axes, plan: Plan, seen: tuple[int, int, int], ends: Floats) -> 
                 *(plan.point_ids[row] for row in held.tolist()),
                 *(plan.photo_ids[row] for row in photos.tolist()),
             ],
-            [INK] * len(held) + [FAINT] * len(photos),
+            [INK] * len(held) + [SOFT] * len(photos),
             avoid=ends,
         )

@@ -241,7 +241,7 @@ def labels(
             text, place, (0.0, 0.0), textcoords="offset points", fontsize=7.0, color=colour
         )
         written.set_in_layout(False)
-        written.set_bbox({"facecolor": "white", "alpha": 0.6, "linewidth": 0.0, "pad": 0.2})
+        written.set_bbox({"facecolor": "white", "alpha": 0.85, "linewidth": 0.0, "pad": 0.4})
         own = written.get_window_extent()
         side = _free_side(own.width, own.height, (x, y), gap * point, taken, obstacles, room)
         if side is None:

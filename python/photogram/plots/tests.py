@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from photogram.plots.panels import Where, handed_out, labels, note, panels
 from photogram.plots.pictured import pictured
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
+from photogram.statistics.patterns import SPEAKING
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,7 +62,7 @@ def tests(result: object, ax: Where = None) -> Any:  # noqa: PT028  (pytest does
         A result without photos and points.
     """
     drawn = pictured(result)
-    groups = drawn.tested
+    groups = [_speaking(each) for each in drawn.tested]
     values = np.concatenate([each.values.ravel() for each in groups])
     values = values[np.isfinite(values)]
     if len(values) < 2:
@@ -69,6 +71,13 @@ def tests(result: object, ax: Where = None) -> Any:  # noqa: PT028  (pytest does
         _histogram(found[0], values, drawn.unit_weight)
         _quantiles(found[1], values, groups, drawn.unit_weight)
     return handed_out(found)
+
+
+def _speaking(group: Observations) -> Observations:
+    """Return a group without the components that weigh nothing: at 0 they would be a spike, and no test."""
+    sizes = np.nan_to_num(np.abs(group.values))
+    silent = sizes.reshape(len(sizes), -1).max(axis=0, initial=0.0) < SPEAKING
+    return replace(group, values=np.where(silent.reshape(sizes.shape[1:]), np.nan, group.values))
 
 
 def _histogram(axes: Axes, values: Floats, unit_weight: float) -> None:

@@ -19,6 +19,7 @@ from photogram.statistics.distributions import LEVEL, bonferroni
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import Systematic
 from photogram.statistics.patterns import (
+    SPEAKING,
     Fit,
     frame_pattern,
     group_patterns,
@@ -35,8 +36,6 @@ NOTABLE = 0.3
 """Standard deviations: mean residuals below this harm nobody."""
 CLIPPED = 3.0
 """Larger test values count as this one."""
-SPEAKING = 1e-3
-"""Standardized residuals that are all smaller belong to weights of nothing, and their drift says nothing."""
 VISIBLE = 0.1
 """Redundancy numbers of the coordinates whose distribution is looked at."""
 KURTOSIS = (-0.7, 1.0)

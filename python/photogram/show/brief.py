@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Mapping, Sequence, Sized
 from dataclasses import fields
+from textwrap import wrap
 
 __all__ = ["Brief", "Rows", "few", "told"]
 
@@ -15,6 +16,8 @@ WIDEST = 110
 """Characters of a line at most."""
 MOST = 20
 """Lines at most, so that all is seen on one screen."""
+WHOLE = "verdict"
+"""What is never cut."""
 NAMED = 6
 """Names that are listed of many."""
 
@@ -36,8 +39,15 @@ class Brief:
     def __repr__(self) -> str:
         title, rows = self._lines()
         width = max((len(name) for name, _ in rows), default=0)
-        lines = [title, *(f"  {name:<{width}}  {told}" for name, told in rows)]
-        return "\n".join(line if len(line) <= WIDEST else f"{line[: WIDEST - 3]}..." for line in lines)
+        lines = [_cut(title)]
+        for name, told in rows:
+            if name == WHOLE:
+                parts = wrap(told, WIDEST - width - 4)
+                heads = [name, *[""] * len(parts)]
+                lines += [f"  {head:<{width}}  {part}" for head, part in zip(heads, parts, strict=False)]
+            else:
+                lines.append(_cut(f"  {name:<{width}}  {told}"))
+        return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         """Return what notebooks show."""
@@ -48,6 +58,10 @@ class Brief:
             for name, told in rows
         )
         return f"<div><p><strong>{html.escape(title)}</strong></p><table><tbody>{cells}</tbody></table></div>"
+
+
+def _cut(line: str) -> str:
+    return line if len(line) <= WIDEST else f"{line[: WIDEST - 3]}..."
 
 
 def few(names: Sequence[str]) -> str:

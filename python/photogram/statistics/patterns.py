@@ -17,6 +17,7 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 
 __all__ = [
+    "SPEAKING",
     "Fit",
     "FramePattern",
     "Normality",
@@ -40,6 +41,9 @@ FULL = 10.0
 
 SINGULAR = 1e-6
 """Determinant, in the product of the diagonal, below which a matrix may be singular."""
+
+SPEAKING = 1e-3
+"""Standardized residuals that are all smaller belong to weights of nothing, and say nothing."""
 
 CELLS = 10
 """Of the frame in each direction: images in one cell are neighbours."""
