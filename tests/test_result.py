@@ -263,8 +263,9 @@ def test_every_quantity_of_the_report_has_a_unit(result):
     assert len(unit.findall(parts[control][0])) == 3
     # Values and deviations stand on two lines under two headings.
     assert len(unit.findall(parts["Photos"][0])) + (2 if result.block.geographic else 0) == 6
-    assert len(unit.findall(parts["Photos"][1])) == 6
-    assert len(unit.findall(parts["Points"][1])) == 3
+    beside = 2 if result.block.geographic else 0  # lengths beside seconds of arc
+    assert len(unit.findall(parts["Photos"][1])) == 6 + beside
+    assert len(unit.findall(parts["Points"][1])) == 3 + beside
 
 
 def test_the_report_names_the_blunder(result):
@@ -283,7 +284,7 @@ def test_values_of_the_report_are_those_of_the_arrays(result):
     assert photo[0].split()[0] == result.block.photo_ids[0]
     angles = [float(value) for value in photo[0].split()[-3:]]
     np.testing.assert_allclose(angles, np.degrees(result.photo_attitudes[0]), rtol=0, atol=0.51e-7)
-    deviations = [float(value) for value in photo[1].split()]
+    deviations = [float(value) for value in photo[1].split()[:6]]
     scale = [ARCSEC, ARCSEC, 1.0] if result.block.geographic else [1.0] * 3
     expected = result.photo_sd[0] * [*scale, *[ARCSEC] * 3]
     np.testing.assert_allclose(deviations, expected, rtol=0, atol=0.51e-3)
@@ -419,3 +420,18 @@ def test_report_and_document_name_the_linear_unit(small_block):
     assert "X ft" in result.report()
     assert " m\n" not in result.report()
     assert json.loads(result.to_json())["units"]["position"] == "ft"
+
+
+def test_reports_of_geographic_blocks_have_lengths_beside_seconds_of_arc():
+    origin = (-1.65, 0.52, 10.0)
+    block = simulate(strips=2, photos_per_strip=3, spheroid=Spheroid.wgs84(), origin=origin, seed=1).block
+    result = adjust(block)
+    lines = result.report().splitlines()
+    row = next(k for k, line in enumerate(lines) if "sd east m" in line and "sd omega" not in line)
+    assert lines[row].split()[-6:] == ["sd", "east", "m", "sd", "north", "m"]
+    sd = lines[row + 2].split()
+    east, north = (float(each) for each in sd[-2:])
+    metres = 6.37e6 * np.radians(1 / 3600)
+    assert east == pytest.approx(float(sd[0]) * metres * np.cos(0.52), rel=0.01)
+    assert north == pytest.approx(float(sd[1]) * metres, rel=0.01)
+    assert re.search(r"rms of control points +longitude \S+ arcsec \(\S+ m\), latitude", result.report())

@@ -307,7 +307,8 @@ def _as_published(grid: Grid, observed: Observed) -> Solved:
         raise InputError("the program needs initial approximations")
     # Parameters are REAL*4 words, angles in minutes: what is cut off comes back as a last correction.
     units = np.array([1.0, 1.0, 1.0, *[MINUTES_PER_RADIAN] * 3])
-    history, corrections = [single(grid.initial * units) / units], []
+    history: list[Floats] = [single(grid.initial * units) / units]
+    corrections: list[Floats] = []
     converged = False
     while not converged and len(corrections) < MOST_CYCLES:
         solution = solve(

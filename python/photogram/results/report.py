@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.network.geometry import lengths_of_units
 from photogram.network.structuring import structure
 from photogram.results.calibration_report import calibration_sections
 from photogram.results.findings import axes, tested_observations
@@ -303,11 +304,11 @@ def _datum(result: Result) -> list[str]:
 
 
 def _photos(result: Result) -> list[str]:
-    position, sd_position = _position_formats(result)
+    (position, sd_position), lengths = _position_formats(result), _lengths(result)
     lines = [
         *_datum(result),
         f"{'photo':<10}{_position_head(result)}{'omega deg':>15}{'phi deg':>15}{'kappa deg':>15}",
-        f"{'':<10}{_sd_head(result)}{'sd arcsec':>15}{'sd arcsec':>15}{'sd arcsec':>15}",
+        f"{'':<10}{_sd_head(result)}{'sd arcsec':>15}{'sd arcsec':>15}{'sd arcsec':>15}{_long_head(result)}",
     ]
     rows = zip(
         result.block.photo_ids,
@@ -318,7 +319,8 @@ def _photos(result: Result) -> list[str]:
     )
     for name, values, angles, sd in rows:
         lines.append(f"{name:<10}{position(values)}" + "".join(f"{angle:>15.7f}" for angle in angles))
-        lines.append(f"{'':<10}{sd_position(sd[:3])}" + "".join(f"{each / ARCSEC:>15.3f}" for each in sd[3:]))
+        turns = "".join(f"{each / ARCSEC:>15.3f}" for each in sd[3:])
+        lines.append(f"{'':<10}{sd_position(sd[:3])}{turns}{_long(result, sd, lengths)}")
     return lines
 
 
@@ -332,11 +334,11 @@ def _held_cameras(result: Result) -> list[str]:
 
 
 def _points(result: Result) -> list[str]:
-    position, sd_position = _position_formats(result)
+    (position, sd_position), lengths = _position_formats(result), _lengths(result)
     lines = [
         *_datum(result),
         f"{'point':<10}{_position_head(result)}  rays  kind",
-        f"{'':<10}{_sd_head(result)}",
+        f"{'':<10}{_sd_head(result)}{_long_head(result)}",
     ]
     rows = zip(
         result.block.point_ids,
@@ -349,7 +351,7 @@ def _points(result: Result) -> list[str]:
     for name, values, sd, rays, kind in rows:
         if rays:
             lines.append(f"{name:<10}{position(values)}  {rays:>4}  {kind}")
-            lines.append(f"{'':<10}{sd_position(sd)}")
+            lines.append(f"{'':<10}{sd_position(sd)}{_long(result, sd, lengths)}")
     return lines
 
 
@@ -401,8 +403,27 @@ def _difference_units(result: Result) -> tuple[str, str, str]:
 
 def _differences(result: Result, values: Iterable[float]) -> list[str]:
     outward = np.array(list(values)) * _outward(result)
-    triples = zip(axes(result), outward, _difference_units(result), strict=True)
-    return [f"{axis} {value:.5f} {unit}" for axis, value, unit in triples if math.isfinite(value)]
+    triples = zip(axes(result), outward, _difference_units(result), _beside(result, outward), strict=True)
+    return [f"{axis} {value:.5f} {unit}{long}" for axis, value, unit, long in triples if math.isfinite(value)]
+
+
+def _beside(result: Result, outward: Floats) -> list[str]:
+    """Return what three differences in the units of the report are as lengths, where they are angles."""
+    lengths = (outward / _outward(result) * _lengths(result)).tolist()
+    unit = result.block.linear_unit
+    return [f" ({each:.4f} {unit})" if result.block.geographic else "" for each in lengths[:2]] + [""]
+
+
+def _long(result: Result, sd: Sequence[float], lengths: Floats) -> str:
+    """Write the standard deviations in plan as lengths, where they are angles."""
+    return "".join(f"{sd[k] * lengths[k]:>15.4f}" for k in (0, 1)) if result.block.geographic else ""
+
+
+def _lengths(result: Result) -> Floats:
+    """Return (3,) the lengths of the units of the coordinates in the middle of the block."""
+    middle = result.photo_positions.mean(axis=0, keepdims=True)
+    found: Floats = lengths_of_units(middle, result.block.spheroid)[0]
+    return found
 
 
 def _position_head(result: Result) -> str:
@@ -414,6 +435,13 @@ def _position_head(result: Result) -> str:
 
 def _sd_head(result: Result) -> str:
     return "".join(f"{f'sd {unit}':>20}" for unit in _difference_units(result))
+
+
+def _long_head(result: Result) -> str:
+    unit = result.block.linear_unit
+    return (
+        "".join(f"{f'sd {axis} {unit}':>15}" for axis in ("east", "north")) if result.block.geographic else ""
+    )
 
 
 def _position_formats(
