@@ -186,3 +186,20 @@ def test_dates_are_those_of_the_report_or_of_today():
     for text in ("", "17.7.1972", "2023-02-29", "13/1/72"):
         with pytest.raises(InputError, match="date of the calibration"):
             day_of(text)
+
+
+def test_damaged_documents_are_refused_with_what_is_wrong():
+    good = json.loads(to_json(year(0)))
+    for member, value, words in (
+        (("joint", "sigma_random_um"), 0.0, "0 is not positive"),
+        (("cases", 0, "points", 3), 99, "points|99"),
+        (("joint", "cases", 0, "rotation_rad"), "north", "could not convert"),
+        (("plates", 0, "corrected_plate_um", 0), [1.0], "holds no calibration"),
+    ):
+        bad = json.loads(json.dumps(good))
+        place = bad
+        for name in member[:-1]:
+            place = place[name]
+        place[member[-1]] = value
+        with pytest.raises(InputError, match=words):
+            RecordedCalibration.from_document(bad, "bad")

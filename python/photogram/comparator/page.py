@@ -82,7 +82,10 @@ _JOINT = "All cases, comparator, polynomials and grid in one adjustment, with th
 def _next(calibration: Calibration) -> list[str]:
     if not calibration.usable:
         return ["The correction is withheld: measure the readings that are named again, or leave them out."]
-    return ["Correct measurements with `photogram comparator correct correction.json FILE`."]
+    return [
+        "Correct measurements with `photogram comparator correct correction.json FILE`.",
+        "Keep the document of `--json`: `photogram comparator compare` finds what changes over years.",
+    ]
 
 
 def _highlights(calibration: Calibration) -> list[Fact]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -190,27 +191,46 @@ def _from_document(document: Any, name: str) -> RecordedCalibration:
     total = document["pointing"]["total"]
     freedom = int(total["degrees_of_freedom"])
     placed = {each["case"]: each for each in joint["cases"]}
+    grids = {
+        plate["plate"]: _grid(plate, own)
+        for plate, own in zip(document["plates"], joint["plates"], strict=True)
+    }
+    cases = tuple(_case(each, placed[each["case"]], counts) for each in document["cases"])
+    for case in cases:
+        if not np.isin(case.points, grids[case.plate].points).all():
+            raise ValueError(f"case {case.number} has points that plate {case.plate} has not")
     return RecordedCalibration(
         name=name,
         day=day_of(str(document["date"])),
         correction=correction,
-        random_um=float(joint["sigma_random_um"]),
-        freedom=int(joint["degrees_of_freedom"]),
+        random_um=_positive(joint["sigma_random_um"]),
+        freedom=int(_positive(joint["degrees_of_freedom"])),
         pointing_um=_pair(total["sd_um"]) if freedom > 0 else (0.0, 0.0),
         pointing_covariance_um2=float(total["covariance_um2"] or 0.0),
         pointing_freedom=freedom,
         operators=_operators(document["pointing"]["operators"]),
-        cases=tuple(_case(each, placed[each["case"]], counts) for each in document["cases"]),
-        grids={
-            plate["plate"]: _grid(plate, own)
-            for plate, own in zip(document["plates"], joint["plates"], strict=True)
-        },
+        cases=cases,
+        grids=grids,
     )
 
 
 def _pair(values: Any) -> tuple[float, float]:
-    x, y = values
-    return float(x), float(y)
+    x, y = (_finite(each) for each in values)
+    return x, y
+
+
+def _finite(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"{number} is no finite number")
+    return number
+
+
+def _positive(value: Any) -> float:
+    number = _finite(value)
+    if number <= 0:
+        raise ValueError(f"{number:g} is not positive")
+    return number
 
 
 def _operators(members: Iterable[Any]) -> dict[int, tuple[float, float, int]]:
@@ -235,7 +255,7 @@ def _case(members: Any, placed: Any, counts: Mapping[tuple[int, int], int]) -> R
         points=points,
         counts=np.array([counts[members["case"], point] for point in points.tolist()], dtype=np.int64),
         means_um=means,
-        rotation_rad=float(placed["rotation_rad"]),
+        rotation_rad=_finite(placed["rotation_rad"]),
         translation_um=np.array(_pair(placed["translation_um"])),
     )
 
