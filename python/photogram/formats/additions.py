@@ -13,6 +13,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.control_lists import ControlList, read_control_list
+from photogram.formats.exchanged import check_systems
 from photogram.formats.images import from_corner, to_corner
 from photogram.formats.intersection import intersected
 from photogram.formats.pixels import corner_of, pixel_table
@@ -23,6 +24,7 @@ from photogram.formats.plain.transform import Transform
 from photogram.formats.plain.writing import attitude_matrices
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
+from photogram.formats.similarity import similarity
 from photogram.io.delimited import ColumnTable, Names
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
@@ -392,6 +394,8 @@ def with_control(
     if missing:
         messages.append(Message(f"control without images is left out: {listed(missing)}", path))
     targets = np.array([places[given.names[row]] for row in rows])
+    raw = np.stack([table.numbers(axis) for axis in "xyz"], axis=1)
+    messages += check_systems(project, settings, table, targets, raw[rows], free=_is_free(project))
     held = [row for row in rows if np.isfinite(given.positions[row]).all()]
     carried = _carried(
         project,
@@ -423,6 +427,11 @@ def with_control(
     return found.replace(messages=(*found.messages, *planes))
 
 
+def _is_free(project: Project) -> bool:
+    """Whether nothing but its first values says where the model of a project is."""
+    return not (project.block.observations or np.isfinite(project.block.photo_position_sd).any())
+
+
 def _carried(
     project: Project, points: np.ndarray[tuple[int], np.dtype[np.int64]], targets: Floats, frame: Frame
 ) -> Project:
@@ -433,9 +442,9 @@ def _carried(
     model[unknown] = intersected(project, points[unknown])
     known = np.isfinite(model).all(axis=1)
     same = replace(project, frame=frame) if frame != project.frame else project
-    if np.count_nonzero(known) < 3 or block.observations or np.isfinite(block.photo_position_sd).any():
+    if np.count_nonzero(known) < 3 or not _is_free(project):
         return same
-    scale, turn, shift, misfit = _similarity(model[known], targets[known])
+    scale, turn, shift, misfit = similarity(model[known], targets[known])
     before = float(np.sqrt(np.mean((model[known] - targets[known]) ** 2)))
     if not (np.isfinite(misfit) and SIMILAR * misfit < before):
         return same
@@ -457,21 +466,3 @@ def _carried(
         frame=frame,
         messages=(*project.messages, message),
     )
-
-
-def _similarity(model: Floats, targets: Floats) -> tuple[float, Floats, Floats, float]:
-    """Return scale, rotation, shift and rms misfit of the similarity between points (Umeyama 1991)."""
-    middle, aim = model.mean(axis=0), targets.mean(axis=0)
-    a, b = model - middle, targets - aim
-    with np.errstate(over="ignore", invalid="ignore"):
-        products = b.T @ a
-    if not np.isfinite(products).all():
-        return 1.0, np.eye(3), np.zeros(3), np.inf
-    u, s, vt = np.linalg.svd(products)
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt)) or 1.0])
-    if s[1] < 1e-9 * s[0] or not s[0] > 0:
-        return 1.0, np.eye(3), np.zeros(3), np.inf
-    turn = (u * signs) @ vt
-    scale = float((s * signs).sum() / (a**2).sum())
-    left = b - scale * a @ turn.T
-    return scale, turn, aim - scale * turn @ middle, float(np.sqrt(np.mean(left**2)))

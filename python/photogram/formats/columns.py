@@ -31,6 +31,7 @@ __all__ = [
     "columns_given",
     "degrees",
     "guess",
+    "heading_of",
     "is_geographic",
     "nameless",
     "settled",
@@ -278,8 +279,12 @@ def settled(
 
 def is_geographic(table: ColumnTable) -> bool:
     """Whether the columns x and y of a table are longitudes and latitudes."""
-    headings = dict(zip(table.columns, table.own, strict=True)) if table.own else {}
-    return all(is_angular(headings.get(axis, "")) for axis in ("x", "y"))
+    return all(axis in table and is_angular(heading_of(table, axis)) for axis in ("x", "y"))
+
+
+def heading_of(table: ColumnTable, column: str) -> str:
+    """Return what a table calls one of our columns."""
+    return dict(zip(table.columns, table.own, strict=True)).get(column) or column if table.own else column
 
 
 def _on_axis(other: str, text: str) -> float:

@@ -102,7 +102,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     owners = {each.name: row for row, each in enumerate(cameras.cameras)} | dict(
         zip(photos.taken, photo_cameras, strict=True)
     )
-    return assembled(
+    project = assembled(
         path=settings.path,
         title="plain project",
         name=settings.name,
@@ -137,6 +137,13 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         photo_to_ground=settings.attitude == "omega_phi_kappa" and settings.rotation == "photo_to_object",
         details={"settings": settings},
     ).replace(sd_taken=True)
+    if control is not None and given is not None:
+        from photogram.formats.exchanged import check_systems
+
+        raw = np.stack([control.numbers(axis) for axis in AXES], axis=1)
+        rows = np.array([points.names.index(name) for name in given.names], dtype=np.int64)
+        check_systems(project, settings, control, rows, raw, free=False)
+    return project
 
 
 def _with_cameras(tables: Tables, path: Path) -> Tables:

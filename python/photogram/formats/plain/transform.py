@@ -16,6 +16,8 @@ from photogram.messages import Message
 
 __all__ = ["Transform"]
 
+_HINT = "; are east and north exchanged (--columns x=..,y=..), or is a zone before the eastings?"
+
 
 class Transform:
     """What carries coordinates of tables into the frame, in units of the house.
@@ -84,7 +86,7 @@ class Transform:
             self._settle(crs, values[known])
             found, turned, remarks = to_frame(crs, values[known], own[known], self.frame)
         except InputError as error:
-            raise (error if error.file else table.head.error(error.message)) from None
+            raise (error if error.file else table.head.error(f"{error.message}{_HINT}")) from None
         positions, rotated = np.full_like(values, math.nan), own.copy()
         positions[known], rotated[known] = found, turned
         self._messages += [Message(text, table.path) for text in remarks]

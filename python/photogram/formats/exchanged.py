@@ -1,0 +1,178 @@
+"""Control in another system than the photos: named before the adjustment, with the option that mends it.
+
+What people exchange is tried: east and north, signs, feet, millimetres, zones before eastings, no system
+named. It is named where control then fits the photos ten times as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.formats.columns import heading_of
+from photogram.formats.intersection import intersected
+from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.transform import Transform
+from photogram.formats.project import Project
+from photogram.formats.similarity import similarity
+from photogram.io.delimited import ColumnTable
+from photogram.messages import Message, quoted
+from photogram.network.observations import Position
+
+__all__ = ["check_systems"]
+
+BETTER = 10.0
+"""How much better control must fit after an exchange for it to be named."""
+FITS = 0.2
+"""Part of the extent of control: what misfits by less is in its place, as far as first values tell."""
+FAR = 100.0
+"""Extents of photos and control that their middles are apart where they are in different systems."""
+ZONE = 1e6
+
+Exchange = tuple[str, str, Callable[[Floats], Floats]]
+
+
+def check_systems(
+    project: Project, settings: Settings, table: ColumnTable, points: Indices, values: Floats, *, free: bool
+) -> list[Message]:
+    """Refuse control that fits the photos only after an exchange, or lies far from them all.
+
+    Parameters
+    ----------
+    project
+        Photos with their first poses, without this control.
+    settings, table
+        Those that the control was read with.
+    points
+        (k,) points of the project.
+    values
+        (k, 3) their coordinates as the table has them.
+    free
+        Whether the model of the project may be carried onto control by a similarity.
+
+    Returns
+    -------
+    A remark where flat control leaves open which of its sides photos look at, and they look from below.
+
+    Raises
+    ------
+    InputError
+        The exchange, and the option that mends it.
+    """
+    known = np.isfinite(values).all(axis=1)
+    points, values = points[known], values[known]
+    block = project.block
+    if block.geographic or not len(points):
+        return []
+    model = intersected(project, points)
+    seen = np.isfinite(model).all(axis=1)
+    posed = np.isfinite(block.photo_positions).all(axis=1)
+    gnss = [np.asarray(each.position) for each in block.observations if isinstance(each, Position)]
+    stations = np.vstack([block.photo_positions[posed], *(each[np.newaxis] for each in gnss)])
+    firm = np.count_nonzero(seen) > 2
+    if not firm and (free or not len(stations)):
+        return []
+
+    def misfit(own: Settings, xyz: Floats) -> tuple[float, float]:
+        """Return by how much control misfits, and its extent; infinite where it has no place."""
+        try:
+            placed, _ = Transform(own, []).positions("control", xyz, None, table)
+        except InputError:
+            return np.inf, 0.0
+        extent = float(np.sqrt(np.mean((placed - placed.mean(axis=0)) ** 2)))
+        if firm and free:
+            return similarity(model[seen], placed[seen])[3], extent
+        if firm:
+            return float(np.sqrt(np.mean((model[seen] - placed[seen]) ** 2))), extent
+        return float(np.linalg.norm(placed.mean(axis=0) - stations.mean(axis=0))), extent
+
+    as_is, extent = misfit(settings, values)
+    reach = extent + (float(np.ptp(stations, axis=0).max()) if len(stations) else 0.0)
+    if as_is <= (FITS * extent if firm else FAR * reach):
+        if free and len(stations) and settings.crs.get("control", "") == "":
+            below, above = (
+                _from_below(stations, model[seen], own[seen]) for own in (values, _swapped(values))
+            )
+            if below and not above:
+                text = "photos look from below as x and y of control are, from above if they are exchanged"
+                return [Message(f"{text}: {_swap(table)}, if so", table.path)]
+        return []
+    tried = [
+        (misfit(settings, change(values))[0], what, option)
+        for what, option, change in (_exchanges(table, values, free=free) if firm else ())
+    ]
+    tried += [
+        (misfit(own, values)[0], f"its coordinates are of {crs}", f"--control-crs {crs}")
+        for crs, own in _systems(project, settings)
+    ]
+    best, what, option = min(tried, default=(np.inf, "", ""))
+    if firm:
+        extent = max(extent, float(np.std(model[seen], axis=0).max()))
+    if best < as_is / BETTER and (not firm or best < extent):
+        raise table.head.error(
+            f"control fits the photos {as_is / best:.3g} times as well if {what}: {option}"
+        )
+    if not free and as_is > FAR * reach:
+        raise table.head.error(
+            f"control lies {as_is:.3g} {block.linear_unit} from the photos, which with it extend over"
+            f" {reach:.3g}: it is in another system; --control-crs CRS names it (EPSG:25832 ...)"
+        )
+    return []
+
+
+def _times(factors: Sequence[float], xyz: Floats) -> Floats:
+    return np.asarray(xyz * np.asarray(factors))
+
+
+def _swap(table: ColumnTable) -> str:
+    return f"--columns x={heading_of(table, 'y')},y={heading_of(table, 'x')}"
+
+
+def _swapped(xyz: Floats) -> Floats:
+    return xyz[:, [1, 0, 2]]
+
+
+def _from_below(stations: Floats, model: Floats, placed: Floats) -> bool:
+    """Whether stations come to stand below control by the similarity that carries their model onto it."""
+    scale, turn, shift, misfit = similarity(model, placed)
+    heights = (scale * stations @ turn.T + shift)[:, 2]
+    return bool(np.isfinite(misfit) and (heights < placed[:, 2].min()).all())
+
+
+def _exchanges(table: ColumnTable, values: Floats, *, free: bool) -> Iterator[Exchange]:
+    """Yield what people exchange, in words, with what mends it; a similarity sees no scale, and one sign."""
+    x, y, z = (heading_of(table, axis) for axis in "xyz")
+    yield "x and y (east and north) are exchanged", _swap(table), _swapped
+    yield (f"{quoted(z)} is in feet", f"--columns z={z}[ft]", partial(_times, (1.0, 1.0, 0.3048)))
+    if free:
+        return
+    for column, name, sign in (("x", x, (-1, 1, 1)), ("y", y, (1, -1, 1)), ("z", z, (1, 1, -1))):
+        yield (
+            f"{quoted(name)} has the other sign",
+            f"--columns {column}=-{name}",
+            partial(_times, sign),
+        )
+    for unit, scale in (("ft", 0.3048), ("mm", 0.001)):
+        option = f"--columns x={x}[{unit}],y={y}[{unit}],z={z}[{unit}]"
+        yield f"it is in {unit}", option, partial(_times, (scale, scale, scale))
+    if (values[:, 0] > ZONE).all():
+        yield (
+            f"the eastings are without the zone, {int(values[0, 0] // ZONE)}, before them",
+            "take it off, or name a system with it by --control-crs (EPSG:4647 is ETRS89, zone 32)",
+            lambda xyz: np.column_stack([xyz[:, 0] % ZONE, xyz[:, 1:]]),
+        )
+
+
+def _systems(project: Project, settings: Settings) -> Iterator[tuple[str, Settings]]:
+    """Yield systems that control without one may have where the project has a place on the earth."""
+    if settings.crs.get("control") or project.frame.kind != "topocentric" or project.frame.origin is None:
+        return
+    latitude, longitude, _ = project.frame.origin
+    zone = int((longitude + 180) // 6) % 60 + 1
+    for crs in (f"EPSG:{(32600 if latitude >= 0 else 32700) + zone}", "EPSG:4979", "EPSG:3857"):
+        yield crs, replace(settings, crs={"control": crs})
