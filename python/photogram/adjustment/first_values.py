@@ -202,7 +202,7 @@ def _mirrored(block: Block, known: Known, directions: Floats, started: int, asid
         return [
             Message(
                 "probably the photos are mirrored: with the other sign of x (or of y) they fit the control,"
-                " as they are they do not"
+                " as they are they do not; or east and north of the control are exchanged"
             )
         ]
     if not doubtful:
