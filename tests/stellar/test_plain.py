@@ -247,3 +247,15 @@ def test_the_figure_of_the_frames_is_drawn_as_they_are(monkeypatch):
     assert (ROOT / "docs" / "stellar-frames.svg").read_text(encoding="utf-8").count("<text") == drawn.count(
         "<text"
     )
+
+
+@pytest.mark.parametrize(("delimiter", "decimal"), [(";", ","), ("\t", ","), (";", ".")])
+def test_tables_of_stars_take_semicolons_as_other_tables_do(tmp_path, delimiter, decimal):
+    for name in ("stars.csv", "images.csv"):
+        text = (EXAMPLE.parent / name).read_text()
+        (tmp_path / name).write_text(text.replace(",", delimiter).replace(".", decimal))
+    (tmp_path / "plate.toml").write_text(EXAMPLE.read_text())
+    given, plain = read_plain(tmp_path / "plate.toml"), read_plain(EXAMPLE)
+    assert given.star_names == plain.star_names
+    np.testing.assert_array_equal(given.image_xy, plain.image_xy)
+    np.testing.assert_array_equal(given.image_times, plain.image_times)

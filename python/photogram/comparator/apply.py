@@ -84,7 +84,7 @@ def correct_table(
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow([*table.columns, *columns])
     for place, own, within in zip(table.records.records, values.tolist(), there, strict=True):
-        writer.writerow([*cells(place), *(f"{value:.4f}" for value in own), within])
+        writer.writerow([*cells(place, table.records.delimiter), *(f"{value:.4f}" for value in own), within])
     return buffer.getvalue().encode(), remarks
 
 

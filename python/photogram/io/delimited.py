@@ -26,13 +26,11 @@ from photogram.io.files import read_text
 from photogram.io.marks import Marks, marks_of
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place
-from photogram.io.rows import LONGEST_RECORD
+from photogram.io.rows import DELIMITERS, LONGEST_RECORD
 from photogram.messages import listed, quoted
 
 __all__ = ["FALSE", "NAMELESS", "TRUE", "ColumnTable", "Names", "Spelling", "read_columns", "read_rows"]
 
-DELIMITERS = ("\t", ";", ",", "|")
-"""In this order; blanks where a header has none of them."""
 LARGE = 1 << 20
 """Bytes from which a table is worth the parser of pandas."""
 COMMENT = "#"

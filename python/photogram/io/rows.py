@@ -1,4 +1,4 @@
-"""Comma-separated tables of all programs, whose errors name file, record and text.
+"""Tables of all programs, with commas, semicolons, tabs or bars, whose errors name file, record and text.
 
 Nothing in a file can make reading dear or end it with anything but an :class:`InputError`: a record has a
 greatest length, which keeps every cell below the limit of the module `csv`; columns are looked up by name;
@@ -18,8 +18,10 @@ from photogram.io.numbers import LARGEST_INTEGER, finite_number, whole_number
 from photogram.io.places import Place
 from photogram.messages import listed, quoted
 
-__all__ = ["LONGEST_RECORD", "Row", "Table", "cells", "read_rows"]
+__all__ = ["DELIMITERS", "LONGEST_RECORD", "Row", "Table", "cells", "read_rows"]
 
+DELIMITERS = ("\t", ";", ",", "|")
+"""What a header shows to stand between cells, in this order."""
 LONGEST_RECORD = 100_000
 """Characters of a record at most. The module `csv` stops at cells of 131,072."""
 
@@ -30,6 +32,8 @@ class Row:
 
     cells: Mapping[str, str]
     place: Place
+    commas: bool = False
+    """Whether decimals may have commas: these do not stand between cells."""
 
     def integer(self, column: str, default: int | None = None, *, highest: int = LARGEST_INTEGER) -> int:
         """Return a whole number that is not negative; `default` where the cell or the column is missing.
@@ -59,7 +63,7 @@ class Row:
         if not text:
             return None
         try:
-            return finite_number(text)
+            return finite_number(text.replace(",", ".") if self.commas and "." not in text else text)
         except ValueError as error:
             raise self.place.error(f"{column} {error}") from None
 
@@ -95,6 +99,8 @@ class Table:
         Records that begin with the mark of a comment.
     ragged
         Whether cells may be missing at the end of a record; they are blank then.
+    delimiter
+        What stands between cells, as the header has it.
     """
 
     path: Path
@@ -103,6 +109,7 @@ class Table:
     records: tuple[Place, ...]
     comments: tuple[Place, ...] = ()
     ragged: bool = False
+    delimiter: str = ","
 
     @classmethod
     def read(
@@ -136,15 +143,16 @@ class Table:
         for number, line in enumerate(read_lines(path), 1):
             if comment is not None and line.lstrip().startswith(comment):
                 comments.append(Place(path, number, line))
-            elif line.strip(" \t,"):
+            elif line.strip(" \t,;|"):
                 records.append(Place(path, number, line))
         if not records:
             raise Place(path).error("holds no table")
         head, *body = records
-        columns = tuple(spelling(name) for name in cells(head))
+        delimiter = next((each for each in DELIMITERS if each in (head.text or "")), ",")
+        columns = tuple(spelling(name) for name in cells(head, delimiter))
         if twice := [name for name, count in Counter(columns).items() if name and count > 1]:
             raise head.error(f"the column {quoted(twice[0])} is there twice")
-        return cls(path, head, columns, tuple(body), tuple(comments), ragged)
+        return cls(path, head, columns, tuple(body), tuple(comments), ragged, delimiter)
 
     def require(self, *columns: str) -> None:
         """Refuse a table without these columns.
@@ -169,14 +177,14 @@ class Table:
         """
         count = len(self.columns)
         for place in self.records:
-            found = cells(place)
+            found = cells(place, self.delimiter)
             if len(found) > count or (len(found) < count and not self.ragged):
                 raise place.error(f"there are {len(found)} cells under {count} columns")
-            yield Row(dict(zip(self.columns, found, strict=False)), place)
+            yield Row(dict(zip(self.columns, found, strict=False)), place, self.delimiter != ",")
 
 
-def cells(place: Place) -> list[str]:
-    """Split a record at its commas; quotation marks hold a cell together.
+def cells(place: Place, delimiter: str = ",") -> list[str]:
+    """Split a record at its commas, or another delimiter; quotation marks hold a cell together.
 
     Raises
     ------
@@ -187,7 +195,7 @@ def cells(place: Place) -> list[str]:
     if len(text) > LONGEST_RECORD:
         raise place.error(f"a record of {len(text)} characters; {LONGEST_RECORD} are the most")
     try:
-        return [cell.strip() for cell in next(csv.reader([text]))]
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter))]
     except csv.Error as error:
         raise place.error(f"cannot be split into cells: {error}") from None
 
