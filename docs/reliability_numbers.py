@@ -18,12 +18,13 @@ from tests.fuzz.page import machine, write_section  # noqa: E402  # found only n
 
 PAGE = Path(__file__).with_name("reliability.md")
 COMMANDS: dict[str, list[str]] = {
+    "growth": [sys.executable, "-m", "tests.fuzz.growth"],
     "fuzz": [sys.executable, "-m", "tests.fuzz", "--inputs", "1000000", "--seed", "12"],
     "blocks": [sys.executable, "-m", "tests.fuzz.dense", "--blocks", "8000", "--seed", "12"],
     "nist": ["cargo", "test", "--release", "--package", "photocore", "--test", "nist", "--", "--nocapture"],
     "stars": [sys.executable, "benches/star_nights.py", "30"],
 }
-OWN = ("fuzz", "blocks")
+OWN = ("fuzz", "blocks", "growth")
 """Commands that write their section themselves."""
 LONG = ("fuzz",)
 """Made anew only when named."""

@@ -11,15 +11,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_parts import OPTIONS
+from test_parts import OPTIONS, tied_block
 from test_streamed import project_of
 
 import photogram
 from photogram import adjust
 from photogram.adjustment.elsewhere import Division
+from photogram.distributed.core import CoreEngine
 from photogram.distributed.entrance import plan_in_parts
 from photogram.distributed.files import alone
-from photogram.distributed.run import partition
+from photogram.distributed.run import partition, read_node
 from photogram.distributed.running import fingerprint
 from photogram.distributed.tasks import shelf
 from photogram.distributed.workers import connected
@@ -176,3 +177,16 @@ def _listening(process):
     tables = [path.read_text().splitlines()[1:] for path in Path("/proc/net").glob("tcp*")]
     rows = [line.split() for table in tables for line in table]
     return [row[1].split(":")[0] for row in rows if row[3] == "0A" and row[9] in inodes]
+
+
+def test_unknowns_of_nodes_below_have_their_names_where_they_are_undetermined(tmp_path):
+    block = tied_block()
+    manifest = partition(block, tmp_path, 4, OPTIONS, fingerprint(block, OPTIONS))
+    parts = [read_node(tmp_path, manifest, node) for node in range(len(manifest.tree))]
+    larger = [each for each in parts if len(each.common) > len(each.block.unknowns)]
+    assert larger
+    for each in larger:
+        last = len(each.common) - 1
+        combination = ([], [], [last], [], [])
+        failure = CoreEngine().failure(tmp_path, each.node, ("undetermined photos", "", [combination], []))
+        assert f"moving {each.common[last].title}" in str(failure)

@@ -13,6 +13,10 @@ VALUES |= {"B1": 5.8e-6, "B2": -8.6e-6, "C1": -7e-5, "C2": -3e-5, "r0": 13.488}
 
 @pytest.fixture(scope="module")
 def block():
+    return block_of_tests()
+
+
+def block_of_tests():
     """Return a block of our own with such a camera, and a scale bar."""
     made = simulate(
         strips=2,
@@ -35,6 +39,11 @@ def block():
 @pytest.fixture
 def files(block, tmp_path):
     """Return the folder with the five files of the block."""
+    return write_files(block, tmp_path)
+
+
+def write_files(block, folder):
+    """Write the five files of a block."""
     v = VALUES
     lines = {
         "ior": [
@@ -69,8 +78,8 @@ def files(block, tmp_path):
         ],
     }
     for suffix, own in lines.items():
-        (tmp_path / f"job.{suffix}").write_text("\n".join(["# comment", *own]) + "\n")
-    return tmp_path
+        (folder / f"job.{suffix}").write_text("\n".join(["# comment", *own]) + "\n")
+    return folder
 
 
 def changed(files, suffix, old, new, count=1):

@@ -10,7 +10,8 @@ import pytest
 
 import photogram
 from photogram import InputError, formats
-from photogram.formats import additions
+from photogram.cli.options import default_out
+from photogram.formats import additions, crs
 from photogram.formats.xml_stream import LONGEST, MOST, read_stream, root_of
 from photogram.io.delimited import read_columns
 from photogram.network.directions import without_lenses
@@ -165,3 +166,29 @@ def test_a_camera_that_shows_everything_in_one_point_is_named():
 def test_a_similarity_of_extreme_coordinates_is_none():
     model = np.array([[0.0, 0.0, 0.0], [1e200, 0.0, 1.0], [0.0, 1e200, 0.0]])
     assert additions._similarity(model, model)[3] == np.inf
+
+
+def test_links_that_lead_nowhere_or_in_circles_are_named(tmp_path):
+    for name in ("one", "other"):
+        shutil.copytree(EXAMPLE, tmp_path / name)
+    (tmp_path / "one" / "more.csv").symlink_to("more.csv")
+    assert "tables of other names are not read: more.csv" in [
+        each.text for each in formats.read(tmp_path / "one").messages
+    ]
+    (tmp_path / "other" / "images.csv").unlink()
+    (tmp_path / "other" / "images.csv").symlink_to("images.csv")
+    with pytest.raises(InputError, match=r"has no table of images \(images\.csv\)"):
+        formats.read(tmp_path / "other")
+    (tmp_path / "loop").symlink_to("loop")
+    assert default_out(tmp_path / "loop", "-adjusted").name == "loop-adjusted"
+
+
+def test_spellings_of_systems_that_proj_would_like_to_drop_are_read_in_silence():
+    pytest.importorskip("pyproj")
+    assert crs.is_projected("+init=epsg:25832")
+
+
+@pytest.mark.parametrize("sd", [1e-200, 1e200])
+def test_deviations_whose_squares_are_no_numbers_are_refused(sd):
+    with pytest.raises(InputError, match="is not positive and finite"):
+        photogram.network.observations.Distance("a", "b", 1.0, sd)

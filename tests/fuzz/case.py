@@ -19,7 +19,7 @@ from .damage import damaged
 from .programs import PROGRAMS, Watch, unsound
 from .sound import SOUND, Files
 
-__all__ = ["ENDINGS", "Fuzzer", "Outcome", "kind_of"]
+__all__ = ["ENDINGS", "Fuzzer", "Outcome", "kind_of", "write_input"]
 
 ENDINGS = (
     "converged",
@@ -65,6 +65,17 @@ def kind_of(seed: int, number: int) -> tuple[str, Random]:
     return rng.choices(_FORMATS, _WEIGHTS)[0], rng
 
 
+def write_input(folder: Path, files: Files) -> None:
+    """Write the files of an input, and its links."""
+    for name, content in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if isinstance(content, str):
+            path.symlink_to(content)
+        else:
+            path.write_bytes(content)
+
+
 class Fuzzer:
     """Makes, runs and judges inputs in a directory.
 
@@ -99,8 +110,7 @@ class Fuzzer:
         kind, files, rng = self.input_of(number)
         source = self.place / "in"
         source.mkdir(parents=True)
-        for name, content in files.items():
-            (source / name).write_bytes(content)
+        write_input(source, files)
         # It stays in the programs: only where inputs are run, in a process of their own.
         self.watch = self.watch or Watch()
         self.watch.begin()
@@ -147,18 +157,20 @@ class Fuzzer:
     def _left(self, files: Files, ending: str, written: list[str] | None) -> str | None:
         """Look at the files: inputs are as they were; outputs are whole, or there are none."""
         source = self.place / "in"
-        names = set(os.listdir(source))
-        if names != set(files):
-            return f"the directory of the input holds {sorted(names)}"
-        for name, content in files.items():
-            if (source / name).read_bytes() != content:
-                return f"{name} was changed"
-        left = {
+        there = {
             str(Path(folder, name).relative_to(self.place))
-            for folder, _, inside in os.walk(self.place)
-            for name in inside
-            if not folder.startswith(str(source))
+            for folder, folders, inside in os.walk(self.place)
+            for name in (*inside, *(each for each in folders if os.path.islink(os.path.join(folder, each))))
         }
+        given = {f"in/{name}" for name in files}
+        left = {name for name in there if not name.startswith("in/")}
+        if there - left != given:
+            return f"the directory of the input holds {sorted(there - left)}"
+        for name, content in files.items():
+            path = source / name
+            found = os.readlink(path) if isinstance(content, str) else path.read_bytes()
+            if found != content:
+                return f"{name} was changed"
         if written is None:
             # What a deck gave before the set that stopped it is kept.
             kept = (

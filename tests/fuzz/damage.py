@@ -10,7 +10,8 @@ import zlib
 from collections.abc import Callable
 from random import Random
 
-from .sound import Files
+from .projects import Files
+from .structures import as_a_whole, damages_of, resealed
 
 __all__ = ["damaged"]
 
@@ -293,7 +294,7 @@ def _plus(rng: Random, text: str) -> str:
 
 
 TEXT_DAMAGES: tuple[tuple[Callable[[Text], None], int], ...] = (
-    (Text.number, 56),
+    (Text.number, 70),
     (Text.column, 10),
     (Text.exchange, 10),
     (Text.line, 9),
@@ -314,14 +315,17 @@ def damaged(rng: Random, files: Files) -> Files:
     result = dict(files)
     for _ in range(1 + (rng.random() < 0.4) + (rng.random() < 0.2) * rng.randrange(6)):
         name = rng.choice(list(result))
-        result[name] = (
-            _bytes_damaged(rng, result[name])
-            if rng.random() < 0.04
-            else _text_damaged(rng, name, result[name])
-        )
-    if rng.random() < 0.01:
-        del result[rng.choice(list(result))]
-    return result
+        content = result[name]
+        if isinstance(content, str):
+            continue
+        if rng.random() < 0.04:
+            result[name] = _bytes_damaged(rng, content)
+        else:
+            structured = damages_of(rng, name, content, changed)
+            result[name] = _text_damaged(rng, name, content) if structured is None else structured
+    if rng.random() < 0.02:
+        result = as_a_whole(rng, result)
+    return resealed(result) if "summary.json" in result and rng.random() < 0.7 else result
 
 
 def _text_damaged(rng: Random, name: str, content: bytes) -> bytes:

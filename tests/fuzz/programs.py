@@ -28,6 +28,8 @@ from photogram.cli import (
 from photogram.cli.console import errors, output
 from photogram.cli.options import OrderingName
 
+from .projects import PROJECTS, project_run
+
 __all__ = ["PROGRAMS", "Watch"]
 
 PAGES = 0.0
@@ -42,6 +44,8 @@ class Watch:
 
     COMPUTATIONS = (
         ("photogram", "adjust"),
+        ("photogram", "adjust_started"),
+        ("photogram", "snoop"),
         ("photogram", "orient"),
         ("photogram.giant", "check"),
         ("photogram.collection", "adjust"),
@@ -277,19 +281,20 @@ PROGRAMS: dict[str, tuple[Run, int]] = {
     "GIANT project": (_giant, 8),
     "GIANT project, check": (_check, 2),
     "BAL collection": (_collection, 20),
-    "Bundle file": (_collection, 20),
+    "Bundle file": (_collection, 6),
     "orientation: stations": (_orientation, 40),
     "orientation: transform": (_transform, 30),
     "perspective-center deck": (_perspective, 14),
     "comparator: tables": (_tables, 2),
     "comparator: cards": (_cards, 2),
-    "comparator: correction": (_correct, 66),
+    "comparator: correction": (_correct, 16),
     "stellar camera: plain form": (_plate("input.toml"), 1),
     "stellar camera: deck": (_plate("input.deck"), 2),
     "exposures": (_exposures, 1),
     "simulate": (_simulate, 4),
 }
-"""How each program is run, and how often among 192 inputs: what is quick is tried more often."""
+PROGRAMS |= {f"project: {name}": (project_run(main), often) for name, (main, often) in PROJECTS.items()}
+"""How each program is run, and how often among all inputs: what is quick is tried more often."""
 
 
 def unsound(result: Any) -> str | None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from shutil import rmtree
 from tempfile import TemporaryDirectory
 
-from .case import Fuzzer, Outcome, kind_of
+from .case import Fuzzer, Outcome, kind_of, write_input
 
 __all__ = ["Figures", "fuzz", "replay"]
 
@@ -24,8 +24,8 @@ CPU_SECONDS = 20
 """Of one input; more is a hang."""
 WALL_SECONDS = 900
 """Of one input, for waits that use no processor."""
-MEMORY = 5 << 30
-"""Address space of a worker, bytes; pyarrow reserves more than one GiB of it where pandas finds it."""
+MEMORY = 8 << 30
+"""Address space of a worker, bytes; pyarrow and the libraries of pyproj reserve several GiB of it."""
 TOLD = 60.0
 """Seconds between two lines about the progress of a run."""
 IN_MEMORY = "/dev/shm"
@@ -136,8 +136,7 @@ def replay(seed: int, number: int, keep: Path | None = None) -> Outcome:
         fuzzer = Fuzzer(seed, Path(folder) / "case")
         if keep is not None:
             keep.mkdir(parents=True, exist_ok=True)
-            for name, content in fuzzer.input_of(number)[1].items():
-                (keep / name).write_bytes(content)
+            write_input(keep, fuzzer.input_of(number)[1])
         return fuzzer.run(number)
 
 

@@ -7,6 +7,7 @@ import gzip
 import json
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,10 +27,10 @@ from photogram.stellar.night import calibrate_night
 from photogram.stellar.night_file import read_night
 from photogram.stellar.plain import read_plain
 
+from .projects import PROJECTS, Files, sound_projects
+
 __all__ = ["SOUND", "Files"]
 
-Files = dict[str, bytes]
-"""Contents by name, of one input."""
 EXAMPLES = Path(str(files("photogram") / "examples"))
 STELLAR_TESTS = Path(__file__).parents[1] / "stellar"
 
@@ -247,4 +248,5 @@ SOUND: dict[str, Callable[[], list[Files]]] = {
     "exposures": night,
     "simulate": options,
 }
+SOUND |= {f"project: {name}": partial(sound_projects, name) for name in PROJECTS}
 """How the sound inputs of each format are made."""

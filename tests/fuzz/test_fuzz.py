@@ -17,7 +17,7 @@ from fuzz.programs import PROGRAMS
 from fuzz.sound import SOUND
 
 ROOT = Path(__file__).parents[2]
-INPUTS = 2500
+INPUTS = 1500
 
 
 def test_damaged_inputs_end_in_good_order(tmp_path):
@@ -36,8 +36,8 @@ def test_damaged_inputs_end_in_good_order(tmp_path):
     assert ended.returncode == 0, ended.stdout + ended.stderr
     outcomes = [json.loads(line)[0] for line in (tmp_path / "0.log").read_text().splitlines()]
     assert len(outcomes) == INPUTS
-    # Half of a million do, give or take 2 % of so many.
-    assert sum(outcome.get("reached", False) for outcome in outcomes) > 0.48 * INPUTS
+    # Half of a million do, give or take 4 % of so few.
+    assert sum(outcome.get("reached", False) for outcome in outcomes) > 0.46 * INPUTS
     assert {outcome["format"] for outcome in outcomes} == set(SOUND)
     assert {outcome["ending"] for outcome in outcomes} == set(ENDINGS) - {"failed"}
 
@@ -60,7 +60,8 @@ while wanted:
     if kind in wanted:
         outcome = fuzzer.run(number)
         assert outcome.fault is None, outcome
-        # Options are drawn by lot: not every method can start everywhere. A check may find something.
+        # Options are drawn by lot: not every method can start everywhere. A check may find something, and
+        # what is refused may be meant so.
         if outcome.ending == "converged" or kind == "GIANT project, check":
             assert outcome.reached, outcome
             wanted.discard(kind)

@@ -215,9 +215,12 @@ def _is_covariance(matrix: Floats) -> bool:
     if not (np.isfinite(matrix).all() and (variances >= 0).all()):
         return False
     unit = np.sqrt(np.where(variances > 0, variances, 1.0))
-    correlations = matrix / unit / unit[:, np.newaxis]
+    with np.errstate(over="ignore", invalid="ignore"):
+        correlations = matrix / unit / unit[:, np.newaxis]
+        asymmetry = np.abs(correlations - correlations.T).max()
     return bool(
-        np.abs(correlations - correlations.T).max() < INDEFINITE
+        asymmetry < INDEFINITE
+        and np.isfinite(correlations).all()
         and np.linalg.eigvalsh(correlations)[0] > -INDEFINITE
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from os import PathLike
@@ -33,6 +33,7 @@ from photogram.network.datum import (
     minimum_row,
 )
 from photogram.network.refracted import check_cameras, remarks
+from photogram.network.unknowns import Unknown
 from photogram.results.datum import datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
 from photogram.results.result import Result
@@ -419,8 +420,10 @@ def named(
     message: str,
     combinations: list[_photocore.CombinationRow],
     points: list[int],
+    *,
+    unknowns: Sequence[Unknown] | None = None,
 ) -> AdjustmentError:
-    """Put names to the indices of a failure of the core."""
+    """Put names to the indices of a failure of the core; `unknowns` where it has others than the block."""
     point_names = [block.point_ids[i] for i in points]
     if kind == "undetermined points":
         seen = sorted({int(p) for p in block.image_photos[np.isin(block.image_points, points)]})
@@ -429,7 +432,7 @@ def named(
         text += one_place(block, seen)
         return RankError(text, photo_names, point_names)
     if kind == "undetermined photos":
-        return undetermined_combinations(block, combinations)
+        return undetermined_combinations(block, combinations, unknowns)
     if kind == "no intersection":
         return RankError(f"point {point_names[0]}: its rays do not intersect", [], point_names)
     if kind == "coarse":

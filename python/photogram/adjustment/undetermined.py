@@ -12,6 +12,7 @@ from photogram.errors import RankError
 from photogram.messages import listed
 from photogram.network.block import Block
 from photogram.network.geometry import rotation_matrix, viewing_directions
+from photogram.network.unknowns import Unknown
 
 if TYPE_CHECKING:
     from photogram import _photocore
@@ -116,8 +117,16 @@ def one_place(block: Block, photos: Sequence[int]) -> str:
     )
 
 
-def undetermined_combinations(block: Block, combinations: list[_photocore.CombinationRow]) -> RankError:
-    """Name the photos, points and cameras of undetermined combinations, and what they are."""
+def undetermined_combinations(
+    block: Block,
+    combinations: list[_photocore.CombinationRow],
+    unknowns: Sequence[Unknown] | None = None,
+) -> RankError:
+    """Name the photos, points and cameras of undetermined combinations, and what they are.
+
+    `unknowns` are the common ones that the combinations count, where they are not those of the block alone.
+    """
+    common = unknowns or block.unknowns
     rows = [
         (tuple(of), tuple(by), tuple(others), tuple(moved), tuple(poses))
         for of, by, others, moved, poses in combinations
@@ -130,8 +139,11 @@ def undetermined_combinations(block: Block, combinations: list[_photocore.Combin
     point_names = [block.point_ids[point] for point in points]
     lines = [f"the observations leave {len(rows)} combinations of unknowns undetermined:"]
     at = setting_of(block)
-    words = [_said(block, each, at) for each in sorted(set(rows))]
-    moving = [_moved(block, *each[:3]) for each in sorted(set(rows))]
+    words = [_said(block, each, at, common) for each in sorted(set(rows))]
+    moving = [
+        _moved(block, of, by, [common[row].title for row in others])
+        for of, by, others, *_ in sorted(set(rows))
+    ]
     for each, said, moved in zip(sorted(set(rows)), words, moving, strict=True):
         lines.append(f"  {rows.count(each)} moving {moved}")
         if said:
@@ -148,10 +160,10 @@ def undetermined_combinations(block: Block, combinations: list[_photocore.Combin
     return RankError("\n".join(lines), names, point_names, camera_names, what)
 
 
-def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unknowns: tuple[int, ...]) -> str:
+def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unknowns: list[str]) -> str:
     """Say which photos, cameras and common unknowns a combination moves."""
     of_cameras = listed([block.camera_names[camera] for camera in cameras])
-    others = listed([block.unknowns[row].title for row in unknowns])
+    others = listed(unknowns)
     if not photos:
         parts = [f"the parameters of {of_cameras}"] if cameras else []
         return " and ".join([*parts, *([others] if unknowns else [])])
@@ -169,11 +181,11 @@ def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unkn
     return f"{moved}, which {held}"
 
 
-def _said(block: Block, combination: _Combination, at: Setting) -> str:
+def _said(block: Block, combination: _Combination, at: Setting, common: Sequence[Unknown]) -> str:
     """Name parameters and parts of poses, then what that is; nothing where it has no name."""
     photos, cameras, others, moved, poses = combination
     if not moved:
-        return "" if cameras else _of_unknowns({block.unknowns[row].KIND for row in others}, len(photos), at)
+        return "" if cameras else _of_unknowns({common[row].KIND for row in others}, len(photos), at)
     by_camera: dict[int, list[str]] = {}
     for camera, k in moved:
         by_camera.setdefault(camera, []).append(block.cameras[camera].names[k])

@@ -202,6 +202,6 @@ def default_out(source: Path, ending: str) -> Path:
 
     It is beside the input, or, as published data are often read-only, else where the command is given.
     """
-    place = source.resolve()
+    place = Path(os.path.realpath(source))
     parent = place.parent if os.access(place.parent, os.W_OK) else Path()
     return parent / f"{place.name if place.is_dir() else place.stem}{ending}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -165,7 +166,7 @@ def _adjusted(projects: list[Path]) -> dict[str, Block]:
 
 def _names(projects: list[Path]) -> dict[str, Path]:
     """Name projects by the last part of their paths, or the whole where two have the same."""
-    places = [directory.resolve() for directory in projects]
+    places = [Path(os.path.realpath(directory)) for directory in projects]
     if len(set(places)) < len(places):
         raise typer.BadParameter("the same project twice", param_hint="DIR")
     short = len({place.name for place in places}) == len(places)

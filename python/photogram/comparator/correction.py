@@ -350,7 +350,9 @@ def _is_covariance(matrix: Floats) -> bool:
     if (variances < 0).any() or matrix[~known].any():
         return False
     scale = np.sqrt(variances[known])
-    correlations = matrix[np.ix_(known, known)] / scale / scale[:, np.newaxis]
-    if np.abs(correlations - correlations.T).max(initial=0.0) > ROUNDING:
+    with np.errstate(over="ignore", invalid="ignore"):
+        correlations = matrix[np.ix_(known, known)] / scale / scale[:, np.newaxis]
+        asymmetry = np.abs(correlations - correlations.T).max(initial=0.0)
+    if not asymmetry <= ROUNDING or not np.isfinite(correlations).all():
         return False
     return bool(np.linalg.eigvalsh(correlations).min(initial=0.0) > -ROUNDING)

@@ -57,7 +57,7 @@ class CoreEngine:
         try:
             return network.node(local(manifest.outer[number]), children, middle=manifest.middle, threads=0)
         except _photocore.BlockError as error:
-            raise named(part.block, *error.args) from None
+            raise named(part.block, *error.args, unknowns=part.common) from None
 
     def stations(self, run: Path, number: int) -> int:
         """Return how many weighted unknowns of photos and cameras are at home in a node."""
@@ -65,7 +65,8 @@ class CoreEngine:
 
     def failure(self, run: Path, number: int, undetermined: Any) -> Exception:
         """Return what a node leaves undetermined as an error, with names."""
-        return named(read_node(run, read_manifest(run), number).block, *undetermined)
+        part = read_node(run, read_manifest(run), number)
+        return named(part.block, *undetermined, unknowns=part.common)
 
     def keep(self, run: Path, number: int, solution: BlockSolution, variance: float | None) -> None:
         """Write the result of a node as a folder that :func:`photogram.read_result` reads."""

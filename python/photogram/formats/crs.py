@@ -7,6 +7,7 @@ A topocentric frame has its axes to the east, north and up of the ellipsoid of W
 from __future__ import annotations
 
 import re
+import warnings
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -51,7 +52,9 @@ def _system(crs: str) -> pyproj.CRS:
     import pyproj
 
     try:
-        return pyproj.CRS.from_user_input(without_geoid(crs))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FutureWarning)  # of spellings that PROJ would like to drop
+            return pyproj.CRS.from_user_input(without_geoid(crs))
     except pyproj.exceptions.CRSError as error:
         raise InputError(f"{crs!r} is no coordinate reference system that PROJ knows: {error}") from None
 

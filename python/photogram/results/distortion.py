@@ -101,7 +101,8 @@ def largest_radius(result: Result, camera: AdjustedCamera) -> float:
     if _is_backward(camera.camera):
         return float(np.hypot(*(xy - _principal_point(camera.camera)).T).max())
     rays = camera.camera.rays(xy)
-    return camera.camera.scale * float(np.nanmax(_ideal(camera.camera, rays)))
+    ideal = _ideal(camera.camera, rays)
+    return camera.camera.scale * float(np.max(ideal[np.isfinite(ideal)], initial=0.0))
 
 
 def distortion_curve(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 import re
 import tomllib
 from collections.abc import Mapping
@@ -347,11 +348,11 @@ class _File:
 
 def unread_tables(settings: Settings) -> list[Message]:
     """Return a remark on tables beside the settings that no table is called, with the nearest names."""
-    used = {path.resolve() for path in settings.tables.values()}
+    used = {os.path.realpath(path) for path in settings.tables.values()}
     others = [
         path
         for path in sorted(settings.path.parent.iterdir())
-        if path.suffix in ENDINGS and path.suffix != ".txt" and path.resolve() not in used
+        if path.suffix in ENDINGS and path.suffix != ".txt" and os.path.realpath(path) not in used
     ]
     if not others:
         return []

@@ -154,8 +154,9 @@ class Observation:
         covariance: ArrayLike | None = getattr(self, "covariance", None)
         if sd is not None and covariance is None:
             deviations = shaped(f"sd of {self.name}", sd, (r,), missing=True)
-            own = deviations[use]
-            if not ((own > 0) & np.isfinite(own)).all():
+            with np.errstate(over="ignore", under="ignore"):
+                own = deviations[use] ** 2
+            if not ((deviations[use] > 0) & (own > 0) & np.isfinite(own)).all():
                 raise InputError(f"sd of {self.name} is not positive and finite: {deviations.tolist()}")
             return np.asarray(np.diag(np.where(use, deviations, 1.0) ** 2))
         if sd is not None or covariance is None:
