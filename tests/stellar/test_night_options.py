@@ -1,6 +1,7 @@
 """Options of `photogram stellar-camera exposures`: they count instead of the file, and are reported."""
 
 import json
+import re
 from dataclasses import fields
 
 import numpy as np
@@ -86,6 +87,29 @@ def test_neither_attitudes_nor_field_of_view(folder):
     text, _ = run(folder, "--blind", "25", "50")
     assert "in the whole sky, with a field of view between 25 and 50 degrees" in line(text, "first attitudes")
     assert line(text, "exposures, of those given") == "5 of 5"
+
+
+def test_longitude_to_the_east_azimuth_from_north_and_hectopascals(folder):
+    file = folder / "night.toml"
+    text, before = file.read_text(), read_night(file)
+    for old, factor, new in (
+        ("longitude_west_deg", lambda each: -each, "longitude_east_deg"),
+        ("pressure_mmHg", lambda each: each * 1013.25 / 760.0, "pressure_hPa"),
+        ("azimuth_deg", lambda each: (each + 180.0) % 360.0, "azimuth_north_deg"),
+    ):
+        said = re.compile(rf"^{old} = (\S+)", re.MULTILINE)
+        assert said.search(text)
+        text = said.sub(lambda found, f=factor, n=new: f"{n} = {f(float(found[1]))!r}", text)
+    file.write_text(text)
+    after = read_night(file)
+    assert after.site.longitude_west == pytest.approx(before.site.longitude_west, rel=1e-15)
+    assert after.site.air.pressure == pytest.approx(before.site.air.pressure, rel=1e-14)
+    for one, other in zip(before.exposures, after.exposures, strict=True):
+        turns = (np.exp(1j * each.attitude) for each in (one, other))
+        np.testing.assert_allclose(*turns, rtol=0, atol=1e-12)
+    file.write_text(text.replace("longitude_east_deg", "longitude_west_deg = 8.0\nlongitude_east_deg"))
+    with pytest.raises(InputError, match="says what longitude_west_deg says"):
+        read_night(file)
 
 
 def test_rolls_that_are_not_to_be_relied_on(folder):

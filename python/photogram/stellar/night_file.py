@@ -60,7 +60,10 @@ _TABLES = {
         "confirmed",
         "blind_field_deg",
     ),
-    "exposures": ("name", "utc", "azimuth_deg", "elevation_deg", "roll_deg", "alpha", "omega", "kappa"),
+    "exposures": (
+        *("name", "utc", "azimuth_north_deg", "azimuth_deg", "elevation_deg", "roll_deg"),
+        *("alpha", "omega", "kappa"),
+    ),
 }
 
 
@@ -277,11 +280,13 @@ def _star(row: Row, index: dict[str, int]) -> int:
 
 
 def _attitude(table: Table) -> Floats:
-    """Take alpha, omega, kappa in grads, or azimuth (from south), elevation, roll in degrees."""
+    """Take alpha, omega, kappa in grads, or azimuth (from north or south), elevation, roll in degrees."""
     if "alpha" in table:
         return GRAD * np.array([table.number(name) for name in ("alpha", "omega", "kappa")])
+    north = table.says("azimuth_north_deg", "azimuth_deg")
+    azimuth = table.number("azimuth_north_deg" if north else "azimuth_deg", low=-360, high=360)
     return attitude_of(
-        math.radians(table.number("azimuth_deg", low=-360, high=360)),
+        math.radians(azimuth - 180.0 if north else azimuth),
         math.radians(table.number("elevation_deg", low=-90, high=90)),
         math.radians(table.number("roll_deg", 0.0, low=-360, high=360)),
     )

@@ -17,7 +17,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.show.angles import ARCSEC
 
-__all__ = ["ABERRATION", "TAU", "Air", "Effects", "Site", "refraction"]
+__all__ = ["ABERRATION", "HECTOPASCAL", "TAU", "Air", "Effects", "Site", "refraction"]
 
 
 TAU: tuple[float, float, float, float] = (1050.6103, 706.11502, 262.06086, 142.67293)
@@ -30,7 +30,8 @@ TEMPERATURES = (150.0, 350.0)
 """Air on the ground in kelvin: -123 to 77 degrees Celsius."""
 HIGHEST_PRESSURE = 850.0
 """Millimetres of mercury; 840 at the Dead Sea in a strong anticyclone."""
-_HECTOPASCAL = 1013.25 / 760.0
+HECTOPASCAL = 1013.25 / 760.0
+"""Of a millimetre of mercury."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ class Air:
             )
         if not 0 <= self.pressure <= HIGHEST_PRESSURE:
             hint = ""
-            if HIGHEST_PRESSURE < self.pressure <= HIGHEST_PRESSURE * _HECTOPASCAL:
-                hint = f"; {self.pressure:g} hPa are {self.pressure / _HECTOPASCAL:.1f}"
+            if HIGHEST_PRESSURE < self.pressure <= HIGHEST_PRESSURE * HECTOPASCAL:
+                hint = f"; {self.pressure:g} hPa are {self.pressure / HECTOPASCAL:.1f}"
             raise InputError(
                 f"the pressure is {self.pressure:g} mm of mercury; it must be between 0 and"
                 f" {HIGHEST_PRESSURE:g}{hint}"

@@ -14,15 +14,17 @@ from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.messages import listed
 from photogram.show.angles import ARCSEC
-from photogram.stellar.sky import ABERRATION, Air, Effects, Site
+from photogram.stellar.sky import ABERRATION, HECTOPASCAL, Air, Effects, Site
 
 __all__ = ["Document", "Table", "effects", "pole_arcsec", "read_document", "site"]
 
 _STATION = {
     "latitude_deg",
+    "longitude_east_deg",
     "longitude_west_deg",
     "elevation_m",
     "temperature_K",
+    "pressure_hPa",
     "pressure_mmHg",
     "aberration_arcsec",
     "number",
@@ -85,6 +87,18 @@ class Table:
         if not low <= found <= high:
             raise self.error(key, f"is {found:g}; it must be {_range(low, high)}")
         return found
+
+    def says(self, today: str, report: str) -> bool:
+        """Return whether the table has a value in the units of today; else it may have it in the report's.
+
+        Raises
+        ------
+        InputError
+            It has both.
+        """
+        if today in self and report in self:
+            raise self.error(today, f"says what {report} says: one of them is enough")
+        return today in self
 
     def positive(self, key: str, default: float | None = None) -> float:
         """Return a finite number above zero; errors are those of `number`."""
@@ -368,14 +382,22 @@ def site(table: Table) -> Site:
     latitude = table.number("latitude_deg")
     if not abs(latitude) <= 90:
         raise table.error("latitude_deg", f"is {latitude:g}; it is not between -90 and 90 degrees")
-    temperature, pressure = table.number("temperature_K", 273.15), table.number("pressure_mmHg", 760.0)
+    temperature = table.number("temperature_K", 273.15)
+    if table.says("pressure_hPa", "pressure_mmHg"):
+        pressure = table.number("pressure_hPa") / HECTOPASCAL
+    else:
+        pressure = table.number("pressure_mmHg", 760.0)
+    if table.says("longitude_east_deg", "longitude_west_deg"):
+        west = -table.number("longitude_east_deg", low=-360, high=360)
+    else:
+        west = table.number("longitude_west_deg", 0.0, low=-360, high=360)
     try:
         air = Air(temperature, pressure)
     except InputError as error:
         raise InputError(f"[{table.name}] {error.message}", file=table.file) from None
     return Site(
         latitude=math.radians(latitude),
-        longitude_west=math.radians(table.number("longitude_west_deg", 0.0, low=-360, high=360)),
+        longitude_west=math.radians(west),
         elevation=table.number("elevation_m", 0.0, low=-500, high=100_000),
         air=air,
         aberration=table.number("aberration_arcsec", low=0, high=1) * ARCSEC
