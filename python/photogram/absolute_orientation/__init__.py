@@ -11,6 +11,7 @@ from photogram.absolute_orientation import (  # noqa: F401  (the ways to show a 
 from photogram.absolute_orientation.adjust import orient
 from photogram.absolute_orientation.cards import read_cards
 from photogram.absolute_orientation.csv_files import read_csv
+from photogram.absolute_orientation.models import Model, Strip, relative_model, strip_of
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
@@ -18,12 +19,16 @@ from photogram.absolute_orientation.stream import transform_file
 from photogram.arguments.annotations import check_arguments
 
 __all__ = [
+    "Model",
     "Orientation",
     "Similarity",
     "Stations",
+    "Strip",
     "orient",
     "read_cards",
     "read_csv",
+    "relative_model",
+    "strip_of",
     "transform_file",
 ]
 

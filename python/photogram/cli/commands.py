@@ -23,6 +23,7 @@ from photogram.cli import (
     new,
     perspective_center,
     plan,
+    relative_orientation,
     simulate,
     stellar_camera,
 )
@@ -62,6 +63,7 @@ orientation_app = typer.Typer(
 )
 orientation_app.command("orient", cls=Command)(absolute_orientation.absolute_orientation)
 orientation_app.command("transform", cls=Command)(absolute_orientation.transform)
+orientation_app.command("relative", cls=Command)(relative_orientation.relative)
 stellar_app = typer.Typer(
     name="stellar-camera",
     cls=GroupWithMain,

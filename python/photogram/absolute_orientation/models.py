@@ -1,0 +1,178 @@
+"""Models before their absolute orientation: pairs of photos oriented relatively, and joined to strips.
+
+A model is a network of two photos in a minimum datum, a strip a chain of similarities between models: both
+are what the engine and `orient` do already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from photogram.absolute_orientation.adjust import orient
+from photogram.absolute_orientation.stations import Stations
+from photogram.adjustment.adjustment import adjust
+from photogram.adjustment.first_values import first_values
+from photogram.arguments.types import Floats
+from photogram.errors import InputError, RankError
+from photogram.network.block import Block
+from photogram.network.chosen import kept_images, of_photos
+from photogram.network.datum import MinimumConstraints
+from photogram.results.result import Result
+
+__all__ = ["Model", "Strip", "relative_model", "strip_of"]
+
+LEAST = 5
+"""Points that determine the relative orientation of two photos."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Two photos oriented relatively.
+
+    Attributes
+    ----------
+    ids
+        Of its n places: points, then the projection centres, by the names of their photos in brackets.
+    positions
+        (n, 3) in axes of its own, from the first projection centre; the second is at the distance 1.
+    result
+        The adjustment of the two photos in a minimum datum, with residuals and tests.
+    """
+
+    ids: tuple[str, ...]
+    positions: Floats
+    result: Result
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """Models joined by similarities, in the units and axes of the first.
+
+    Attributes
+    ----------
+    ids, positions
+        As of a model; places of several models have their mean.
+    models
+        What was joined.
+    rms
+        Of each joint after the first model: root mean square of the differences of common places, in units of
+        the strip.
+    """
+
+    ids: tuple[str, ...]
+    positions: Floats
+    models: tuple[Model, ...]
+    rms: tuple[float, ...]
+
+    @property
+    def converged(self) -> bool:
+        """Whether all models have."""
+        return all(each.result.converged for each in self.models)
+
+    @property
+    def unchecked(self) -> list[str]:
+        """Models that nothing checks: five points leave no degrees of freedom."""
+        return [
+            " ".join(each.result.block.photo_ids)
+            for each in self.models
+            if not each.result.degrees_of_freedom
+        ]
+
+
+def relative_model(block: Block, first: str, second: str) -> Model:
+    """Orient two photos of a block relatively: their common points alone, in a minimum datum.
+
+    Raises
+    ------
+    InputError
+        Photos that are not there; geographic space.
+    RankError
+        Fewer than five common points.
+    AdjustmentError
+        The adjustment gave nothing finite.
+    """
+    missing = [name for name in (first, second) if name not in block.photo_ids]
+    if missing or first == second:
+        raise InputError(f"a model has two photos of the block: {missing[0] if missing else first}")
+    if block.geographic:
+        raise InputError("a model is cartesian: geographic coordinates have no place there")
+    pair = of_photos(block, np.isin(np.array(block.photo_ids, dtype=object), [first, second]))
+    twice = np.bincount(pair.image_points, minlength=len(pair.point_ids)) == 2
+    if np.count_nonzero(twice) < LEAST:
+        text = (
+            f"photos {first} and {second} have {np.count_nonzero(twice)} common points, not {LEAST} or more"
+        )
+        raise RankError(text, [first, second], [])
+    rows = np.flatnonzero(twice)
+    number = np.cumsum(twice) - 1
+    pair = kept_images(pair, twice[pair.image_points])
+    free = np.full((len(rows), 3), np.inf)
+    pair = pair.replace(
+        point_ids=[block.point_ids[row] for row in rows.tolist()],
+        point_positions=np.full((len(rows), 3), np.nan),
+        point_sd=free,
+        image_points=number[pair.image_points],
+        observations=(),
+        mounts=(),
+        photo_positions=np.full((2, 3), np.nan),
+        photo_attitudes=np.full((2, 3), np.nan),
+        photo_positions_observed=None,
+        photo_attitudes_observed=None,
+        photo_position_sd=np.inf,
+        photo_attitude_sd=np.inf,
+        refraction=None,
+    )
+    result = adjust(first_values(pair).usable(), datum=MinimumConstraints())
+    centres, own = result.photo_positions, result.block
+    base = np.linalg.norm(centres[1] - centres[0])
+    places = np.vstack([result.point_positions, centres])
+    start = own.photo_ids.index(first)
+    ids = [*own.point_ids, *(f"[{name}]" for name in own.photo_ids)]
+    # What first values set aside has no place.
+    rows = np.flatnonzero(np.isfinite(places).all(axis=1))
+    return Model(tuple(ids[row] for row in rows.tolist()), (places[rows] - centres[start]) / base, result)
+
+
+def strip_of(block: Block, photos: Sequence[str]) -> Strip:
+    """Form the models of neighbouring photos, and join each to those before by a similarity.
+
+    Parameters
+    ----------
+    block
+        The block; its control, its poses and what was observed beside images take no part.
+    photos
+        Names in the order of the strip, two at least.
+
+    Raises
+    ------
+    InputError
+        Fewer than two photos, or what :func:`relative_model` refuses.
+    RankError
+        Models that have too few places in common, or all of them on a line.
+    """
+    if len(photos) < 2:
+        raise InputError("a strip has two photos at least")
+    models = [relative_model(block, *pair) for pair in pairwise(photos)]
+    places = dict(zip(models[0].ids, models[0].positions, strict=True))
+    counts = dict.fromkeys(places, 1)
+    rms: list[float] = []
+    for model, name in zip(models[1:], photos[1:], strict=False):
+        rows = [row for row, place in enumerate(model.ids) if place in places]
+        common = [model.ids[row] for row in rows]
+        ground = np.array([places[each] for each in common]).reshape(-1, 3)
+        try:
+            found = orient(Stations(common, ground, model.positions[rows].reshape(-1, 3)))
+        except RankError as error:
+            raise RankError(
+                f"the model after photo {name} cannot be joined: {error}", [name], common
+            ) from None
+        carried = found.similarity.transform(model.positions)[0]
+        rms.append(found.rms / found.similarity.scale)
+        for place, position in zip(model.ids, carried, strict=True):
+            count = counts[place] = counts.get(place, 0) + 1
+            places[place] = position if count == 1 else places[place] + (position - places[place]) / count
+    return Strip(tuple(places), np.array(list(places.values())), tuple(models), tuple(rms))
