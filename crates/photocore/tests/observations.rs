@@ -712,16 +712,22 @@ fn every_kind_agrees_with_dense_algebra() {
     };
     for (i, common) in solution.commons.iter().enumerate() {
         let kind = network.commons[i].kind;
-        let mut r = Vector3::zeros();
-        for (k, &(_, component, _)) in kind.unknowns().iter().enumerate().filter(|(_, own)| own.1 > 2) {
-            r[component - 3] = common.change[k];
+        let (mut offset, mut r) = (Vector3::zeros(), Vector3::zeros());
+        for (&(_, component, _), &change) in kind.unknowns().iter().zip(&common.change) {
+            match component.checked_sub(3) {
+                Some(turn) => r[turn] = change,
+                None => offset[component] = change,
+            }
         }
+        // Offsets of lines and planes are along axes that turn.
+        let turning = matches!(kind, CommonKind::Line | CommonKind::Plane);
         let turns = geometry::angle_axis_with_jacobian(&r).1.transpose();
         let mut steps = nalgebra::DMatrix::zeros(common.change.len(), x.len());
         for (row, &(_, component, _)) in kind.unknowns().iter().enumerate() {
             for (column, &(_, by, _)) in kind.unknowns().iter().enumerate() {
                 let step = match (component.checked_sub(3), by.checked_sub(3)) {
                     (Some(turn), Some(by)) => turns[(turn, by)],
+                    (None, Some(by)) if turning => turns.column(by).cross(&offset)[component],
                     _ => f64::from(u8::from(row == column)),
                 };
                 steps[(row, dense.first(i) + column)] = step;
