@@ -336,8 +336,8 @@ def test_units_and_conventions_of_the_document(result, document):
     units, conventions = document["units"], document["conventions"]
     assert set(units) == {
         "position", "position_covariance", "attitude", "attitude_covariance", "covariance", "residual_mm",
-        "difference", "operations", "seconds", "water_level", "position_residual", "position_sd",
-        "attitude_residual_rad", "attitude_sd_rad",
+        "difference", "operations", "seconds", "water_level", "position_difference", "position_sd",
+        "attitude_difference_rad", "attitude_sd_rad",
     }  # fmt: skip
     assert units["residual_mm"] == "mm"
     assert units["attitude"] == "rad"

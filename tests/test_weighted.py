@@ -285,17 +285,15 @@ def test_tables_of_stations_and_control(result):
     stations, control = result.station_table(), result.control_table()
     assert stations["photo"].tolist() == result.block.photo_ids
     degrees = 180 / math.pi
-    np.testing.assert_allclose(
-        stations["residual_kappa_deg"], result.photo_residuals[:, 5] * degrees, rtol=1e-12
-    )
+    np.testing.assert_allclose(stations["d_kappa_deg"], -result.photo_residuals[:, 5] * degrees, rtol=1e-12)
     np.testing.assert_array_equal(stations["redundancy_kappa"], result.photo_redundancy[:, 5])
-    np.testing.assert_array_equal(stations["standardized_kappa"], result.photo_standardized[:, 5])
+    np.testing.assert_array_equal(stations["standardized_kappa"], -result.photo_standardized[:, 5])
     axis = "height" if result.block.geographic else "Z"
     held = np.isfinite(result.block.point_sd).any(axis=1)
     assert control["point"].tolist() == np.array(result.block.point_ids)[held].tolist()
-    np.testing.assert_array_equal(control[f"residual_{axis}"], result.point_residuals[held, 2])
+    np.testing.assert_array_equal(control[f"d_{axis}"], -result.point_residuals[held, 2])
     np.testing.assert_array_equal(control[f"sd_{axis}"], result.block.point_sd[held, 2])
-    np.testing.assert_array_equal(control[f"standardized_{axis}"], result.point_standardized[held, 2])
+    np.testing.assert_array_equal(control[f"standardized_{axis}"], -result.point_standardized[held, 2])
 
 
 def test_document_of_stations_and_control(result):
@@ -303,9 +301,9 @@ def test_document_of_stations_and_control(result):
     stations, control = document["stations"], document["control"]
     assert [station["id"] for station in stations] == result.block.photo_ids
     for member, values in {
-        "attitude_residual_rad": result.photo_residuals[:, 3:],
+        "attitude_difference_rad": -result.photo_residuals[:, 3:],
         "redundancy": result.photo_redundancy,
-        "standardized": result.photo_standardized,
+        "standardized": -result.photo_standardized,
     }.items():
         found = np.array([station[member] for station in stations], dtype=float)
         np.testing.assert_array_equal(found, values)
@@ -313,8 +311,8 @@ def test_document_of_stations_and_control(result):
     assert stations[1]["attitude_sd_rad"] == [None, None, None]
     scale = [180 / math.pi, 180 / math.pi, 1.0] if result.block.geographic else [1.0] * 3
     held = np.isfinite(result.block.point_sd).any(axis=1)
-    found = np.array([point["position_residual"] for point in control], dtype=float)
-    np.testing.assert_allclose(found, result.point_residuals[held] * scale, rtol=1e-12)
+    found = np.array([point["position_difference"] for point in control], dtype=float)
+    np.testing.assert_allclose(found, -result.point_residuals[held] * scale, rtol=1e-12)
 
 
 def test_report_of_stations_and_control(result):
@@ -327,7 +325,7 @@ def test_report_of_stations_and_control(result):
         [float(value) for value in lines["redundancy"][3:]], result.photo_redundancy[0, 3:], atol=6e-4
     )
     np.testing.assert_allclose(
-        [float(value) for value in lines["standardized"][3:]], result.photo_standardized[0, 3:], atol=6e-3
+        [float(value) for value in lines["standardized"][3:]], -result.photo_standardized[0, 3:], atol=6e-3
     )
     assert stations[7].split()[:2] == [result.block.photo_ids[1], "sd"]
     assert stations[7].split()[-3:] == ["free"] * 3

@@ -62,7 +62,7 @@ def test_a_weighted_principal_point_is_an_observation():
     table = result.station_table()
     assert (table["redundancy_cx"] > 0.05).all()
     assert np.isfinite(table["standardized_cy"]).all()
-    np.testing.assert_allclose(table["residual_cx_px"], PRINCIPAL_POINT[0] - result.photo_parameters[:, 7])
+    np.testing.assert_allclose(table["d_cx_px"], result.photo_parameters[:, 7] - PRINCIPAL_POINT[0])
 
 
 def test_report_and_document_name_the_parameters_of_the_camera():

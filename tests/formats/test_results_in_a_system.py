@@ -137,7 +137,7 @@ def test_the_command_writes_tables_in_the_system(run, quarry):
         assert {"sd_east", "sd_north", "sd_up", "c_up_east"} <= set(header)
     control = Path("out/in_crs/control.csv").read_text()
     assert "metres along east, north and up of this system" in control
-    assert "residual_east" in control
+    assert "d_east" in control
 
 
 def test_the_command_refuses_before_it_adjusts(run):

@@ -271,7 +271,7 @@ def test_section_2_6_unheld_components_are_checks(directory, tmp_path):
     assert result.degrees_of_freedom == before.degrees_of_freedom - 1
     height = result.point_positions[row, 2]
     assert result.point_differences[row, 2] == pytest.approx(height - control.position[2], abs=1e-9)
-    title = "Components of control that are not held: adjusted minus supplied"
+    title = "Components of control that are not held: adjusted minus given"
     _, _, table = result.report().partition(f"{title}\n{'-' * len(title)}\n")
     _, listed, *others = table.partition("\n\n")[0].split("\n")
     assert not others

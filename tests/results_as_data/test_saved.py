@@ -217,7 +217,7 @@ def test_angles_are_radians_and_names_have_no_units(tmp_path):
     assert photos.schema.field("omega").metadata[b"unit"] == b"rad"
     stations = parquet.read_table(tmp_path / "stations.parquet")
     np.testing.assert_allclose(
-        stations.column("residual_longitude").to_numpy(), result.stations.residuals[:, 0], rtol=1e-12
+        stations.column("difference_longitude").to_numpy(), -result.stations.residuals[:, 0], rtol=1e-12
     )
 
 

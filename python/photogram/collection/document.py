@@ -34,6 +34,7 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
         "conventions": {
             "camera": f"P = R(w) X + t, {result.collection.formula}",
             "residual": "observed minus computed",
+            "difference": "adjusted minus given; standardized has its sign",
             "standardized": "residual / (sd x root of redundancy number), a priori unit weight",
             "covariance": "cofactors times covariance_scale",
             "cost": "half the sum that is minimised",
@@ -142,9 +143,9 @@ def _observations(result: AdjustedCollection) -> list[dict[str, Any]]:
 def _observed(given: Observed) -> list[dict[str, Any]]:
     """Return points or photos as observations of their own unknowns."""
     columns = zip(
-        given.rows.tolist(), given.residuals, given.sd, given.redundancy, given.standardized, strict=True
+        given.rows.tolist(), given.differences, given.sd, given.redundancy, given.tests, strict=True
     )
     return [
-        {"number": number, "residual": residual, "sd": sd, "redundancy": redundancy, "standardized": test}
-        for number, residual, sd, redundancy, test in columns
+        {"number": number, "difference": difference, "sd": sd, "redundancy": redundancy, "standardized": test}
+        for number, difference, sd, redundancy, test in columns
     ]

@@ -34,11 +34,11 @@ def report(result: AdjustedCollection) -> str:
         ("Reliability", _reliability(result)),
         ("Iterations", _iterations(result)),
         (
-            "Weighted and fixed points: given minus adjusted, redundancy, standardized residual",
+            "Weighted and fixed points: adjusted minus given, redundancy, standardized difference",
             observed_lines("point", points, "XYZ", np.ones(3), result.control),
         ),
         (
-            "Weighted and fixed parameters: given minus adjusted, redundancy, standardized residual",
+            "Weighted and fixed parameters: adjusted minus given, redundancy, standardized difference",
             observed_lines("photo", photos, heads, np.ones(len(heads)), result.stations),
         ),
         ("Photos: values and standard deviations", _photos(result)),

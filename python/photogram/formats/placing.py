@@ -88,18 +88,18 @@ class Placed:
         lengths = lengths_of_units(known, self.result.block.spheroid or Spheroid.wgs84())
         return places + steps / lengths * [DEGREE, DEGREE, 1.0]
 
-    def residuals(self) -> tuple[Indices, Floats]:
-        """Return rows among all points, and (c, 3) residuals of control, observed minus adjusted: metres.
+    def control_differences(self) -> tuple[Indices, Floats]:
+        """Return rows among all points, and (c, 3) differences of control, adjusted minus given: metres.
 
         They are along east, north and up; components that are not held are 0 before they are turned.
         """
         control = self.result.control
         places = {row: k for k, row in enumerate(self.rows.tolist())}
         own = self.point_turns[[places[row] for row in control.rows.tolist()]]
-        return control.rows, _turned(own, _metric(self.result, control.rows, control.residuals))
+        return control.rows, _turned(own, _metric(self.result, control.rows, control.differences))
 
     def differences(self) -> tuple[Indices, Floats]:
-        """Return rows among all points, and (c, 3) adjusted minus supplied of check points, likewise."""
+        """Return rows among all points, and (c, 3) adjusted minus given of check points, likewise."""
         result = self.result
         own = result.point_kinds[self.rows] == "check"
         rows = self.rows[own]
@@ -203,12 +203,12 @@ def placed_files(found: Placed) -> dict[str, bytes]:
             **_positions(found.names, found.points, found.point_covariances),
         },
     }
-    for name, (rows, vectors), prefix in (
-        ("control.csv", found.residuals(), "residual"),
-        ("check_points.csv", found.differences(), "d"),
+    for name, (rows, vectors) in (
+        ("control.csv", found.control_differences()),
+        ("check_points.csv", found.differences()),
     ):
         if len(rows):
-            columns = {f"{prefix}_{axis}": part for axis, part in zip(_LOCAL, vectors.T, strict=True)}
+            columns = {f"d_{axis}": part for axis, part in zip(_LOCAL, vectors.T, strict=True)}
             tables[name] = {"point": ids[rows], **columns}
     comments = [
         f"coordinates in {found.crs}: "

@@ -40,8 +40,8 @@ def _document(result: Result) -> dict[str, Any]:
             "residual": "observed minus computed",
             "standardized": "residual / (sd x root of redundancy number), a priori unit weight",
             "covariance": "cofactors times covariance_scale",
-            "difference": "adjusted minus supplied",
-            "control, stations": "residual: observed minus adjusted; sd 0: fixed, null: free or not held",
+            "difference": "adjusted minus given",
+            "control, stations": "standardized: sign of the difference; sd 0: fixed, null: free or not held",
         },
         "datum": result.datum.document(),
         "refraction": asdict(result.block.refraction) if result.block.refraction else None,
@@ -116,9 +116,9 @@ def _units(result: Result) -> dict[str, str]:
         "attitude_covariance": "rad^2",
         "covariance": "products of the units of position_covariance and rad",
         f"residual_{unit}": unit,
-        "position_residual": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
+        "position_difference": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
         "position_sd": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
-        "attitude_residual_rad": "rad",
+        "attitude_difference_rad": "rad",
         "attitude_sd_rad": "rad",
         "difference": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
         "operations": "multiply-adds, each time the phase is carried out",
@@ -281,16 +281,16 @@ def _control(result: Result) -> list[dict[str, Any]]:
     given = result.control
     columns = zip(
         given.rows.tolist(),
-        _outward(result, given.residuals).tolist(),
+        _outward(result, given.differences).tolist(),
         _outward(result, given.sd).tolist(),
         given.redundancy.tolist(),
-        given.standardized.tolist(),
+        given.tests.tolist(),
         strict=True,
     )
     return [
         {
             "id": result.block.point_ids[row],
-            "position_residual": residual,
+            "position_difference": residual,
             "position_sd": sd,
             "redundancy": redundancy,
             "standardized": standardized,
@@ -303,20 +303,20 @@ def _stations(result: Result) -> list[dict[str, Any]]:
     given = result.stations
     columns = zip(
         given.rows.tolist(),
-        _outward(result, given.residuals[:, :3]).tolist(),
+        _outward(result, given.differences[:, :3]).tolist(),
         _outward(result, given.sd[:, :3]).tolist(),
-        given.residuals[:, 3:].tolist(),
+        given.differences[:, 3:].tolist(),
         given.sd[:, 3:].tolist(),
         given.redundancy.tolist(),
-        given.standardized.tolist(),
+        given.tests.tolist(),
         strict=True,
     )
     return [
         {
             "id": result.block.photo_ids[row],
-            "position_residual": position,
+            "position_difference": position,
             "position_sd": position_sd,
-            "attitude_residual_rad": attitude,
+            "attitude_difference_rad": attitude,
             "attitude_sd_rad": attitude_sd,
             "redundancy": redundancy,
             "standardized": standardized,

@@ -66,6 +66,16 @@ class Observed:
     redundancy: Floats
     standardized: Floats
 
+    @property
+    def differences(self) -> Floats:
+        """(r, k) adjusted minus given: the residuals with the sign of check points, as tables have them."""
+        return 0.0 - self.residuals
+
+    @property
+    def tests(self) -> Floats:
+        """(r, k) standardized residuals with the sign of the differences."""
+        return 0.0 - self.standardized
+
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class AdjustedNetwork(Valued, Brief, Shown, ABC):

@@ -117,7 +117,7 @@ def observed_lines(
     """
     if not len(given.rows):
         return []
-    sd, residuals = given.sd * factors, given.residuals * factors
+    sd, differences = given.sd * factors, given.differences * factors
     lines = [f"{kind:<10}{'':<14}" + "".join(f"{column:>18}" for column in columns)]
     held = np.isfinite(sd)
     weighted = held & (sd > 0)
@@ -127,9 +127,9 @@ def observed_lines(
         ]
         parts = (
             ("sd", deviations),
-            ("residual", _cells(residuals[row], held[row], 5)),
+            ("difference", _cells(differences[row], held[row], 5)),
             ("redundancy", _cells(given.redundancy[row], weighted[row], 3)),
-            ("standardized", _cells(given.standardized[row], weighted[row], 2)),
+            ("standardized", _cells(given.tests[row], weighted[row], 2)),
         )
         lines += [
             f"{name if part == 'sd' else '':<10}{part:<14}" + "".join(f"{cell:>18}" for cell in cells)

@@ -55,15 +55,15 @@ def report(result: Result) -> str:
         ("Iterations", _iterations(result)),
         ("Check points: adjusted minus given, standard deviations, test", _check_points(result)),
         (
-            "Control as observations: observed minus adjusted, redundancy, standardized residual",
+            "Control as observations: adjusted minus given, redundancy, standardized difference",
             _control(result),
         ),
         (
-            "Components of control that are not held: adjusted minus supplied",
+            "Components of control that are not held: adjusted minus given",
             _difference_table(result, _unheld_differences(result)),
         ),
         (
-            "Stations as observations: observed minus adjusted, redundancy, standardized residual",
+            "Stations as observations: adjusted minus given, redundancy, standardized difference",
             _stations(result),
         ),
         (

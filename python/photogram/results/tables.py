@@ -159,17 +159,17 @@ def images(result: AdjustedNetwork, unit: str) -> dict[str, Any]:
 
 
 def observed(names: Sequence[str], given: Observed) -> dict[str, Any]:
-    """Name what there is of observed components: residuals and `sd_` in their units, plain numbers without.
+    """Name what there is of observed components: differences and `sd_` in their units, plain numbers without.
 
-    Residuals are observed minus adjusted. Where `sd_` is 0 a component is fixed, where it is infinite it is
-    not observed.
+    Differences are adjusted minus given, as of check points, and test values have their sign. Where `sd_`
+    is 0 a component is fixed, where it is infinite it is not observed.
     """
     plain = [name.removesuffix("_deg").removesuffix("_rad").removesuffix("_px") for name in names]
     return {
-        **named(names, given.residuals, "residual_"),
+        **named(names, given.differences, "d_"),
         **named(names, given.sd, "sd_"),
         **named(plain, given.redundancy, "redundancy_"),
-        **named(plain, given.standardized, "standardized_"),
+        **named(plain, given.tests, "standardized_"),
     }
 
 

@@ -140,16 +140,16 @@ def map_layers(
             f"error ellipses ({100 * confidence:g} %) of{few} points, magnified {scale:g} times",
             *_ellipses(found, drawn, confidence, scale),
         ),
-        ("control", "control as it was given, residuals observed minus adjusted, metres", *_control(found)),
+        ("control", "control as it was given, differences adjusted minus given, metres", *_control(found)),
         (
             "control_residuals",
             f"from given to adjusted places of control, magnified {scale:g} times",
-            *_vectors(found, *_given(found, found.residuals(), -1.0), scale),
+            *_vectors(found, *_given(found, found.control_differences()), scale),
         ),
         (
             "check_residuals",
             f"from supplied to adjusted places of check points, magnified {scale:g} times",
-            *_vectors(found, *_given(found, found.differences(), 1.0), scale),
+            *_vectors(found, *_given(found, found.differences()), scale),
         ),
         (
             "suspicious",
@@ -255,23 +255,22 @@ def _ellipses(found: Placed, known: Indices, confidence: float, scale: float) ->
     }
 
 
-def _given(found: Placed, differences: tuple[Indices, Floats], sign: float) -> tuple[Indices, Floats, Floats]:
+def _given(found: Placed, differences: tuple[Indices, Floats]) -> tuple[Indices, Floats, Floats]:
     """Return rows of points, where they were given, and (c, 3) steps from there to the adjusted places."""
-    rows, vectors = differences
+    rows, steps = differences
     places = {row: k for k, row in enumerate(found.rows.tolist())}
     adjusted = found.points[[places[row] for row in rows.tolist()]]
-    steps = sign * vectors
     return rows, found.moved(adjusted, -steps), steps
 
 
 def _control(found: Placed) -> _Part:
     import shapely
 
-    rows, given, steps = _given(found, found.residuals(), -1.0)
+    rows, given, steps = _given(found, found.control_differences())
     tests = np.abs(found.result.control.standardized)
     return shapely.points(given), {
         "point": _ids(found)[rows],
-        **{f"residual_{axis}": column for axis, column in zip(_LOCAL, -steps.T, strict=True)},
+        **{f"d_{axis}": column for axis, column in zip(_LOCAL, steps.T, strict=True)},
         "largest_test": np.where(np.isnan(tests), 0.0, tests).max(axis=1, initial=0.0),
     }
 

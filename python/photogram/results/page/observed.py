@@ -173,11 +173,11 @@ def observed_table(
                 else f"{frame.names[component]}, {frame.units[component]}",
                 frame.cell(component, float(observed[number, component]), decimals[component]),
                 frame.cell(component, float(adjusted[number, component]), decimals[component]),
-                frame.difference(component, float(given.residuals[row, component]), few[component]),
+                frame.difference(component, float(given.differences[row, component]), few[component]),
                 "fixed" if fixed else float(given.sd[row, component]) * factor,
                 float(deviations[number, component]) * factor,
                 None if fixed else float(given.redundancy[row, component]),
-                None if fixed else float(given.standardized[row, component]),
+                None if fixed else float(given.tests[row, component]),
             ]
         )
     unit = next(iter(units)) if len(units) == 1 else ""
@@ -188,7 +188,7 @@ def observed_table(
         Column("Component", text=True),
         Column("Given", written, decimals=value),
         Column("Adjusted", written, decimals=value),
-        Column("Given - adjusted", unit, decimals=max(few)),
+        Column("Adjusted - given", unit, decimals=max(few)),
         Column("sd given", unit, figures=3),
         Column("sd adjusted", unit, figures=3),
         Column("Redundancy", decimals=3),
