@@ -295,3 +295,22 @@ def test_an_excel_sheet_is_a_table(tmp_path):
     (tmp_path / "damaged.xlsx").write_bytes((tmp_path / "list.xlsx").read_bytes()[:200])
     with pytest.raises(InputError, match="no workbook"):
         with_control(block(), tmp_path / "damaged.xlsx", {}, None)
+
+
+def test_results_are_a_workbook_whose_text_is_never_a_formula(run, tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    assert run("new", "own").exit_code == 0
+    for name in ("images", "points", "control"):
+        path = tmp_path / "own" / f"{name}.csv"
+        if path.exists():
+            path.write_text(path.read_text().replace("t01", "=1+1"))
+    done = run("adjust", "own", "--xlsx", "result.xlsx", "-q")
+    assert done.exit_code == 0, done.output
+    book = openpyxl.load_workbook(tmp_path / "result.xlsx")
+    rows = list(book["points"].iter_rows())
+    assert [cell.value for cell in rows[0]][:2] == ["point", "kind"]
+    table = pd.read_csv(tmp_path / "own-adjusted" / "points.csv", comment="#")
+    assert len(rows) == len(table) + 1
+    named = next(row[0] for row in rows if row[0].value == "=1+1")
+    assert named.data_type != "f"
+    assert any("unit" in str(row[1].value) for row in book["notes"].iter_rows())

@@ -86,6 +86,15 @@ def adjust(
         out_option("Directory for reports, tables, and the adjusted project. Default: PATH-adjusted."),
     ] = None,
     json: JsonFile = None,
+    xlsx: Annotated[
+        Path | None,
+        Writes.FILE,
+        typer.Option(
+            metavar="FILE",
+            help="Write the tables of the result as an Excel workbook, a sheet each; needs openpyxl.",
+            show_default=False,
+        ),
+    ] = None,
     html: HtmlFile = None,
     no_html: NoHtml = False,
     plots: Plots = False,
@@ -220,9 +229,10 @@ def adjust(
         if removed is not None:
             files["removed.csv"] = removed.table().to_csv(index=False).encode()
         taken = [] if removed is None else removed.sections()[1:]
+        sheets = {} if xlsx is None else {xlsx: _workbook(result)}
         page = html_files(job, "adjust", place, html is not None, lambda: page_of(told))
         job.finish(
-            {target / name: content for name, content in files.items()} | pictures.of(result) | page,
+            {target / name: content for name, content in files.items()} | pictures.of(result) | page | sheets,
             {} if json is None else {json: told.to_json()},
             as_data(result, parquet),
             drawn_maps(result, map, crs, _sizes(project), quiet=quiet),
@@ -350,6 +360,12 @@ def _files(
         if beside is not None:
             files |= {f"adjusted-{own}/{name}": content for name, content in beside(after, result).items()}
     return files
+
+
+def _workbook(result: Result) -> bytes:
+    from photogram.formats.adjusted import excel_file
+
+    return excel_file(result)
 
 
 def _sizes(project: Project) -> Sequence[tuple[float, float] | None]:

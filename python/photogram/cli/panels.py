@@ -13,7 +13,7 @@ PANELS = {
     " pixel_origin model angles grid hand against against_spacing against_position_sd catalogue utc epoch"
     " faintest points point_sd decimals format zero_missing ground_unit model_unit restart"
     " start reject",
-    "Results": "out overwrite json html no_html plots plot_format parquet crs map ply ply_origin listing"
+    "Results": "out overwrite json xlsx html no_html plots plot_format parquet crs map ply ply_origin listing"
     " pdf to trace points_out date safe_csv",
     "Adjustment": "datum datum_points loss scale tolerance max_iterations covariance unit_variance"
     " self_calibrate keep_all keep_repeated as_published weights method polynomial"

@@ -10,10 +10,11 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.formats.project import Project
 from photogram.io.csv_text import csv_text
+from photogram.io.sheets import workbook
 from photogram.results.result import Result
 from photogram.show.ways import columns_of
 
-__all__ = ["adjusted", "table_files"]
+__all__ = ["adjusted", "excel_file", "table_files"]
 
 _TABLES = {
     "photos": "photo",
@@ -52,6 +53,14 @@ def table_files(result: Result) -> Mapping[str, bytes]:
             "point", used, result.point_covariances[result.used_points], names[:3], result
         )
     return files
+
+
+def excel_file(result: Result) -> bytes:
+    """Return the tables of a result as a workbook: a sheet each, units in a last one, `notes`."""
+    tables = {file: dict(columns_of(result, kind)) for file, kind in _TABLES.items()}
+    filled = {file: columns for file, columns in tables.items() if len(next(iter(columns.values())))}
+    notes = {file: "; ".join(_units(result, columns)) for file, columns in filled.items()}
+    return workbook(filled, {file: note for file, note in notes.items() if note})
 
 
 def _units(result: Result, columns: Mapping[str, Any]) -> list[str]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import io
+import math
 import zipfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from photogram.errors import InputError
 
-__all__ = ["sheet_text"]
+__all__ = ["sheet_text", "workbook"]
 
 LARGEST = 1 << 29
 """Bytes that a workbook may unpack to: beyond, it is no table of a person but an attack."""
@@ -54,3 +57,43 @@ def _cell(value: Any) -> str:
         return str(int(value))  # names that are numbers
     text = " ".join(str(value).split())
     return f'"{text.replace(chr(34), chr(34) * 2)}"' if '"' in text else text
+
+
+def workbook(tables: Mapping[str, Mapping[str, Sequence[Any]]], notes: Mapping[str, str]) -> bytes:
+    """Return tables as a workbook, a sheet each, headers in the first row; text is never a formula.
+
+    Parameters
+    ----------
+    tables
+        Columns by the names of tables.
+    notes
+        What is said of tables, in a last sheet.
+
+    Raises
+    ------
+    InputError
+        The library is not installed.
+    """
+    try:
+        import openpyxl
+        from openpyxl.cell import WriteOnlyCell
+    except ImportError:
+        raise InputError("Excel workbooks need openpyxl: pip install photogram[excel]") from None
+    book = openpyxl.Workbook(write_only=True)
+
+    def cell(sheet: Any, value: Any) -> Any:
+        if isinstance(value, str):
+            text = WriteOnlyCell(sheet, "")
+            text.value, text.data_type = value, "s"
+            return text
+        return None if value is None or (isinstance(value, float) and not math.isfinite(value)) else value
+
+    for name, columns in {**tables, "notes": {"table": list(notes), "note": list(notes.values())}}.items():
+        sheet = book.create_sheet(name)
+        sheet.append(list(columns))
+        lists = [own.tolist() if hasattr(own, "tolist") else list(own) for own in columns.values()]
+        for row in zip(*lists, strict=True):
+            sheet.append([cell(sheet, value) for value in row])
+    buffer = io.BytesIO()
+    book.save(buffer)
+    return buffer.getvalue()
