@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from photogram.network.observations import Distance
 from photogram.results import network_trial
 from photogram.statistics import lambda0
 from photogram.statistics.snooping.linear import LinearTrial
+from photogram.statistics.snooping.robust_start import _robust_sizes
 from photogram.statistics.snooping.snooping import Settings, snooped
 from shared_data import SHARED
 
@@ -443,3 +445,11 @@ def test_check_points_are_compared_with_what_was_given_of_them():
     # What tells how good the block is has errors, in the size of its standard deviations.
     ratio = table[["d_X", "d_Y", "d_Z"]].to_numpy() / table[["sd_X", "sd_Y", "sd_Z"]].to_numpy()
     assert 0.5 < np.sqrt((ratio**2).mean()) < 2.0
+
+
+def test_nothing_is_robust_where_nothing_is_tested():
+    """Redundancy numbers that rounding has made negative in the mean: the square root was a traceback."""
+    suspects = SimpleNamespace(kinds=np.zeros(2, int), row_starts=np.array([0, 2, 4]))
+    for active in (True, False):
+        tests = SimpleNamespace(active=np.full(2, active), redundancy=np.full(4, -1e-17))
+        assert _robust_sizes(SimpleNamespace(tests=tests, suspects=suspects)) is None

@@ -366,6 +366,8 @@ def test_columns_that_hold_something_else_are_named(folder, table, column, value
         (lambda document: document["kept"]["result"].update(loss={"same": 10**6}), "is no same"),
         (lambda document: document["kept"]["result"].update(dropped={"map": 3}), "is no map"),
         (lambda document: document["kept"].update(state={"tuple": []}), "keeps no state"),
+        (lambda document: document["kept"]["block"].update(other=1), "does not hold together: .*'other'"),
+        (lambda document: document["kept"]["block"].pop("spheroid"), "does not hold together: 'spheroid'"),
     ],
 )
 def test_damaged_summaries_are_refused(folder, change, message):

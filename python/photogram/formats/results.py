@@ -54,7 +54,12 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
     kind = document["kind"]
     if kind not in _READERS:
         raise InputError(f"keeps a result of a kind that is not known: {kind!r}", file=folder / SUMMARY)
-    return _READERS[kind](folder, document)
+    try:
+        return _READERS[kind](folder, document)
+    except InputError:
+        raise
+    except (LookupError, TypeError, ValueError) as error:
+        raise InputError(f"does not hold together: {error}", file=folder / SUMMARY) from None
 
 
 def _recognises(path: Path) -> bool:

@@ -116,7 +116,10 @@ def _robust_sizes(work: TakingOut) -> tuple[Floats, float] | None:
     """
     active = work.tests.active & (work.suspects.kinds == 0)
     rows = np.repeat(active, np.diff(work.suspects.row_starts))
-    expected = MEDIAN_OF_TWO * math.sqrt(float(np.mean(work.tests.redundancy[rows])))
+    redundancy = float(np.mean(work.tests.redundancy[rows])) if rows.any() else 0.0
+    if not redundancy > 0.0:
+        return None  # nothing is tested
+    expected = MEDIAN_OF_TWO * math.sqrt(redundancy)
     scale = max(robust_factor(values(work, active)), 1.0)
     sizes = work.trial.resist(scale)
     for _ in range(SCALES):
