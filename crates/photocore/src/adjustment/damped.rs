@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::method::{NEGLIGIBLE, Stop, leaves_cofactors};
+use super::method::{self, NEGLIGIBLE, Stop, leaves_cofactors};
 use super::options::{Iteration, Status};
 use super::problem::Model;
 use super::result::AdjustError;
@@ -41,6 +41,13 @@ const BACK: usize = 3;
 /// badly, the combination is determined so weakly that its standard deviation is no measure of a step.
 const GAIN: f64 = 0.5;
 
+/// So many full steps may fail; after more the steps are controlled by how well they are predicted, as in a trust region: full steps do not
+/// lead there, since what the linearized equations leave out, residuals times second derivatives, is larger than what they have of a
+/// combination of unknowns, and damping that is taken away each time makes them creep.
+const MOST_FAILURES: usize = 4;
+/// A full step from where a trust region has ended that changes no unknown by more than this multiple of its standard deviation.
+const SHORT: f64 = 1e-2;
+
 /// What the control of the steps remembers from one to the next.
 struct Control {
     stop: Stop,
@@ -52,6 +59,8 @@ struct Control {
     in_valley: bool,
     /// How many have been taken along one.
     along: usize,
+    /// How many full steps have failed.
+    failures: usize,
 }
 
 /// The damping after a step that failed.
@@ -78,8 +87,14 @@ impl<'a, M: Model> Run<'a, '_, M> {
         stop: Stop,
     ) -> Result<End<'a, M>, AdjustError> {
         let mut state = start;
-        let mut control =
-            Control { stop, best: state.sum_of_squares, refused: None, in_valley: false, along: 0 };
+        let mut control = Control {
+            stop,
+            best: state.sum_of_squares,
+            refused: None,
+            in_valley: false,
+            along: 0,
+            failures: 0,
+        };
         while self.iterations.len() < self.options.max_iterations && state.damping <= MOST_DAMPING {
             match self.step_from(state, &mut control)? {
                 ControlFlow::Continue(next) => state = next,
@@ -188,7 +203,31 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let state = self.form(unknowns, 0.0)?;
             return self.stay(state, Status::Converged).map(ControlFlow::Break);
         }
+        control.failures += usize::from(damping == 0.0);
+        if control.failures > MOST_FAILURES {
+            return self.handed_over(unknowns, control.stop).map(ControlFlow::Break);
+        }
         self.form(unknowns, harder(damping)).map(ControlFlow::Continue)
+    }
+
+    /// Goes on in a trust region, to its end. It has converged where a full step from there is short, which damping may hide, or where the
+    /// sum of squares has crept to rest along a combination that is named.
+    fn handed_over(&mut self, unknowns: Vec<f64>, stop: Stop) -> Result<End<'a, M>, AdjustError> {
+        let state = self.form(unknowns, method::FIRST_DAMPING)?;
+        let end = self.in_trust_region(state, stop)?;
+        if end.status != Status::Converged || !self.weak.is_empty() {
+            return Ok(end);
+        }
+        let state = self.form(end.unknowns.clone(), 0.0)?;
+        let Some(Solved { basis, step, change }) = self.solve_unless_lost(state)? else {
+            return Ok(End { status: Status::NotConverged, ..end });
+        };
+        let rests = change <= SHORT;
+        if !rests {
+            self.weak = basis.factor.moved(&self.problem.system, &step);
+        }
+        basis.factor.recycle(&self.problem.system);
+        Ok(if rests { end } else { End { status: Status::NotConverged, ..end } })
     }
 
     /// Whether a full step is the last one, by its length or by those that would follow.

@@ -228,7 +228,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             return self.rest(unknowns, status);
         }
         self.curved = false;
-        self.datum = self.problem.to_hold(&unknowns, self.pool);
+        self.hold(&unknowns);
         let state = self.form(unknowns.clone(), 0.0)?;
         let Some(Solved { basis, step, change }) = self.solve_unless_lost(state)? else {
             return self.rest(unknowns, status);
@@ -244,9 +244,16 @@ impl<'a, M: Model> Run<'a, '_, M> {
         Ok(End::at(status, unknowns, None))
     }
 
+    /// Holds a datum, unless one has been held from the beginning.
+    fn hold(&mut self, unknowns: &[f64]) {
+        if self.datum.is_empty() {
+            self.datum = self.problem.to_hold(unknowns, self.pool);
+        }
+    }
+
     /// Ends at the values reached, with a datum there.
     fn rest(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a, M>, AdjustError> {
-        self.datum = self.problem.to_hold(&unknowns, self.pool);
+        self.hold(&unknowns);
         if !self.options.covariance {
             return Ok(End::at(status, unknowns, None));
         }
