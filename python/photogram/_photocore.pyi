@@ -1734,6 +1734,7 @@ def orient_model(
     tolerance: float,
     threads: int,
     trace: bool,
+    scale: float | None = None,
 ) -> SimilaritySolution:
     """Find the similarity x = s A X + B between control X and model x (C&GS Technical Bulletin 19).
 
@@ -1759,6 +1760,8 @@ def orient_model(
         Number of threads; 0 leaves it to the core (see `BlockNetwork`).
     trace
         Whether the report's methods keep what each cycle computed on its way.
+    scale
+        s that is held, so that six unknowns are left; None: it is found.
 
     Raises
     ------

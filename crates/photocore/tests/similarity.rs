@@ -20,6 +20,7 @@ const PLAIN: Options = Options {
     max_iterations: 50,
     tolerance: 1e-5,
     trace: false,
+    scale: None,
 };
 
 fn run(stations: &[Station], options: &Options) -> Result<Solution, SimilarityError> {

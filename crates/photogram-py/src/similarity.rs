@@ -49,7 +49,7 @@ fn from_row((scale, rotation, shift, control_centre, model_centre): CentredRow) 
 }
 
 #[pyfunction]
-#[pyo3(signature = (control, control_sd, model, model_sd, *, method, start, former, max_iterations, tolerance, threads, trace))]
+#[pyo3(signature = (control, control_sd, model, model_sd, *, method, start, former, max_iterations, tolerance, threads, trace, scale=None))]
 fn orient_model(
     py: Python<'_>,
     control: PyReadonlyArrayDyn<'_, f64>,
@@ -63,6 +63,7 @@ fn orient_model(
     tolerance: f64,
     threads: usize,
     trace: bool,
+    scale: Option<f64>,
 ) -> PyResult<SimilaritySolution> {
     let control: Vec<[f64; 3]> = rows("control", &control)?;
     let (control_sd, model): (_, Vec<[f64; 3]>) = (rows("control_sd", &control_sd)?, rows("model", &model)?);
@@ -99,6 +100,7 @@ fn orient_model(
         max_iterations,
         tolerance,
         trace,
+        scale,
     };
     run(py, &stations, &options, threads)
 }

@@ -62,6 +62,7 @@ def orient(
     max_iterations: int = MOST_ITERATIONS,
     tolerance: float = 1e-5,
     trace: bool = False,
+    scale: float | None = None,
 ) -> Orientation:
     """Orient a model absolutely: find s, A and B of x = s A X + B from any mix of control.
 
@@ -96,6 +97,9 @@ def orient(
         Fraction of its standard deviation by which no unknown changes any more.
     trace
         Whether the cycles of the report's methods keep what they computed on their way (`traces`).
+    scale
+        s, model units per ground unit, where it is known and held: six unknowns are left, and one horizontal
+        coordinate less is needed.
 
     Returns
     -------
@@ -104,8 +108,9 @@ def orient(
     Raises
     ------
     RankError
-        Control that does not determine the seven parameters: fewer than seven components, four horizontal
-        ones or three elevations; stations or elevations in a straight line; horizontal stations that
+        Control that does not determine the unknowns: fewer than seven components (six with the scale held),
+        four horizontal ones (three) or three elevations; stations or elevations in a straight line;
+        horizontal stations that
         coincide. Its `points` names the stations.
     AdjustmentError
         The scale became zero or negative (the model is a mirror image), or nothing finite.
@@ -119,6 +124,8 @@ def orient(
     start = ("auto" if method == "rigorous" else "report") if start is None else start
     rejected = tuple(names_of("reject", reject))
     _check_options(stations, method, start, rejected, unit_variance, max_iterations, tolerance, trace)
+    if scale is not None and not 0 < number("scale", scale) < math.inf:
+        raise InputError(f"a scale that is held is positive, not {scale!r}")
     used = stations.held & ~np.isin(np.array(stations.ids, dtype=object), rejected)[:, np.newaxis]
     rows = np.flatnonzero(used.any(axis=1))
     control = np.where(used, stations.control, np.nan)[rows]
@@ -134,6 +141,7 @@ def orient(
                 "max_iterations": max_iterations,
                 "tolerance": tolerance,
                 "trace": False,
+                **({} if scale is None else {"scale": scale}),
                 **options,
             },
             threads=0,
@@ -142,12 +150,12 @@ def orient(
     try:
         solution = solve(control, method=method, start=start, former=_parameters(former), trace=trace)
     except _photocore.SimilarityError as error:
-        raise _named(stations, used, rows, *error.args) from None
+        raise _named(stations, used, rows, scale is not None, *error.args) from None
     if not np.isfinite(solution.sum_of_squares):
         raise AdjustmentError(
             "the weighted sum of squares is beyond double precision: standard deviations are too small"
         )
-    result = _orientation(stations, used, rejected, method, unit_variance, rows, solution)
+    result = _orientation(stations, used, rejected, method, unit_variance, rows, solution, scale is not None)
 
     def fit(changed: Floats) -> Fit | None:
         try:
@@ -264,9 +272,10 @@ def _orientation(
     unit_variance: str,
     rows: NDArray[np.intp],
     solution: _photocore.SimilaritySolution,
+    held: bool,
 ) -> Orientation:
     weighted = stations.model_sd is not None
-    freedom = int(used.sum()) - 7
+    freedom = int(used.sum()) - 7 + held
     squares = solution.sum_of_squares if weighted else float(np.nansum(solution.misclosures**2))
     variance = squares / freedom if freedom else None
     scale = 1.0 if weighted and (unit_variance == "unity" or variance is None) else variance
@@ -310,6 +319,7 @@ def _orientation(
         weighted_sum_of_squares=squares,
         covariance_scale=scale,
         condition=solution.condition,
+        scale_held=held,
         messages=_messages(solution, [stations.ids[row] for row in rows.tolist()], scale, freedom),
     )
 
@@ -345,6 +355,7 @@ def _named(
     stations: Stations,
     used: NDArray[np.bool_],
     rows: NDArray[np.intp],
+    held: bool,
     kind: str,
     message: str,
     concerned: list[int],
@@ -354,8 +365,9 @@ def _named(
     if kind == "insufficient":
         x, y, z = (int(count) for count in used.sum(axis=0))
         text = (
-            f"insufficient control: {x + y + z} known coordinates (7 needed), {x + y} of them horizontal"
-            f" (4 needed; {x} X and {y} Y, 1 of each needed), {z} elevations (3 needed)"
+            f"insufficient control: {x + y + z} known coordinates ({7 - held} needed), {x + y} of them"
+            " horizontal"
+            f" ({4 - held} needed; {x} X and {y} Y, 1 of each needed), {z} elevations (3 needed)"
         )
         return RankError(text, [], [stations.ids[row] for row in rows])
     if kind == "undetermined":

@@ -71,6 +71,7 @@ def _head(result: Orientation) -> dict[str, Any]:
             "translation": result.initial.translation,
         },
         "scale": similarity.scale,
+        "scale_held": result.scale_held,
         "rotation": similarity.rotation,
         "angles_rad": similarity.angles,
         "translation": similarity.translation,

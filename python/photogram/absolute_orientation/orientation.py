@@ -118,6 +118,8 @@ class Orientation(Shown, Brief):
         Why this is no orientation to be used, though it converged.
     traces
         What each cycle of the report's methods computed, where it was asked for.
+    scale_held
+        Whether the scale was given, and six unknowns were left.
     """
 
     stations: Stations
@@ -146,6 +148,7 @@ class Orientation(Shown, Brief):
     messages: list[Message]
     grave: list[Message]
     traces: list[Trace]
+    scale_held: bool = False
 
     @property
     def converged(self) -> bool:
@@ -222,8 +225,8 @@ class Orientation(Shown, Brief):
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Control coordinates that took part, minus seven."""
-        return self.known - 7
+        """Control coordinates that took part, minus the unknowns: seven, or six with the scale held."""
+        return self.known - 7 + self.scale_held
 
     @property
     def rms(self) -> float:

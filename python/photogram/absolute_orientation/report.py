@@ -88,7 +88,9 @@ def _parameters(result: Orientation) -> list[str]:
         angle = f"{math.degrees(similarity.angles[k]):>20.8f}"
         lines.append(f"{name:<8}{angle}{_number(sd[k] / ARCSEC, 16, 3)}  deg, sd arcsec")
     scale = f"{unit} / {stations.ground_unit}"
-    lines.append(f"{'s':<8}{similarity.scale:>20.12g}{_general(sd[3])}  {scale}")
+    lines.append(
+        f"{'s':<8}{similarity.scale:>20.12g}{'held' if result.scale_held else _general(sd[3]):>16}  {scale}"
+    )
     lines += [
         f"{f'b{k + 1}':<8}{similarity.translation[k]:>20.10g}{_general(sd[4 + k])}  {unit}" for k in range(3)
     ]

@@ -178,6 +178,12 @@ def absolute_orientation(
             help="Initial values. Default: auto, or report with the report's methods.", show_default=False
         ),
     ] = None,
+    scale: Annotated[
+        float | None,
+        typer.Option(
+            help="Held: model units per ground unit, where it is known. Default: found.", show_default=False
+        ),
+    ] = None,
     method: Annotated[
         Method, typer.Option(help="Least squares by the engine, or the cycles of the report.")
     ] = Method.RIGOROUS,
@@ -246,6 +252,7 @@ def absolute_orientation(
             reject=reject or (),
             unit_variance=unit_variance.value,
             trace=trace is not None,
+            scale=scale,
         )
         result.messages[:0] = deck.messages
         if points and not result.usable:

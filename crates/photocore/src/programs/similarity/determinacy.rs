@@ -4,6 +4,7 @@ use std::fmt;
 
 use faer::{Mat, Side};
 
+use super::model::{CHANGES, SCALE};
 use super::transform::Similarity;
 use super::{SimilarityError, Station};
 use crate::geometry::{Matrix3, Vector3};
@@ -59,19 +60,24 @@ impl fmt::Display for Cause {
 }
 
 /// Counts known components: seven at least, of these four horizontal (both X and Y among them) and three elevations. That is two
-/// horizontal pairs where they come in pairs (TB 19, section 6), but each coordinate counts by itself.
-pub fn check_counts(stations: &[Station]) -> Result<(), SimilarityError> {
+/// horizontal pairs where they come in pairs (TB 19, section 6), but each coordinate counts by itself. A scale that is held takes the
+/// place of one horizontal coordinate.
+pub fn check_counts(stations: &[Station], held: bool) -> Result<(), SimilarityError> {
     let known = std::array::from_fn(|k| stations.iter().filter(|station| station.known()[k]).count());
     let [x, y, z] = known;
-    if x + y < 4 || x == 0 || y == 0 || z < 3 {
+    if x + y + usize::from(held) < 4 || x == 0 || y == 0 || z < 3 {
         return Err(SimilarityError::Insufficient { known });
     }
     Ok(())
 }
 
 /// Looks for combinations of parameters that leave all known components where they are.
-pub fn check_geometry(stations: &[Station], similarity: &Similarity) -> Result<(), SimilarityError> {
-    if condition(stations, similarity) * UNDETERMINED < 1.0 {
+pub fn check_geometry(
+    stations: &[Station],
+    similarity: &Similarity,
+    held: bool,
+) -> Result<(), SimilarityError> {
+    if condition(stations, similarity, held) * UNDETERMINED < 1.0 {
         return Ok(());
     }
     let all = || (Cause::Singular, (0..stations.len()).collect());
@@ -115,9 +121,9 @@ fn shape(stations: &[Station], similarity: &Similarity, tolerance: f64) -> Optio
 
 /// The condition number of the linearized misclosures: rotations in radians, the scale relative, translations as fractions of the size
 /// of the model; infinite where they are singular.
-pub fn condition(stations: &[Station], similarity: &Similarity) -> f64 {
+pub fn condition(stations: &[Station], similarity: &Similarity, held: bool) -> f64 {
     let size = spread(stations);
-    let unit = [1.0, 1.0, 1.0, similarity.scale, size, size, size];
+    let unit = [1.0, 1.0, 1.0, if held { 0.0 } else { similarity.scale }, size, size, size];
     let mut normal = [[0.0; 7]; 7];
     for station in stations {
         let partials = similarity.misclosure_partials(&station.control, &station.model);
@@ -127,6 +133,10 @@ pub fn condition(stations: &[Station], similarity: &Similarity) -> f64 {
                 (0..7).for_each(|j| normal[i][j] += row[i] * row[j]);
             }
         }
+    }
+    if held {
+        // The mean of the other eigenvalues changes neither the least nor the largest.
+        normal[SCALE][SCALE] = (0..CHANGES).map(|i| normal[i][i]).sum::<f64>() / (CHANGES - 1) as f64;
     }
     let values = eigenvalues(&normal);
     let (least, most) = (values[0].max(0.0), values[6]);

@@ -8,6 +8,7 @@ use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
 
 use super::Station;
+use super::model::SCALE;
 use super::transform::{Matrix7, Similarity, propagate};
 use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Vector3};
@@ -15,8 +16,8 @@ use crate::geometry::{Matrix3, Vector3};
 /// A redundancy number below this is what rounding leaves of zero: a test value would be noise.
 const CHECKED: f64 = 1e-9;
 
-/// Cofactors of the tangent parameters (see [`Similarity`]); None when they are not determined.
-pub fn tangent_cofactors(stations: &[Station], similarity: &Similarity) -> Option<Matrix7> {
+/// Cofactors of the tangent parameters (see [`Similarity`]), zero for a scale that is held; None when they are not determined.
+pub fn tangent_cofactors(stations: &[Station], similarity: &Similarity, held: bool) -> Option<Matrix7> {
     let mut normal = [[0.0; 7]; 7];
     for station in stations {
         let partials = known_partials(station, similarity);
@@ -27,9 +28,16 @@ pub fn tangent_cofactors(stations: &[Station], similarity: &Similarity) -> Optio
             }
         }
     }
-    let scale: [f64; 7] = std::array::from_fn(|i| normal[i][i].sqrt().recip());
+    if held {
+        (0..7).for_each(|i| (normal[i][SCALE], normal[SCALE][i]) = (0.0, 0.0));
+        normal[SCALE][SCALE] = 1.0;
+    }
+    let mut scale: [f64; 7] = std::array::from_fn(|i| normal[i][i].sqrt().recip());
     let scaled = Mat::from_fn(7, 7, |i, j| scale[i] * normal[i][j] * scale[j]);
     let inverse = scaled.llt(Side::Lower).ok()?.inverse();
+    if held {
+        scale[SCALE] = 0.0;
+    }
     Some(std::array::from_fn(|i| std::array::from_fn(|j| scale[i] * inverse[(i, j)] * scale[j])))
 }
 

@@ -21,7 +21,7 @@
 //! };
 //! let stations: Vec<Station> = (0..4).map(station).collect();
 //! let options =
-//!     Options { method: Method::Rigorous, start: Start::Auto, max_iterations: 50, tolerance: 1e-5, trace: false };
+//!     Options { method: Method::Rigorous, start: Start::Auto, max_iterations: 50, tolerance: 1e-5, trace: false, scale: None };
 //! let solution = on_all_processors(|pool, watch| orient(&stations, &options, pool, watch))??;
 //! let parameters = solution.similarity.parameters();
 //! assert!((parameters.scale - 0.5).abs() < 1e-9);
@@ -51,7 +51,7 @@ use crate::normals::{Layout, LayoutError, Ordering, System};
 
 pub use crout::gauss_crout;
 pub use determinacy::Cause;
-use model::{AsControl, CHANGES};
+use model::{AsControl, CHANGES, SCALE};
 pub use published::Trace;
 pub use solution::{AdjustedStation, Solution};
 use start::Chosen;
@@ -128,6 +128,8 @@ pub struct Options {
     pub tolerance: f64,
     /// Whether the cycles of the bulletin keep what they computed on their way.
     pub trace: bool,
+    /// The scale that is held; six unknowns are left then.
+    pub scale: Option<f64>,
 }
 
 /// Why there is no orientation. Stations are indices.
@@ -182,9 +184,10 @@ pub fn orient(
     pool: &ThreadPool,
     watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
 ) -> Result<Solution, SimilarityError> {
-    determinacy::check_counts(stations)?;
-    let chosen = start::choose(stations, options.start)?;
-    determinacy::check_geometry(stations, &chosen.similarity)?;
+    let held = options.scale.is_some();
+    determinacy::check_counts(stations, held)?;
+    let chosen = start::choose(stations, options.start, options.scale)?;
+    determinacy::check_geometry(stations, &chosen.similarity, held)?;
     match options.method {
         Method::Rigorous => adjust(stations, options, chosen, None, pool, watch),
         Method::Report | Method::FillIn => {
@@ -199,8 +202,8 @@ pub fn orient(
 /// # Errors
 /// Control that does not determine the parameters, or a mirror image.
 pub fn closed_form(stations: &[Station]) -> Result<Similarity, SimilarityError> {
-    determinacy::check_counts(stations)?;
-    Ok(start::choose(stations, Start::ClosedForm)?.similarity)
+    determinacy::check_counts(stations, false)?;
+    Ok(start::choose(stations, Start::ClosedForm, None)?.similarity)
 }
 
 /// Adjusts by the engine; after the cycles of the bulletin only for cofactors and statistics.
@@ -217,7 +220,7 @@ fn adjust(
         return Err(SimilarityError::Scale(start.scale));
     }
     let weighted = Weighted::new(stations, &chosen)?;
-    let problem = problem(&weighted.stations, &start)?;
+    let problem = problem(&weighted.stations, &start, options.scale.is_some())?;
     let engine = adjustment::Options {
         method: adjustment::Method::Damped(Stop::Fraction(options.tolerance)),
         max_iterations: if cycles.is_some() { 0 } else { options.max_iterations },
@@ -238,13 +241,17 @@ fn adjust(
     if let Some(cycles) = &cycles {
         adjusted.status = if cycles.converged { Status::Converged } else { Status::NotConverged };
     }
-    let solution = Solution::new(&weighted, &problem, &adjusted, chosen, cycles)?;
+    let solution = Solution::new(&weighted, &problem, &adjusted, chosen, cycles, options.scale.is_some())?;
     let scale = solution.similarity.scale;
     if scale.is_nan() || scale <= 0.0 { Err(SimilarityError::Scale(scale)) } else { Ok(solution) }
 }
 
 /// The least-squares problem: the control coordinates are local blocks of three, the seven parameters one kept block.
-fn problem(stations: &[Station], start: &Similarity) -> Result<Problem<AsControl>, SimilarityError> {
+fn problem(
+    stations: &[Station],
+    start: &Similarity,
+    held: bool,
+) -> Result<Problem<AsControl>, SimilarityError> {
     let (mut initial, mut prior, mut sd) = (vec![], vec![], vec![]);
     for station in stations {
         let known = station.known();
@@ -260,7 +267,7 @@ fn problem(stations: &[Station], start: &Similarity) -> Result<Problem<AsControl
     let parameters = [0.0, 0.0, 0.0, start.scale, x, y, z];
     initial.extend(parameters);
     prior.extend(parameters);
-    sd.extend([f64::INFINITY; CHANGES]);
+    sd.extend((0..CHANGES).map(|i| if held && i == SCALE { 0.0 } else { f64::INFINITY }));
     let count = stations.len();
     let layout = Layout::new(3, 3, &[CHANGES], (0..=count).collect(), vec![0; count])?;
     Ok(Problem {

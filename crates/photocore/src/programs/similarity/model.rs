@@ -8,6 +8,8 @@ use crate::normals::GroupRows;
 
 /// Unknowns of the kept block: three changes of the rotation (omega, phi, kappa of a rotation after that of the start), s, t.
 pub const CHANGES: usize = 7;
+/// Which of them is s.
+pub const SCALE: usize = 3;
 
 /// Model coordinates as functions of control coordinates and the seven parameters (TB 19, equation 2.1).
 #[derive(Debug)]

@@ -5,6 +5,8 @@
 //!
 //! S(A) = sum_j a_j^T M_j a_j - (sum_j a_j . c_j)^2 / V,   M_j = sum x x^T,  c_j = sum x X_j,  V = sum_j sum X_j^2.
 //!
+//! With s held S(A) = sum_j a_j^T M_j a_j - 2 s sum_j a_j . c_j + s^2 V.
+//!
 //! Its minima over all rotations are found without the stations and without initial values.
 
 use nalgebra::Matrix4;
@@ -40,11 +42,17 @@ pub struct Moments {
     full: bool,
     control_centre: Vector3,
     model_centre: Vector3,
+    held: Option<f64>,
 }
 
 impl Moments {
-    /// The moments of some stations, counted from given centres.
-    pub fn new(stations: &[Station], control_centre: Vector3, model_centre: Vector3) -> Self {
+    /// The moments of some stations, counted from given centres; the scale may be held.
+    pub fn new(
+        stations: &[Station],
+        control_centre: Vector3,
+        model_centre: Vector3,
+        held: Option<f64>,
+    ) -> Self {
         let mut moments = Self {
             m: [Matrix3::zeros(); 3],
             c: [Vector3::zeros(); 3],
@@ -54,6 +62,7 @@ impl Moments {
             full: stations.iter().all(|station| station.known() == [true; 3]),
             control_centre,
             model_centre,
+            held,
         };
         (0..3).for_each(|j| moments.add_component(stations, j));
         moments
@@ -139,17 +148,25 @@ impl Moments {
             by_scale += control;
             gradient += scale * control - skew * self.m[j] * column;
         }
-        (normal - by_scale * by_scale.transpose() / self.v, gradient)
+        if self.held.is_none() {
+            normal -= by_scale * by_scale.transpose() / self.v;
+        }
+        (normal, gradient)
+    }
+
+    fn product(&self, a: &Matrix3) -> f64 {
+        a.column_iter().zip(&self.c).map(|(column, c)| column.dot(c)).sum()
     }
 
     fn scale(&self, a: &Matrix3) -> f64 {
-        a.column_iter().zip(&self.c).map(|(column, c)| column.dot(c)).sum::<f64>() / self.v
+        self.held.unwrap_or_else(|| self.product(a) / self.v)
     }
 
     /// S(A).
     fn value(&self, a: &Matrix3) -> f64 {
         let model: f64 = a.column_iter().zip(&self.m).map(|(column, m)| column.dot(&(m * column))).sum();
-        model - self.scale(a).powi(2) * self.v
+        let scale = self.scale(a);
+        model - scale * (2.0 * self.product(a) - scale * self.v)
     }
 
     fn size(&self) -> f64 {

@@ -5,6 +5,7 @@
 
 use super::crout::{Normal, gauss_crout};
 use super::determinacy::Cause;
+use super::model::SCALE;
 use super::transform::{Parameters, Similarity};
 use super::{Method, Options, SimilarityError, Station};
 use crate::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
@@ -60,7 +61,10 @@ pub fn iterate(
             };
             let known = station.known();
             for component in (0..3).filter(|&k| known[k]) {
-                let row = rows[component];
+                let mut row = rows[component];
+                if options.scale.is_some() {
+                    row[SCALE] = 0.0;
+                }
                 for i in 0..7 {
                     (0..8).for_each(|j| normal[i][j] += row[i] * row[j]);
                 }
@@ -68,6 +72,9 @@ pub fn iterate(
                     equations.push((index, component, row));
                 }
             }
+        }
+        if options.scale.is_some() {
+            normal[SCALE][SCALE] = 1.0;
         }
         let singular = || SimilarityError::Undetermined { cause: Cause::Singular, stations: vec![] };
         let (auxiliary, e) = gauss_crout(&normal).ok_or_else(singular)?;

@@ -66,10 +66,11 @@ impl Solution {
         adjustment: &Adjustment,
         chosen: Chosen,
         cycles: Option<Cycles>,
+        held: bool,
     ) -> Result<Self, SimilarityError> {
         let similarity = problem.model.similarity(&adjustment.unknowns[3 * stations.len()..]);
         let singular = || SimilarityError::Undetermined { cause: Cause::Singular, stations: vec![] };
-        let cofactors = misclosures::tangent_cofactors(stations, &similarity).ok_or_else(singular)?;
+        let cofactors = misclosures::tangent_cofactors(stations, &similarity, held).ok_or_else(singular)?;
         let adjusted =
             |i: usize| AdjustedStation::new(i, &stations[i], &similarity, &cofactors, adjustment, *inner);
         let outward = inner * inner;
@@ -88,7 +89,7 @@ impl Solution {
             status: adjustment.status,
             cycles,
             traces: traces.unwrap_or_default(),
-            condition: determinacy::condition(stations, &similarity),
+            condition: determinacy::condition(stations, &similarity, held),
             weakness: determinacy::weakness(stations, &similarity),
             sum_of_squares: outward * last.unwrap_or(adjustment.initial_sum_of_squares),
             iterations: iterations.collect(),

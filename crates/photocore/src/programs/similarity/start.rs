@@ -35,20 +35,21 @@ pub struct Chosen {
     pub alternatives: Vec<Similarity>,
 }
 
-/// Chooses initial values as asked.
-pub fn choose(stations: &[Station], start: Start) -> Result<Chosen, SimilarityError> {
+/// Chooses initial values as asked; the scale may be held.
+pub fn choose(stations: &[Station], start: Start, held: Option<f64>) -> Result<Chosen, SimilarityError> {
     let (control_centre, model_centre) = centres(stations);
     let only = |similarity, started| Chosen { similarity, started, alternatives: vec![] };
     match start {
         Start::Given(parameters) => {
-            let given = Similarity::from_parameters(&parameters, control_centre, model_centre);
+            let mut given = Similarity::from_parameters(&parameters, control_centre, model_centre);
+            given.scale = held.unwrap_or(given.scale);
             Ok(only(given, Started::Restart))
         }
-        Start::Report => Ok(only(report(stations, control_centre, model_centre)?, Started::Report)),
+        Start::Report => Ok(only(report(stations, control_centre, model_centre, held)?, Started::Report)),
         Start::ClosedForm | Start::Auto => {
-            let moments = Moments::new(stations, control_centre, model_centre);
+            let moments = Moments::new(stations, control_centre, model_centre, held);
             let mut minima = moments.best()?;
-            let report = report(stations, control_centre, model_centre).ok();
+            let report = report(stations, control_centre, model_centre, held).ok();
             let report = report.filter(|_| start == Start::Auto);
             let sum = |similarity: &Similarity| sum_of_squares(stations, similarity);
             minima.sort_by(|a, b| sum(a).total_cmp(&sum(b)));
@@ -96,6 +97,7 @@ fn report(
     stations: &[Station],
     control_centre: Vector3,
     model_centre: Vector3,
+    held: Option<f64>,
 ) -> Result<Similarity, SimilarityError> {
     let [first, second, ..] = stations else {
         return Err(SimilarityError::FirstStations("are not there"));
@@ -110,7 +112,7 @@ fn report(
         (control.z, model.z) = (0.0, 0.0);
     }
     let length = |v: Vector3| v[0].hypot(v[1]).hypot(v[2]);
-    let scale = length(model) / length(control);
+    let scale = held.unwrap_or(length(model) / length(control));
     if !(x.hypot(y) > 0.0 && p.hypot(q) > 0.0) {
         return Err(SimilarityError::FirstStations("coincide in plan"));
     }
