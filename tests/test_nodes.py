@@ -136,7 +136,7 @@ def piece(block, node, parent, homes, at, outer, tied, options):
     for name in ("photo_positions_observed", "photo_attitudes_observed", "principal_distances"):
         values = getattr(block, name)
         changes[name] = None if values is None else values[photos]
-    for name in ("point_positions", "point_sd"):
+    for name in ("point_positions", "point_sd", "point_check_sd"):
         changes[name] = getattr(block, name)[points]
     for name in ("image_xy", "image_sd"):
         changes[name] = getattr(block, name)[images]
