@@ -28,10 +28,10 @@ PACKAGES = (
 MADE_BY_THE_LIBRARY = {
     "photogram": "Cleaned Differences FirstValues GroupSums Iteration Message Orientation Plan Pose Progress"
     " Resection Result Simulation Snooped VarianceComponents VarianceFunction",
-    "photogram.absolute_orientation": "Orientation",
+    "photogram.absolute_orientation": "Model Orientation Strip",
     "photogram.collection": "AdjustedCollection Simulation",
-    "photogram.comparator": "Calibration Case CaseResult Decomposition Place PlateResult Pointing Reading"
-    " Session Simulation collect_cases",
+    "photogram.comparator": "Calibration Case CaseResult Comparison Decomposition Identity Place PlateResult"
+    " Pointing Reading RecordedCalibration RecordedCase Session Simulation collect_cases",
     "photogram.giant": "Check ErrorWarning Finding ImageFrame Project Section",
     "photogram.perspective_center": "Cycle PerspectiveCenter Run Stop",
     "photogram.stellar": "Result",
@@ -92,6 +92,7 @@ def good(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sound")
     examples = Path(photogram.__file__).parent / "examples"
     block = photogram.simulate(**SMALL).block
+    pair = photogram.simulate(strips=1, photos_per_strip=2, points_per_photo=40, control_spacing=1).block
     project = Project.from_block(block)
     photogram.giant.write_project(project, folder / "giant")
     project = read_project(folder / "giant")
@@ -106,6 +107,10 @@ def good(tmp_path_factory):
     session = comparator.simulate_calibration(plate, cases=1, sequence=range(1, 26)).session
     options = comparator.Options(joint=False, polynomial=False)
     calibration = comparator.calibrate(session, options)
+    years = [
+        comparator.calibrate(comparator.simulate_calibration(plate, cases=2, date=day, seed=k).session)
+        for k, day in enumerate(("1970-01-15", "1971-01-20"))
+    ]
     star_camera = folder / "camera.json"
     star_camera.write_bytes(stellar.BrownCamera.of_field(6000, 4000, 0.6).to_json())
     readings, deck, own_grid = folder / "readings.csv", folder / "deck.txt", folder / "grid.csv"
@@ -171,6 +176,8 @@ def good(tmp_path_factory):
             },
             "Stations": {"ids": ["a", "b"], "control": np.eye(2, 3), "model": np.eye(2, 3)},
             "orient": {"stations": stations},
+            "relative_model": {"block": pair, "first": pair.photo_ids[0], "second": pair.photo_ids[1]},
+            "strip_of": {"block": pair, "photos": pair.photo_ids[:2]},
             "read_cards": {"path": cards},
             "read_csv": {"path": examples / "absolute_orientation" / "stations.csv"},
             "transform_file": {
@@ -201,6 +208,7 @@ def good(tmp_path_factory):
             },
             "built_in_grid": {"number": 1320},
             "calibrate": {"session": session, "options": options},
+            "compare": {"calibrations": years},
             "find_grid": {"name": "1320"},
             "listing": {"calibration": calibration},
             "read": {"paths": [readings]},
@@ -258,6 +266,7 @@ def good(tmp_path_factory):
                 for name in ("ids", "plate_xy", "model", "principal_distance", "initial")
             },
             "determine": {"grid": grid},
+            "joined": {"grids": [grid]},
             "read_deck": {"path": grid_deck},
             "reduce": {
                 "readings": [np.ones((2, 3))] * len(grid.ids),

@@ -11,7 +11,7 @@ COMMANDS = {
     "index.md": 1,
     "tutorials/aerial-block.md": 6,
     "tutorials/drone.md": 7,
-    "tutorials/metrology.md": 8,
+    "tutorials/metrology.md": 5,
     "tutorials/vision.md": 6,
 }
 """Of each page; a page of which nothing is found would pass unseen."""

@@ -33,6 +33,10 @@ RUNS = {
         ["absolute-orientation", "transform", "former.json", "points.csv"],
         ["former.json", "points.csv"],
     ),
+    "absolute-orientation relative": (
+        ["absolute-orientation", "relative", "project"],
+        ["project/images.csv"],
+    ),
     "comparator calibrate": (
         ["comparator", "comparator-3.txt", "--grid", "grid.csv", "--no-plots"],
         ["comparator-3.txt", "grid.csv"],

@@ -32,4 +32,4 @@ __all__ = [
     "transform_file",
 ]
 
-check_arguments(globals(), ["read_cards", "read_csv", "transform_file"])
+check_arguments(globals(), ["read_cards", "read_csv", "relative_model", "strip_of", "transform_file"])

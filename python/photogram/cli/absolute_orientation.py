@@ -189,7 +189,11 @@ def absolute_orientation(
     ] = Method.RIGOROUS,
     unit_variance: Annotated[
         UnitVariance,
-        typer.Option(help="Scale covariances by sigma0 squared, or not (with standard deviations)."),
+        typer.Option(
+            metavar="NAME",
+            help="`estimated`: covariances are scaled by sigma0 squared; `unity`: they are not (with standard"
+            " deviations).",
+        ),
     ] = UnitVariance.ESTIMATED,
     point_sd: Annotated[
         float, typer.Option(min=0.0, help="Standard deviation of the points' own coordinates, model units.")

@@ -116,8 +116,7 @@ def adjust(
         str | None,
         typer.Option(
             metavar="POINT=AXES,...",
-            help="Coordinates of points that are held, in the place of all control: A=XYZ,B=YZ,C=Z is a datum"
-            " on three points (3-2-1); the former control becomes check points.",
+            help="Held coordinates, in the place of control: A=XYZ,B=YZ,C=Z (3-2-1).",
             show_default=False,
         ),
     ] = None,
@@ -128,8 +127,9 @@ def adjust(
     unit_variance: Annotated[
         UnitVarianceName | None,
         typer.Option(
-            help="What the variance of unit weight is based on: all weighted values (`constrained`),"
-            " redundancy numbers, or 1. Default: what PATH says, else constrained.",
+            metavar="NAME",
+            help="What the variance of unit weight is based on: `constrained` (all weighted values),"
+            " `redundancy` (numbers), or `unity`: 1. Default: what PATH says, else constrained.",
             show_default=False,
         ),
     ] = None,
@@ -146,8 +146,7 @@ def adjust(
         bool,
         typer.Option(
             "--keep-all",
-            help="Of photos without a pose: adjust with all images from the beginning, those too that first"
-            " values would set aside.",
+            help="Begin with all images, those too that first values would set aside.",
         ),
     ] = False,
     divided: Parts = WHOLE,

@@ -112,6 +112,7 @@ def giant(
     unit_variance: Annotated[
         UnitVarianceName | None,
         typer.Option(
+            metavar="NAME",
             help="What the variance of unit weight is based on: all weighted values (`constrained`),"
             " redundancy numbers, or 1. Default: as COMMON says, with redundancy numbers for cameras that are"
             " free; with --as-published the rule of 1987 for these.",

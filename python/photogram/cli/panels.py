@@ -12,13 +12,14 @@ PANELS = {
     "Input": "example packaged file_format control control_crs columns roles images names camera sd"
     " pixel_origin model angles grid hand against against_spacing against_position_sd catalogue utc epoch"
     " faintest points point_sd decimals format zero_missing ground_unit model_unit restart"
-    " start reject",
+    " start reject photos kind",
     "Results": "out overwrite json xlsx html no_html plots plot_format parquet crs map ply ply_origin listing"
-    " pdf to trace points_out date safe_csv",
-    "Adjustment": "datum datum_points loss scale tolerance max_iterations covariance unit_variance"
+    " pdf to trace points_out part_two restart_out ident date safe_csv",
+    "Adjustment": "datum datum_points hold loss scale tolerance max_iterations covariance unit_variance"
     " self_calibrate keep_all keep_repeated as_published weights method polynomial"
     " estimate_grid each_case lens common_scale without any_roll blind air_refraction"
-    " water_refraction water_level water_index limits invert extrapolate components",
+    " water_refraction water_level water_index limits invert extrapolate components"
+    " together calibrate",
     "Gross errors": "snoop level fdr unit_weight",
     "In parts": "cluster workers parts memory run plan",
     "Simulated block": "strips photos_per_strip forward_overlap side_overlap principal_distance frame_size"

@@ -90,7 +90,7 @@ ControlColumns = Annotated[
     typer.Option(
         "--columns",
         metavar="COLUMN=HEADING,..",
-        help="What the columns of control are: point=Name,x=East[ft],y=-South; -=Heading is not read;"
+        help="What the columns of control are: point=Name,x=East\\[ft],y=-South; -=Heading is not read;"
         " point,y,x,z or PNEZD without a header.",
         show_default=False,
     ),
@@ -159,7 +159,7 @@ KeepRepeated = Annotated[
     bool,
     typer.Option(
         "--keep-repeated",
-        help="Take second images of a point on a photo in, as COLMAP does: their mean with the first.",
+        help="Second images of a point on a photo count too: their mean with the first.",
     ),
 ]
 

@@ -104,16 +104,14 @@ def iterate(
         if stop:
             break
         # What the equations do not touch yet (a direction of no decentering) is not corrected.
-        try:
-            correction = core.correction(**_tolerances(problem))
-        except _photocore.StellarError as error:
-            raise failure(problem, error) from None
+        correction = _correction(problem, core)
         parameters = parameters + correction["parameters"]
         if abs(parameters[21]) > 2 * np.pi:
             parameters[21] = np.mod(parameters[21], 2 * np.pi)
         if problem.options.common_scale:
             parameters[13] = parameters[12]
     if not correction:
+        _correction(problem, core)  # names what is out of sight
         raise AdjustmentError(
             "the initial values give discrepancies beyond all numbers: those of the camera are wrong"
         )
@@ -130,6 +128,14 @@ def iterate(
         converged=stop == SETTLED or once,
         levels=tuple(Level(solution, i + 1, level) for i, level in enumerate(levels)),
     )
+
+
+def _correction(problem: Problem, core: _photocore.StellarProblem) -> dict[str, Any]:
+    """Return the correction at the values of the core; raise what the equations do not allow, by name."""
+    try:
+        return core.correction(**_tolerances(problem))
+    except _photocore.StellarError as error:
+        raise failure(problem, error) from None
 
 
 def residual_cycle(
