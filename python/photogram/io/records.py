@@ -43,8 +43,8 @@ class Source:
         Raises
         ------
         InputError
-            The file cannot be read or is UTF-16 without its mark or UTF-32, or a record holds a tab or another control
-            character, which would move its columns.
+            The file cannot be read or is UTF-32 or UTF-16 without its mark, or a record holds a tab or
+            another control character, which would move its columns.
         """
         lines = read_lines(path)
         if sum(line.count("\0") for line in lines) > WIDE * sum(map(len, lines)):
