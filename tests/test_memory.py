@@ -224,14 +224,17 @@ print(*said)
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="this system has no such limits")
 @pytest.mark.parametrize("room", [0.05, 0.5, 1.2, 3.5])
 def test_short_addresses_are_an_error_and_no_abort(room):
-    """Two adjustments at once in threads of Python, with addresses for so many threads of the core."""
+    """Two adjustments at once in threads of Python, with addresses for so many threads of the core.
+
+    Between what is less than the buffers and what is enough for both, one may end before the other begins.
+    """
     own = memory.addresses_of_a_thread() or 160 << 20
     command = [sys.executable, "-c", SHORT, str(int(room * own) + (64 << 20))]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     assert (done.returncode, done.stderr) == (0, "")
     assert len(done.stdout.split()) == 2
     assert set(done.stdout.split()) <= {"converged", "refused"}
-    if room != 1.2:
+    if room in (0.05, 3.5):
         assert set(done.stdout.split()) == {"converged" if room > 1 else "refused"}
 
 

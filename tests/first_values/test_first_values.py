@@ -6,7 +6,7 @@ import pytest
 
 import photogram
 from example_scripts import load
-from photogram import AdjustmentError, Block, InputError, adjust, first_values
+from photogram import AdjustmentError, Block, Camera, InputError, adjust, first_values
 from photogram.geometry import rotation_matrix
 from photogram.giant import read_project
 from photogram.network.observations import Attitude, Distance, Position
@@ -302,3 +302,37 @@ def test_the_same_every_time():
     block = networks.network(*networks.ring(1), seed=1, wrong=0.1)[0]
     first, again = first_values(block), first_values(block)
     assert np.array_equal(first.block.photo_positions, again.block.photo_positions)
+
+
+@pytest.mark.parametrize(
+    ("seed", "own", "shared"), [(26, (15, 10, 16), (3, 1, 2)), (43, (12, 10, 16), (3, 2, 1))]
+)
+def test_a_model_takes_in_those_before_and_after_it(seed, own, shared):
+    """Three pairs of photos, images alone; with the third one the second has enough for the first."""
+    generator = np.random.default_rng(seed)
+    west = {"A": -6.0, "B": 0.0, "C": 6.0}
+    photos = [(pair, k) for pair in west for k in range(2)]
+    centres = np.array([[west[pair] + 6 * k - 3, 6.0 * (pair == "B") + k, 30.0 + k] for pair, k in photos])
+    seen = [*("A" * own[0] + "B" * own[1] + "C" * own[2])]
+    seen += ["AB"] * shared[0] + ["AC"] * shared[1] + ["BC"] * shared[2]
+    points = generator.uniform([-10, -10, -4], [10, 10, 4], (len(seen), 3))
+    rows = np.array([(p, q) for q, by in enumerate(seen) for p, (pair, _) in enumerate(photos) if pair in by])
+    camera = Camera("pinhole", {"fx": 1000.0, "fy": 1000.0, "cx": 0.0, "cy": 0.0}, name="cam")
+    xy = np.vstack([camera.project([points[q] - centres[p]]) for p, q in rows])
+    block = Block(
+        photo_ids=[f"{pair}{k}" for pair, k in photos],
+        photo_positions=np.full((6, 3), np.nan),
+        photo_attitudes=np.full((6, 3), np.nan),
+        photo_position_sd=np.inf,
+        photo_attitude_sd=np.inf,
+        point_ids=[f"p{q}" for q in range(len(seen))],
+        point_positions=np.full((len(seen), 3), np.nan),
+        point_sd=np.inf,
+        image_photos=rows[:, 0],
+        image_points=rows[:, 1],
+        image_xy=xy + generator.normal(0, 0.5, xy.shape),
+        image_sd=1.0,
+        cameras=[camera],
+        photo_cameras=np.zeros(6, int),
+    )
+    assert first_values(block).block.photo_ids == block.photo_ids

@@ -11,7 +11,8 @@ import pytest
 import photogram
 from photogram import InputError, formats
 from photogram.cli.options import default_out
-from photogram.formats import additions, crs
+from photogram.formats import crs
+from photogram.formats.similarity import similarity
 from photogram.formats.xml_stream import LONGEST, MOST, read_stream, root_of
 from photogram.io.delimited import read_columns
 from photogram.network.directions import without_lenses
@@ -165,7 +166,7 @@ def test_a_camera_that_shows_everything_in_one_point_is_named():
 
 def test_a_similarity_of_extreme_coordinates_is_none():
     model = np.array([[0.0, 0.0, 0.0], [1e200, 0.0, 1.0], [0.0, 1e200, 0.0]])
-    assert additions._similarity(model, model)[3] == np.inf
+    assert similarity(model, model)[3] == np.inf
 
 
 def test_links_that_lead_nowhere_or_in_circles_are_named(tmp_path):

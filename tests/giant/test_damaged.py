@@ -12,12 +12,14 @@ from photogram import Spheroid, simulate
 from photogram.cli import app
 from photogram.giant import Common, Project
 from photogram.giant.files import NAMES, to_bytes
+from photogram.io.files import read_text
 from photogram.io.writing import write_whole
 
 PROJECTS = 840
 RUNS = 8
 ERROR_AT = re.compile(r"error: (?P<file>.+?)(, record (?P<record>\d+))?: ")
 WRITTEN = {"RESTART", "report.txt"}
+NOT_CONVERGED = "Not converged"
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +69,9 @@ def outcome(result, place, told):
     assert {path.name for path in place.iterdir()} <= {"in", "out"}, told
     if "error: " not in result.stderr:
         assert result.exit_code in (0, 3, 4), told
-        converged = result.exit_code != 3
+        # Unknowns that are hardly determined end with 3, too, though the adjustment has converged.
+        converged = NOT_CONVERGED not in result.output
+        assert converged or result.exit_code == 3, told
         assert left is not None, told
         assert left >= WRITTEN or "RESTART is not written" in result.output, told
         assert left <= (WRITTEN | {"FRAMES", "GROUND"} if converged else WRITTEN), told
@@ -86,12 +90,8 @@ def outcome(result, place, told):
 
 def record_text(path, number):
     """Return a record as an error shows it."""
-    content = path.read_bytes()
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = content.decode("latin-1")
-    record = text.replace("\r\n", "\n").replace("\r", "\n").removesuffix("\x1a").split("\n")[number - 1][:80]
+    text = read_text(path)
+    record = text.removesuffix("\x1a").split("\n")[number - 1][:80]
     return "".join(character if character.isprintable() else "\ufffd" for character in record)
 
 

@@ -99,7 +99,15 @@ def test_records_may_be_long_and_are_cut_after_column_80(sound, tmp_path):
     )
 
 
-@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+@pytest.mark.parametrize("name", ["COMMON", "IMAGES"])
+def test_text_of_two_bytes_a_character_is_read_by_its_mark(name, sound, tmp_path):
+    files = sound[0] | {name: sound[0][name].decode().encode("utf-16")}
+    block = read_project(written(tmp_path / "wide", files)).to_block()
+    plain = read_project(written(tmp_path / "plain", sound[0])).to_block()
+    np.testing.assert_array_equal(block.image_xy, plain.image_xy)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-32"])
 @pytest.mark.parametrize("name", ["COMMON", "IMAGES"])
 def test_other_encodings_are_named(name, encoding, sound, tmp_path):
     files = sound[0] | {name: sound[0][name].decode().encode(encoding)}

@@ -14,7 +14,7 @@ PANELS = {
     " faintest points point_sd decimals format zero_missing ground_unit model_unit restart"
     " start reject photos kind",
     "Results": "out overwrite json xlsx html no_html plots plot_format parquet crs map ply ply_origin listing"
-    " pdf to trace points_out part_two restart_out ident date safe_csv",
+    " pdf to trace points_out part_two restart_out ident date",
     "Adjustment": "datum datum_points hold loss scale tolerance max_iterations covariance unit_variance"
     " self_calibrate keep_all keep_repeated as_published weights method polynomial"
     " estimate_grid each_case lens common_scale without any_roll blind air_refraction"

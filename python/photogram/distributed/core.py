@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
@@ -102,7 +102,13 @@ def _result(part: Part, manifest: Manifest, solution: BlockSolution, variance: f
     """Return the result of a node, scaled by the variance of unit weight of the whole."""
     scaled = cast("BlockSolution", _Scaled(part, solution, variance))
     datum = datum_of(part.block, solution)
-    return Result.from_solution(part.block, scaled, manifest.options, datum, [], solution.degrees_of_freedom)
+    return _OfNode.from_solution(part.block, scaled, manifest.options, datum, [], solution.degrees_of_freedom)
+
+
+class _OfNode(Result):
+    """The result of a node: its own normal equations are not those of the block, and are not formed again."""
+
+    WHOLE: ClassVar[bool] = False
 
 
 class _Scaled:

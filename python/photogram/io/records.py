@@ -38,13 +38,13 @@ class Source:
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Read a text file (UTF-8, else Latin-1; any line ends).
+        """Read a text file as :func:`~photogram.io.files.read_lines` does.
 
         Raises
         ------
         InputError
-            The file cannot be read or is UTF-16 or UTF-32, or a record holds a tab or another control
-            character, which would move its columns.
+            The file cannot be read or is UTF-32 or UTF-16 without its mark, or a record holds a tab or
+            another control character, which would move its columns.
         """
         lines = read_lines(path)
         if sum(line.count("\0") for line in lines) > WIDE * sum(map(len, lines)):

@@ -158,10 +158,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
             if damping == 0.0 {
                 control.in_valley = change <= VALLEY;
             }
-            // Full steps that have led here say that the linearized equations are worth following.
+            // Full steps that have led here say that the linearized equations are worth following. A step that the bends of a loss make
+            // fail follows no valley.
             let led = self.iterations.iter().any(|iteration| iteration.damping == 0.0);
             if damping == 0.0
                 && led
+                && self.options.loss.is_none()
                 && control.in_valley
                 && control.along < MOST_ALONG
                 && !self.is_still(&control.refused, control.best)

@@ -59,7 +59,8 @@ impl Search<'_> {
             let mut model = apart.remove(index);
             let before = apart.len();
             self.join_all(&mut model, apart)?;
-            apart.insert(index, model);
+            // It may have taken in those before it, too.
+            apart.insert(index.min(apart.len()), model);
             index = if before + 1 > apart.len() { 0 } else { index + 1 };
         }
         Ok(())
