@@ -68,7 +68,7 @@ def rotation(vector: Floats) -> Floats:
 def spin(r: Floats) -> Floats:
     """Return (2,) by how much axes R0 Exp(r1, r2, 0) turn about the third for turns about the first two.
 
-    Lines and planes have two unknowns of rotation: the axes of offsets and residuals spin by the rest of Jr dr.
+    Lines and planes have two unknowns of rotation: axes of offsets and residuals spin by the rest of Jr dr.
     """
     t = np.linalg.norm(r)
     if t == 0:
