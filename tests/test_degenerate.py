@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import degenerate as of
-from photogram import Camera, RankError, adjust, read_result
+from photogram import Camera, RankError, adjust, formats, read_result
 from photogram.network.observations import EqualHeight, OnPlumbLine, Position
 from photogram.network.unknowns import Drift, LeverArm, PlumbLine, Shift
 
@@ -103,6 +103,23 @@ def test_what_is_open_is_counted_and_named_with_what_helps(name):
         assert f"the observations leave {count} combinations" in said
     assert all(re.search(each, said) for each in words), said
     assert "second flying height" not in said
+
+
+@pytest.mark.parametrize("name", SET_UPS)
+def test_the_command_says_it_and_ends_with_its_code(name, run, tmp_path):
+    make, _, words = SET_UPS[name]
+    block = make()
+    project = formats.Project(
+        block=block, path=tmp_path, title=name, sizes=(None,), pixel_mm=(None,), starts=block.point_positions
+    )
+    (tmp_path / "given").mkdir()
+    for file, content in formats.to_files(project, "plain").items():
+        (tmp_path / "given" / file).write_bytes(content)
+    done = run("adjust", "given", "--no-html")
+    said = " ".join((done.output + done.stderr).split())
+    assert done.exit_code == 3, said
+    assert all(re.search(each, said) for each in words), said
+    assert not re.search("accepted|usable", said, re.IGNORECASE)
 
 
 REMEDIES = {
