@@ -156,18 +156,20 @@ def level(pairs):
 
 
 @pytest.mark.parametrize(
-    ("make", "count"),
+    ("make", "count", "words"),
     [
-        (lambda: plumb(known=False), 5),
-        (lambda: plumb(known=True), 3),
-        (lambda: level([(0, 1)]), 6),
-        (lambda: level([(0, 1), (2, 3)]), 5),
-        (lambda: strip((), gnss(STRIP, drift=Drift("d"))), 7),
+        (lambda: plumb(known=False), 5, "gives the vertical.*open are place, azimuth, scale"),
+        (lambda: plumb(known=True), 3, "open are the turn about it, the shift along it, scale"),
+        (lambda: level([(0, 1)]), 6, "it can still tilt about that line; a third point aside of it"),
+        (lambda: level([(0, 1), (2, 3)]), 5, "refer to these$"),
+        (lambda: strip((), gnss(STRIP, drift=Drift("d"))), 7, "refer to these$"),
     ],
 )
-def test_free_networks_hold_what_is_open(make, count):
+def test_free_networks_hold_what_is_open_and_say_it(make, count, words):
     """Set-ups 9 and 10, and 8 without control."""
-    assert len(adjust(make()).datum.held) == count
+    result = adjust(make())
+    assert len(result.datum.held) == count
+    assert any(re.search(words, str(each)) for each in result.messages), result.messages
 
 
 def with_errors(block, seed=0, start=2.0, tilt=0.002):
