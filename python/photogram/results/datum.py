@@ -177,8 +177,8 @@ def _levelled(block: Block, held: int) -> str:
     if kinds == {EqualHeight} and beyond == 1:
         return (
             "; points of equal height level the network in the direction of their line only: it can still"
-            " tilt about that line; a third point aside of it on the same level, a pair across, or a plumb line"
-            " would hold it"
+            " tilt about that line; a third point aside of it on the same level, a pair across, or a plumb"
+            " line would hold it"
         )
     return ""
 
