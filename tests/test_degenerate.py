@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import degenerate as of
-from photogram import Camera, RankError, adjust, read_result
+from photogram import Camera, RankError, adjust, formats, read_result
 from photogram.network.observations import EqualHeight, OnPlumbLine, Position
 from photogram.network.unknowns import Drift, LeverArm, PlumbLine, Shift
 
@@ -105,6 +105,23 @@ def test_what_is_open_is_counted_and_named_with_what_helps(name):
     assert "second flying height" not in said
 
 
+@pytest.mark.parametrize("name", SET_UPS)
+def test_the_command_says_it_and_ends_with_its_code(name, run, tmp_path):
+    make, _, words = SET_UPS[name]
+    block = make()
+    project = formats.Project(
+        block=block, path=tmp_path, title=name, sizes=(None,), pixel_mm=(None,), starts=block.point_positions
+    )
+    (tmp_path / "given").mkdir()
+    for file, content in formats.to_files(project, "plain").items():
+        (tmp_path / "given" / file).write_bytes(content)
+    done = run("adjust", "given", "--no-html")
+    said = " ".join((done.output + done.stderr).split())
+    assert done.exit_code == 3, said
+    assert all(re.search(each, said) for each in words), said
+    assert not re.search("accepted|usable", said, re.IGNORECASE)
+
+
 REMEDIES = {
     "1 relief with heights": lambda: vertical(["c"], of.IN_SPACE, 200.0),
     "3 one photo tilted": lambda: of.block(
@@ -139,18 +156,20 @@ def level(pairs):
 
 
 @pytest.mark.parametrize(
-    ("make", "count"),
+    ("make", "count", "words"),
     [
-        (lambda: plumb(known=False), 5),
-        (lambda: plumb(known=True), 3),
-        (lambda: level([(0, 1)]), 6),
-        (lambda: level([(0, 1), (2, 3)]), 5),
-        (lambda: strip((), gnss(STRIP, drift=Drift("d"))), 7),
+        (lambda: plumb(known=False), 5, "gives the vertical.*open are place, azimuth, scale"),
+        (lambda: plumb(known=True), 3, "open are the turn about it, the shift along it, scale"),
+        (lambda: level([(0, 1)]), 6, "it can still tilt about that line; a third point aside of it"),
+        (lambda: level([(0, 1), (2, 3)]), 5, "refer to these$"),
+        (lambda: strip((), gnss(STRIP, drift=Drift("d"))), 7, "refer to these$"),
     ],
 )
-def test_free_networks_hold_what_is_open(make, count):
+def test_free_networks_hold_what_is_open_and_say_it(make, count, words):
     """Set-ups 9 and 10, and 8 without control."""
-    assert len(adjust(make()).datum.held) == count
+    result = adjust(make())
+    assert len(result.datum.held) == count
+    assert any(re.search(words, str(each)) for each in result.messages), result.messages
 
 
 def with_errors(block, seed=0, start=2.0, tilt=0.002):

@@ -20,7 +20,7 @@ from photogram.network.observations import (
     Position,
     Relative,
 )
-from photogram.network.unknowns import Level, Line, Plane, PlumbLine, Shift
+from photogram.network.unknowns import Drift, Level, LeverArm, Line, Plane, PlumbLine, Shift
 
 SD = 0.001
 """Of everything but images, in metres and radians."""
@@ -41,8 +41,9 @@ def places():
 
 POINTS, (CENTRES, ANGLES) = places(), of.around()
 PHOTOS = len(CENTRES)
-SHIFTED = Shift("s")
+SHIFTED, DRIFTING, ARM = Shift("s"), Drift("d"), LeverArm("a")
 PLUMB, LEVEL = PlumbLine("l", POINTS[0]), Level("h", POINTS[10, 2])
+KNOWN = PlumbLine("k", POINTS[0], sd=SD)
 LINE, PLANE = Line("g", AXIS, POINTS[3]), Plane("e", ACROSS[0], POINTS[6])
 
 
@@ -82,12 +83,20 @@ KINDS = {
     "a plane": ([OnPlane(f"P{k}", PLANE, SD) for k in range(6, 10)], 7),
     "a plumb line of two": ([OnPlumbLine(f"P{k}", PLUMB, SD) for k in (0, 1)], 5),
     "a plumb line": ([OnPlumbLine(f"P{k}", PLUMB, SD) for k in (0, 1, 2)], 5),
+    "a plumb line, uneven": ([OnPlumbLine(f"P{k}", PLUMB, [SD, 2 * SD]) for k in (0, 1, 2)], 5),
+    "a plumb line that is known": ([OnPlumbLine(f"P{k}", KNOWN, SD) for k in (0, 1, 2)], 3),
     "a line of two": ([OnLine(f"P{k}", LINE, SD) for k in (3, 4)], 7),
     "a line": ([OnLine(f"P{k}", LINE, SD) for k in (3, 4, 5)], 7),
     "a line, uneven": ([OnLine(f"P{k}", LINE, [SD, 2 * SD]) for k in (3, 4, 5)], 7),
     "one position": ([position(1)], 4),
     "positions": ([position(k) for k in (0, 2, 5)], 0),
     "positions, shifted": ([position(k, shift=SHIFTED) for k in (0, 2, 5)], 3),
+    "positions, drifting": (
+        [position(k, shift=SHIFTED, drift=DRIFTING, time=float(k)) for k in range(PHOTOS)],
+        3,
+    ),
+    "antennas": ([position(k, lever_arm=ARM) for k in range(PHOTOS)], 0),
+    "antennas, shifted": ([position(k, lever_arm=ARM, shift=SHIFTED) for k in range(PHOTOS)], 3),
     "attitudes": ([attitude(k) for k in (0, 3)], 4),
     "a relative pose": (
         [
@@ -112,6 +121,8 @@ WITHOUT_SCALE = {
     "a plane",
     "a plumb line of two",
     "a plumb line",
+    "a plumb line, uneven",
+    "a plumb line that is known",
     "a line of two",
     "a line",
     "a line, uneven",
@@ -146,6 +157,12 @@ def cross(vector):
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
+def of_priors(unknown, step):
+    """Return what is observed of an unknown itself, to unit weight."""
+    deviations = np.broadcast_to(unknown.given.deviations, step.shape)
+    return [own / sd for own, sd in zip(step, deviations, strict=True) if np.isfinite(sd)]
+
+
 def design(block, result):
     """Return the partials of all observations, to unit weight, by points, photos, common unknowns.
 
@@ -155,6 +172,7 @@ def design(block, result):
     widths = [each.cofactors.shape[0] for each in unknowns]
     first = np.cumsum([3 * n + 6 * PHOTOS, *widths])
     turns = rotation_matrix(result.photo_attitudes)
+    times = np.mean([each.time for each in block.observations if isinstance(each, Position)] or [0.0])
 
     def computed(step):
         points = result.point_positions + step[: 3 * n].reshape(n, 3)
@@ -163,7 +181,10 @@ def design(block, result):
         to_photo = [(np.eye(3) - cross(poses[k, 3:])) @ turns[k] for k in range(PHOTOS)]
         to_all = np.array(to_photo)[block.image_photos]
         u = np.einsum("mij,mj->mi", to_all, points[block.image_points] - centres[block.image_photos])
-        rows = list((of.C * u[:, :2] / u[:, 2:] / block.image_sd).ravel())
+        rows = [
+            own for k, each in enumerate(unknowns) for own in of_priors(each, step[first[k] : first[k + 1]])
+        ]
+        rows += list((of.C * u[:, :2] / u[:, 2:] / block.image_sd).ravel())
         for each in block.observations:
             row = [block.point_ids.index(name) for name in each.points]
             photo = [block.photo_ids.index(name) for name in each.photos]
@@ -194,7 +215,15 @@ def design(block, result):
                 case Control():
                     value = points[row[0]]
                 case Position():
-                    value = centres[photo[0]] + sum(steps, np.zeros(3))
+                    value = np.array(centres[photo[0]])
+                    for k, moved in zip(at, steps, strict=True):
+                        match unknowns[k].given:
+                            case LeverArm():
+                                value = value + to_photo[photo[0]].T @ (unknowns[k].position + moved)
+                            case Drift():
+                                value = value + (each.time - times) * moved
+                            case _:
+                                value = value + moved
                 case Attitude():
                     value = poses[photo[0], 3:]
                 case Relative():
@@ -265,7 +294,7 @@ def test_a_line_far_from_where_it_started_has_the_covariance_of_one_that_starts_
     assert np.abs((far.covariance - expected) / scale).max() < 1e-6
 
 
-@pytest.mark.parametrize(("seed", "number"), [(3, 148), (2, 652)])
+@pytest.mark.parametrize(("seed", "number"), [(3, 148), (2, 652), (115, 40), (166, 76)])
 def test_verticals_of_an_ellipsoid_do_not_say_where_a_network_is(seed, number):
     """Attitudes and differences together tell its place to kilometres: rounding takes that."""
     network = random_network(seed, number)
@@ -274,3 +303,17 @@ def test_verticals_of_an_ellipsoid_do_not_say_where_a_network_is(seed, number):
     result = adjust(network.block)
     assert result.converged
     assert [name for _, name in result.datum.held] == ["longitude", "latitude", "height"]
+
+
+@pytest.mark.parametrize(("given", "open_still"), [([np.inf, 0.1], "longitude"), ([0.1, np.inf], "latitude")])
+@pytest.mark.parametrize("point", [0, 5])
+def test_a_network_is_held_by_what_moves_well(point, given, open_still):
+    """Up at a plumb line is north or east, too, by a millionth, at photos that are metres away."""
+    block = random_network(3, 148).block
+    line = PlumbLine("edge", block.point_positions[point], sd=given)
+    result = adjust(
+        block.replace(observations=[*block.observations, OnPlumbLine(f"point {point}", line, SD)])
+    )
+    assert result.converged
+    assert [name for _, name in result.datum.held] == [open_still, "height"]
+    assert np.nanmax(result.point_sd[:, 2]) < 0.1

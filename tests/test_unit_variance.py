@@ -82,7 +82,12 @@ def adjusted(run, folder, *command):
 def test_all_entrances_have_one_unit_variance(run, written):
     block = formats.read(written / "plain").block
     whole = adjust(block)
-    for command in (("adjust", "plain"), ("adjust", "cards"), ("giant", "cards")):
+    # A project that does not say: that of most users.
+    toml = written / "plain" / "project.toml"
+    toml.write_text(toml.read_text().replace('unit_variance = "constrained"\n', ""))
+    assert "unit_variance" not in toml.read_text()
+    parts = ("adjust", "plain", "--parts", "2")
+    for command in (("adjust", "plain"), parts, ("adjust", "cards"), ("giant", "cards")):
         found = adjusted(run, written, *command)
         assert found["unit_variance"] == "constrained"
         assert found["degrees_of_freedom"] == whole.degrees_of_freedom

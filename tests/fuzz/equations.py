@@ -68,7 +68,7 @@ def rotation(vector: Floats) -> Floats:
 def spin(r: Floats) -> Floats:
     """Return (2,) by how much axes R0 Exp(r1, r2, 0) turn about the third for turns about the first two.
 
-    Lines and planes have two unknowns of rotation: what offsets are told in spins by the rest of Jr dr.
+    Lines and planes have two unknowns of rotation: axes of offsets and residuals spin by the rest of Jr dr.
     """
     t = np.linalg.norm(r)
     if t == 0:
@@ -207,11 +207,16 @@ class Dense:
         return self.points[row] + d[self.of("point", row)]
 
     def common(self, d: Numbers, unknown: commons.Unknown) -> tuple[Numbers, Numbers]:
-        """Return (3,) the offset and (3, 3) the rotation of a common unknown."""
+        """Return (3,) the offset and (3, 3) the rotation of a common unknown.
+
+        Steps of a line are how its place moves along the adjusted axes: its offset is along axes that spin.
+        """
         row, six = self.places[id(unknown)], np.zeros(6, complex)
         six[self.components(unknown)] = d[self.of("common", row)]
-        six[5] += self.spins[row] @ six[3:5]
-        return self.offsets[row] + six[:3], self.turns[row] @ (np.eye(3) + cross(six[3:]))
+        spun = self.spins[row] @ six[3:5]
+        six[5] += spun
+        offset = self.offsets[row] + six[:3] - np.cross([0.0, 0.0, 1.0], self.offsets[row]) * spun
+        return offset, self.turns[row] @ (np.eye(3) + cross(six[3:]))
 
     def vector(self, d: Numbers, unknown: commons.Unknown) -> Numbers:
         """Return (3,) a lever arm, shift, drift, instrument or sensor."""

@@ -10,6 +10,7 @@ from test_adjusting import GEOGRAPHIC, SIZE, changed, differences, run, solution
 
 from photogram import AsPublished, adjust, simulate
 from photogram.giant import Common, ImageFrame, Project, read_project, write_project
+from photogram.network import geometry
 
 SPACES = pytest.mark.parametrize("space", [{}, GEOGRAPHIC], ids=["rectangular", "geographic"])
 
@@ -290,9 +291,15 @@ def test_section_2_6_unheld_components_are_checks(directory, tmp_path):
     assert np.isnan(again.point_differences[again.block.point_ids.index(check[0].name), 2])
     differences = again.point_differences[again.point_kinds == "check"]
     line = again.report().partition("rms of check points")[2].partition("\n")[0]
-    printed = [float(value) for value in re.findall(r"(\d+\.\d+) (?:m|arcsec)\b", line)]
+    # In seconds of arc the lengths stand behind, in parentheses.
+    printed = [float(value) for value in re.findall(r"\w (\d+\.\d+) (?:m|arcsec)\b", line)]
+    lengths = [float(value) for value in re.findall(r"\((\d+\.\d+) m\)", line)]
     scale = np.array([180 / math.pi * 3600] * 2 + [1]) if again.block.geographic else 1.0
-    assert printed == pytest.approx(np.sqrt(np.nanmean(differences**2, axis=0)) * scale, abs=1e-5)
+    root = np.sqrt(np.nanmean(differences**2, axis=0))
+    assert printed == pytest.approx(root * scale, abs=1e-5)
+    middle = again.block.photo_positions.mean(axis=0, keepdims=True)
+    metres = root * geometry.lengths_of_units(middle, again.block.spheroid)[0]
+    assert lengths == pytest.approx(metres[:2] if again.block.geographic else [], abs=1e-4)
 
 
 @pytest.mark.giant("13", "10 weights as a diagnostic tool")

@@ -13,6 +13,7 @@ from photogram.errors import AdjustmentError, InputError, OutOfMemoryError
 from photogram.messages import Message, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 from photogram.network.datum import DatumRow, InnerConstraints
+from photogram.network.observations import Distance, EqualHeight, OnPlumbLine
 from photogram.results.covariance import Failure
 
 if TYPE_CHECKING:
@@ -149,6 +150,7 @@ def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> 
             Message(
                 "there is no control, and nothing else gives a datum: held at their initial values are"
                 f" {held_lines(datum.held)}; coordinates and standard deviations refer to these"
+                f"{_levelled(block, len(datum.held))}"
             )
         ]
     if datum.kind == "minimal control":
@@ -162,6 +164,23 @@ def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> 
     if held.any() or block.observations or (block.photo_position_sd == 0).all():
         return []
     return [Message("there is no control: the datum of the block rests on the weights of its photos")]
+
+
+def _levelled(block: Block, held: int) -> str:
+    """Say what a plumb line, or equal heights, leave open that alone, beside distances, give of a datum."""
+    kinds = {type(each) for each in block.observations}
+    scale = [] if Distance in kinds else ["scale"]
+    beyond, kinds = held - 4 - len(scale), kinds - {Distance}
+    if kinds == {OnPlumbLine} and beyond in (0, -2):
+        what = ["place", "azimuth"] if beyond == 0 else ["the turn about it", "the shift along it"]
+        return f"; a plumb line gives the vertical, both tilts are known: open are {', '.join(what + scale)}"
+    if kinds == {EqualHeight} and beyond == 1:
+        return (
+            "; points of equal height level the network in the direction of their line only: it can still"
+            " tilt about that line; a third point aside of it on the same level, a pair across, or a plumb"
+            " line would hold it"
+        )
+    return ""
 
 
 def inner_datum(datum: object) -> InnerConstraints:

@@ -40,8 +40,8 @@ class AdjustedUnknown:
     attitude
         (3, 3) adjusted: the axes of a boresight, sensor, line or plane (the third along it, or its normal).
     cofactors
-        (k, k) for a priori unit weight, of rotations about the adjusted axes; zero for held ones, NaN without
-        covariances.
+        (k, k) for a priori unit weight, of rotations about the adjusted axes and a line's place along these;
+        zero for held ones, NaN without covariances.
     covariance
         (k, k) cofactors times the variance of unit weight.
     redundancy

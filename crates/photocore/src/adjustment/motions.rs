@@ -24,8 +24,9 @@ pub(super) struct Open {
 /// of a matrix of ones are good to 1e-15. Positions of photos that are observed to a hundred metres change a hundred times as much; the
 /// verticals of an ellipsoid, which attitudes to a thousandth tell apart over kilometres only, 2e-14, which a factor cannot tell from nothing.
 const NULL: f64 = 1e-12;
-/// An unknown holds a combination when that moves it by more than this share of what its parts do.
-const HOLDS: f64 = 1e-6;
+/// An unknown holds a combination when that moves it by more than this share of what its parts do: the first that do so well, or at all. Up at a
+/// plumb line moves latitudes, too, over metres by a millionth, and a network that is held by these is so weakly.
+const HOLDS: [f64; 2] = [1e-2, 1e-6];
 /// Local blocks that are added up one after the other.
 const AT_ONCE: usize = 256;
 
@@ -302,11 +303,13 @@ fn along(motions: &Motions, combinations: &Mat<f64>, unknown: usize, column: usi
 fn to_hold(
     motions: &Motions,
     combinations: &Mat<f64>,
-    unknowns: impl Iterator<Item = (usize, f64)>,
+    unknowns: impl Iterator<Item = (usize, f64)> + Clone,
 ) -> Vec<usize> {
     let d = combinations.ncols();
     let (mut basis, mut held): (Vec<Vec<f64>>, _) = (vec![], vec![]);
-    for (unknown, length) in unknowns {
+    for (share, (unknown, length)) in
+        HOLDS.iter().flat_map(|share| unknowns.clone().map(move |own| (share, own)))
+    {
         if held.len() == d {
             break;
         }
@@ -316,7 +319,7 @@ fn to_hold(
             row.iter_mut().zip(direction).for_each(|(x, y)| *x -= along * y);
         }
         let rest = row.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if rest > HOLDS * length {
+        if rest > share * length {
             basis.push(row.iter().map(|x| x / rest).collect());
             held.push(unknown);
         }
