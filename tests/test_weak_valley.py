@@ -65,10 +65,15 @@ def test_what_is_weak_is_named_where_the_iterations_run_out():
 
 
 @pytest.fixture(scope="module")
-def bathtub():
+def project():
     if not (SHARED / "bathtub").exists():
         pytest.skip("the bathtub is not there (../shared/data/bathtub)")
-    return formats.read(SHARED / "bathtub").block
+    return formats.read(SHARED / "bathtub")
+
+
+@pytest.fixture
+def bathtub(project):
+    return project.block
 
 
 @pytest.mark.parametrize("loss", [None, "huber", "cauchy"])
@@ -94,6 +99,13 @@ def test_with_more_iterations_all_images_end_where_another_solver_ends(bathtub):
     assert result.converged
     assert not result.dropped
     assert result.sums_of_squares.total / 2 == pytest.approx(15430.19, abs=0.005)
+
+
+def test_a_camera_that_is_unknown_too_comes_to_rest_with_a_loss(project):
+    result = adjust(self_calibrated(project, ["f", "k1", "k2"]).block, loss="huber")
+    assert result.converged
+    [weak] = [str(each) for each in result.messages if "hardly determine" in str(each)]
+    assert "f of v2 unknown" in weak
 
 
 @pytest.fixture(scope="module")
