@@ -38,7 +38,7 @@ def _spelled(columns: Sequence[str]) -> list[str]:
 
 
 def titled(path: Path) -> ColumnTable:
-    """Read a table whose header stands in a comment, `# id, image, x, y`; it may have no word for the first."""
+    """Read a table whose header stands in a comment, `# id, image, x, y`, perhaps without the first."""
     table = read_columns(path, known=(*_COLUMNS, *_DEVIATIONS), numbers=_NUMBERS, spelling=_spelled)
     return table.renamed({NAMELESS: "id"}) if NAMELESS in table and "id" not in table else table
 
