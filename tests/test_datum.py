@@ -128,6 +128,9 @@ def test_standard_deviations_say_what_they_refer_to(golden):
     assert document["kind"] == "inner constraints"
     assert document["scale"] is True
     assert len(document["points"]) == 40
+    barred = adjust(free_network(golden, bars=True), datum=InnerConstraints(photos=None))
+    assert str(barred.datum) == "inner constraints over 40 points and 8 photos"
+    assert json.loads(barred.to_json())["datum"]["scale"] is False
     assert result.point_table().attrs["datum"] == str(result.datum)
     assert any("inner constraints" in str(message) for message in result.messages)
     minimum = adjust(free_network(golden, bars=False))

@@ -411,7 +411,9 @@ def test_section_14_the_command_line_applies_what_common_and_options_say(run):
     # The guide's own record asks for both, and its listing says that neither is included.
     assert job_refraction(common, water="none") == Refraction("giant")
     none = ("--air-refraction", "none", "--water-refraction", "none")
-    run("giant", "block", "--json", "result.json", *none)  # rays that were bent do not meet
+    straight = run("giant", "block", "--json", "result.json", *none)  # rays that were bent do not meet
+    assert "unless --air-refraction names another model" in straight.output
+    assert "is applied" not in straight.output
     assert json.loads(Path("result.json").read_bytes())["refraction"] is None
 
 

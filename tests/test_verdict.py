@@ -52,7 +52,7 @@ CASES = {
     "accepted": (findings(good()), 0, False, "Accepted: the residuals agree"),
     "not tested": (findings(good(), global_test=None), 0, False, "Not tested as a whole (no a-priori unit"),
     "not converged": (findings(good(), status="diverged"), 3, False, "Not converged (diverged)"),
-    "undetermined": (findings(good(), undetermined=["kappa of photo 3"]), 3, False, "Unknowns that no"),
+    "undetermined": (findings(good(), undetermined=["kappa of photo 3"]), 3, False, "Unknowns that the"),
     "hint": (findings(with_blunder, 2.0, hints=["probably feet"]), 4, False, "Probably feet"),
     "stars": (findings(good(), doubtful=["exposure 2"]), 4, False, "The identification of stars is doubtful"),
     "blunder": (findings(with_blunder, 2.0), 4, False, "Gross errors likely: 1) y of point 7 (w = 9)"),

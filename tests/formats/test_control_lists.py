@@ -87,7 +87,7 @@ def test_a_list_is_adjusted_as_delivered_or_with_the_option_that_the_message_nam
 @pytest.mark.parametrize(
     ("heading", "column"),
     [
-        *((each, "point") for each in ("Punkt-Nr.", "Nom", "Point ID", "GCP Name", "Numéro")),
+        *((each, "point") for each in ("Punkt-Nr.", "PtNr", "Nom", "Point ID", "GCP Name", "Numéro")),
         *(
             (each, "x")
             for each in ("Rechtswert [m]", "Easting (m)", "X/Easting", "Est", "UTM32 Easting", "east_ft")
@@ -98,8 +98,8 @@ def test_a_list_is_adjusted_as_delivered_or_with_the_option_that_the_message_nam
             for each in ("Höhe", "Hoehe", "Höhe ü. NN", "Altitude", "Cota", "Elevation (US survey ft)")
         ),
         *((each, "sd_x") for each in ("sigmaX", "Accuracy_X/Easting (m)", "sx", "Écart-type X")),
-        *((each, "sd_z") for each in ("Vertical accuracy", "Std. Dev. Z", "Höhengenauigkeit")),
-        *((each, "sd_xy") for each in ("Lagegenauigkeit", "Horizontal accuracy")),
+        *((each, "sd_z") for each in ("Vertical accuracy", "VRMS", "Std. Dev. Z", "Höhengenauigkeit")),
+        *((each, "sd_xy") for each in ("Lagegenauigkeit", "Horizontal accuracy", "HRMS")),
         *((each, "use") for each in ("Type", "Punktart", "Rôle")),
         ("lat", "latitude"),
         ("Länge", "longitude"),
@@ -165,7 +165,11 @@ def test_a_column_of_roles_is_read_whatever_it_is_called(tmp_path, head, cells, 
         ("Type", ["GCP", "Check", "PB"], '--roles "PB=check"'),
         ("role", ["one", "two", "one"], '--roles "one=check"'),
         ("Quality", ["0.01", "0.02", "0.01"], "--columns sd_x=quality (a guess), or --columns -=quality"),
-        ("Easting", ["1", "2", "3"], "the column 'x' is there twice: x, easting"),
+        (
+            "Easting",
+            ["1", "2", "3"],
+            "the column 'x' is there twice: x, easting: --columns x=x, or x=easting,",
+        ),
     ],
 )
 def test_what_looks_like_a_role_or_a_number_and_is_not_read_stops(tmp_path, head, cells, option):
@@ -189,6 +193,18 @@ def test_options_say_what_columns_and_words_are(tmp_path):
     for bad, say in (("point=Nummer", "'Nummer'"), ("east=x", "'east'"), ("point,x,y=Y", "either")):
         with pytest.raises(InputError, match=say):
             given(path, turned, columns=bad)
+
+
+def test_two_columns_that_may_be_heights_are_settled_by_the_option_of_the_message(tmp_path):
+    # H is Hochwert beside R, and a height elsewhere.
+    path, text = tmp_path / "list.csv", table("d", ["a", "b", "c"]).replace("point,x,y,z", "Nr,R,H,Z")
+    with pytest.raises(InputError, match=r"'z' is there twice: h, z: --columns z=h, or z=z, says"):
+        given(path, text)
+    with pytest.raises(InputError, match=r"--columns x=r,y=h \(a guess\)"):
+        given(path, text, columns="z=z")
+    project = given(path, text, columns="z=z,x=r,y=h")
+    place = project.block.point_ids.index("103")
+    np.testing.assert_array_equal(project.block.point_positions[place], ROWS[2][1:])
 
 
 def test_deviations_of_position_and_height(tmp_path):

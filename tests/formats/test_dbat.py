@@ -60,6 +60,21 @@ def test_the_tables_of_the_sample_are_the_truth(tmp_path):
         formats.read(place)
 
 
+@pytest.mark.parametrize("header", ["point,label,X,Y,Z,sX,sY,sZ", "X,Y,Z,sX,sY,sZ"])
+def test_control_in_the_folder_may_have_other_headers(tmp_path, header):
+    wishes = Wishes(cameras=table_of_cameras(tmp_path / "cameras.csv"))
+    place = copied(sample("dbat"), tmp_path / "block")
+    before = formats.read(place, None, wishes).block
+    control = place / "control.txt"
+    rows = [line.split(",") for line in control.read_text().splitlines() if not line.startswith("#")]
+    if not header.startswith("point"):
+        rows = [[row[0], *row[2:]] for row in rows]  # a word less than there are cells
+    control.write_text("\n".join([header, *(",".join(row) for row in rows), ""]))
+    after = formats.read(place, None, wishes).block
+    np.testing.assert_array_equal(after.point_sd, before.point_sd)
+    np.testing.assert_array_equal(after.point_positions, before.point_positions)
+
+
 def export_of(place):
     """Write the photos of camera A of the sample as an export file, with all digits."""
     cameras = json.loads(sample("dbat", "cameras.json").read_text())["A"]

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import photogram
 from photogram import adjust, formats
 from photogram.stellar.night_file import inputs
 
@@ -158,6 +159,19 @@ def test_a_datum_on_three_points_is_held_as_asked_for(run, tmp_path):
         refused = run("adjust", "own", "--hold", wanted)
         assert refused.exit_code == 1
         assert said in refused.stderr
+
+
+def test_cards_for_intersection_only_are_told_of_photos_that_move(tmp_path):
+    sample = Path(photogram.__file__).parent / "examples" / "galveston"
+    for each in sample.iterdir():
+        (tmp_path / each.name).write_bytes(each.read_bytes())
+    assert not any("column 10" in str(each) for each in formats.read(tmp_path).messages)
+    lines = (tmp_path / "COMMON").read_text().splitlines(keepends=True)
+    lines[1] = f"{lines[1][:9]}1{lines[1][10:]}"
+    (tmp_path / "COMMON").write_text("".join(lines))
+    assert any(
+        "column 10 asks for intersection only" in str(each) for each in formats.read(tmp_path).messages
+    )
 
 
 def test_a_user_adds_what_a_project_lacks(run, tmp_path):

@@ -96,4 +96,9 @@ def test_the_command_calibrates(run, tmp_path):
     assert found["interior"]["c"] == pytest.approx(150.0, abs=3 * errors["c"])
     assert found["interior"]["xp"] == pytest.approx(0.0, abs=3 * errors["xp"])
     assert "c, mm" in (tmp_path / "out" / "report.html").read_text()
-    assert "VARIANCE-COVARIANCE" in (tmp_path / "out" / "listing.txt").read_text()
+    listing = (tmp_path / "out" / "listing.txt").read_text()
+    assert "VARIANCE-COVARIANCE" in listing
+    (line,) = [each for each in listing.splitlines() if "PRINCIPAL DISTANCE (MM) =" in each]
+    value, error = map(float, line.partition("=")[2].split())
+    assert value == pytest.approx(found["interior"]["c"], abs=6e-6)
+    assert error == pytest.approx(errors["c"], abs=6e-6)

@@ -18,7 +18,7 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "point": {
         "en": "point, points, name, id, pid, number, no, nr, p, pt, pnt, label, marker, target,"
         " station, mark, ident",
-        "de": "punkt, punktnummer, punktname, punktnr, pktnr, pkt, nummer, bezeichnung, kennung",
+        "de": "punkt, punktnummer, punktname, punktnr, pktnr, ptnr, pkt, nummer, bezeichnung, kennung",
         "fr": "nom, numero, num, matricule, repere, cible",
         "es/it/pt": "punto, nombre, nome, ponto, codigo",
         "nl": "punt, puntnummer, naam",
@@ -183,6 +183,8 @@ _TOGETHER = {
     "vertical": "sd_z",
     "hohengenauigkeit": "sd_z",
     "hoehengenauigkeit": "sd_z",
+    "hrms": "sd_xy",
+    "vrms": "sd_z",
 }
 
 
@@ -197,7 +199,7 @@ def column_of(heading: str) -> str | None:
         return whole
     if len(words) == 1 and (glued := _GLUED.fullmatch(words[0])):
         words = ["sd", glued[1]]
-    if words[0] in ("lagegenauigkeit", "hohengenauigkeit", "hoehengenauigkeit"):
+    if words[0] in ("lagegenauigkeit", "hohengenauigkeit", "hoehengenauigkeit", "hrms", "vrms"):
         return _TOGETHER[words[0]]
     for cut in range(1, len(words)):
         for deviation, rest in ((words[:cut], words[cut:]), (words[-cut:], words[:-cut])):

@@ -14,6 +14,7 @@ from photogram.giant import read_project
 from photogram.giant.assembly import job_refraction
 from photogram.giant.files import present_files, to_bytes
 from photogram.giant.project import Project as GiantProject
+from photogram.messages import Message
 
 __all__ = ["FORMAT", "TITLE"]
 
@@ -34,6 +35,15 @@ def read(path: Path, wishes: Wishes) -> Project:
     found = read_project(path)
     block = found.to_block()
     block = block.replace(refraction=job_refraction(found.common))
+    messages = list(found.messages)
+    if found.common.intersection_only:
+        messages.append(
+            Message(
+                "COMMON column 10 asks for intersection only, which `photogram giant` does: here photos are"
+                " adjusted",
+                path,
+            )
+        )
     count = len(block.cameras)
     return Project(
         block=block,
@@ -46,7 +56,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         if block.spheroid
         else Frame(),
         options=Options(unit_variance=found.common.unbiased_variance),
-        messages=tuple(found.messages),
+        messages=tuple(messages),
     )
 
 

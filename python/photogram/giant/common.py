@@ -171,14 +171,14 @@ def _remark_on_refraction(common: Common, job: Record) -> None:
     """Say what columns 16 and 17 ask for: images that were corrected before would be corrected twice."""
     if common.air_refraction:
         job.remark(
-            "column 16 asks for refraction in air, and it is applied (by the model of Appendix F unless an"
-            " option names another); 0 if the preprocessing has corrected the images for it"
+            "column 16 asks for refraction in air, which is that of Appendix F unless --air-refraction names"
+            " another model; 0, or --air-refraction none, if the preprocessing has corrected the images"
         )
     if common.water_refraction:
         job.remark(
-            "column 17 asks for refraction in water, and it is applied to points below"
-            f" {common.water_level:g} m (columns 31-40; by the model of Appendix G unless an option names"
-            " another); 0 if there are none"
+            "column 17 asks for refraction in water, which is that of Appendix G for points below"
+            f" {common.water_level:g} m (columns 31-40) unless --water-refraction names another model; 0, or"
+            " --water-refraction none, if there are none"
         )
 
 

@@ -317,15 +317,19 @@ def read_columns(
     text = read_text(path)
     head, delimiter = _head(path, text, known, spelling, hint)
     own = _lowered(head, delimiter)
-    return _below(path, text, head, own, _named(head, own, spelling), delimiter, numbers)
+    names = _named(head, own, spelling, settled=hint is not None)
+    return _below(path, text, head, own, names, delimiter, numbers)
 
 
-def _named(head: Place, own: Sequence[str], spelling: Spelling) -> tuple[str, ...]:
+def _named(head: Place, own: Sequence[str], spelling: Spelling, *, settled: bool = False) -> tuple[str, ...]:
+    """Return the names of all columns; `settled` where a user may say which of two is one."""
     columns = tuple(spelling(own))
     for column in columns:
         if column and columns.count(column) > 1:
             both = [raw for raw, name in zip(own, columns, strict=True) if name == column]
             what = f"is there twice: {listed(both)}" if set(both) != {column} else "is there twice"
+            if settled and len(set(both)) > 1:
+                what += f": --columns {column}={both[0]}, or {column}={both[1]}, says which it is"
             raise head.error(f"the column {quoted(column)} {what}")
     return columns
 

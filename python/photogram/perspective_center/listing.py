@@ -15,13 +15,14 @@ import numpy as np
 from photogram.errors import RankError
 from photogram.perspective_center.batch import Run, Stop
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid
-from photogram.perspective_center.solution import SINGULAR, PerspectiveCenter
+from photogram.perspective_center.solution import INTERIOR, SINGULAR, PerspectiveCenter
 
 __all__ = ["listing"]
 
 NEW_PAGE = "\f"
 NOT_CONVERGED = "SORRY - SOLUTION DOES NOT CONVERGE"
-_MATRIX_ROW = fortranformat.FortranRecordWriter("(I3,3X,6D15.8)")
+_MATRIX_ROW = fortranformat.FortranRecordWriter("(I3,3X,9D15.8)")
+_INTERIOR = {"c": "PRINCIPAL DISTANCE (MM)", "xp": "PRINCIPAL POINT X (MM)", "yp": "PRINCIPAL POINT Y (MM)"}
 
 
 def listing(run: Run) -> str:
@@ -137,13 +138,30 @@ def _errors(result: PerspectiveCenter) -> list[str]:
         f" STANDARD ERROR OF UNIT WEIGHT OF PLATE GRID COORDINATES ={_f(result.sigma0_plate, 8, 5)}",
         "",
         f"{'':5}VARIANCE-COVARIANCE MATRIX",
-        *(_MATRIX_ROW.write([number, *row.tolist()]) for number, row in enumerate(covariance[:6, :6], 1)),
+        *(_MATRIX_ROW.write([number, *row.tolist()]) for number, row in enumerate(covariance, 1)),
         "",
         " STANDARD ERRORS OF THE PERSPECTIVE CENTER PARAMETERS",
         "",
         *(
             f"{'':13}{name} ={_f(value, 8, 5)}"
             for name, value in zip(names, [*errors, result.sigma0_model], strict=True)
+        ),
+        *_interior(result),
+    ]
+
+
+def _interior(result: PerspectiveCenter) -> list[str]:
+    """Say what of the interior, which the program holds, was unknown, with its standard errors."""
+    if result.interior_errors is None or not result.unknown:
+        return []
+    values = dict(zip(INTERIOR, result.interior.tolist(), strict=True))
+    return [
+        "",
+        " INTERIOR THAT WAS DETERMINED, AND ITS STANDARD ERRORS",
+        "",
+        *(
+            f"{'':13}{_INTERIOR[name]} ={_f(values[name], 11, 5)}{_f(error, 11, 5)}"
+            for name, error in zip(result.unknown, result.interior_errors.tolist(), strict=True)
         ),
     ]
 

@@ -42,7 +42,7 @@ class ResultDatum:
     attitudes
         Photos whose attitudes carry inner constraints.
     scale
-        Whether inner constraints take the scale from them, too.
+        Whether inner constraints take the scale from them, too: nothing else gives one.
     lost
         About how large a part of the variances rounding may be.
     """
@@ -113,12 +113,17 @@ def datum_of(block: Block, solution: BlockSolution, row: DatumRow | None = None)
         return ResultDatum("minimum constraints" if held else given, held)
     name, points, photos, scale, attitudes, _ = row
     used = solution.point_rays > 0
+    # Where the scale is open, the core has held it by one coordinate of a photo that holds nothing else.
+    unknowns: dict[int, list[int]] = {}
+    for photo, unknown in solution.datum:
+        unknowns.setdefault(photo, []).append(unknown)
+    is_open = any(len(own) == 1 and own[0] < 3 for own in unknowns.values())
     return ResultDatum(
         kind="inner constraints" if name == "inner" else name,
         held=held,
         points=tuple(block.point_ids[point] for point in points if used[point]),
         photos=tuple(block.photo_ids[photo] for photo in photos),
-        scale=scale,
+        scale=scale and is_open,
         lost=solution.lost_digits,
         attitudes=tuple(block.photo_ids[photo] for photo in attitudes),
         row=row,

@@ -280,7 +280,7 @@ class Findings:
     untested
         Why there is no global test.
     undetermined
-        Unknowns that no observation determines.
+        Unknowns that the observations do not determine, or hardly.
     hints
         Accepted hypotheses of what is wrong with the data, as sentences ("probably ...").
     exchanged

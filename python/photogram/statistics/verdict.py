@@ -146,7 +146,11 @@ def _rank_defect(e: Evidence) -> _Line | None:
     if not e.found.undetermined:
         return None
     names = listed(list(e.found.undetermined))
-    return _Line("undetermined", f"Unknowns that no observation determines: {names}", EXIT_NOT_CONVERGED)
+    return _Line(
+        "undetermined",
+        f"Unknowns that the observations do not determine, or hardly: {names}",
+        EXIT_NOT_CONVERGED,
+    )
 
 
 def _hint(e: Evidence) -> _Line | None:

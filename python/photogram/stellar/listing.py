@@ -21,7 +21,7 @@ def listing(result: Result) -> str:
     """Return the listing of a calibration."""
     sections = [
         ("Problem", _labels(result)),
-        ("Problem descriptors", descriptors(result)),
+        ("Problem descriptors", [*descriptors(result), *_own(result)]),
         *summary(result),
         *((f"{stage.solution.capitalize()} solution", _stage(stage)) for stage in result.stages),
         *_solution(result),
@@ -113,13 +113,13 @@ def _labels(result: Result) -> list[str]:
 
 
 def descriptors(result: Result) -> list[str]:
-    """Say of every option in which state it is."""
+    """Say of every option of the report in which state it is, in the words of figure 22 where it has them."""
     o, problem = result.problem.options, result.given
     states = [
         (
             o.common_scale,
-            "COMMON SCALAR FOR X AND Y (CX EQUALS CY)",
-            "INDIVIDUAL SCALAR COMPONENTS FOR X AND Y (CX DOES NOT EQUAL CY)",
+            "COMMON SCALAR COMPUTED FOR X AND Y (CX EQUALS CY)",
+            "INDIVIDUAL SCALAR COMPONENTS COMPUTED FOR X AND Y (CX DOES NOT EQUAL CY)",
         ),
         (
             problem.axis is not None,
@@ -128,13 +128,13 @@ def descriptors(result: Result) -> list[str]:
         ),
         (
             _common(problem.star_weights[problem.known]),
-            "COMMON WEIGHT FOR ALL STARS",
-            "INDIVIDUAL WEIGHTS FOR STARS",
+            "COMMON WEIGHT MATRIX FOR ALL KNOWN STARS",
+            "INDIVIDUAL WEIGHT MATRICES FOR KNOWN STARS",
         ),
         (
             _common(problem.image_weights),
-            "COMMON WEIGHT FOR ALL PLATE COORDINATES",
-            "INDIVIDUAL WEIGHTS FOR PLATE COORDINATES",
+            "COMMON WEIGHT MATRIX FOR ALL PLATE POINTS",
+            "INDIVIDUAL WEIGHT MATRICES FOR PLATE POINTS",
         ),
         (
             o.refraction,
@@ -150,7 +150,7 @@ def descriptors(result: Result) -> list[str]:
         (o.curves, "RADIAL AND TANGENTIAL LENS DISTORTION CURVES COMPUTED", "NO DISTORTION CURVES COMPUTED"),
         (
             o.reference is not None,
-            "ORIENTATION ANGLES TRANSFORMED TO A REFERENCE STATION SYSTEM",
+            "FINAL CAMERA ORIENTATION ANGLES TRANSFORMED TO A REFERENCE STATION SYSTEM",
             "NO TRANSFORMATION TO A REFERENCE STATION",
         ),
         (bool(problem.weighted.any()), "PARAMETERS WEIGHTED", "NO PARAMETERS WEIGHTED"),
@@ -171,10 +171,17 @@ def descriptors(result: Result) -> list[str]:
             "COMPUTED MEAN ERROR OF UNIT WEIGHT",
         ),
         (o.histogram, "HISTOGRAM OF RESIDUALS COMPUTED", "NO HISTOGRAM OF RESIDUALS"),
-        (bool(o.distortion_first), "SCALE AFTER DISTORTION", "SCALE BEFORE DISTORTION"),
-        (o.as_published, "ITERATION AS PUBLISHED", "STRICT ITERATION"),
     ]
     return [yes if state else no for state, yes, no in states]
+
+
+def _own(result: Result) -> list[str]:
+    """Say of the options that the report does not have in which state they are."""
+    o = result.problem.options
+    return [
+        "SCALE AFTER DISTORTION" if o.distortion_first else "SCALE BEFORE DISTORTION",
+        "ITERATION AS PUBLISHED" if o.as_published else "STRICT ITERATION",
+    ]
 
 
 def _common(weights: Floats) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.dbat.content import Content
-from photogram.io.delimited import ColumnTable, read_columns, read_rows
+from photogram.io.delimited import NAMELESS, ColumnTable, read_columns, read_rows
 from photogram.io.numbers import whole_number
 
 __all__ = ["take_images", "take_photos", "take_points", "take_poses", "titled", "untitled"]
@@ -19,6 +19,7 @@ _KNOWN = {
     "image": "im",
     "photo": "im",
     "frame": "im",
+    "point": "id",
     "name": "label",
     "camera": "cam",
     "sigmax": "sx",
@@ -37,8 +38,9 @@ def _spelled(columns: Sequence[str]) -> list[str]:
 
 
 def titled(path: Path) -> ColumnTable:
-    """Read a table whose header stands in a comment, `# id, image, x, y`."""
-    return read_columns(path, known=(*_COLUMNS, *_DEVIATIONS), numbers=_NUMBERS, spelling=_spelled)
+    """Read a table whose header stands in a comment, `# id, image, x, y`, perhaps without the first."""
+    table = read_columns(path, known=(*_COLUMNS, *_DEVIATIONS), numbers=_NUMBERS, spelling=_spelled)
+    return table.renamed({NAMELESS: "id"}) if NAMELESS in table and "id" not in table else table
 
 
 def untitled(path: Path, columns: Sequence[str]) -> ColumnTable:
