@@ -12,7 +12,7 @@ from photogram import Camera, InnerConstraints, adjust, read_result, simulate
 from photogram.cli import app
 from photogram.formats import Wishes, read, to_files
 from photogram.formats.additions import with_control
-from photogram.giant import Project
+from photogram.giant import Project, write_project
 from photogram.network.geometry import Spheroid
 from photogram.results.check_points import check_points
 from photogram.show.ways import page_of
@@ -258,3 +258,35 @@ def test_giant_has_them_in_ground(tmp_path):
     found = project.to_block()
     np.testing.assert_allclose(found.point_check_sd[checks_of(found)], [[0.1, 0.2, 0.3]] * 8)
     assert adjust(found).verdict.exit == 0
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["giant"], ["adjust"], ["adjust", "--parts", "2", "--unit-variance", "constrained"]],
+    ids=" ".join,
+)
+def test_every_command_ends_by_them_and_says_what_to_do(tmp_path, command):
+    one = spoiled(block(), 30.0)
+    write_project(Project.from_block(one), tmp_path / "wrong")
+    out = tmp_path / "out"
+    first, *others = command
+    arguments = [
+        first,
+        str(tmp_path / "wrong"),
+        *others,
+        "--out",
+        str(out),
+        "--json",
+        str(tmp_path / "a.json"),
+    ]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 4, done.output
+    said = f"Check points disagree with the adjustment: 1) {one.point_ids[checks_of(one)[2]]}, -"
+    verdict = json.loads((tmp_path / "a.json").read_bytes())["verdict"]
+    assert (verdict["exit"], verdict["code"]) == (4, "check-points")
+    assert verdict["headline"].startswith(said)
+    assert f"Verdict\n-------\n{said}" in (out / "report.txt").read_text()
+    page = (out / "report.html").read_text()
+    assert said in page
+    assert "Look at the check points that are named" in page
+    assert "Nothing needs to be done" not in page
