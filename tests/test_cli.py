@@ -278,7 +278,9 @@ def test_strasbourg(run, tmp_path):
     if not STRASBOURG.exists():
         pytest.skip("the Strasbourg block is not beside the repository")
     result = run("giant", STRASBOURG, "--out", "out", "--json", "result.json")
-    assert result.exit_code == 0, result.output
+    # One of the two published check points is 0.3 m off, four standard deviations of the difference.
+    assert result.exit_code == 4, result.output
+    assert "Check points disagree with the adjustment: 1) 410, -0.294 m in Y" in result.output
     document = json.loads(Path("result.json").read_bytes())
     expected = json.loads((STRASBOURG / "expected.json").read_bytes())
     for group in ("plates", "ground"):

@@ -17,7 +17,7 @@ ELSE = {"plan": ["--strips", "2", "--photos-per-strip", "4"], "new": ["made"], "
     "stellar-camera places": ["stars.csv", "--utc", "1966-03-01T21:03:05"]
 }
 """Words of commands that need no input, or no example of it."""
-NEEDED = {"convert": ["made"]}
+NEEDED = {"absolute-orientation relative": ["stations.csv"], "convert": ["made"]}
 """Words beside --example."""
 CHANGED = {"comparator compare": 4}
 """Exit codes of examples that have something to find."""

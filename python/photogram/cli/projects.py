@@ -90,7 +90,7 @@ ControlColumns = Annotated[
     typer.Option(
         "--columns",
         metavar="COLUMN=HEADING,..",
-        help="What the columns of control are: point=Name,x=East\\[ft],y=-South; -=Heading is not read;"
+        help="What the columns of control are: point=Name,x=East,y=-South; -=Heading is not read;"
         " point,y,x,z or PNEZD without a header.",
         show_default=False,
     ),

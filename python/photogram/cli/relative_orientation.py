@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from photogram.cli.console import print_sections
@@ -53,6 +52,8 @@ def relative(
     """
     assert out is not None
     with job:
+        import numpy as np
+
         from photogram.absolute_orientation.models import strip_of
         from photogram.formats.reduced_writing import given_control
         from photogram.io.csv_text import csv_text
