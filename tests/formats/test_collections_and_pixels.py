@@ -87,6 +87,7 @@ def test_pixels_and_control_alone_make_a_block(run, tmp_path):
     done = run("adjust", "table/images.csv", *words)
     assert done.exit_code == 0, done.output
     assert "table of pixels" in done.output
+    assert "no control" not in done.output
     assert "oriented" in done.output or "resected" in done.output
     after = formats.read(tmp_path / "table" / "images-adjusted" / "adjusted")
     project = formats.read(EXAMPLE)

@@ -420,6 +420,10 @@ def with_control(
             observations=[*block.observations, *full],
         ),
         messages=(*messages, *carried.messages[len(project.messages) :]),
+        # What is given now is no longer lacking.
+        lacks=tuple(
+            each for each in carried.lacks if not ("--control FILE" in each and np.isfinite(deviation).any())
+        ),
     )
     planes = [
         each for each in plane_remarks(found.block, found.path, found.starts) if each not in found.messages
