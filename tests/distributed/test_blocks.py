@@ -218,3 +218,18 @@ def test_the_example_is_right(capsys):
     values, redundancy = script.apart(adjust(block, parts=3), adjust(block))
     assert values < 1e-9
     assert redundancy < 1e-9
+
+
+def test_what_is_held_is_not_tested_in_parts():
+    """Its score needs the normal equations of the whole: the verdict once ended in an error."""
+    block = photogram.simulate(strips=3, photos_per_strip=8, points_per_photo=40, seed=4).block
+    held = np.isfinite(block.point_sd).all(axis=1)
+    positions = block.point_positions.copy()
+    positions[np.flatnonzero(held)[3], 2] += 50.0
+    wrong = block.replace(
+        point_positions=positions, point_sd=np.where(held[:, np.newaxis], 0.0, block.point_sd)
+    )
+    parts, whole = (photogram.adjust(wrong, parts=each) for each in (2, None))
+    assert parts.verdict.code == whole.verdict.code == "model"
+    names = [{each.name.split(":")[0] for each in result.verdict.tests} for result in (parts, whole)]
+    assert names[1] - names[0] >= {"held values"}

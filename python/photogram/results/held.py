@@ -56,9 +56,9 @@ class Held:
 def held_tested(result: Result) -> list[Tested]:
     """Return tests of the fixed stations and points with the worst images, where residuals are too large.
 
-    None where the adjustment is accepted, has not converged, or has no covariances.
+    None where the adjustment is accepted, has not converged, has no covariances, or was done in parts.
     """
-    if result.loss or not is_suspected(result, result.global_test):
+    if result.loss or not result.WHOLE or not is_suspected(result, result.global_test):
         return []
     suspected = _suspected(result)
     return held_tests(result, suspected, result.block.image_sd, _partials(result)) if suspected else []
