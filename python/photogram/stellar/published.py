@@ -111,7 +111,10 @@ def iterate(
         if problem.options.common_scale:
             parameters[13] = parameters[12]
     if not correction:
-        _correction(problem, core)  # names what is out of sight
+        if np.isfinite(constant).any():
+            _correction(
+                problem, core
+            )  # names the stars that are out of sight; where all are, it is the camera
         raise AdjustmentError(
             "the initial values give discrepancies beyond all numbers: those of the camera are wrong"
         )
