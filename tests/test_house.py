@@ -1,6 +1,7 @@
 """The house of the Python package: arrows point down, and files import each other in no circle."""
 
 import ast
+import re
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -72,3 +73,29 @@ def test_arrows_point_down():
             if own != foreign:
                 assert floor[own] < floor[foreign], f"{name} imports {other}"
     assert seen == set(floor)
+
+
+CRATE = Path(__file__).parents[1] / "crates" / "photocore" / "src"
+KNOWS = {
+    "programs": {"network", "adjustment", "normals", "geometry"},
+    "network": {"adjustment", "normals", "geometry"},
+    "adjustment": {"normals"},
+    "normals": set(),
+    "geometry": set(),
+}
+"""What a folder of the crate may know of the others."""
+
+
+def test_floors_of_the_crate():
+    """Beside its files a folder names those below it only, in `use` and in paths."""
+    arrows = set()
+    for folder, below in KNOWS.items():
+        files = [*(CRATE / folder).rglob("*.rs")]
+        assert len(files) > 5
+        for path in files:
+            named = set(re.findall(r"\bcrate::(?:\{?\s*)(\w+)", path.read_text(encoding="utf-8"))) & set(
+                KNOWS
+            )
+            assert named <= below | {folder}, f"{path.relative_to(CRATE)} knows {named - below - {folder}}"
+            arrows |= {(folder, other) for other in named - {folder}}
+    assert arrows >= {("programs", "network"), ("network", "adjustment"), ("adjustment", "normals")}
