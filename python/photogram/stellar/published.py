@@ -111,10 +111,9 @@ def iterate(
         if problem.options.common_scale:
             parameters[13] = parameters[12]
     if not correction:
+        # The equations name the stars that are out of sight; where all are, it is the camera.
         if np.isfinite(constant).any():
-            _correction(
-                problem, core
-            )  # names the stars that are out of sight; where all are, it is the camera
+            _correction(problem, core)
         raise AdjustmentError(
             "the initial values give discrepancies beyond all numbers: those of the camera are wrong"
         )
