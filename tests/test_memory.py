@@ -201,20 +201,24 @@ from pathlib import Path
 from photogram import OutOfMemoryError, adjust, simulate
 
 block = simulate(strips=3, photos_per_strip=12, seed=2).block
-used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-limit = used + int(sys.argv[1])
-resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 said = []
+limited = threading.Event()
 
 def work(threads):
+    limited.wait()
     try:
         said.append(adjust(block, threads=threads).status)
     except OutOfMemoryError:
         said.append("refused")
 
+# The threads of Python stand before the limit: what is short is what the adjustments would take.
 workers = [threading.Thread(target=work, args=(own,)) for own in (1, None)]
 for each in workers:
     each.start()
+used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+limit = used + int(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+limited.set()
 for each in workers:
     each.join()
 print(*said)
