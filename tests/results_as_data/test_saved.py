@@ -337,6 +337,8 @@ def test_the_input_of_a_result_is_known_again(tmp_path):
         ("points", "covariance", "number"),
         ("photos", "corrections", "short"),
         ("images", "residual_x", "text"),
+        ("points", "point", "number"),
+        ("images", "photo", "number"),
     ],
 )
 def test_columns_that_hold_something_else_are_named(folder, table, column, values):
@@ -366,6 +368,11 @@ def test_columns_that_hold_something_else_are_named(folder, table, column, value
         (lambda document: document["kept"]["result"].update(loss={"same": 10**6}), "is no same"),
         (lambda document: document["kept"]["result"].update(dropped={"map": 3}), "is no map"),
         (lambda document: document["kept"].update(state={"tuple": []}), "keeps no state"),
+        (lambda document: document["kept"]["result"].update(cameras=["x"]), "cameras.0. is 'x', not a Adj"),
+        (
+            lambda document: document["kept"]["block"].update(point_ids="x"),
+            "point_ids is 'x', not a sequence",
+        ),
         (lambda document: document["kept"]["block"].update(other=1), "does not hold together: .*'other'"),
         (lambda document: document["kept"]["block"].pop("spheroid"), "does not hold together: 'spheroid'"),
     ],

@@ -12,8 +12,8 @@ from __future__ import annotations
 import inspect
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from functools import wraps
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache, wraps
 from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
@@ -25,7 +25,7 @@ from photogram.arguments.arrays import number, one_of, shown, truth_value, whole
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 
-__all__ = ["check_arguments", "path"]
+__all__ = ["check_arguments", "check_members", "path"]
 
 Check = Callable[[str, Any], Any]
 """Takes the name of an argument and its value; returns the value, converted where it must be, or raises."""
@@ -53,6 +53,32 @@ def check_arguments(names: dict[str, Any], public: Iterable[str]) -> None:
                 type.__setattr__(found, "__init__", checking)
         elif not hasattr(found, _MARK):
             names[name] = _checked(found, name, names)
+
+
+def check_members(kind: type, given: Mapping[str, Any]) -> None:
+    """Check what a class is to be made of as arguments are checked; nothing is converted.
+
+    Parameters
+    ----------
+    kind
+        The class.
+    given
+        Values by the names of its parameters.
+
+    Raises
+    ------
+    InputError
+        A value of a wrong kind.
+    """
+    checks = _checks_of_class(kind)
+    for name, value in given.items():
+        checks.get(name, _anything)(name, value)
+
+
+@cache
+def _checks_of_class(kind: type) -> dict[str, Check]:
+    plain = inspect.unwrap(kind.__init__)  # type: ignore[misc]
+    return _checks(plain, {**_ARRAYS, **vars(sys.modules[kind.__module__])})
 
 
 def path(name: str, value: object) -> Path:
@@ -152,8 +178,9 @@ def _check_of(hint: Any) -> Check | None:
 
 def _check_of_union(inner: tuple[Any, ...]) -> Check | None:
     kinds = [kind for kind in inner if kind is not type(None)]
-    if set(get_args(ArrayLike)) <= set(inner):
-        check: Check | None = _array
+    arrays = set(get_args(ArrayLike))
+    if arrays <= set(inner):
+        check: Check | None = _array_or(*(kind for kind in kinds if kind not in arrays))
     elif all(kind in (str, Path) or get_origin(kind) is os.PathLike for kind in kinds) and kinds != [str]:
         check = path
     elif len(kinds) == 1:
@@ -255,6 +282,11 @@ def _array(name: str, value: Any) -> Any:
     if isinstance(value, np.ma.MaskedArray) and np.ma.getmaskarray(value).any():
         raise InputError(f"{name} has masked values")
     return value
+
+
+def _array_or(*kinds: type) -> Check:
+    """Return a check of an array, or of an object of some classes."""
+    return lambda name, value: value if isinstance(value, kinds) else _array(name, value)
 
 
 def _numpy(kind: type[np.generic]) -> Check:

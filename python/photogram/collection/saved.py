@@ -66,14 +66,16 @@ def read_collection_result(folder: Path, document: Mapping[str, Any]) -> Adjuste
         Files that are missing, damaged or contradict each other.
     """
     saved = read_saved(folder, (CollectionOptions, Iteration, Message), document)
-    given = saved.members("collection")
+    given = saved.members("collection", Collection)
     images = saved.sheets["images"]
     for kind in ("photo", "point"):
         given[f"image_{kind}s"] = images.numbers(kind)
     names, units = Collection.parameters_of(given["camera"])
     own, arrays = saved.arrays(_parts(names, units), "collection")
     collection = Collection(**given, **arrays)
-    return AdjustedCollection(**saved.members("result"), **own, collection=collection, state=saved.state())
+    return AdjustedCollection(
+        **saved.members("result", AdjustedCollection), **own, collection=collection, state=saved.state()
+    )
 
 
 def _parts(names: tuple[str, ...], units: tuple[str, ...]) -> dict[str, list[Part]]:

@@ -393,12 +393,12 @@ def read_part(folder: Path, sealed: str) -> Part:
         check_seal(folder / f"{table}.parquet", document["tables"][table], SETTINGS)
     sheets = {table: read_sheet(folder / f"{table}.parquet") for table in TABLES}
     decoder = Decoder(_classes(), folder / SETTINGS)
-    given: dict[str, Any] = decoder.fields(document["block"])
+    given: dict[str, Any] = decoder.fields(document["block"], Block)
     common = tuple(decoder.value(document["common"]))
     for table, fields in TABLES.items():
         given |= {name: sheets[table].columns.get(name) for name in fields}
     for table in ("photos", "points"):
-        names = sheets[table].column(table[:-1])
+        names = sheets[table].names(table[:-1])
         given[f"{table[:-1]}_ids"] = [names.names[row] for row in names.rows.tolist()]
     return Part(
         document["node"],

@@ -97,6 +97,19 @@ class Sheet:
             raise InputError(f"the column {name} is missing", file=self.path)
         return self.columns[name]
 
+    def names(self, name: str) -> Repeated:
+        """Return a column of names.
+
+        Raises
+        ------
+        InputError
+            It is not there, or holds something else.
+        """
+        found = self.column(name)
+        if not isinstance(found, Repeated):
+            raise self._other(name, found)
+        return found
+
     def numbers(self, name: str, columns: int = 0) -> Any:
         """Return a column of numbers: (rows,), or (rows, columns) of lists; a negative count divides theirs.
 
@@ -110,10 +123,11 @@ class Sheet:
         width = found.shape[1] if kind and found.ndim == 2 else 0
         fits = width == columns if columns >= 0 else width > 0 and width % columns == 0
         if kind not in tuple("iuf") or not fits:
-            raise InputError(
-                f"the column {name} does not hold what it should: {found!r}"[:200], file=self.path
-            )
+            raise self._other(name, found)
         return found
+
+    def _other(self, name: str, found: object) -> InputError:
+        return InputError(f"the column {name} does not hold what it should: {found!r}"[:200], file=self.path)
 
 
 def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Callable[[BinaryIO], None]:

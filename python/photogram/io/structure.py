@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.annotations import check_members
 from photogram.errors import InputError
 from photogram.messages import quoted
 
@@ -137,17 +138,22 @@ class Decoder:
                 raise
             raise self._error(f"{quoted(str(given))} is no {kind} ({error})") from None
 
-    def fields(self, given: Any) -> dict[str, Any]:
-        """Return the fields of an object that were written one by one.
+    def fields(self, given: Any, kind: type = object) -> dict[str, Any]:
+        """Return the fields of an object of a class that were written one by one.
 
         Raises
         ------
         InputError
-            As :meth:`value`.
+            As :meth:`value`; a value of another kind than the class has.
         """
         if not isinstance(given, dict):
             raise self._error(f"{quoted(str(given))} has no members")
-        return {name: self.value(each) for name, each in given.items()}
+        found = {name: self.value(each) for name, each in given.items()}
+        try:
+            check_members(kind, found)
+        except InputError as error:
+            raise self._error(error.message) from None
+        return found
 
     def _object(self, given: dict[str, Any]) -> object:
         name = given["is"]
@@ -155,6 +161,7 @@ class Decoder:
             raise self._error(f"{quoted(str(name))} is no class that this version knows")
         own = self.fields({member: each for member, each in given.items() if member != "is"})
         try:
+            check_members(self._classes[name], own)
             made = self._classes[name](**own)
         except InputError as error:
             raise self._error(error.message) from None

@@ -214,9 +214,9 @@ class Saved:
                 (own if name == each.field else others)[name] = found
         return own, others
 
-    def members(self, name: str) -> dict[str, Any]:
-        """Return the fields that stand in the document: of `result`, or of what was adjusted."""
-        return self.decoder.fields(self.summary["kept"][name])
+    def members(self, name: str, kind: type) -> dict[str, Any]:
+        """Return the fields of a class that stand in the document: of `result`, or of what was adjusted."""
+        return self.decoder.fields(self.summary["kept"][name], kind)
 
     def state(self) -> _photocore.BlockState:
         """Return where the core has ended."""
@@ -361,7 +361,7 @@ def read_summary(folder: Path) -> Mapping[str, Any]:
     return document
 
 
-def rows_of(names: Any, known: Sequence[str], path: Path) -> np.ndarray:
+def rows_of(names: Repeated, known: Sequence[str], path: Path) -> np.ndarray:
     """Return which of the known names each row of a column has.
 
     Raises
@@ -369,8 +369,6 @@ def rows_of(names: Any, known: Sequence[str], path: Path) -> np.ndarray:
     InputError
         A name that is not known.
     """
-    if not isinstance(names, Repeated):
-        raise InputError("has no names where they should be", file=path)
     places = {name: row for row, name in enumerate(known)}
     try:
         codes = np.array([places[name] for name in names.names], dtype=np.int64)

@@ -116,14 +116,14 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
         Files that are missing, damaged or contradict each other.
     """
     saved = read_saved(folder, [*_CLASSES, *_below(Observation), *_below(Unknown)], document)
-    given = saved.members("block")
+    given = saved.members("block", Block)
     images, names = saved.sheets["images"], {}
     for kind in ("photo", "point"):
         sheet = saved.sheets[f"{kind}s"]
-        own = sheet.column(kind)
+        own = sheet.names(kind)
         names[kind] = own.names if (own.rows == np.arange(len(own))).all() else _spelt(own)
         given[f"{kind}_ids"] = names[kind]
-        given[f"image_{kind}s"] = rows_of(images.column(kind), names[kind], images.path)
+        given[f"image_{kind}s"] = rows_of(images.names(kind), names[kind], images.path)
     parts = _parts_of(
         geographic=given["spheroid"] is not None,
         unit=given["linear_unit"],
@@ -133,7 +133,7 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     )
     own_arrays, block_arrays = saved.arrays(parts, "block")
     block = Block(**given, **block_arrays)
-    return Result(**saved.members("result"), **own_arrays, block=block, state=saved.state())
+    return Result(**saved.members("result", Result), **own_arrays, block=block, state=saved.state())
 
 
 def _parts(block: Block, result: Result) -> dict[str, list[Part]]:
