@@ -6,6 +6,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import photogram
+from rust_files import imports as rust_imports
 
 SOURCES = Path(photogram.__file__).parent
 PROGRAMS = ("giant", "collection", "perspective_center", "absolute_orientation", "comparator", "stellar")
@@ -99,3 +100,14 @@ def test_floors_of_the_crate():
             assert named <= below | {folder}, f"{path.relative_to(CRATE)} knows {named - below - {folder}}"
             arrows |= {(folder, other) for other in named - {folder}}
     assert arrows >= {("programs", "network"), ("network", "adjustment"), ("adjustment", "normals")}
+
+
+def test_files_of_network_name_each_other_in_no_circle():
+    """The types of a network stand below what is made of them, and its adjustment above all."""
+    graph = {file: arrows for file, arrows in rust_imports(CRATE).items() if file[:1] == ("network",)}
+    assert len(graph) > 60
+    inside = {file: {other for other in arrows if other in graph} for file, arrows in graph.items()}
+    order = list(TopologicalSorter(inside).static_order())
+    types, driver = order.index(("network",)), order.index(("network", "adjust"))
+    assert types < order.index(("network", "problem")) < driver
+    assert {("network", "screens"), ("network", "solution")} <= inside["network", "adjust"]

@@ -15,7 +15,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use photocore::adjustment;
 use photocore::geometry::{self, Bal, ObjectSpace, Orientation, Perspective, PoseNumbers, RotationSense};
-use photocore::network::{Camera, Image, Network, Options, Photo, Point, Start, UnitVariance};
+use photocore::network::{Camera, Image, Network, Options, Photo, Point, Screens, Start, UnitVariance};
 use photocore::normals::{Equations, Factor, GroupRows, Layout, Ordering, Prior, Stopped, System};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -249,6 +249,7 @@ fn adjust(criterion: &mut Criterion) {
         hold_unused: false,
         memory: None,
         minimum: None,
+        screens: Screens::default(),
     };
     let adjust = |block: &Network| {
         block.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).expect("a determined block")

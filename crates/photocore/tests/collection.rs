@@ -11,8 +11,8 @@ use photocore::geometry::{
     angle_axis_with_jacobian,
 };
 use photocore::network::{
-    AdjustedPhoto, Camera, Coarse, Image, Network, NetworkError, Options, Photo, Point, Solution, Start,
-    UnitVariance,
+    AdjustedPhoto, Camera, Coarse, Image, Network, NetworkError, Options, Photo, Point, Screens, Solution,
+    Start, UnitVariance,
 };
 use photocore::normals::Ordering;
 use proptest::prelude::*;
@@ -187,6 +187,7 @@ fn adjusted_from(
         hold_unused: true,
         memory: None,
         minimum: None,
+        screens: Screens::default(),
     };
     collection.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))
 }

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use super::median::median;
 use super::model::Bundle;
-use super::precision::median;
 use super::problem::Assembled;
 use super::surroundings::Surroundings;
 use super::{AdjustedPhoto, Network};

@@ -7,41 +7,11 @@ use rayon::ThreadPool;
 
 use super::model::Owner;
 use super::problem::Assembled;
-use super::{InnerConstraints, Network, NetworkError, Options, Solution};
+use super::state::{InnerConstraints, NetworkDatum, State};
+use super::{Network, NetworkError, Options, Solution};
 use crate::adjustment::{Adjusted, Classes, CofactorError, Datum, Event, Factored, InDatum, Phase};
 use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
-use crate::normals::{Function, Ordering};
-
-/// Where an adjustment of a network has ended: all that is needed to come back to it.
-#[derive(Debug, Clone)]
-pub struct State {
-    /// The adjusted unknowns, in the order of the adjustment.
-    pub unknowns: Vec<f64>,
-    /// Those of them that were held for a datum.
-    pub held: Vec<usize>,
-    /// Points that were left out because they ran into a station, or their rays do not determine them, ascending.
-    pub collapsed: Vec<usize>,
-    /// Photos that were left out because their images do not determine them, ascending.
-    pub loose: Vec<usize>,
-    /// The ordering in force.
-    pub ordering: Ordering,
-    /// The datum that it was taken to since; None for that of what was held, or of the observations.
-    pub datum: Option<NetworkDatum>,
-    /// Whether control and weights of poses, which were exactly what a datum takes, were given up for it.
-    pub released: bool,
-}
-
-/// What coordinates and their cofactors refer to.
-#[derive(Debug, Clone)]
-pub enum NetworkDatum {
-    /// Chosen points and photos are, together, as near to their given places as they come: of networks that are free.
-    Inner(InnerConstraints),
-    /// Cofactors are relative to a photo (of one on a frame: to the frame), as if its pose were held where it has been adjusted to. Nothing is moved, scale stays as it is
-    /// given or held, and the network need not be free.
-    RelativeToPhoto(usize),
-    /// The same with points, whose mean position and orientation count.
-    RelativeToPoints(Vec<usize>),
-}
+use crate::normals::Function;
 
 /// Shares that are more than rounding.
 const NOTABLE: f64 = 1e-6;
@@ -239,33 +209,6 @@ impl Network {
         let assembled = self.assembled_again(options, &state, pool)?;
         let held = assembled.problem.to_hold(&state.unknowns, pool);
         Ok(State { held, ..state })
-    }
-
-    /// The problem whose solution a state is.
-    pub(super) fn assembled_again(
-        &self,
-        options: &Options,
-        state: &State,
-        pool: &ThreadPool,
-    ) -> Result<Assembled, NetworkError> {
-        self.check()?;
-        let mut left_out = vec![false; self.points.len()];
-        for &point in &state.collapsed {
-            *left_out.get_mut(point).ok_or(NetworkError::State)? = true;
-        }
-        let options = Options { ordering: state.ordering, ..*options };
-        let mut loose = vec![false; self.photos.len()];
-        for &photo in &state.loose {
-            *loose.get_mut(photo).ok_or(NetworkError::State)? = true;
-        }
-        let screened = pool.install(|| self.screen(&left_out, &loose));
-        let assembled = pool.install(|| self.assemble(&options, screened, None))?;
-        let count = assembled.problem.layout().unknowns();
-        if state.unknowns.len() != count || state.held.iter().any(|&unknown| unknown >= count) {
-            return Err(NetworkError::State);
-        }
-        assembled.check_memory(&options)?;
-        Ok(assembled)
     }
 
     /// What carries a datum, and the values that it stays near to; None where nothing is to move.

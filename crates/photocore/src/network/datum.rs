@@ -6,35 +6,20 @@ use nalgebra::{Matrix4, Vector6};
 use rayon::ThreadPool;
 
 use super::commons::Motion;
+use super::median::median;
 use super::model::Bundle;
-use super::parts::{Joined, MOST_PARTS, Part, Parts};
-use super::precision::median;
+use super::parts::{Joined, MOST_PARTS, MOTIONS, Part, Parts};
 use super::problem::Assembled;
+use super::state::InnerConstraints;
 use super::stations::{Placed, Stations};
+use super::{Network, NetworkError};
 use crate::adjustment::{Datum, Motions};
 use crate::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Point, PoseNumbers, Vector3, angle_axis::rotation_angle_axis,
     angle_axis_rotation, local_vertical,
 };
 
-/// Inner constraints: the datum in which chosen points and photos, taken together, are as near as they come to their given places
-/// (where a point has none, to where it started from).
-#[derive(Debug, Clone, Default)]
-pub struct InnerConstraints {
-    /// Indices of points.
-    pub points: Vec<usize>,
-    /// Indices of photos, whose positions count.
-    pub photos: Vec<usize>,
-    /// Indices of photos, whose attitudes count: a turn of one about its own axes, times `radius`.
-    pub attitudes: Vec<usize>,
-    /// What makes turns comparable with shifts; None for the root mean square distance of all points and photos from their middle.
-    pub radius: Option<f64>,
-    /// Whether scale is taken from them, too; otherwise it stays as it is held.
-    pub scale: bool,
-}
-
-/// Shifts along, rotations about the axes of cartesian space, and scale.
-pub(super) const MOTIONS: usize = 7;
+/// The last of the [`MOTIONS`].
 const SCALE: usize = 6;
 /// A photo so many times as far from the central one as the others has left the network.
 const LEFT: f64 = 10.0;
@@ -267,6 +252,21 @@ impl Bundle {
                 }
             }
         }
+    }
+}
+
+impl Network {
+    /// Refuses photos that cannot carry a datum.
+    pub(super) fn check_carriers(
+        &self,
+        inner: &InnerConstraints,
+        assembled: &Assembled,
+    ) -> Result<(), NetworkError> {
+        if self.poses == PoseNumbers::Vectors && !(inner.photos.is_empty() && inner.attitudes.is_empty()) {
+            return Err(NetworkError::Vectors);
+        }
+        let bad = inner.attitudes.iter().find(|&&photo| !assembled.turns(photo));
+        bad.map_or(Ok(()), |&photo| Err(NetworkError::Attitude(photo)))
     }
 }
 

@@ -2,12 +2,9 @@
 
 use thiserror::Error;
 
-use super::model::Owner;
 use super::observations::Fault;
-use super::precision::Coarse;
-use super::problem::Assembled;
 use super::surroundings::BlockOf;
-use crate::adjustment::{AdjustError, CofactorError, DatumError, gib};
+use crate::adjustment::{CofactorError, DatumError, gib};
 use crate::normals::LayoutError;
 
 /// Why a network cannot be adjusted, or has no cofactors. Photos, cameras and points are indices into the network.
@@ -136,6 +133,16 @@ pub enum NetworkError {
     Layout(#[from] LayoutError),
 }
 
+/// Coordinates or angles that double precision rounds by more than their standard deviations, or than image coordinates show.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{} photos and {} points have coordinates or angles too large for double precision", .photos.len(), .points.len())]
+pub struct Coarse {
+    /// Photos that have them.
+    pub photos: Vec<usize>,
+    /// Points that have them.
+    pub points: Vec<usize>,
+}
+
 /// What a combination of unknowns moves.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Combination {
@@ -175,49 +182,5 @@ impl PosePart {
             Self::Tilt => "tilt",
             Self::Swing => "swing",
         }
-    }
-}
-
-impl NetworkError {
-    /// What stopped the adjustment, in terms of the network.
-    pub(super) fn new(error: AdjustError, assembled: &Assembled) -> Self {
-        match error {
-            AdjustError::UndeterminedLocals(locals) => {
-                let mut points: Vec<usize> =
-                    locals.into_iter().map(|local| assembled.points[local]).collect();
-                points.sort_unstable();
-                Self::UndeterminedPoints(points)
-            }
-            AdjustError::Undetermined(combinations) => Self::undetermined(combinations, assembled),
-            AdjustError::NotFinite => Self::NotFinite,
-            AdjustError::Interrupted => Self::Interrupted,
-            AdjustError::OutOfMemory(bytes) => Self::OutOfMemory(bytes),
-        }
-    }
-
-    /// Combinations of kept blocks: those that move photos and cameras by these, else the points that they move.
-    fn undetermined(combinations: Vec<Vec<usize>>, assembled: &Assembled) -> Self {
-        let model = &assembled.problem.model;
-        let stations = model.stations();
-        let of_stations = |blocks: &Vec<usize>| {
-            let mut found = Combination::default();
-            for &block in blocks.iter().filter(|&&block| block < stations) {
-                match model.owner(block) {
-                    Owner::Photo(photo) => found.photos.push(photo),
-                    Owner::Camera(camera) => found.cameras.push(camera),
-                    Owner::Common(common) => found.commons.push(common),
-                }
-            }
-            (found != Combination::default()).then_some(found)
-        };
-        let found: Vec<Combination> = combinations.iter().filter_map(of_stations).collect();
-        if !found.is_empty() {
-            return Self::Undetermined(found);
-        }
-        let point = |block: usize| assembled.points[model.locals + block - stations];
-        let mut points: Vec<usize> = combinations.into_iter().flatten().map(point).collect();
-        points.sort_unstable();
-        points.dedup();
-        Self::UndeterminedPoints(points)
     }
 }

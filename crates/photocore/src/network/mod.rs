@@ -53,20 +53,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod approaches;
-mod beside;
+mod adjust;
+mod adjusted;
 mod camera_priors;
 mod cameras;
+mod check;
 pub mod commons;
 mod covariance;
 mod datum;
-mod departures;
 mod effects;
 mod error;
 mod group_tests;
 mod groups;
-mod hidden;
 mod in_lanes;
+mod intersection;
+mod layout;
+mod median;
 mod model;
 mod mounts;
 mod naming;
@@ -79,48 +81,45 @@ mod precision;
 mod predictions;
 mod problem;
 mod responses;
-mod screening;
-mod settled;
+mod screens;
+mod selection;
 mod solution;
-mod start;
+mod state;
+mod station_values;
 mod stations;
 mod surroundings;
 mod suspects;
 mod trial;
+mod visibility;
 mod weak_points;
 mod weighted_angles;
 
-use std::ops::ControlFlow;
-
 use nalgebra::DMatrix;
-use rayon::ThreadPool;
 
-use self::beside::{Beside, Leaving};
-use crate::adjustment::{self, AdjustError, Adjustment, Event, Method};
+use crate::adjustment;
 use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
 use crate::normals::Ordering;
 
+pub use adjusted::{AdjustedPhoto, AdjustedPoint};
 pub use cameras::AdjustedCamera;
 pub use commons::{AdjustedCommon, Common, CommonKind};
-pub use covariance::{Covariances, NetworkDatum, Of, State};
-pub use datum::InnerConstraints;
-pub use error::{Combination, NetworkError, PosePart};
+pub use covariance::{Covariances, Of};
+pub use error::{Coarse, Combination, NetworkError, PosePart};
 pub use group_tests::Tests;
 pub use groups::Groups;
+pub(crate) use intersection::meet;
+pub(crate) use median::median;
 pub use mounts::Mount;
 pub use node::{FormedNode, Node, NodePrediction};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
-pub use precision::Coarse;
-pub(crate) use precision::median;
 pub use predictions::{OnPoint, Prediction};
 pub use responses::{Moved, UnknownOf};
-pub use screening::{Dropped, Reason};
-pub use settled::Settled;
-pub use solution::{AdjustedPhoto, AdjustedPoint, Redundancies, Solution, SumsOfSquares};
-pub(crate) use start::meet;
+pub use selection::{Dropped, Reason};
+pub use solution::{Redundancies, Solution, SumsOfSquares};
+pub use state::{InnerConstraints, NetworkDatum, State};
 pub use surroundings::{BlockOf, Surroundings};
 pub use suspects::Subject;
-pub use trial::{Out, Standing, Trial};
+pub use trial::{Converged, Out, Outcome, Trial};
 pub use weak_points::WeakPoint;
 
 /// A photo as it is known beforehand.
@@ -254,6 +253,35 @@ pub struct Minimum {
     pub coordinate: Option<(usize, usize)>,
 }
 
+/// What may leave a network for the good of the rest while it is adjusted, see [`Reason`]; each is on unless it is switched off, and then
+/// stays and does its harm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Screens {
+    /// Points and photos that their images do not determine, where they are few.
+    pub not_determined: bool,
+    /// Points that rays which part, or are parallel, lead out of the network.
+    pub ran_off: bool,
+    /// Points that two rays lead to the station of a photo.
+    pub ran_into_station: bool,
+    /// Points given at the place of a station that sees them.
+    pub at_station: bool,
+    /// Points held near a station that sees them, where the adjustment goes wrong with them and not without.
+    pub near_station: bool,
+}
+
+impl Default for Screens {
+    /// All.
+    fn default() -> Self {
+        Self {
+            not_determined: true,
+            ran_off: true,
+            ran_into_station: true,
+            at_station: true,
+            near_station: true,
+        }
+    }
+}
+
 /// How to adjust a network.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
@@ -271,6 +299,8 @@ pub struct Options {
     pub memory: Option<usize>,
     /// What to hold where nothing else gives a datum; None for what is best held.
     pub minimum: Option<Minimum>,
+    /// What may leave for the good of the rest.
+    pub screens: Screens,
 }
 
 impl Default for Options {
@@ -284,278 +314,7 @@ impl Default for Options {
             hold_unused: false,
             memory: None,
             minimum: None,
+            screens: Screens::default(),
         }
-    }
-}
-
-impl Network {
-    /// Adjusts the network by least squares.
-    ///
-    /// Points that their image points cannot determine are left out first (see [`Dropped`]). So are points that run into the station
-    /// of a photo: the adjustment goes on without them from where it was. `watch` is called on the calling thread; when it breaks, the
-    /// adjustment stops. Observations of points that are left out do not take part.
-    ///
-    /// # Errors
-    /// A network that contradicts itself, has nothing to adjust, or leaves unknowns undetermined; an interruption.
-    pub fn adjust(
-        &self,
-        options: &Options,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Solution, NetworkError> {
-        self.adjusted(options, (None, false), None, pool, watch)
-    }
-
-    /// The same, and keeps what tests of it need ([`Solution::settled`]) where it converges by least squares and there is memory: it
-    /// takes about a twentieth longer.
-    ///
-    /// # Errors
-    /// Those of [`Network::adjust`].
-    pub fn adjust_and_keep(
-        &self,
-        options: &Options,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Solution, NetworkError> {
-        self.adjusted(options, (None, true), None, pool, watch)
-    }
-
-    /// Adjusts the network from where an adjustment of it has ended, perhaps with other weights: in the order that was in force, and
-    /// without the points that had run into a station.
-    ///
-    /// # Errors
-    /// Those of [`Network::adjust`]; a state that is not of this network.
-    pub fn adjust_again(
-        &self,
-        options: &Options,
-        state: &State,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Solution, NetworkError> {
-        let options = Options { ordering: state.ordering, ..*options };
-        self.adjusted(&options, (None, false), Some(state), pool, watch)
-    }
-
-    /// Adjusts a network that is free, and takes it to the datum of inner constraints.
-    ///
-    /// # Errors
-    /// Those of [`Network::adjust`]; a network that is not free, or points and photos that do not carry its datum.
-    pub fn adjust_in_datum(
-        &self,
-        options: &Options,
-        datum: &InnerConstraints,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Solution, NetworkError> {
-        self.adjusted(options, (Some(datum), false), None, pool, watch)
-    }
-
-    fn adjusted(
-        &self,
-        options: &Options,
-        (datum, keep): (Option<&InnerConstraints>, bool),
-        start: Option<&State>,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Solution, NetworkError> {
-        self.check()?;
-        let (points, photos) = (vec![false; self.points.len()], self.untouched_photos());
-        let mut leaving = Leaving { points, photos, harmful: vec![] };
-        for &point in start.iter().flat_map(|state| &state.collapsed) {
-            *leaving.points.get_mut(point).ok_or(NetworkError::State)? = true;
-        }
-        for &photo in start.iter().flat_map(|state| &state.loose) {
-            *leaving.photos.get_mut(photo).ok_or(NetworkError::State)? = true;
-        }
-        let mut start = start;
-        let mut before: Option<(Adjustment, problem::Reached)> = None;
-        let mut beside = Beside::Untried(leaving.clone());
-        loop {
-            let screened = pool.install(|| self.screen(&leaving.points, &leaving.photos));
-            if screened.points.is_empty() {
-                return Err(NetworkError::Empty);
-            }
-            let reached = before.as_ref().map(|(_, reached)| reached);
-            let mut assembled = pool.install(|| self.assemble(options, screened, reached))?;
-            if let Some(state) = start.filter(|_| before.is_none()) {
-                assembled.go_on_from(state)?;
-            }
-            let problem = &assembled.problem;
-            assembled.check_memory(options)?;
-            let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
-            let mut own = options.adjustment;
-            own.max_iterations = own.max_iterations.saturating_sub(done);
-            let adjusted = match datum {
-                // Cofactors are those of the datum that is asked for; weights that a loss leaves are known at the end only.
-                Some(inner)
-                    if own.covariance && own.loss.is_none() && matches!(own.method, Method::Damped(_)) =>
-                {
-                    self.check_carriers(inner, &assembled)?;
-                    let (datum, reference) = assembled.datum(inner);
-                    adjustment::adjust_in_datum(problem, &own, &datum, &reference, pool, watch)
-                }
-                _ => {
-                    own.covariance &= datum.is_none();
-                    let plain =
-                        own.covariance && own.loss.is_none() && !matches!(own.method, Method::Full(_));
-                    if keep && plain && assembled.may_keep(options) {
-                        adjustment::adjust_by_groups(problem, &own, pool, watch)
-                    } else {
-                        adjustment::adjust(problem, &own, pool, watch)
-                    }
-                }
-            };
-            let may_try = own.loss.is_none() && !matches!(own.method, Method::Full(_));
-            if may_try && beside.is_untried() && beside.tries(&adjusted, &assembled, &mut leaving) {
-                (start, before) = (None, None);
-                continue;
-            }
-            if let Ok(Adjustment { undetermined: Some(error), .. }) | Err(error) = &adjusted {
-                let (points, photos) = (assembled.few_points(error), assembled.few_photos(error));
-                if !(points.is_empty() && photos.is_empty()) {
-                    // They have led the others astray: these begin again.
-                    points.iter().for_each(|&point| leaving.points[point] = true);
-                    photos.iter().for_each(|&photo| leaving.photos[photo] = true);
-                    let reason = Reason::NotDetermined;
-                    leaving.harmful.extend(points.into_iter().map(|point| Dropped { point, reason }));
-                    start = None;
-                    continue;
-                }
-            }
-            let astray = match &adjusted {
-                Ok(adjusted) => assembled.run_off(adjusted, &options.adjustment),
-                Err(AdjustError::NotFinite) => assembled.at_stations(),
-                Err(_) => vec![],
-            };
-            if !astray.is_empty() {
-                astray.iter().for_each(|dropped| leaving.points[dropped.point] = true);
-                leaving.harmful.extend(astray);
-                (start, before) = (None, None);
-                continue;
-            }
-            if may_try && !beside.is_untried() && beside.tries(&adjusted, &assembled, &mut leaving) {
-                (start, before) = (None, None);
-                continue;
-            }
-            let named = |error, values: &[f64]| self.name(error, &assembled, values, pool);
-            let mut adjusted = adjusted
-                .map_err(|error| named(NetworkError::new(error, &assembled), &assembled.problem.initial))?;
-            let earlier = before.take();
-            adjusted.go_on_from(earlier.map(|(adjustment, _)| adjustment));
-            if adjusted.collapsed.is_empty() {
-                let mut lost = adjusted.lost.unwrap_or(0.0);
-                if let Some(inner) = datum.filter(|_| adjusted.lost.is_none()) {
-                    lost =
-                        self.take_to(inner, &options.adjustment, &assembled, &mut adjusted, pool, watch)?;
-                }
-                let collapsed = (0..leaving.points.len()).filter(|&point| leaving.points[point]).collect();
-                let minimal = datum.is_none() && assembled.is_minimal(&adjusted.unknowns, pool);
-                let (mut solution, found) =
-                    pool.install(|| Solution::with_tried(self, options, &assembled, adjusted, collapsed));
-                let undetermined = solution.undetermined.take();
-                solution.undetermined = undetermined.map(|error| named(error, &solution.state.unknowns));
-                solution.minimal_control = minimal;
-                solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
-                solution.lost_digits = lost;
-                solution.dropped.extend(leaving.harmful);
-                solution.dropped.sort_unstable_by_key(|dropped| dropped.point);
-                solution.settled =
-                    found.map(|found| Box::new(Settled::new(assembled, options.adjustment, found)));
-                return Ok(solution);
-            }
-            for dropped in assembled.collapsed(&adjusted) {
-                leaving.points[dropped.point] = true;
-                leaving.harmful.push(dropped);
-            }
-            let reached = assembled.reached(&adjusted.unknowns, self.points.len());
-            before = Some((adjusted, reached));
-        }
-    }
-
-    /// The problem of the network as it is given.
-    fn assembled_first(
-        &self,
-        options: &Options,
-        pool: &ThreadPool,
-    ) -> Result<problem::Assembled, NetworkError> {
-        self.check()?;
-        let untouched = self.untouched_photos();
-        let screened = pool.install(|| self.screen(&vec![false; self.points.len()], &untouched));
-        if screened.points.is_empty() {
-            return Err(NetworkError::Empty);
-        }
-        let assembled = pool.install(|| self.assemble(options, screened, None))?;
-        assembled.check_memory(options)?;
-        Ok(assembled)
-    }
-
-    /// Refuses photos that cannot carry a datum.
-    fn check_carriers(
-        &self,
-        inner: &InnerConstraints,
-        assembled: &problem::Assembled,
-    ) -> Result<(), NetworkError> {
-        if self.poses == PoseNumbers::Vectors && !(inner.photos.is_empty() && inner.attitudes.is_empty()) {
-            return Err(NetworkError::Vectors);
-        }
-        let bad = inner.attitudes.iter().find(|&&photo| !assembled.turns(photo));
-        bad.map_or(Ok(()), |&photo| Err(NetworkError::Attitude(photo)))
-    }
-
-    /// Takes an adjusted network to the datum of inner constraints; returns how large a part of its variances may be rounding.
-    fn take_to(
-        &self,
-        inner: &InnerConstraints,
-        options: &adjustment::Options,
-        assembled: &problem::Assembled,
-        adjusted: &mut Adjustment,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<f64, NetworkError> {
-        self.check_carriers(inner, assembled)?;
-        let (datum, reference) = assembled.datum(inner);
-        let total = assembled.points.len();
-        let mut between = |done| watch(Event::Progress { phase: adjustment::Phase::Invert, done, total });
-        let problem = &assembled.problem;
-        Ok(adjusted.take_to(problem, options, &datum, &reference, pool, &mut between)?)
-    }
-
-    /// Refuses a network that contradicts itself.
-    fn check(&self) -> Result<(), NetworkError> {
-        let counts = (self.photos.len(), self.points.len());
-        let outside = |image: &Image| image.photo >= counts.0 || image.point >= counts.1;
-        if let Some(bad) = self.images.iter().position(outside) {
-            return Err(NetworkError::Index(bad));
-        }
-        for (index, photo) in self.photos.iter().enumerate() {
-            if photo.camera >= self.cameras.len() {
-                return Err(NetworkError::NoCamera(index));
-            }
-        }
-        for (index, camera) in self.cameras.iter().enumerate() {
-            if camera.sd.len() != camera.camera.parameter_names().len() {
-                return Err(NetworkError::CameraDeviations(index));
-            }
-            if !camera.has_sound_covariance() {
-                return Err(NetworkError::CameraCovariance(index));
-            }
-            let known = camera.camera.parameter_names();
-            let unknowns = known.len() - camera.camera.constants();
-            if let Some(free) = (unknowns..known.len()).find(|&k| camera.sd[k] != 0.0) {
-                return Err(NetworkError::CameraConstant { camera: index, parameter: known[free].0 });
-            }
-        }
-        for (index, common) in self.commons.iter().enumerate() {
-            if common.sd.len() != common.kind.unknowns().len() {
-                return Err(NetworkError::CommonDeviations(index));
-            }
-        }
-        self.check_mounts()?;
-        for (index, observation) in self.observations.iter().enumerate() {
-            let checked = observation.check(self.points.len(), self.photos.len(), &self.commons);
-            checked.map_err(|fault| NetworkError::Observation { index, kind: observation.kind(), fault })?;
-        }
-        let cartesian = self.space == ObjectSpace::Rectangular && self.refraction.is_none();
-        if self.poses == PoseNumbers::Vectors && !cartesian { Err(NetworkError::Vectors) } else { Ok(()) }
     }
 }

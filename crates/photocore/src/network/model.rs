@@ -7,13 +7,12 @@ use rayon::prelude::*;
 
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
-use super::datum::MOTIONS;
 use super::in_lanes::{FEWEST, Sight, write_in_lanes};
 use super::mounts::{Mount, mounted};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
-use super::parts::Parts;
+use super::parts::{MOTIONS, Parts};
 use super::stations::{Bent, Placed, Refracted, Station, Stations, write_in_its_place};
-use super::{Image, Minimum, Point};
+use super::{Image, Minimum, Point, Screens};
 use crate::adjustment::{Model, Motions, Weighted};
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::camera::{CameraModel, each_camera};
@@ -77,6 +76,8 @@ pub struct Bundle {
     pub anchor: Option<usize>,
     /// What the user wants to be held where nothing else gives a datum.
     pub minimum: Option<Minimum>,
+    /// What may leave while it is adjusted.
+    pub screens: Screens,
     /// What hangs together, once it was asked for: it depends on all above.
     pub parts: OnceLock<Parts>,
 }
@@ -457,11 +458,11 @@ impl Model for Bundle {
     }
 
     fn collapsed(&self, before: &[f64], after: &Stations) -> Vec<usize> {
-        self.run_into_stations(before, after)
+        if self.screens.ran_into_station { self.run_into_stations(before, after) } else { vec![] }
     }
 
     fn run_off(&self, before: &[f64], after: &Stations) -> Vec<usize> {
-        self.lead_nowhere(before, after)
+        if self.screens.ran_off { self.lead_nowhere(before, after) } else { vec![] }
     }
 
     /// Straight rays turn and stretch with everything else; what a frame carries may have known lengths.

@@ -2,8 +2,7 @@
 
 use nalgebra::Matrix6;
 
-use super::commons::{CommonKind, CommonState};
-use super::{Network, NetworkError};
+use super::commons::CommonState;
 use crate::geometry::{ObjectSpace, Orientation, Vector3, local_vertical};
 
 /// That a photo was taken by a sensor on a frame. Its pose follows from those of the frame, which is that of the photo of the first
@@ -62,32 +61,4 @@ pub(super) fn mounted(
 fn set(steps: &mut Matrix6<f64>, column: usize, shift: &Vector3, rho: &Vector3) {
     steps.fixed_view_mut::<3, 1>(0, column).copy_from(shift);
     steps.fixed_view_mut::<3, 1>(3, column).copy_from(rho);
-}
-
-impl Network {
-    /// Refuses mounts that contradict the network or each other.
-    pub(super) fn check_mounts(&self) -> Result<(), NetworkError> {
-        let mut mounted = vec![false; self.photos.len()];
-        let mut carries = mounted.clone();
-        for (index, mount) in self.mounts.iter().enumerate() {
-            let sensor = self.commons.get(mount.sensor).is_some_and(|own| own.kind == CommonKind::Sensor);
-            let there = mount.photo.max(mount.frame) < self.photos.len();
-            if !sensor || !there || std::mem::replace(&mut mounted[mount.photo], true) {
-                return Err(NetworkError::Mount(index));
-            }
-            carries[mount.frame] = true;
-        }
-        let both = self.mounts.iter().position(|mount| carries[mount.photo]);
-        both.map_or(Ok(()), |index| Err(NetworkError::Mount(index)))
-    }
-
-    /// The mount of each photo; none at all where there are no rigs.
-    pub(super) fn mounts_by_photo(&self) -> Vec<Option<Mount>> {
-        if self.mounts.is_empty() {
-            return vec![];
-        }
-        let mut all = vec![None; self.photos.len()];
-        self.mounts.iter().for_each(|mount| all[mount.photo] = Some(*mount));
-        all
-    }
 }

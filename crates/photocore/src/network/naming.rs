@@ -6,13 +6,58 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 
 use super::error::{Combination, PosePart};
+use super::model::Owner;
 use super::problem::Assembled;
 use super::{Network, NetworkError};
-use crate::adjustment::NormalEquations;
+use crate::adjustment::{AdjustError, NormalEquations};
 use crate::geometry::{PoseNumbers, Vector3};
 
 /// What takes part by less than this share of all, of n_ii x_i^2 summed up, is not named.
 const NOTABLE: f64 = 0.01;
+
+impl NetworkError {
+    /// What stopped the adjustment, in terms of the network.
+    pub(super) fn new(error: AdjustError, assembled: &Assembled) -> Self {
+        match error {
+            AdjustError::UndeterminedLocals(locals) => {
+                let mut points: Vec<usize> =
+                    locals.into_iter().map(|local| assembled.points[local]).collect();
+                points.sort_unstable();
+                Self::UndeterminedPoints(points)
+            }
+            AdjustError::Undetermined(combinations) => Self::undetermined(combinations, assembled),
+            AdjustError::NotFinite => Self::NotFinite,
+            AdjustError::Interrupted => Self::Interrupted,
+            AdjustError::OutOfMemory(bytes) => Self::OutOfMemory(bytes),
+        }
+    }
+
+    /// Combinations of kept blocks: those that move photos and cameras by these, else the points that they move.
+    fn undetermined(combinations: Vec<Vec<usize>>, assembled: &Assembled) -> Self {
+        let model = &assembled.problem.model;
+        let stations = model.stations();
+        let of_stations = |blocks: &Vec<usize>| {
+            let mut found = Combination::default();
+            for &block in blocks.iter().filter(|&&block| block < stations) {
+                match model.owner(block) {
+                    Owner::Photo(photo) => found.photos.push(photo),
+                    Owner::Camera(camera) => found.cameras.push(camera),
+                    Owner::Common(common) => found.commons.push(common),
+                }
+            }
+            (found != Combination::default()).then_some(found)
+        };
+        let found: Vec<Combination> = combinations.iter().filter_map(of_stations).collect();
+        if !found.is_empty() {
+            return Self::Undetermined(found);
+        }
+        let point = |block: usize| assembled.points[model.locals + block - stations];
+        let mut points: Vec<usize> = combinations.into_iter().flatten().map(point).collect();
+        points.sort_unstable();
+        points.dedup();
+        Self::UndeterminedPoints(points)
+    }
+}
 
 impl Network {
     /// Adds to undetermined combinations which parameters of cameras and parts of poses they move. Nothing where cameras are known, or

@@ -5,7 +5,7 @@
 use rayon::prelude::*;
 
 use super::Network;
-use super::screening::{PointImages, TOGETHER};
+use super::selection::{PointImages, TOGETHER};
 use crate::geometry::Vector3;
 
 /// Cells of the curve along each axis.

@@ -8,7 +8,7 @@ use rayon::ThreadPool;
 
 use super::problem::Assembled;
 use super::solution::{observations, sums_of_squares};
-use super::surroundings::Surroundings;
+use super::surroundings::{BlockOf, Surroundings};
 use super::{Dropped, Image, Network, NetworkError, Options, Point, Solution, SumsOfSquares};
 use crate::adjustment::{Adjustment, Counts, Model, Part, PartError, Watch};
 use crate::normals::{Contribution, Operations, packed};
@@ -74,9 +74,9 @@ impl Network {
         }
         let mut network = self.clone();
         network.release(&surroundings.outer);
-        let none = (vec![false; self.points.len()], vec![false; self.photos.len()]);
-        let screened = pool.install(|| network.screen_within(&none.0, &none.1, surroundings));
-        let assembled = pool.install(|| network.assemble(options, screened, None))?;
+        let none = self.left_out(vec![false; self.photos.len()], None)?;
+        let selected = pool.install(|| network.select(&none, surroundings));
+        let assembled = pool.install(|| network.assemble(options, selected, None))?;
         assembled.check_memory(options)?;
         let layout = assembled.problem.layout();
         let outer = layout.unknowns_of(layout.outer()).collect();
@@ -84,6 +84,35 @@ impl Network {
             layout.contributions().iter().map(|blocks| layout.unknowns_of(blocks).collect()).collect();
         Ok(Node { network, options: *options, assembled, outer, below })
     }
+
+    /// Takes the weights of outer blocks away: they count where these are eliminated. What is fixed stays so.
+    pub(super) fn release(&mut self, outer: &[BlockOf]) {
+        let mut photos_of = vec![0; self.cameras.len()];
+        self.photos.iter().for_each(|photo| photos_of[photo.camera] += 1);
+        let named = |camera: usize| outer.contains(&BlockOf::Camera(camera));
+        let mut cameras: Vec<usize> = (0..self.cameras.len()).filter(|&camera| named(camera)).collect();
+        for block in outer {
+            match *block {
+                BlockOf::Photo(photo) => {
+                    let photo = &mut self.photos[photo];
+                    free(&mut photo.sd);
+                    cameras.extend(Some(photo.camera).filter(|&camera| photos_of[camera] == 1));
+                }
+                BlockOf::Camera(_) => {}
+                BlockOf::Common(common) => free(&mut self.commons[common].sd),
+                BlockOf::Point(point) => free(&mut self.points[point].sd),
+            }
+        }
+        for camera in cameras {
+            free(&mut self.cameras[camera].sd);
+            self.cameras[camera].covariance = None;
+        }
+    }
+}
+
+/// Makes weighted unknowns free.
+fn free(sd: &mut [f64]) {
+    sd.iter_mut().filter(|sd| **sd > 0.0).for_each(|sd| *sd = f64::INFINITY);
 }
 
 impl Node {

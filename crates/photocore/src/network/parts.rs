@@ -17,6 +17,9 @@ pub(super) struct Parts {
     pub of_common: Vec<Option<usize>>,
 }
 
+/// Shifts along, rotations about the axes of cartesian space, and scale.
+pub(super) const MOTIONS: usize = 7;
+
 /// Parts that are given a datum at the most: a network in more of them is a mistake.
 pub(super) const MOST_PARTS: usize = 8;
 

@@ -1,10 +1,11 @@
 //! Values that double precision holds too coarsely.
 
 use rayon::prelude::*;
-use thiserror::Error;
 
+use super::error::Coarse;
+use super::median::median;
 use super::model::Bundle;
-use super::screening::{Screened, TOGETHER};
+use super::selection::{Selected, TOGETHER};
 use super::stations::Station;
 use super::{Network, Start};
 use crate::geometry::PoseNumbers;
@@ -14,26 +15,14 @@ const LARGEST: f64 = 1e100;
 /// The weight that belongs to a smaller standard deviation is not one either.
 const SMALLEST: f64 = 1e-100;
 
-/// Coordinates or angles that double precision rounds by more than their standard deviations, or than image coordinates show.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("{} photos and {} points have coordinates or angles too large for double precision", .photos.len(), .points.len())]
-pub struct Coarse {
-    /// Photos that have them.
-    pub photos: Vec<usize>,
-    /// Points that have them.
-    pub points: Vec<usize>,
-}
-
-impl Coarse {
-    /// Refuses photos, ascending, and points that are too coarse.
-    ///
-    /// # Errors
-    /// There are any.
-    fn refuse(photos: impl Iterator<Item = usize>, points: impl Iterator<Item = usize>) -> Result<(), Self> {
-        let (photos, mut points): (Vec<usize>, Vec<usize>) = (photos.collect(), points.collect());
-        points.sort_unstable();
-        if photos.is_empty() && points.is_empty() { Ok(()) } else { Err(Self { photos, points }) }
-    }
+/// Refuses photos, ascending, and points that are too coarse.
+///
+/// # Errors
+/// There are any.
+fn refuse(photos: impl Iterator<Item = usize>, points: impl Iterator<Item = usize>) -> Result<(), Coarse> {
+    let (photos, mut points): (Vec<usize>, Vec<usize>) = (photos.collect(), points.collect());
+    points.sort_unstable();
+    if photos.is_empty() && points.is_empty() { Ok(()) } else { Err(Coarse { photos, points }) }
 }
 
 /// By how much rounding may have changed a number: half its distance from the next one, and more than would give no weight.
@@ -51,12 +40,6 @@ fn is_coarser(value: f64, shown: f64) -> bool {
     shown < rounding(value)
 }
 
-/// The middle one of some numbers, in order; None where there are none.
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (middle < values.len()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
 impl Network {
     /// Refuses photos and points whose values rounding has changed by more than their standard deviations; of those that take part.
     ///
@@ -64,10 +47,10 @@ impl Network {
     /// There are any.
     pub(super) fn check_rounding(
         &self,
-        screened: &Screened,
+        selected: &Selected,
         uses: impl Fn(usize) -> bool,
     ) -> Result<(), Coarse> {
-        let points = screened.points.par_iter().with_min_len(TOGETHER).copied();
+        let points = selected.points.par_iter().with_min_len(TOGETHER).copied();
         let coarse =
             |values: &[f64], sd: &[f64]| values.iter().zip(sd).any(|(&value, &sd)| is_coarse(value, sd));
         let photo = |&i: &usize| {
@@ -78,7 +61,7 @@ impl Network {
         let point = |&i: &usize| coarse(&self.points[i].coordinates, &self.points[i].sd);
         let photos = (0..self.photos.len()).filter(|&photo| uses(photo));
         let points: Vec<usize> = points.filter(point).collect();
-        Coarse::refuse(photos.filter(photo), points.into_iter())
+        refuse(photos.filter(photo), points.into_iter())
     }
 
     /// Refuses photos and points whose values rounding has changed by more than image coordinates show: their standard deviation
@@ -88,7 +71,7 @@ impl Network {
     /// There are any.
     pub(super) fn check_resolution(
         &self,
-        screened: &Screened,
+        selected: &Selected,
         model: &Bundle,
         distance: Option<f64>,
         start: Start,
@@ -118,7 +101,7 @@ impl Network {
             let given = start == Start::Given || self.points[i].held() == [true; 3];
             given && too_far(self.points[i].coordinates, middle_angle)
         };
-        Coarse::refuse((0..self.photos.len()).filter(photo), screened.points.iter().copied().filter(point))
+        refuse((0..self.photos.len()).filter(photo), selected.points.iter().copied().filter(point))
     }
 }
 

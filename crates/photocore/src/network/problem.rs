@@ -4,22 +4,23 @@
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
+use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::camera_priors::CameraPrior;
 use super::commons::PlacedCommon;
+use super::layout::layout;
+use super::median::median;
 use super::model::Bundle;
 use super::observations::{Fault, Observation, TiedObservation, Touches};
-use super::precision::median;
-use super::screening::{Dropped, Reason, Screened, TOGETHER};
+use super::selection::{Dropped, LeftOut, Selected, TOGETHER};
+use super::state::State;
 use super::stations::Station;
 use super::surroundings::Surroundings;
-use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Start, State};
-use crate::adjustment::{self, AdjustError, Adjustment, Method, Model, Problem, Status};
-use crate::geometry::{
-    Matrix3, ObjectSpace, Orientation, PoseNumbers, Refraction, Vector3, local_vertical, nearest_turns,
-};
-use crate::normals::{Layout, System, TieRows};
+use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Screens, Start};
+use crate::adjustment::{Method, Model, Problem};
+use crate::geometry::{Matrix3, ObjectSpace, PoseNumbers, Refraction, local_vertical};
+use crate::normals::{System, TieRows};
 
 /// A problem, and what its parts are in the network.
 #[derive(Debug)]
@@ -39,13 +40,6 @@ pub(super) struct Reached {
     stations: Vec<f64>,
 }
 
-/// Points that are not determined are few where there are so many times as many.
-pub(super) const FEW: usize = 10;
-/// Photos that are not determined, each by itself, are few where there are so many times as many: a network of some photos has few.
-const HALF: usize = 2;
-/// A point so many times as far from the nearest station as others, or as near, has left the network.
-const ASTRAY: f64 = 1e3;
-
 impl Assembled {
     /// Refuses what takes more memory than it may.
     pub fn check_memory(&self, options: &Options) -> Result<(), NetworkError> {
@@ -62,83 +56,14 @@ impl Assembled {
         options.memory.is_none_or(|available| system.memory() + system.memory_of_groups() <= available)
     }
 
-    /// The points that an adjustment has ended with because their rays do not determine them, where they are so few that the others make
-    /// up a network without them: indices into it. None where observations beside images touch them.
-    pub fn few_points(&self, error: &AdjustError) -> Vec<usize> {
-        let AdjustError::UndeterminedLocals(locals) = error else { return vec![] };
-        let free = |&local: &usize| self.problem.model.points[local].held() == [false; 3];
-        let few = FEW * locals.len() <= self.problem.model.locals && locals.iter().all(free);
-        if few { locals.iter().map(|&local| self.points[local]).collect() } else { vec![] }
-    }
-
-    /// The photos that an adjustment has ended with because their images do not determine them, each by itself, where they are few.
-    pub fn few_photos(&self, error: &AdjustError) -> Vec<usize> {
-        let AdjustError::Undetermined(combinations) = error else { return vec![] };
-        let model = &self.problem.model;
-        let alone = |blocks: &Vec<usize>| match blocks[..] {
-            [block] => (block < model.cameras.len() && model.images_on[block] > 0).then_some(block),
-            _ => None,
-        };
-        let Some(mut photos) = combinations.iter().map(alone).collect::<Option<Vec<usize>>>() else {
-            return vec![];
-        };
-        photos.sort_unstable();
-        photos.dedup();
-        let is_frame = |photo: usize| model.mounts.iter().flatten().any(|mount| mount.frame == photo);
-        let few = HALF * photos.len() <= model.cameras.len() && !photos.iter().any(|&photo| is_frame(photo));
-        if few { photos } else { vec![] }
-    }
-
-    /// Free points that iterations which have not converged have led out of the network, or to a station, where they are few.
-    ///
-    /// Rays that part before the cameras fit best at infinity, where least squares creeps to, and photos are turned until they do.
-    pub fn run_off(&self, ended: &Adjustment, options: &adjustment::Options) -> Vec<Dropped> {
-        if ended.status != Status::NotConverged || !matches!(options.method, Method::Damped(_)) {
-            return vec![];
-        }
-        let squares = self.nearest_stations(&ended.unknowns);
-        let Some(middle) = median(squares.clone()) else { return vec![] };
-        let model = &self.problem.model;
-        let is_out = |&local: &usize| {
-            let apart = (squares[local] / middle).sqrt();
-            model.points[local].held() == [false; 3] && !(ASTRAY.recip()..=ASTRAY).contains(&apart)
-        };
-        let out: Vec<usize> = (0..model.locals).filter(is_out).collect();
-        let few = FEW * out.len() <= model.locals;
-        let reason = Reason::RanOff;
-        if few { out.iter().map(|&i| Dropped { point: self.points[i], reason }).collect() } else { vec![] }
-    }
-
-    /// Points that an adjustment has ended for, so that it can go on without them: they have run into a station, or out of the network.
-    pub fn collapsed(&self, ended: &Adjustment) -> Vec<Dropped> {
-        if ended.collapsed.is_empty() {
-            return vec![];
-        }
-        let squares = self.nearest_stations(&ended.unknowns);
-        let middle = median(squares.clone()).unwrap_or(f64::INFINITY);
-        let dropped = |&local: &usize| Dropped {
-            point: self.points[local],
-            reason: if squares[local] > middle { Reason::RanOff } else { Reason::RanIntoStation },
-        };
-        ended.collapsed.iter().map(dropped).collect()
-    }
-
-    /// Points whose first values are those of a station that sees them, so that no image can be computed.
-    pub fn at_stations(&self) -> Vec<Dropped> {
-        let squares = self.nearest_stations(&self.problem.initial);
-        let reason = Reason::AtStation;
-        let at_station = self.points.iter().zip(&squares).filter(|(_, square)| **square == 0.0);
-        at_station.map(|(&point, _)| Dropped { point, reason }).collect()
-    }
-
-    /// The same at the first values, and their median.
+    /// Squares of the distances of all points from the nearest station that sees them, at the first values, and their median.
     pub fn first_distances(&self) -> Option<(Vec<f64>, f64)> {
         let squares = self.nearest_stations(&self.problem.initial);
         median(squares.clone()).map(|middle| (squares, middle))
     }
 
-    /// Squares of the distances of all points from the nearest station that sees them.
-    fn nearest_stations(&self, unknowns: &[f64]) -> Vec<f64> {
+    /// The same at given values.
+    pub fn nearest_stations(&self, unknowns: &[f64]) -> Vec<f64> {
         let model = &self.problem.model;
         let photos = model.photos(&unknowns[model.of_stations()]);
         let of_point = |(at, images): (&[f64; 3], &[usize])| {
@@ -169,92 +94,46 @@ impl Assembled {
 }
 
 impl Network {
-    /// The projection centre of given six unknowns.
-    pub(super) fn centre(&self, pose: &[f64; 6]) -> Vector3 {
-        match self.poses {
-            PoseNumbers::Angles(_) => self.space.cartesian([pose[0], pose[1], pose[2]]),
-            PoseNumbers::Vectors => Orientation::new(self.poses, self.space, pose).centre(),
-        }
-    }
-
-    /// A point near the photos: coordinates are counted from it while the network is adjusted, so that no digits are lost in
-    /// large ones. Medians, so that a single photo with a wrong position does not move it. Geographic coordinates stay as they
-    /// are, differences being formed in geocentric space; so do poses in vectors, whose translations turn with the rotation.
-    fn origin(&self, middle: [f64; 3]) -> [f64; 3] {
-        match (self.space, self.poses) {
-            (ObjectSpace::Rectangular, PoseNumbers::Angles(_)) => middle.map(f64::round),
-            _ => [0.0; 3],
-        }
-    }
-
-    /// The medians of the coordinates of the photos.
-    fn middle(&self) -> [f64; 3] {
-        let middle = |k: usize| median(self.photos.iter().map(|photo| photo.pose[k]).collect());
-        std::array::from_fn(|k| middle(k).unwrap_or_default())
-    }
-
-    fn camera(&self, photo: &Photo) -> &Camera {
-        &self.cameras[photo.camera]
-    }
-
-    /// Standard deviations of the unknowns of photos, shared cameras and common unknowns; those of `unused` and of mounted photos, of
-    /// cameras that have no others, and of common unknowns that nothing which takes part is of, are held.
-    fn station_sd(
+    /// The problem of the network without what is left out, from the initial values on or from those reached.
+    ///
+    /// # Errors
+    /// Those of [`Network::assemble`]; nothing is left, or it takes more memory than it may.
+    pub(super) fn assembled(
         &self,
-        model: &Bundle,
-        surroundings: &Surroundings,
-        unused: impl Fn(usize) -> bool,
-    ) -> Vec<f64> {
-        let mut all = Vec::new();
-        let mut used = vec![false; self.cameras.len()];
-        surroundings.cameras().into_iter().for_each(|camera| used[camera] = true);
-        let elsewhere = surroundings.commons();
-        for (index, photo) in self.photos.iter().enumerate() {
-            let own = if model.has_own_camera(index) { &self.camera(photo).sd[..] } else { &[] };
-            used[photo.camera] |= !unused(index);
-            let held = unused(index) || model.mount(index).is_some();
-            all.extend(photo.sd.iter().chain(own).map(|&sd| if held { 0.0 } else { sd }));
+        options: &Options,
+        left_out: &LeftOut,
+        reached: Option<&Reached>,
+        pool: &ThreadPool,
+    ) -> Result<Assembled, NetworkError> {
+        let selected = pool.install(|| self.select(left_out, Surroundings::default()));
+        if selected.points.is_empty() {
+            return Err(NetworkError::Empty);
         }
-        for &camera in &model.shared {
-            all.extend(self.cameras[camera].sd.iter().map(|&sd| if used[camera] { sd } else { 0.0 }));
-        }
-        for (common, own) in self.commons.iter().enumerate().filter(|&(i, _)| model.common_block[i].is_some())
-        {
-            let is_used = model.uses_of_commons[common] > 0 || elsewhere.contains(&common);
-            all.extend(own.sd.iter().map(|&sd| if is_used { sd } else { 0.0 }));
-        }
-        all
+        let assembled = pool.install(|| self.assemble(options, selected, reached))?;
+        assembled.check_memory(options)?;
+        Ok(assembled)
     }
 
-    /// The values of the unknowns of photos, with the given poses, of shared cameras and common unknowns.
-    fn station_values(&self, model: &Bundle, pose: impl Fn(&Photo) -> [f64; 6]) -> Vec<f64> {
-        let mut all = Vec::new();
-        for (index, photo) in self.photos.iter().enumerate() {
-            all.extend(pose(photo));
-            if model.has_own_camera(index) {
-                all.extend(self.camera(photo).camera.parameters());
-            }
+    /// The problem whose solution a state is, at its initial values.
+    pub(super) fn assembled_again(
+        &self,
+        options: &Options,
+        state: &State,
+        pool: &ThreadPool,
+    ) -> Result<Assembled, NetworkError> {
+        self.check()?;
+        let options = Options { ordering: state.ordering, ..*options };
+        let assembled = self.assembled(
+            &options,
+            &self.left_out(vec![false; self.photos.len()], Some(state))?,
+            None,
+            pool,
+        )?;
+        let count = assembled.problem.layout().unknowns();
+        if state.unknowns.len() != count || state.held.iter().any(|&unknown| unknown >= count) {
+            return Err(NetworkError::State);
         }
-        all.extend(model.shared.iter().flat_map(|&camera| self.cameras[camera].camera.parameters()));
-        // They count from what is given.
-        all.resize(model.of_stations().len(), 0.0);
-        all
-    }
-
-    /// The observed pose of a photo, as near to the initial one as whole turns bring it.
-    fn observed_pose(&self, photo: &Photo) -> [f64; 6] {
-        let near = nearest_turns(photo.observed, photo.pose);
-        let turning = |k: usize| match self.poses {
-            PoseNumbers::Angles(_) => k >= 3 || k == 0 && self.space != ObjectSpace::Rectangular,
-            PoseNumbers::Vectors => false,
-        };
-        std::array::from_fn(|k| if turning(k) { near[k] } else { photo.observed[k] })
-    }
-
-    /// Whether a photo's attitude steps by a rotation vector: a fixed angle keeps its bits.
-    fn turns(&self, photo: usize) -> bool {
-        let fixed = self.photos[photo].sd[3..].contains(&0.0);
-        !fixed && matches!(self.poses, PoseNumbers::Angles(_))
+        Ok(assembled)
     }
 
     /// The problem of the points that take part, from the initial values on or from those reached.
@@ -264,26 +143,27 @@ impl Network {
     pub(super) fn assemble(
         &self,
         options: &Options,
-        mut screened: Screened,
+        mut selected: Selected,
         reached: Option<&Reached>,
     ) -> Result<Assembled, NetworkError> {
-        let order = screened.images.order.par_iter().with_min_len(TOGETHER);
+        let order = selected.images.order.par_iter().with_min_len(TOGETHER);
         let images: Vec<Image> = order.map(|&image| self.images[image]).collect();
         let mut images_on = vec![0; self.photos.len()];
         images.iter().for_each(|image| images_on[image.photo] += 1);
         // A frame is used when a photo on it is.
         let mut used: Vec<bool> = images_on.iter().map(|&images| images > 0).collect();
         self.mounts.iter().for_each(|mount| used[mount.frame] |= images_on[mount.photo] > 0);
-        let loose = screened.loose.clone();
+        let loose = selected.loose.clone();
         let unused =
             |photo: usize| !used[photo] && (options.hold_unused || loose.binary_search(&photo).is_ok());
         if reached.is_none() {
-            self.check_rounding(&screened, |photo| !unused(photo))?;
+            self.check_rounding(&selected, |photo| !unused(photo))?;
         }
-        let middle = screened.surroundings.middle.unwrap_or_else(|| self.middle());
+        let middle = selected.surroundings.middle.unwrap_or_else(|| self.middle());
         let origin = self.origin(middle);
-        let mut model = self.bundle(&mut screened, images, images_on.clone(), middle)?;
+        let mut model = self.bundle(&mut selected, images, images_on.clone(), middle)?;
         model.minimum = options.minimum;
+        model.screens = options.screens;
         // The programs of their time stepped in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
             let turns = |photo: usize| self.turns(photo) && !unused(photo) && model.mount(photo).is_none();
@@ -302,13 +182,13 @@ impl Network {
         let placed = model.placed(&values);
         let stations = placed.photos;
         let start = match reached {
-            Some(reached) => screened.points.iter().map(|&point| reached.points[point]).collect(),
-            None => self.start(options.start, &screened, &model, &stations)?,
+            Some(reached) => selected.points.iter().map(|&point| reached.points[point]).collect(),
+            None => self.start(options.start, &selected, &model, &stations)?,
         };
         let of_points =
             |each: fn(&Point) -> [f64; 3]| -> Vec<[f64; 3]> { model.points.iter().map(each).collect() };
         let observed = self.station_values(&model, |photo| local(self.observed_pose(photo)));
-        let station_sd = self.station_sd(&model, &screened.surroundings, unused);
+        let station_sd = self.station_sd(&model, &selected.surroundings, unused);
         // Local points, photos and shared cameras, points that observations touch.
         let unknowns = |points: &[[f64; 3]], stations: &[f64]| {
             let (local, tied) = points.split_at(model.locals);
@@ -334,7 +214,7 @@ impl Network {
         let mut observation_sd = of_images.collect::<Vec<[f64; 2]>>().into_flattened();
         model.observations.iter().for_each(|tied| observation_sd.extend(vec![1.0; tied.root.nrows()]));
         let held: Vec<bool> = sd.iter().map(|&sd| sd == 0.0).collect();
-        let (outer, below) = screened.surroundings.blocks(&model, &screened.points)?;
+        let (outer, below) = selected.surroundings.blocks(&model, &selected.points)?;
         let layout = layout(&model, places)?.with_held(&held).as_part(outer, below)?;
         let problem = Problem {
             observation_sd,
@@ -345,7 +225,7 @@ impl Network {
             model,
         };
         self.check_observations(&problem)?;
-        Ok(Assembled { problem, points: screened.points, dropped: screened.dropped, loose: screened.loose })
+        Ok(Assembled { problem, points: selected.points, dropped: selected.dropped, loose: selected.loose })
     }
 
     /// Refuses observations that cannot be computed from the initial values.
@@ -371,7 +251,7 @@ impl Network {
 
     fn bundle(
         &self,
-        screened: &mut Screened,
+        selected: &mut Selected,
         images: Vec<Image>,
         images_on: Vec<usize>,
         middle: [f64; 3],
@@ -381,7 +261,7 @@ impl Network {
             let Point { coordinates, sd } = self.points[point];
             Point { coordinates: std::array::from_fn(|k| coordinates[k] - origin[k]), sd }
         };
-        let (shared, mut first) = (self.shared_cameras(&screened.surroundings), vec![0]);
+        let (shared, mut first) = (self.shared_cameras(&selected.surroundings), vec![0]);
         for photo in &self.photos {
             let camera = self.camera(photo);
             let own = if camera.is_held() || shared.binary_search(&photo.camera).is_ok() {
@@ -412,9 +292,9 @@ impl Network {
             uses_of_commons[mount.sensor] += 1;
         }
         let commons_of = |&observation: &usize| self.observations[observation].touches().commons;
-        let touched = screened.observations.iter().flat_map(commons_of);
+        let touched = selected.observations.iter().flat_map(commons_of);
         touched.for_each(|(common, _)| uses_of_commons[common] += 1);
-        let (placed, anchor) = self.placed(screened, &mounts);
+        let (placed, anchor) = self.placed(selected, &mounts);
         let mut bundle = Bundle {
             space: self.space,
             poses: self.poses,
@@ -433,17 +313,18 @@ impl Network {
             uses_of_commons,
             mounts,
             origin,
-            locals: screened.locals,
-            points: screened.points.par_iter().with_min_len(TOGETHER).map(local_point).collect(),
+            locals: selected.locals,
+            points: selected.points.par_iter().with_min_len(TOGETHER).map(local_point).collect(),
             images,
-            start: std::mem::take(&mut screened.images.start),
-            order: std::mem::take(&mut screened.images.order),
+            start: std::mem::take(&mut selected.images.start),
+            order: std::mem::take(&mut selected.images.order),
             turning: vec![false; self.photos.len()],
             images_on,
             observations: vec![],
             placed,
             anchor,
             minimum: None,
+            screens: Screens::default(),
             parts: OnceLock::new(),
         };
         let prior = |(index, camera): (usize, &Camera)| {
@@ -451,8 +332,18 @@ impl Network {
             CameraPrior::of(camera, self.first_parameter(&bundle, index)?)
         };
         bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();
-        bundle.observations = self.tied_observations(screened, &bundle)?;
+        bundle.observations = self.tied_observations(selected, &bundle)?;
         Ok(bundle)
+    }
+
+    /// The mount of each photo; none at all where there are no rigs.
+    fn mounts_by_photo(&self) -> Vec<Option<Mount>> {
+        if self.mounts.is_empty() {
+            return vec![];
+        }
+        let mut all = vec![None; self.photos.len()];
+        self.mounts.iter().for_each(|mount| all[mount.photo] = Some(*mount));
+        all
     }
 
     /// The axes amid the photos, as rows, that shifts and drifts are told in: X, Y, Z or, in geographic space, east, north and up.
@@ -464,7 +355,7 @@ impl Network {
     }
 
     /// Whether the datum is the user's; and the photo to hold where it is not, but the position of a single one is fixed.
-    fn placed(&self, screened: &Screened, mounts: &[Option<Mount>]) -> (bool, Option<usize>) {
+    fn placed(&self, selected: &Selected, mounts: &[Option<Mount>]) -> (bool, Option<usize>) {
         // Angles alone leave position and scale open.
         let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };
         let own = |photo: &Photo| photo.sd[..positions].iter().any(|sd| sd.is_finite());
@@ -472,7 +363,7 @@ impl Network {
         let mut photos = (0..self.photos.len()).filter(|&index| !mounted(index) && own(&self.photos[index]));
         let fixed = |index: usize| self.photos[index].sd[..positions].iter().all(|&sd| sd == 0.0);
         match (photos.next(), photos.next()) {
-            _ if screened.points.iter().any(|&point| self.points[point].held() != [false; 3]) => (true, None),
+            _ if selected.points.iter().any(|&point| self.points[point].held() != [false; 3]) => (true, None),
             (None, _) => (false, None),
             (first, None) if first.is_some_and(fixed) => (false, first),
             _ => (true, None),
@@ -490,10 +381,10 @@ impl Network {
     /// The observations that take part.
     fn tied_observations(
         &self,
-        screened: &Screened,
+        selected: &Selected,
         model: &Bundle,
     ) -> Result<Vec<TiedObservation>, NetworkError> {
-        let Screened { points, locals, observations, .. } = screened;
+        let Selected { points, locals, observations, .. } = selected;
         let place: HashMap<usize, usize> =
             points[*locals..].iter().enumerate().map(|(i, &point)| (point, locals + i)).collect();
         let tied = |&index: &usize| {
@@ -522,7 +413,7 @@ impl Network {
     fn start(
         &self,
         start: Start,
-        screened: &Screened,
+        selected: &Selected,
         model: &Bundle,
         stations: &[Station],
     ) -> Result<Vec<[f64; 3]>, NetworkError> {
@@ -530,37 +421,17 @@ impl Network {
         if start == Start::Given && given().flatten().all(|value| !value.is_nan()) {
             let given: Vec<[f64; 3]> = given().collect();
             let distance = model.middle_distance(stations, Some(&given));
-            self.check_resolution(screened, model, distance, start)?;
+            self.check_resolution(selected, model, distance, start)?;
             return Ok(given);
         }
         let met = model.intersect(stations);
         let distance = model.middle_distance(stations, met.as_deref().ok());
-        self.check_resolution(screened, model, distance, start)?;
-        let mut met = met.map_err(|point| NetworkError::NoIntersection(screened.points[point]))?;
+        self.check_resolution(selected, model, distance, start)?;
+        let mut met = met.map_err(|point| NetworkError::NoIntersection(selected.points[point]))?;
         if start == Start::Given {
             let known = met.iter_mut().zip(given()).filter(|(_, given)| given.iter().all(|x| !x.is_nan()));
             known.for_each(|(met, given)| *met = given);
         }
         Ok(met)
     }
-}
-
-/// The blocks of a model, at the given places, and what ties them.
-fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, NetworkError> {
-    let (groups, tied) = (model.start[model.locals], model.points.len() - model.locals);
-    let widths = model.first.windows(2).map(|pair| pair[1] - pair[0]);
-    let widths: Vec<usize> = widths.chain(vec![3; tied]).collect();
-    let images = &model.images[..groups];
-    let photo_of = images.iter().map(|image| model.carrier(image.photo) as u32).collect();
-    let mut layout = Layout::new(2, 3, &widths, model.start[..=model.locals].to_vec(), photo_of)?;
-    if !(model.shared.is_empty() && model.mounts.is_empty()) {
-        let (mut further_ptr, mut further) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
-        further_ptr.push(0);
-        for image in images {
-            further.extend(model.further(image).map(|block| block as u32));
-            further_ptr.push(further.len());
-        }
-        layout = layout.with_further(further_ptr, further)?;
-    }
-    Ok(layout.with_places(places)?.with_ties(model.ties())?.with_pairs(model.pairs())?)
 }

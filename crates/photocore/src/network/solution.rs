@@ -2,56 +2,15 @@
 
 use std::ops::Range;
 
-use nalgebra::DMatrix;
-use rayon::prelude::*;
-
-use super::model::Owner;
+use super::adjusted::{adjusted_photos, adjusted_points, in_order};
+use super::model::{Bundle, Owner};
 use super::problem::Assembled;
-use super::screening::TOGETHER;
-use super::stations::Placed;
 use super::{
-    AdjustedCamera, AdjustedCommon, AdjustedObservation, Dropped, KindSums, Network, NetworkError, Options,
-    Point, Settled, State, UnitVariance, WeakPoint,
+    AdjustedCamera, AdjustedCommon, AdjustedObservation, AdjustedPhoto, AdjustedPoint, Converged, Dropped,
+    KindSums, Network, NetworkError, Options, State, UnitVariance, WeakPoint,
 };
-use crate::adjustment::{Adjustment, Observed, Problem, Tried, leading_matrix};
-use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
-use crate::network::model::Bundle;
-use crate::normals::Cofactors;
+use crate::adjustment::{Adjustment, Observed, Problem, Tried};
 
-/// An adjusted photo.
-#[derive(Debug, Clone)]
-pub struct AdjustedPhoto {
-    /// The six unknowns of its pose; of a photo on a frame those that it would have, from the poses of frame and sensor.
-    pub pose: [f64; 6],
-    /// The parameters of its camera.
-    pub camera: Vec<f64>,
-    /// Cofactors (a priori unit weight) of pose and, unless it is held or shared, camera, row by row; NaN where there are none.
-    pub cofactors: Vec<f64>,
-    /// Redundancy numbers of these unknowns as observations of themselves; zero unless weighted, NaN where there are no cofactors.
-    pub redundancy: Vec<f64>,
-    /// Number of images that took part.
-    pub images: usize,
-}
-
-/// An adjusted point.
-#[derive(Debug, Clone, Copy)]
-pub struct AdjustedPoint {
-    /// Coordinates in the object space.
-    pub coordinates: [f64; 3],
-    /// Cofactors (a priori unit weight); NaN where there are none.
-    pub cofactors: [[f64; 3]; 3],
-    /// Redundancy numbers of its components as observations of themselves; zero unless weighted, NaN where there are no cofactors.
-    pub redundancy: [f64; 3],
-    /// Its correction in the last iteration.
-    pub last_correction: [f64; 3],
-    /// Number of images.
-    pub rays: usize,
-    /// How many of them have it behind the camera.
-    pub behind: usize,
-}
-
-/// Photos that a thread takes at least.
-const PHOTOS_TOGETHER: usize = 128;
 /// A redundancy of less is rounding.
 const LEAST_REDUNDANCY: f64 = 1e-9;
 
@@ -157,7 +116,7 @@ pub struct Solution {
     /// Whether control and weights of poses are exactly what a datum takes: they check nothing, and another datum may be chosen.
     pub minimal_control: bool,
     /// Where the adjustment has converged, the problem with its cofactors: tests of it form nothing again.
-    pub settled: Option<Box<Settled>>,
+    pub converged: Option<Box<Converged>>,
     /// Status, iterations, counts, operations and times.
     pub adjustment: Adjustment,
 }
@@ -202,7 +161,7 @@ impl Solution {
         let images = in_order(network.images.len(), &problem.model.order, observed);
         let photos_end = problem.model.first[network.photos.len()];
         let of_photo = |&unknown: &usize| of_photo(problem, unknown);
-        let photos = photos(network, assembled, &adjustment, &unknowns);
+        let photos = adjusted_photos(network, assembled, &adjustment, &unknowns);
         let mut solution = Self {
             cameras: network.adjusted_cameras(assembled, &adjustment, &unknowns, &photos),
             photos,
@@ -232,7 +191,7 @@ impl Solution {
             },
             lost_digits: 0.0,
             minimal_control: false,
-            settled: None,
+            converged: None,
             collapsed,
             sums_of_squares,
             redundancies,
@@ -301,157 +260,6 @@ pub(super) fn observations(
         all[tied.index] = Some(AdjustedObservation::new(tied, whitened, shares, weight));
     }
     all
-}
-
-fn photos(
-    network: &Network,
-    Assembled { problem, .. }: &Assembled,
-    adjustment: &Adjustment,
-    unknowns: &[f64],
-) -> Vec<AdjustedPhoto> {
-    let model = &problem.model;
-    let origin = model.origin;
-    let positions = if let PoseNumbers::Angles(_) = network.poses { 3 } else { 0 };
-    let placed = model.placed(&unknowns[model.of_stations()]);
-    let photo = |(index, photo): (usize, &super::Photo)| {
-        let range = model.of_block(index);
-        let (first, end) = (range.start, range.end);
-        let values = &unknowns[range];
-        let count = (end - first).pow(2);
-        let angles = reported_angles(model, index, values);
-        let absolute = |k: usize| {
-            let counted = if k < positions { values[k] + origin[k] } else { values[k] };
-            let counted = angles.filter(|_| k >= 3).map_or(counted, |angles| angles[k - 3]);
-            // Fixed ones as they were given, to the last bit.
-            if k < positions && photo.sd[k] == 0.0 { photo.pose[k] } else { counted }
-        };
-        // A photo without images that is held has no cofactors: nothing was asked of it.
-        let asked = model.images_on[index] > 0 || problem.sd[first..end].iter().any(|&sd| sd != 0.0);
-        let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
-        let redundancy = adjustment.prior_redundancy.as_ref();
-        let camera = match model.camera_block[index] {
-            Some(block) => unknowns[model.of_block(block)].to_vec(),
-            None if values.len() > 6 => values[6..].to_vec(),
-            None => model.cameras[index].parameters(),
-        };
-        if model.mount(index).is_some() {
-            // In a part of a network its images may be at home below.
-            let asked = model.images_on[index] > 0 || !problem.layout().contributions().is_empty();
-            let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
-            let (pose, cofactors) = mounted_pose(network, problem, &placed, index, cofactors);
-            let redundancy = vec![if cofactors[0].is_nan() { f64::NAN } else { 0.0 }; 6];
-            return AdjustedPhoto { pose, camera, cofactors, redundancy, images: model.images_on[index] };
-        }
-        AdjustedPhoto {
-            pose: std::array::from_fn(absolute),
-            camera,
-            cofactors: cofactors.map_or_else(
-                || vec![f64::NAN; count],
-                |all| in_angles(model, index, values, model.cofactors_of_block(all, index)),
-            ),
-            redundancy: redundancy
-                .map_or_else(|| vec![f64::NAN; end - first], |all| all[first..end].to_vec()),
-            images: model.images_on[index],
-        }
-    };
-    network.photos.par_iter().enumerate().with_min_len(PHOTOS_TOGETHER).map(photo).collect()
-}
-
-/// The six numbers of the pose of a photo that is mounted, and their cofactors; NaN where there are none.
-fn mounted_pose(
-    network: &Network,
-    problem: &Problem<Bundle>,
-    Placed { photos, mounted, .. }: &Placed,
-    photo: usize,
-    cofactors: Option<&Cofactors>,
-) -> ([f64; 6], Vec<f64>) {
-    let (model, orientation) = (&problem.model, &photos[photo].orientation);
-    let (mut pose, taken) = model.reported(orientation);
-    let found = cofactors.zip(mounted[photo].as_ref()).zip(taken).map(|((all, own), taken)| {
-        let cofactors = model.mounted_cofactors(problem.layout(), photo, own, all);
-        (taken * cofactors * taken.transpose()).as_slice().to_vec()
-    });
-    if let PoseNumbers::Angles(_) = network.poses {
-        (0..3).for_each(|k| pose[k] += model.origin[k]);
-    }
-    (pose, found.unwrap_or_else(|| vec![f64::NAN; 36]))
-}
-
-/// The angles of a photo that steps by a rotation vector; at a singular attitude kappa is zero and omega takes the sum.
-fn reported_angles(model: &Bundle, photo: usize, values: &[f64]) -> Option<[f64; 3]> {
-    let numbers = AttitudeNumbers::OmegaPhiKappa(model.turning_sense(photo)?);
-    let angles = [values[3], values[4], values[5]];
-    Some(if numbers.is_singular(angles) { numbers.numbers(&numbers.attitude(angles)) } else { angles })
-}
-
-/// Cofactors of a photo's unknowns: where its attitude has stepped by a rotation vector rho = K d(angles), taken to the angles by
-/// diag(I, K^-1, I). NaN for angles that are not determined, phi being 90 degrees.
-fn in_angles(model: &Bundle, photo: usize, values: &[f64], cofactors: &[f64]) -> Vec<f64> {
-    let Some(sense) = model.turning_sense(photo) else { return cofactors.to_vec() };
-    let (numbers, angles) = (AttitudeNumbers::OmegaPhiKappa(sense), [values[3], values[4], values[5]]);
-    let inverse = numbers.rates(angles).try_inverse().filter(|_| !numbers.is_singular(angles));
-    let inverse = inverse.unwrap_or_else(|| Matrix3::repeat(f64::NAN));
-    let width = values.len();
-    let mut found = DMatrix::from_row_slice(width, width, cofactors);
-    let rows = inverse * found.fixed_rows::<3>(3);
-    found.fixed_rows_mut::<3>(3).copy_from(&rows);
-    let columns = found.fixed_columns::<3>(3) * inverse.transpose();
-    found.fixed_columns_mut::<3>(3).copy_from(&columns);
-    ((&found + found.transpose()) / 2.0).as_slice().to_vec()
-}
-
-fn adjusted_points(
-    network: &Network,
-    Assembled { problem, points, .. }: &Assembled,
-    adjustment: &Adjustment,
-    unknowns: &[f64],
-) -> Vec<Option<AdjustedPoint>> {
-    let (model, origin) = (&problem.model, problem.model.origin);
-    let cofactors = adjustment.cofactors.as_ref();
-    let corrections = last_corrections(adjustment);
-    let (local, tied) = model.all_coordinates(unknowns);
-    in_order(network.points.len(), points, |point, i| {
-        let values = i.checked_sub(model.locals).map_or_else(|| &local[i], |tie| &tied[tie]);
-        let Point { coordinates, sd } = network.points[point];
-        let absolute = |k: usize| if sd[k] == 0.0 { coordinates[k] } else { values[k] + origin[k] };
-        let first = model.of_point(i).start;
-        let own = cofactors.map(|all| match i.checked_sub(model.locals) {
-            None => &all.local[9 * i..],
-            // The last kept blocks.
-            Some(tied) => &all.kept[all.kept.len() - 9 * (points.len() - model.locals - tied)..],
-        });
-        AdjustedPoint {
-            coordinates: std::array::from_fn(absolute),
-            cofactors: leading_matrix(own),
-            redundancy: adjustment.prior_redundancy(first),
-            last_correction: std::array::from_fn(|k| corrections(first + k)),
-            rays: model.images_of(i).len(),
-            behind: 0,
-        }
-    })
-}
-
-/// What `each` makes of the things of a network that take part, as the network numbers them; None for all others. `order` are those that
-/// do, as the problem has them; `each` is given both numbers.
-fn in_order<T: Send>(
-    count: usize,
-    order: &[usize],
-    each: impl Fn(usize, usize) -> T + Sync,
-) -> Vec<Option<T>> {
-    let mut place = vec![u32::MAX; count];
-    order.iter().zip(0..).for_each(|(&thing, own)| place[thing] = own);
-    let of = |(thing, &own): (usize, &u32)| (own != u32::MAX).then(|| each(thing, own as usize));
-    place.par_iter().enumerate().with_min_len(TOGETHER).map(of).collect()
-}
-
-/// The correction of each unknown in the last iteration; zero where there was none.
-fn last_corrections(adjustment: &Adjustment) -> impl Fn(usize) -> f64 {
-    let local = &adjustment.last_local_corrections;
-    let kept = adjustment.history.last_chunk::<2>();
-    move |unknown| match unknown.checked_sub(local.len()) {
-        None => local[unknown],
-        Some(kept_unknown) => kept.map_or(0.0, |[before, after]| after[kept_unknown] - before[kept_unknown]),
-    }
 }
 
 /// Sums of squares by group (GIANT guide, Appendix E).

@@ -2,9 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use super::model::Bundle;
-use super::{Network, NetworkError};
-
 /// What a block of unknowns that several nodes touch belongs to: indices into the network of the node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BlockOf {
@@ -30,7 +27,7 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    fn all(&self) -> impl Iterator<Item = BlockOf> {
+    pub(super) fn all(&self) -> impl Iterator<Item = BlockOf> {
         self.outer.iter().chain(self.below.iter().flatten()).copied()
     }
 
@@ -54,74 +51,4 @@ impl Surroundings {
             .filter_map(|block| if let BlockOf::Common(own) = block { Some(own) } else { None })
             .collect()
     }
-
-    /// The kept blocks of a model of these points that outer ones are, and those that each node below leaves something for.
-    ///
-    /// # Errors
-    /// One that has no unknowns of its own here.
-    pub(super) fn blocks(
-        &self,
-        model: &Bundle,
-        points: &[usize],
-    ) -> Result<(Vec<u32>, Vec<Vec<u32>>), NetworkError> {
-        let (photos, tied) = (model.cameras.len(), &points[model.locals..]);
-        let block = |&block: &BlockOf| {
-            let found = match block {
-                BlockOf::Photo(photo) => Some(photo),
-                BlockOf::Camera(camera) => {
-                    model.shared.binary_search(&camera).ok().map(|shared| photos + shared)
-                }
-                BlockOf::Common(common) => model.common_block[common],
-                BlockOf::Point(point) => {
-                    tied.iter().position(|&own| own == point).map(|place| model.stations() + place)
-                }
-            };
-            found.map(|block| block as u32).ok_or(NetworkError::NoBlock(block))
-        };
-        let blocks = |all: &Vec<BlockOf>| all.iter().map(block).collect::<Result<Vec<u32>, NetworkError>>();
-        Ok((blocks(&self.outer)?, self.below.iter().map(blocks).collect::<Result<_, _>>()?))
-    }
-}
-
-impl Network {
-    /// Refuses names of blocks that are not there.
-    pub(super) fn check_blocks(&self, surroundings: &Surroundings) -> Result<(), NetworkError> {
-        let there = |block: BlockOf| match block {
-            BlockOf::Photo(photo) => photo < self.photos.len(),
-            BlockOf::Camera(camera) => camera < self.cameras.len(),
-            BlockOf::Common(common) => common < self.commons.len(),
-            BlockOf::Point(point) => point < self.points.len(),
-        };
-        let missing = surroundings.all().find(|&block| !there(block));
-        missing.map_or(Ok(()), |block| Err(NetworkError::NoBlock(block)))
-    }
-
-    /// Takes the weights of outer blocks away: they count where these are eliminated. What is fixed stays so.
-    pub(super) fn release(&mut self, outer: &[BlockOf]) {
-        let mut photos_of = vec![0; self.cameras.len()];
-        self.photos.iter().for_each(|photo| photos_of[photo.camera] += 1);
-        let named = |camera: usize| outer.contains(&BlockOf::Camera(camera));
-        let mut cameras: Vec<usize> = (0..self.cameras.len()).filter(|&camera| named(camera)).collect();
-        for block in outer {
-            match *block {
-                BlockOf::Photo(photo) => {
-                    let photo = &mut self.photos[photo];
-                    free(&mut photo.sd);
-                    cameras.extend(Some(photo.camera).filter(|&camera| photos_of[camera] == 1));
-                }
-                BlockOf::Camera(_) => {}
-                BlockOf::Common(common) => free(&mut self.commons[common].sd),
-                BlockOf::Point(point) => free(&mut self.points[point].sd),
-            }
-        }
-        for camera in cameras {
-            free(&mut self.cameras[camera].sd);
-            self.cameras[camera].covariance = None;
-        }
-    }
-}
-
-/// Makes weighted unknowns free.
-fn free(sd: &mut [f64]) {
-    sd.iter_mut().filter(|sd| **sd > 0.0).for_each(|sd| *sd = f64::INFINITY);
 }

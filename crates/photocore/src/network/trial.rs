@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::ThreadPool;
 
-use super::covariance::State;
 use super::problem::Assembled;
+use super::state::State;
 use super::suspects::{Home, Row, Subject, Suspect};
 use super::{Network, NetworkError, Options};
 use crate::adjustment::{self, AdjustError, Loss, Method, Status, Stop, Tried, Watch, Weighted};
@@ -33,6 +33,18 @@ pub struct Trial {
     stands: bool,
 }
 
+/// A network where its adjustment has converged, kept with its cofactors: tests of it, and trials without some observations, begin there
+/// without forming, factoring and inverting once more.
+///
+/// Its cofactors are those of the adjustment: before the last step, which has moved no unknown by more than a thousandth of its standard
+/// deviation.
+#[derive(Debug)]
+pub struct Converged {
+    assembled: Assembled,
+    options: adjustment::Options,
+    found: Tried,
+}
+
 /// What is out.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Out<'a> {
@@ -46,7 +58,7 @@ pub struct Out<'a> {
 
 /// How a trial has ended.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Standing {
+pub struct Outcome {
     /// How the iterations have.
     pub status: Status,
     /// How many there were.
@@ -57,6 +69,21 @@ pub struct Standing {
     pub degrees_of_freedom: i64,
     /// Points that have run into a station.
     pub collapsed: Vec<usize>,
+}
+
+impl Converged {
+    pub(super) fn new(assembled: Assembled, options: adjustment::Options, found: Tried) -> Self {
+        assembled.problem.system.release();
+        Self { assembled, options, found }
+    }
+
+    /// Prepares for trials of the network, which is the one that was adjusted; [`Trial::stand`] is done already.
+    pub fn trial(self, network: &Network) -> Trial {
+        let Self { mut assembled, options, found } = self;
+        assembled.problem.initial.clone_from(&found.values);
+        let held = found.held.clone();
+        Trial::new(network, assembled, &options, held, Some(found))
+    }
 }
 
 impl Network {
@@ -77,7 +104,10 @@ impl Network {
                 assembled.problem.initial.clone_from(&state.unknowns);
                 assembled
             }
-            None => self.assembled_first(options, pool)?,
+            None => {
+                self.check()?;
+                self.assembled(options, &self.left_out(self.untouched_photos(), None)?, None, pool)?
+            }
         };
         let held = state.map_or(vec![], |state| state.held.clone());
         Ok(Trial::new(self, assembled, &options.adjustment, held, None))
@@ -154,7 +184,7 @@ impl Trial {
     ///
     /// # Errors
     /// Values that leave unknowns undetermined; an interruption, no memory.
-    pub fn stand(&mut self, pool: &ThreadPool, watch: Watch<'_>) -> Result<Standing, NetworkError> {
+    pub fn stand(&mut self, pool: &ThreadPool, watch: Watch<'_>) -> Result<Outcome, NetworkError> {
         if let Some(found) = self.found.take_if(|_| self.stands) {
             return self.keep(Ok(found));
         }
@@ -176,7 +206,7 @@ impl Trial {
         tolerance: Option<f64>,
         pool: &ThreadPool,
         watch: Watch<'_>,
-    ) -> Result<Standing, NetworkError> {
+    ) -> Result<Outcome, NetworkError> {
         self.stands = false;
         self.take_out(out);
         let options = adjustment::Options { method: self.method(tolerance), ..self.options };
@@ -253,11 +283,11 @@ impl Trial {
         }
     }
 
-    fn keep(&mut self, found: Result<Tried, AdjustError>) -> Result<Standing, NetworkError> {
+    fn keep(&mut self, found: Result<Tried, AdjustError>) -> Result<Outcome, NetworkError> {
         let found = found.map_err(|error| NetworkError::new(error, &self.assembled))?;
         self.assembled.problem.initial.clone_from(&found.values);
         let points = &self.assembled.points;
-        let standing = Standing {
+        let outcome = Outcome {
             status: found.status,
             iterations: found.iterations,
             sum_of_squares: found.sum_of_squares,
@@ -265,7 +295,7 @@ impl Trial {
             collapsed: found.collapsed.iter().map(|&local| points[local]).collect(),
         };
         self.found = Some(found);
-        Ok(standing)
+        Ok(outcome)
     }
 
     /// Weights of zero for what is out; points and photos that are out stay where they are.

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::median::median;
 use super::model::Bundle;
-use super::precision::median;
-use super::screening::TOGETHER;
+use super::selection::TOGETHER;
 use super::{AdjustedPoint, Network};
 use crate::geometry::{self, Matrix3};
 

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
 use photocore::geometry::PoseNumbers;
-use photocore::network::{Camera, Minimum, Network, Options, Photo, Start, UnitVariance};
+use photocore::network::{Camera, Minimum, Network, Options, Photo, Screens, Start, UnitVariance};
 use pyo3::prelude::*;
 
 use super::block_network::BlockNetwork;
@@ -126,6 +126,7 @@ fn block_network(
         hold_unused: false,
         memory,
         minimum: minimum.map(|(photo, coordinate)| Minimum { photo, coordinate }),
+        screens: Screens::default(),
     };
     Ok(BlockNetwork { network, options })
 }

@@ -4,7 +4,9 @@ use numpy::{PyArray2, PyReadonlyArrayDyn};
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop};
 use photocore::geometry::camera::ModelFacts;
 use photocore::geometry::{self, ObjectSpace, Orientation, Point as GroundPoint, PoseNumbers};
-use photocore::network::{Camera, Network, NetworkError as Failure, Options, Photo, Start, UnitVariance};
+use photocore::network::{
+    Camera, Network, NetworkError as Failure, Options, Photo, Screens, Start, UnitVariance,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -185,6 +187,7 @@ fn collection_network(
         hold_unused: true,
         memory,
         minimum: None,
+        screens: Screens::default(),
     };
     Ok(CollectionNetwork { network, options, unknowns })
 }

@@ -377,7 +377,7 @@ solution_class! {
 
         #[getter]
         fn beside_stations(&self) -> Vec<usize> {
-            left_out(&self.solution, Reason::BesideStation)
+            left_out(&self.solution, Reason::NearStation)
         }
 
         #[getter]

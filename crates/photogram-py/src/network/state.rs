@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use photocore::network::{InnerConstraints, NetworkDatum, Settled, Solution, State};
+use photocore::network::{Converged, InnerConstraints, NetworkDatum, Solution, State};
 use pyo3::prelude::*;
 
 use crate::options::{named_ordering, unknown};
@@ -38,11 +38,11 @@ fn row_of(datum: &NetworkDatum) -> DatumRow {
 type StateRow = (Vec<f64>, Vec<usize>, Vec<usize>, Vec<usize>, String, Option<DatumRow>, bool);
 
 /// A network where its adjustment has converged, until the first that asks takes it: its memory is that of the adjustment.
-pub type Kept = Arc<Mutex<Option<Box<Settled>>>>;
+pub type Kept = Arc<Mutex<Option<Box<Converged>>>>;
 
 /// Takes what a solution has kept.
 pub fn kept(solution: &mut Solution) -> Kept {
-    Arc::new(Mutex::new(solution.settled.take()))
+    Arc::new(Mutex::new(solution.converged.take()))
 }
 
 /// Where an adjustment has ended.
@@ -54,7 +54,7 @@ pub struct BlockState {
 
 impl BlockState {
     /// What the adjustment has kept, the first time; none of copies and of what was read.
-    pub fn take_kept(&self) -> Option<Box<Settled>> {
+    pub fn take_kept(&self) -> Option<Box<Converged>> {
         self.kept.lock().ok().and_then(|mut kept| kept.take())
     }
 }

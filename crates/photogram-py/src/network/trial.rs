@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use photocore::adjustment::Loss;
-use photocore::network::{Moved, Network, Options, Out, Standing, Subject, Trial, UnknownOf};
+use photocore::network::{Moved, Network, Options, Out, Outcome, Subject, Trial, UnknownOf};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -28,10 +28,10 @@ pub struct NetworkTrial {
 }
 
 /// Status, iterations, weighted sum of squares, degrees of freedom, points that ran into a station.
-type StandingRow = (&'static str, usize, f64, i64, Vec<usize>);
+type OutcomeRow = (&'static str, usize, f64, i64, Vec<usize>);
 
-fn standing_row(standing: Standing) -> StandingRow {
-    let Standing { status, iterations, sum_of_squares, degrees_of_freedom, collapsed } = standing;
+fn outcome_row(outcome: Outcome) -> OutcomeRow {
+    let Outcome { status, iterations, sum_of_squares, degrees_of_freedom, collapsed } = outcome;
     (status_name(status), iterations, sum_of_squares, degrees_of_freedom, collapsed)
 }
 
@@ -72,9 +72,9 @@ pub fn tried(
     kept: bool,
 ) -> PyResult<NetworkTrial> {
     let images = network.images.len();
-    let settled = state.as_ref().filter(|_| kept).and_then(|state| state.take_kept());
-    if let Some(settled) = settled {
-        let trial = py.detach(|| settled.trial(network));
+    let converged = state.as_ref().filter(|_| kept).and_then(|state| state.take_kept());
+    if let Some(converged) = converged {
+        let trial = py.detach(|| converged.trial(network));
         return Ok(NetworkTrial { trial, images, threads, refused });
     }
     let state = state.map(|state| state.state.clone());
@@ -118,10 +118,10 @@ impl NetworkTrial {
         table(py, self.trial.points())
     }
 
-    fn stand(&mut self, py: Python<'_>) -> PyResult<StandingRow> {
+    fn stand(&mut self, py: Python<'_>) -> PyResult<OutcomeRow> {
         let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
         let found = watched(py, workers, None, |pool, watch| trial.stand(pool, watch))?;
-        found.map(standing_row).map_err(|error| refused(&error))
+        found.map(outcome_row).map_err(|error| refused(&error))
     }
 
     #[pyo3(signature = (rows, points, photos, *, tolerance, progress))]
@@ -133,12 +133,12 @@ impl NetworkTrial {
         photos: Vec<usize>,
         tolerance: Option<f64>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<StandingRow> {
+    ) -> PyResult<OutcomeRow> {
         let rows: Vec<bool> = rows.as_array().iter().copied().collect();
         let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
         let out = Out { rows: &rows, points: &points, photos: &photos };
         let found = watched(py, workers, progress, |pool, watch| trial.adjust(out, tolerance, pool, watch))?;
-        found.map(standing_row).map_err(|error| refused(&error))
+        found.map(outcome_row).map_err(|error| refused(&error))
     }
 
     #[pyo3(signature = (loss, scale, *, iterations, progress))]

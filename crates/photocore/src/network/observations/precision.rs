@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::Fault;
+use super::fault::Fault;
 
 /// The weight that belongs to a smaller standard deviation is not a number, nor is that of one as large as its reciprocal.
 const SMALLEST: f64 = 1e-100;

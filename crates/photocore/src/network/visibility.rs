@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::problem::Assembled;
-use super::screening::TOGETHER;
+use super::selection::TOGETHER;
 use super::stations::Station;
 use super::{Image, Solution};
 

@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::Network;
+use super::state::State;
 use super::surroundings::Surroundings;
+use super::{Network, NetworkError};
 
 /// Points that a thread takes at least.
 pub(super) const TOGETHER: usize = 1024;
@@ -35,7 +36,7 @@ pub enum Reason {
     /// It was given at the place of a station that sees it: no ray leads there.
     AtStation,
     /// It is held beside a station that sees it, and one of its images is wrong: the adjustment goes wrong with it, and not without.
-    BesideStation,
+    NearStation,
 }
 
 impl Reason {
@@ -49,36 +50,51 @@ impl Reason {
             Reason::NotDetermined => "its rays do not determine it",
             Reason::RanOff => "its rays do not meet: it ran off",
             Reason::AtStation => "given at the place of a station that sees it",
-            Reason::BesideStation => "given beside a station that sees it, and its images do not fit",
+            Reason::NearStation => "given beside a station that sees it, and its images do not fit",
         }
     }
 }
 
+/// What an adjustment does without, by point and by photo.
+#[derive(Debug, Clone)]
+pub(super) struct LeftOut {
+    pub points: Vec<bool>,
+    pub photos: Vec<bool>,
+}
+
 impl Network {
-    /// Leaves out points that their images and held components cannot determine, and those `left_out` already.
+    /// What does not take part: photos, and all that an adjustment has gone on without.
     ///
-    /// A point on one photo stays when at most one of its components is not held: then there are at least four equations for
-    /// three unknowns (specification, open point 21).
-    ///
-    /// Points that observations touch stand behind all others. Images on `loose` photos do not take part.
-    pub(super) fn screen(&self, left_out: &[bool], loose: &[bool]) -> Screened {
-        self.screen_within(left_out, loose, Surroundings::default())
+    /// # Errors
+    /// A state that is not of this network.
+    pub(super) fn left_out(&self, photos: Vec<bool>, state: Option<&State>) -> Result<LeftOut, NetworkError> {
+        let mut all = LeftOut { points: vec![false; self.points.len()], photos };
+        if let Some(state) = state {
+            for (own, left) in [(&mut all.points, &state.collapsed), (&mut all.photos, &state.loose)] {
+                for &index in left {
+                    *own.get_mut(index).ok_or(NetworkError::State)? = true;
+                }
+            }
+        }
+        Ok(all)
     }
 
-    /// The same of a node of a larger network: points that other nodes have unknowns of stay whatever is seen of them here.
-    pub(super) fn screen_within(
-        &self,
-        left_out: &[bool],
-        loose: &[bool],
-        surroundings: Surroundings,
-    ) -> Screened {
+    /// Leaves out points that their images and held components cannot determine, and those that are `left_out` already.
+    ///
+    /// A point on one photo stays when at most one of its components is not held: then there are at least four equations for
+    /// three unknowns (specification, open point 21). Points that other nodes of a larger network have unknowns of stay whatever is
+    /// seen of them here.
+    ///
+    /// Points that observations touch stand behind all others. Images on photos that are left out do not take part.
+    pub(super) fn select(&self, left_out: &LeftOut, surroundings: Surroundings) -> Selected {
+        let loose = &left_out.photos;
         let named = surroundings.points();
         let all = self.point_images(loose);
         let (mut points, mut dropped) = (Vec::new(), Vec::new());
         let along = self.along_curve(&all);
         let reasons: Vec<Option<Reason>> =
             along.par_iter().with_min_len(TOGETHER).map(|&point| self.reason(point, all.of(point))).collect();
-        for (point, reason) in along.into_iter().zip(reasons).filter(|&(point, _)| !left_out[point]) {
+        for (point, reason) in along.into_iter().zip(reasons).filter(|&(point, _)| !left_out.points[point]) {
             match reason.filter(|_| !named.contains(&point)) {
                 Some(reason) => dropped.push(Dropped { point, reason }),
                 None => points.push(point),
@@ -101,7 +117,7 @@ impl Network {
             images.start.push(images.order.len());
         }
         let loose = (0..loose.len()).filter(|&photo| loose[photo]).collect();
-        Screened { points, locals, images, observations, dropped, loose, surroundings }
+        Selected { points, locals, images, observations, dropped, loose, surroundings }
     }
 
     /// Why a point with the given images does not take part; None where it does.
@@ -167,7 +183,7 @@ impl PointImages {
 }
 
 /// What takes part, points neighbours together, and what was left out.
-pub(super) struct Screened {
+pub(super) struct Selected {
     pub points: Vec<usize>,
     /// How many of them, the first, no observation touches.
     pub locals: usize,

@@ -1,11 +1,12 @@
 //! Points that leave for infinity while a network is adjusted.
 
-use super::Image;
-use super::model::Bundle;
-use super::precision::median;
-use super::problem::FEW;
-use super::stations::{Station, Stations};
-use crate::adjustment::Model;
+use super::leaving::{Ended, FEW, Leaves};
+use crate::adjustment::{Method, Model, Status};
+use crate::network::Image;
+use crate::network::median::median;
+use crate::network::model::Bundle;
+use crate::network::selection::{Dropped, Reason};
+use crate::network::stations::{Station, Stations};
 
 /// A point so many times as far from the nearest station as others is on its way out of the network,
 const FAR: f64 = 100.0;
@@ -15,6 +16,32 @@ const AT_INFINITY: f64 = 1.0;
 const GROWS: f64 = 0.003;
 /// Times the distance of a point that stand for infinity.
 const INFINITE: f64 = 1e6;
+/// A point so many times as far from the nearest station as others, or as near, has left the network.
+const ASTRAY: f64 = 1e3;
+
+/// Free points that iterations which have not converged have led out of the network, or to a station, where they are few.
+///
+/// Rays that part before the cameras fit best at infinity, where least squares creeps to, and photos are turned until they do.
+pub(super) fn look(ended: &Ended<'_>) -> Leaves {
+    let Ok(adjusted) = ended.adjusted else { return Leaves::default() };
+    let damped = matches!(ended.options.adjustment.method, Method::Damped(_));
+    if adjusted.status != Status::NotConverged || !damped {
+        return Leaves::default();
+    }
+    let squares = ended.assembled.nearest_stations(&adjusted.unknowns);
+    let Some(middle) = median(squares.clone()) else { return Leaves::default() };
+    let model = &ended.assembled.problem.model;
+    let is_out = |&local: &usize| {
+        let apart = (squares[local] / middle).sqrt();
+        model.points[local].held() == [false; 3] && !(ASTRAY.recip()..=ASTRAY).contains(&apart)
+    };
+    let mut out: Vec<usize> = (0..model.locals).filter(is_out).collect();
+    if FEW * out.len() > model.locals {
+        out.clear();
+    }
+    let dropped = |i: usize| Dropped { point: ended.assembled.points[i], reason: Reason::RanOff };
+    Leaves { points: out.into_iter().map(dropped).collect(), photos: vec![] }
+}
 
 impl Bundle {
     /// Free points that rays which part, or are parallel, lead out of the network, where they are few.

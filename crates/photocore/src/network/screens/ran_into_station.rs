@@ -1,9 +1,12 @@
 //! Points that run into a station while a network is adjusted.
 
-use super::Image;
-use super::model::Bundle;
-use super::stations::{Station, Stations};
+use super::leaving::{Ended, Leaves};
 use crate::adjustment::Model;
+use crate::network::Image;
+use crate::network::median::median;
+use crate::network::model::Bundle;
+use crate::network::selection::{Dropped, Reason};
+use crate::network::stations::{Station, Stations};
 
 /// A point has run into a station when its share in what the station learns is so many times that of the others in the mean: it is
 /// ten thousand times nearer than they are, and rounding leaves eight digits of what they say.
@@ -13,6 +16,21 @@ const ON_ITS_WAY: f64 = 1e4;
 /// when no other photo tells it from the station: their images there, before and after a step, are closer than so many standard
 /// deviations.
 const SAME_PLACE: f64 = 3.0;
+
+/// Points that an adjustment has stopped for, so that it can go on without them: they have run into a station, or out of the network.
+pub(super) fn look(ended: &Ended<'_>) -> Leaves {
+    let Ok(adjusted) = ended.adjusted else { return Leaves::default() };
+    if adjusted.collapsed.is_empty() {
+        return Leaves::default();
+    }
+    let squares = ended.assembled.nearest_stations(&adjusted.unknowns);
+    let middle = median(squares.clone()).unwrap_or(f64::INFINITY);
+    let dropped = |&local: &usize| Dropped {
+        point: ended.assembled.points[local],
+        reason: if squares[local] > middle { Reason::RanOff } else { Reason::RanIntoStation },
+    };
+    Leaves { points: adjusted.collapsed.iter().map(dropped).collect(), photos: vec![] }
+}
 
 /// A point much nearer to a station than the others.
 struct Approach {

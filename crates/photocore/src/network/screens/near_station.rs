@@ -1,11 +1,12 @@
-//! Points that are held beside a station that sees them: a wrong image of one turns photos as no other can.
+//! Points that are held near a station that sees them: a wrong image of one turns photos as no other can.
 
-use super::problem::{Assembled, FEW};
-use super::screening::{Dropped, Reason};
-use crate::adjustment::{AdjustError, Adjustment, Status};
+use super::leaving::{Ended, FEW, Leaving};
+use crate::adjustment::{AdjustError, Adjustment, Method, Status};
+use crate::network::problem::Assembled;
+use crate::network::selection::{Dropped, Reason};
 
-/// A point so many times as near to the nearest station as others stands beside it, first values of stations being coarse.
-pub(super) const NEAR: f64 = 10.0;
+/// A point so many times as near to the nearest station as others stands near to it, first values of stations being coarse.
+const NEAR: f64 = 10.0;
 /// Variance of unit weight of an adjustment that has gone wrong,
 const WRONG: f64 = 25.0;
 /// and by what it must fall for points to be the reason.
@@ -13,19 +14,9 @@ const FALLS: f64 = 4.0;
 /// Points that must be held besides.
 const HELD: usize = 3;
 
-/// What an adjustment does without.
-#[derive(Debug, Clone)]
-pub(super) struct Leaving {
-    /// By point, by photo.
-    pub points: Vec<bool>,
-    pub photos: Vec<bool>,
-    /// Those of the points that leave because they harm the others.
-    pub harmful: Vec<Dropped>,
-}
-
 /// Whether an adjustment that goes wrong goes better without such points, which is tried once.
 #[derive(Debug)]
-pub(super) enum Beside {
+pub(super) enum NearStation {
     /// What the adjustment does without in any case.
     Untried(Leaving),
     /// They are out. With them the variance of unit weight was this, infinite without convergence, and this was left out.
@@ -34,36 +25,38 @@ pub(super) enum Beside {
         variance: f64,
         with: Leaving,
     },
-    Settled,
+    Decided,
 }
 
-impl Beside {
+impl NearStation {
     pub fn is_untried(&self) -> bool {
         matches!(self, Self::Untried(_))
     }
 
     /// Whether an adjustment has to begin again, with or without them, and what it then does without.
-    pub fn tries(
-        &mut self,
-        ended: &Result<Adjustment, AdjustError>,
-        assembled: &Assembled,
-        leaving: &mut Leaving,
-    ) -> bool {
-        let Some(now) = variance(ended) else { return false };
-        match std::mem::replace(self, Self::Settled) {
+    ///
+    /// Only where a variance tells: by least squares, and not under the rules of a program of its time.
+    pub fn tries(&mut self, ended: &Ended<'_>, leaving: &mut Leaving) -> bool {
+        let options = &ended.options.adjustment;
+        let tells = options.loss.is_none() && !matches!(options.method, Method::Full(_));
+        if !(tells && ended.options.screens.near_station) {
+            return false;
+        }
+        let Some(now) = variance(ended.adjusted) else { return false };
+        match std::mem::replace(self, Self::Decided) {
             Self::Untried(least) => {
-                let points = if now > WRONG { assembled.held_beside_stations() } else { vec![] };
+                let points = if now > WRONG { ended.assembled.held_near_stations() } else { vec![] };
                 if points.is_empty() {
                     *self = Self::Untried(least);
                     return false;
                 }
                 let with = std::mem::replace(leaving, least);
-                points.iter().for_each(|&point| leaving.points[point] = true);
+                points.iter().for_each(|&point| leaving.left_out.points[point] = true);
                 *self = Self::Out { points, variance: now, with };
                 true
             }
             Self::Out { points, variance, .. } if FALLS * now < variance => {
-                let reason = Reason::BesideStation;
+                let reason = Reason::NearStation;
                 leaving.harmful.extend(points.into_iter().map(|point| Dropped { point, reason }));
                 false
             }
@@ -71,7 +64,7 @@ impl Beside {
                 *leaving = with;
                 true
             }
-            Self::Settled => false,
+            Self::Decided => false,
         }
     }
 }
@@ -91,8 +84,8 @@ fn variance(ended: &Result<Adjustment, AdjustError>) -> Option<f64> {
 }
 
 impl Assembled {
-    /// Points with held coordinates whose first values are beside a station that sees them, where they are few and others are held.
-    fn held_beside_stations(&self) -> Vec<usize> {
+    /// Points with held coordinates whose first values are near a station that sees them, where they are few and others are held.
+    fn held_near_stations(&self) -> Vec<usize> {
         let model = &self.problem.model;
         let is_held = |&local: &usize| model.points[local].held() != [false; 3];
         let held: Vec<usize> = (0..model.locals).filter(is_held).collect();

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
+use super::median::median;
 use super::model::Bundle;
-use super::precision::median;
 use super::stations::Station;
 use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Point, Ray, Vector3};

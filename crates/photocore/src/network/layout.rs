@@ -1,0 +1,55 @@
+//! The blocks of a network's unknowns.
+
+use super::NetworkError;
+use super::model::Bundle;
+use super::surroundings::{BlockOf, Surroundings};
+use crate::normals::Layout;
+
+/// The blocks of a model, at the given places, and what ties them.
+pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, NetworkError> {
+    let (groups, tied) = (model.start[model.locals], model.points.len() - model.locals);
+    let widths = model.first.windows(2).map(|pair| pair[1] - pair[0]);
+    let widths: Vec<usize> = widths.chain(vec![3; tied]).collect();
+    let images = &model.images[..groups];
+    let photo_of = images.iter().map(|image| model.carrier(image.photo) as u32).collect();
+    let mut layout = Layout::new(2, 3, &widths, model.start[..=model.locals].to_vec(), photo_of)?;
+    if !(model.shared.is_empty() && model.mounts.is_empty()) {
+        let (mut further_ptr, mut further) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
+        further_ptr.push(0);
+        for image in images {
+            further.extend(model.further(image).map(|block| block as u32));
+            further_ptr.push(further.len());
+        }
+        layout = layout.with_further(further_ptr, further)?;
+    }
+    Ok(layout.with_places(places)?.with_ties(model.ties())?.with_pairs(model.pairs())?)
+}
+
+impl Surroundings {
+    /// The kept blocks of a model of these points that outer ones are, and those that each node below leaves something for.
+    ///
+    /// # Errors
+    /// One that has no unknowns of its own here.
+    pub(super) fn blocks(
+        &self,
+        model: &Bundle,
+        points: &[usize],
+    ) -> Result<(Vec<u32>, Vec<Vec<u32>>), NetworkError> {
+        let (photos, tied) = (model.cameras.len(), &points[model.locals..]);
+        let block = |&block: &BlockOf| {
+            let found = match block {
+                BlockOf::Photo(photo) => Some(photo),
+                BlockOf::Camera(camera) => {
+                    model.shared.binary_search(&camera).ok().map(|shared| photos + shared)
+                }
+                BlockOf::Common(common) => model.common_block[common],
+                BlockOf::Point(point) => {
+                    tied.iter().position(|&own| own == point).map(|place| model.stations() + place)
+                }
+            };
+            found.map(|block| block as u32).ok_or(NetworkError::NoBlock(block))
+        };
+        let blocks = |all: &Vec<BlockOf>| all.iter().map(block).collect::<Result<Vec<u32>, NetworkError>>();
+        Ok((blocks(&self.outer)?, self.below.iter().map(blocks).collect::<Result<_, _>>()?))
+    }
+}
