@@ -42,9 +42,10 @@ impl<K: Kernel> WithSimd for Sized<'_, K> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        // Machines without vectors do without sizes: unrolled lane by lane, they would be the largest part of the library.
         match (self.layout.rows(), self.layout.local_dim(), self.kept_dim) {
-            (2, 3, Some(6)) => self.kernel.run::<S, 2, 3, 6>(simd),
-            (2, 3, Some(9)) => self.kernel.run::<S, 2, 3, 9>(simd),
+            (2, 3, Some(6)) if const { S::F64_LANES > 1 } => self.kernel.run::<S, 2, 3, 6>(simd),
+            (2, 3, Some(9)) if const { S::F64_LANES > 1 } => self.kernel.run::<S, 2, 3, 9>(simd),
             (_, 3, _) => self.kernel.run::<S, 0, 3, 0>(simd),
             (_, 2, _) => self.kernel.run::<S, 0, 2, 0>(simd),
             _ => self.kernel.run::<S, 0, 1, 0>(simd),
