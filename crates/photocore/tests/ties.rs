@@ -6,8 +6,8 @@ use std::ops::ControlFlow;
 
 use faer::{Mat, Side};
 use photocore::adjustment::{
-    Datum, DatumError, Loss, Method, Model, Motions, NormalEquations, Options, Problem, Published, Status,
-    Stop, adjust,
+    Datum, DatumError, Leverages, Linearized, Loss, Method, Model, Motions, Options, Problem, Published,
+    Status, Stop, adjust,
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -318,11 +318,10 @@ fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say(
     let (problem, pool) = (network(vec![]), pool());
     let mut go_on = |_| ControlFlow::Continue(());
     let adjusted = adjust(&problem, &Options::default(), &pool, &mut |_| ControlFlow::Continue(())).unwrap();
-    let normal = || {
-        NormalEquations::form(&problem, &adjusted.unknowns, &adjusted.datum, &pool, &mut |_| {
-            ControlFlow::Continue(())
-        })
-    };
+    let (values, held) = (adjusted.unknowns.clone(), adjusted.datum.clone());
+    let leverages =
+        Leverages::at(&problem, values.clone(), held.clone(), &pool, &mut |_| ControlFlow::Continue(()))
+            .unwrap();
     let local = 3;
     let layout = problem.layout();
     // The rows of the point, over all unknowns, in unit weight; what is held has no column.
@@ -338,8 +337,10 @@ fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say(
         row
     };
     let rows: Vec<Vec<f64>> = layout.groups_of(local).map(row).collect();
-    let solved = normal().unwrap().solve_for(&rows.concat(), &mut go_on).unwrap();
-    let blocks = normal().unwrap().observation_blocks(&[local, 0], &mut go_on).unwrap();
+    let linearized = Linearized::form(&problem, None, values, held, &pool, &mut go_on).unwrap();
+    let solved = linearized.solve_for(&problem, &rows.concat(), &pool, &mut go_on).unwrap();
+    let found = leverages.of_locals(&problem, &problem.observation_sd, &[local, 0], |_| vec![], &pool);
+    let blocks: Vec<Vec<f64>> = found.into_iter().map(|own| own.equations).collect();
     assert_eq!(blocks.len(), 2);
     for (k, value) in blocks[0].iter().enumerate() {
         let column = &solved[k % 4 * layout.unknowns()..][..layout.unknowns()];

@@ -8,8 +8,9 @@
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::equations::ObservationEquations;
 use super::group_step::GroupStep;
-use super::problem::{Linearized, Model};
+use super::problem::Model;
 use super::walk::Buffers;
 use crate::normals::Equations;
 
@@ -20,7 +21,7 @@ const PARTS: usize = 64;
 /// Local blocks of one at the least.
 const AT_LEAST: usize = 64;
 
-impl<M: Model> Linearized<'_, M> {
+impl<M: Model> ObservationEquations<'_, M> {
     /// A^T r_vv over all unknowns; ties, which are few, are taken as straight.
     ///
     /// * `ahead`: r(x + h v), in the units of the observations.

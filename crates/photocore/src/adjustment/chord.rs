@@ -8,11 +8,12 @@
 
 use std::time::Instant;
 
+use super::equations::ObservationEquations;
 use super::method::NEGLIGIBLE;
 use super::options::{Iteration, Phase};
-use super::problem::{Linearized, Model};
+use super::problem::Model;
 use super::result::{AdjustError, unless_stopped};
-use super::run::{Basis, Run, between};
+use super::run::{Run, State, between};
 
 /// Steps that change the unknowns by less than this multiple of their standard deviations leave the normal equations as they are, to much
 /// less than what a chord gains.
@@ -26,22 +27,21 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// The values that a step leads to, and a chord after it where that pays.
     pub(super) fn stepped(
         &mut self,
-        unknowns: &[f64],
-        basis: &Basis<'a, M>,
+        state: &State<'a, M>,
         step: &[f64],
         iteration: &Iteration,
     ) -> Result<Vec<f64>, AdjustError> {
         self.chord = None;
-        let values = self.problem.advanced(unknowns, step);
-        if !(basis.factor.has_kept() && self.is_for_chord(iteration)) {
+        let (values, factor) = (self.problem.advanced(state.values(), step), &state.linearized.factor);
+        if !(factor.has_kept() && self.is_for_chord(iteration)) {
             return Ok(values);
         }
         let (problem, start) = (self.problem, Instant::now());
         let prepared = self.pool.install(|| problem.model.prepare(&values));
-        let equations = Linearized::prepared(problem, prepared, &self.datum, None);
+        let equations = ObservationEquations::prepared(problem, prepared, &self.datum, None);
         let prior = problem.prior_equations(&values, &self.datum);
         let mut between = between(&mut *self.watch, Phase::Solve, problem.layout().locals());
-        let chord = problem.system.chord(self.pool, &basis.factor, &equations, &prior, &mut between);
+        let chord = problem.system.chord(self.pool, factor, &equations, &prior, &mut between);
         self.seconds.solve += start.elapsed().as_secs_f64();
         let (chord, decrease) = unless_stopped(chord)?;
         let change = decrease.sqrt();

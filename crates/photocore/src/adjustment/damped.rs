@@ -6,7 +6,7 @@ use super::method::{self, NEGLIGIBLE, Stop, leaves_cofactors};
 use super::options::{Iteration, Status};
 use super::problem::Model;
 use super::result::AdjustError;
-use super::run::{End, Run, Solved, State};
+use super::run::{End, Run, State};
 
 /// A step is accepted when the sum of squares does not rise by more than its own rounding error.
 const ROUNDING: f64 = 1e-12;
@@ -89,19 +89,22 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let mut state = start;
         let mut control = Control {
             stop,
-            best: state.sum_of_squares,
+            best: state.linearized.sum_of_squares,
             refused: None,
             in_valley: false,
             along: 0,
             failures: 0,
         };
-        while self.iterations.len() < self.options.max_iterations && state.damping <= MOST_DAMPING {
+        while self.iterations.len() < self.options.max_iterations
+            && state.linearized.damping() <= MOST_DAMPING
+        {
             match self.step_from(state, &mut control)? {
                 ControlFlow::Continue(next) => state = next,
                 ControlFlow::Break(end) => return Ok(end),
             }
         }
-        let status = if state.damping > MOST_DAMPING { Status::Diverged } else { Status::NotConverged };
+        let too_much = state.linearized.damping() > MOST_DAMPING;
+        let status = if too_much { Status::Diverged } else { Status::NotConverged };
         let creeps = control.in_valley && status == Status::NotConverged;
         if let Some((_, moved)) = control.refused.filter(|_| creeps) {
             self.weak = moved;
@@ -111,50 +114,50 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     /// Solves, and takes the step or ends with it.
     fn step_from(&mut self, state: State<'a, M>, control: &mut Control) -> Next<'a, M> {
-        let (unknowns, damping, curved) = (state.unknowns.clone(), state.damping, state.curved);
-        let Some(solved) = self.solve_unless_lost(state)? else {
-            return self.refuse(unknowns, damping, control, vec![]);
+        let damping = state.linearized.damping();
+        let Some(step) = self.step(&state)? else {
+            return self.refuse(state.recycle(), damping, control, vec![]);
         };
-        let number = self.iterations.len() + 1;
-        let largest_change = solved.change;
+        let (number, largest_change) = (self.iterations.len() + 1, state.linearized.change());
         let iteration = Iteration { number, sum_of_squares: control.best, largest_change, damping };
         if damping == 0.0
-            && (self.is_last(control.stop, solved.change) || self.is_foreseen(control, &unknowns, &solved))
+            && (self.is_last(control.stop, largest_change) || self.is_foreseen(control, &state, &step))
         {
-            let end = if curved {
-                self.stay_after(iteration, &unknowns, &solved.step)?
+            let end = if state.linearized.is_curved() {
+                self.stay_after(iteration, &state.recycle(), &step)?
             } else {
-                End::after(Status::Converged, unknowns, solved, iteration)
+                End::after(Status::Converged, state, step, iteration)
             };
             return Ok(ControlFlow::Break(end));
         }
-        if damping == 0.0 && self.falls_no_more(solved.change) {
-            self.weak = solved.basis.factor.moved(&self.problem.system, &solved.step);
-            return Ok(ControlFlow::Break(End::after(Status::Converged, unknowns, solved, iteration)));
+        if damping == 0.0 && self.falls_no_more(largest_change) {
+            self.weak = state.moved(&step);
+            return Ok(ControlFlow::Break(End::after(Status::Converged, state, step, iteration)));
         }
-        self.take(iteration, unknowns, solved, control)
+        self.take(iteration, state, &step, control)
     }
 
     /// Takes a step, unless it fails.
     fn take(
         &mut self,
         iteration: Iteration,
-        unknowns: Vec<f64>,
-        solved: Solved<'a, M>,
+        state: State<'a, M>,
+        step: &[f64],
         control: &mut Control,
     ) -> Next<'a, M> {
-        let (damping, Solved { basis, step, change }) = (iteration.damping, solved);
-        let trial = self.stepped(&unknowns, &basis, &step, &iteration)?;
-        let moved = (damping == 0.0).then(|| basis.factor.moved(&self.problem.system, &step));
-        basis.factor.recycle(&self.problem.system);
+        let Iteration { damping, largest_change: change, .. } = iteration;
+        let trial = self.stepped(&state, step, &iteration)?;
+        let moved = if damping == 0.0 { state.moved(step) } else { vec![] };
+        let unknowns = state.recycle();
         let far = change > FAR * (unknowns.len() as f64).sqrt();
         self.look_ahead(&iteration);
         let next = self.form(if far { self.relocated(trial) } else { trial }, relaxed(damping))?;
         let negligible = damping == 0.0 && change <= NEGLIGIBLE;
         let highest = if negligible { f64::MAX } else { control.best * (1.0 + ROUNDING) };
         // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
-        if !(next.sum_of_squares <= highest && next.factor.deficient_locals.is_empty()) {
-            next.factor.recycle(&self.problem.system);
+        let sum = next.linearized.sum_of_squares;
+        if !(sum <= highest && next.linearized.factor.deficient_locals.is_empty()) {
+            next.recycle();
             if damping == 0.0 {
                 control.in_valley = change <= VALLEY;
             }
@@ -167,23 +170,22 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 && control.in_valley
                 && control.along < MOST_ALONG
                 && !self.is_still(&control.refused, control.best)
-                && let Some((values, sum)) = self.along_valley(&unknowns, &step, change, control.best)?
+                && let Some((values, sum)) = self.along_valley(&unknowns, step, change, control.best)?
             {
                 let before = std::mem::replace(&mut control.best, sum);
                 control.along += 1;
-                self.weak = moved.unwrap_or_default();
+                self.weak = moved;
                 control.refused = Some((before, self.weak.clone()));
                 self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, &values)?;
                 return self.form(values, 0.0).map(ControlFlow::Continue);
             }
-            return self.refuse(unknowns, damping, control, moved.unwrap_or_default());
+            return self.refuse(unknowns, damping, control, moved);
         }
-        let sum = next.sum_of_squares;
         let decrease = std::mem::replace(&mut control.best, sum) - sum;
         self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, next.reached())?;
         // What harms all others makes full steps fail.
         if damping > 0.0 && self.has_collapsed(&unknowns, next.equations.at()) {
-            return Ok(ControlFlow::Break(End::at(Status::NotConverged, next.unknowns, None)));
+            return Ok(ControlFlow::Break(End::at(Status::NotConverged, next.recycle())));
         }
         if damping == 0.0 && control.stop.at_decrease(decrease, sum) {
             return self.stay(next, Status::Converged).map(ControlFlow::Break);
@@ -221,14 +223,14 @@ impl<'a, M: Model> Run<'a, '_, M> {
             return Ok(end);
         }
         let state = self.form(end.unknowns.clone(), 0.0)?;
-        let Some(Solved { basis, step, change }) = self.solve_unless_lost(state)? else {
+        let Some(step) = self.step(&state)? else {
             return Ok(End { status: Status::NotConverged, ..end });
         };
-        let rests = change <= SHORT;
+        let rests = state.linearized.change() <= SHORT;
         if !rests {
-            self.weak = basis.factor.moved(&self.problem.system, &step);
+            self.weak = state.moved(&step);
         }
-        basis.factor.recycle(&self.problem.system);
+        state.recycle();
         Ok(if rests { end } else { End { status: Status::NotConverged, ..end } })
     }
 
@@ -239,14 +241,14 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     /// Whether the next step after a full one would be negligible, by the sum of squares that this one leads to.
-    fn is_foreseen(&self, control: &Control, unknowns: &[f64], solved: &Solved<'a, M>) -> bool {
+    fn is_foreseen(&self, control: &Control, state: &State<'a, M>, step: &[f64]) -> bool {
         let Stop::Foreseen(limit) = control.stop else { return false };
-        let foreseen = control.best - solved.change.powi(2);
+        let foreseen = control.best - state.linearized.change().powi(2);
         // A smaller difference than this one is rounding.
         if limit.powi(2) <= ROUNDING * control.best {
             return false;
         }
-        let reached = self.objective(&self.problem.advanced(unknowns, &solved.step));
+        let reached = self.objective(&self.problem.advanced(state.values(), step));
         (reached - foreseen).abs() <= limit.powi(2)
     }
 
@@ -284,13 +286,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let predicted = part * (2.0 - part) * change * change;
             for _ in 0..BACK {
                 let state = self.form(values, HOLDING)?;
-                if !(state.sum_of_squares.is_finite() && state.factor.deficient_locals.is_empty()) {
+                let sum = state.linearized.sum_of_squares;
+                if !(sum.is_finite() && state.linearized.factor.deficient_locals.is_empty()) {
                     break;
                 }
-                let before = state.unknowns.clone();
-                let Some(Solved { basis, step, .. }) = self.solve_unless_lost(state)? else { break };
-                basis.factor.recycle(&self.problem.system);
-                values = self.problem.advanced(&before, &step);
+                let Some(step) = self.step(&state)? else { break };
+                values = self.problem.advanced(&state.recycle(), &step);
                 let sum = self.objective(&values);
                 if best - sum >= GAIN * predicted {
                     return Ok(Some((values, sum)));

@@ -12,21 +12,19 @@
 //! and with T = G (B^T G)^-1 and W = Q B, which takes d further right-hand sides, a block of it is
 //! Q_ij - T_i W_j^T - W_i T_j^T + T_i (B^T W) T_j^T. Redundancy numbers and residuals are the same in every datum.
 
-use std::ops::ControlFlow;
-use std::time::Instant;
-
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use super::factored::Factored;
+use super::equations::ObservationEquations;
+use super::linearized::{Forming, Inverted, Inverting, Linearized};
 use super::loss::Loss;
 use super::problem::{Model, Motions, Problem};
-use super::result::{AdjustError, Seconds};
+use super::result::AdjustError;
 use super::transformation::Transformation;
-use crate::normals::{Cofactors, Inversion};
+use crate::normals::Between;
 
 /// A datum of a network whose observations leave one open.
 #[derive(Debug, Clone, Default)]
@@ -46,21 +44,6 @@ impl Datum {
     fn of_carriers<'a>(&'a self, vector: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         self.carriers.iter().map(|&(carrier, factor)| factor * vector[carrier])
     }
-}
-
-/// An adjusted network in another datum.
-#[derive(Debug, Clone)]
-pub struct InDatum {
-    /// The adjusted unknowns.
-    pub unknowns: Vec<f64>,
-    /// Their cofactors.
-    pub cofactors: Cofactors,
-    /// Redundancy numbers of the unknowns as observations of themselves (zero unless weighted).
-    pub prior_redundancy: Vec<f64>,
-    /// About how large a part of a variance rounding may be: large numbers cancel where the old datum is far from the new one, or short.
-    pub lost: f64,
-    /// What forming, factoring, solving and inverting have taken.
-    pub seconds: Seconds,
 }
 
 /// Why an adjusted network cannot be taken to a datum.
@@ -98,7 +81,7 @@ pub struct Adjusted<'a> {
     pub loss: Option<Loss>,
 }
 
-impl Factored {
+impl Linearized {
     /// Moves an adjusted network to another datum, and factors its normal equations there.
     ///
     /// # Errors
@@ -109,43 +92,46 @@ impl Factored {
         datum: &Datum,
         reference: &[f64],
         pool: &ThreadPool,
-        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+        between: Between<'_>,
     ) -> Result<Self, DatumError> {
-        let (unknowns, basis) = moved(problem, adjusted, datum, reference, pool)?;
-        let (mut factored, rights) = basis.form(problem, unknowns, adjusted, datum, pool, between)?;
-        let columns = factored.solve_further(problem, &rights, pool, between)?;
-        let (count, d) = (factored.values.len(), basis.d);
-        let row = |unknown: usize| (0..d).map(move |k| k * count + unknown);
-        let w = (0..count).flat_map(row).map(|at| columns[at]).collect();
-        factored.transformation = Some(basis.transformation(w, datum));
-        Ok(factored)
+        let mut linearized = Self::moved(problem, adjusted, datum, reference, pool, between)?;
+        linearized.take_to_datum(problem, pool, between)?;
+        Ok(linearized)
     }
-}
 
-impl InDatum {
-    /// Moves an adjusted network to another datum, and computes all cofactors there.
-    ///
-    /// # Errors
-    /// Those of [`Factored::in_datum`].
-    pub fn new<M: Model>(
+    /// The same on the way to Q B.
+    fn moved<M: Model>(
         problem: &Problem<M>,
         adjusted: Adjusted<'_>,
         datum: &Datum,
         reference: &[f64],
         pool: &ThreadPool,
-        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+        between: Between<'_>,
     ) -> Result<Self, DatumError> {
         let (unknowns, basis) = moved(problem, adjusted, datum, reference, pool)?;
-        let (factored, rights) = basis.form(problem, unknowns, adjusted, datum, pool, between)?;
-        let (start, mut seconds, unknowns) = (Instant::now(), factored.seconds, factored.values.clone());
-        let (found, prior_redundancy) = factored.invert(problem, &rights, pool, between)?;
-        drop(rights);
-        let Inversion { mut cofactors, further, inversion_share, .. } = found;
-        let transformation = basis.transformation(further, datum);
-        let lost = pool.install(|| transformation.apply(problem.layout(), &mut cofactors));
-        let took = start.elapsed().as_secs_f64();
-        (seconds.invert, seconds.cofactors) = (took * inversion_share, took * (1.0 - inversion_share));
-        Ok(Self { unknowns, cofactors, prior_redundancy, lost, seconds })
+        let Adjusted { held, loss, .. } = adjusted;
+        let equations = ObservationEquations::new(problem, loss, &unknowns, held, pool);
+        let forming = Forming { basis: Some(basis), ..Forming::default() };
+        Ok(Self::of(&equations, unknowns, held.to_vec(), forming, pool, between)?.determined()?)
+    }
+}
+
+impl Inverted {
+    /// Moves an adjusted network to another datum, and computes all cofactors there.
+    ///
+    /// # Errors
+    /// Those of [`Linearized::in_datum`].
+    pub fn in_datum<M: Model>(
+        problem: &Problem<M>,
+        adjusted: Adjusted<'_>,
+        datum: &Datum,
+        reference: &[f64],
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<Self, DatumError> {
+        let linearized = Linearized::moved(problem, adjusted, datum, reference, pool, between)?;
+        let equations = linearized.equations(problem, pool);
+        Ok(linearized.invert(&equations, Inverting::Whole, pool, between)?)
     }
 }
 
@@ -156,16 +142,10 @@ pub(super) struct Target<'a> {
     pub reference: &'a [f64],
 }
 
-/// Normal equations formed where a network was moved to on its way, with the right-hand sides for its datum.
-pub(super) struct AtTarget {
-    pub basis: Basis,
-    pub rights: Vec<f64>,
-    /// The unknowns before.
-    pub before: Vec<f64>,
-}
-
 /// B in the rows of the carriers, and T = G (B^T G)^-1, in the columns for which B divided by the factors is orthonormal.
+#[derive(Debug)]
 pub(super) struct Basis {
+    carriers: Vec<usize>,
     b: Mat<f64>,
     /// A row for each unknown, one after the other.
     t: Vec<f64>,
@@ -178,20 +158,20 @@ pub(super) struct Basis {
 impl Basis {
     /// The right-hand sides B, over all unknowns, one after the other. Held unknowns stand in the normal equations with unit weight: their
     /// columns of Q are zero.
-    pub fn rights<M>(&self, problem: &Problem<M>, count: usize, held: &[usize], datum: &Datum) -> Vec<f64> {
-        let mut rights = vec![0.0; count * self.d];
+    pub fn rights<M>(&self, problem: &Problem<M>, held: &[usize]) -> Vec<f64> {
+        let (count, mut rights) = (problem.layout().unknowns(), vec![0.0; self.t.len()]);
         let free = |unknown: usize| !held.contains(&unknown) && problem.sd[unknown] != 0.0;
-        let carriers = datum.carriers.iter().enumerate();
-        for (row, &(carrier, _)) in carriers.filter(|(_, carrier)| free(carrier.0)) {
+        let carriers = self.carriers.iter().enumerate();
+        for (row, &carrier) in carriers.filter(|(_, carrier)| free(**carrier)) {
             (0..self.d).for_each(|k| rights[k * count + carrier] = self.b[(row, k)]);
         }
         rights
     }
 
     /// Takes a step, in whatever datum it is, to this one: S dx = dx - T B^T dx.
-    pub fn take(&self, step: &mut [f64], datum: &Datum) {
+    pub fn take(&self, step: &mut [f64]) {
         let mut along = vec![0.0; self.d];
-        for (row, &(carrier, _)) in datum.carriers.iter().enumerate() {
+        for (row, &carrier) in self.carriers.iter().enumerate() {
             (0..self.d).for_each(|k| along[k] += self.b[(row, k)] * step[carrier]);
         }
         for (value, t) in step.iter_mut().zip(self.t.chunks_exact(self.d.max(1))) {
@@ -199,32 +179,14 @@ impl Basis {
         }
     }
 
-    /// Forms and factors the normal equations at some values, on the way to Q B; also the right-hand sides B.
-    fn form<M: Model>(
-        &self,
-        problem: &Problem<M>,
-        unknowns: Vec<f64>,
-        Adjusted { held, loss, .. }: Adjusted<'_>,
-        datum: &Datum,
-        pool: &ThreadPool,
-        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
-    ) -> Result<(Factored, Vec<f64>), DatumError> {
-        let rights = self.rights(problem, unknowns.len(), held, datum);
-        let formed = Factored::form_with(problem, loss, unknowns, held.to_vec(), &rights, pool, between)?;
-        Ok((formed, rights))
-    }
-
     /// The transformation, with W = Q B.
-    pub fn transformation(self, w: Vec<f64>, datum: &Datum) -> Transformation {
-        let Self { b, t, d, condition } = self;
-        let of_carrier = |row: usize| w[datum.carriers[row].0 * d..][..d].iter().copied();
-        let of_carriers = by_columns(d, datum.carriers.len(), of_carrier);
+    pub fn transformation(self, w: Vec<f64>) -> Transformation {
+        let Self { carriers, b, t, d, condition } = self;
+        let of_carrier = |row: usize| w[carriers[row] * d..][..d].iter().copied();
+        let of_carriers = by_columns(d, carriers.len(), of_carrier);
         let common = product(b.transpose(), of_carriers.transpose());
-        let mut staying = vec![];
-        if datum.carriers.len() == d {
-            staying = datum.carriers.iter().map(|&(carrier, _)| carrier).collect();
-            staying.sort_unstable();
-        }
+        let mut staying = if carriers.len() == d { carriers } else { vec![] };
+        staying.sort_unstable();
         Transformation { t, w, common, condition, staying }
     }
 }
@@ -372,7 +334,8 @@ impl Carried {
                 row.iter_mut().enumerate().for_each(|(k, t)| *t += vector[unknown] * by_motion[(motion, k)]);
             }
         }
-        Some(Basis { b, t, d, condition })
+        let carriers = datum.carriers.iter().map(|&(carrier, _)| carrier).collect();
+        Some(Basis { carriers, b, t, d, condition })
     }
 }
 

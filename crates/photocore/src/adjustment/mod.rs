@@ -54,19 +54,19 @@
 //! ```
 
 mod acceleration;
-mod again;
 mod chord;
 mod damped;
 mod datum;
 mod distributions;
-mod factored;
+mod equations;
 mod group_step;
 mod group_test;
+mod leverages;
+mod linearized;
 mod loss;
 mod method;
 mod motions;
 mod noncentral;
-mod normal_equations;
 mod observation_rows;
 mod options;
 mod part;
@@ -79,26 +79,25 @@ mod run;
 mod statistics;
 mod traces;
 mod transformation;
-mod tried;
 mod trust_region;
 mod walk;
 
-pub use datum::{Adjusted, Datum, DatumError, InDatum};
+pub use datum::{Adjusted, Datum, DatumError};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, normal, student,
     student_limit,
 };
-pub use factored::{CofactorError, Factored};
 pub use group_test::{Few, GroupTest, VISIBLE, canonical_correlation};
+pub use leverages::{Leverages, TieCofactors};
+pub use linearized::{CofactorError, Inverted, Linearized};
 pub use loss::Loss;
 pub use method::{Method, Published, Stop};
 pub use noncentral::{
     detectable_noncentrality, level_of_equal_power, noncentral_chi_square, noncentral_fisher,
 };
-pub use normal_equations::NormalEquations;
 pub use observation_rows::ObservationRows;
 pub use options::{Event, Iteration, Options, Phase, Status};
-pub use part::{Part, PartError};
+pub use part::PartError;
 pub use problem::{Model, Motions, Problem, Weighted};
 pub use resistance::Classes;
 pub(crate) use result::gib;
@@ -106,4 +105,3 @@ pub use result::{AdjustError, Adjustment, Seconds};
 pub use run::{Watch, adjust, adjust_by_groups, adjust_in_datum, on_all_processors};
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
 pub use traces::{EquationGroups, GroupSquares, Probing};
-pub use tried::{TieCofactors, Tried};

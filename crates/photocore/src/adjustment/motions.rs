@@ -8,7 +8,8 @@ use faer::{Mat, Side};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::problem::{Linearized, Model, Motions, Problem};
+use super::equations::ObservationEquations;
+use super::problem::{Model, Motions, Problem};
 use super::walk::Buffers;
 use crate::normals::{Equations, Layout, TieRows};
 
@@ -123,7 +124,7 @@ impl<'a> Candidates<'a> {
     pub fn add_tie<M: Model>(
         &self,
         sums: &mut Sums,
-        equations: &Linearized<'_, M>,
+        equations: &ObservationEquations<'_, M>,
         tie: usize,
         rows: &mut TieRows<'_>,
     ) {
@@ -254,7 +255,7 @@ impl<M: Model> Problem<M> {
         let stays = |unknown: &usize| released.binary_search(unknown).is_err();
         let fixed: Vec<bool> = (0..values.len()).map(|i| self.sd[i] == 0.0 && stays(&i)).collect();
         let candidates = Candidates::new(motions, &by_unknown, &fixed);
-        let equations = pool.install(|| Linearized::of_all(self, values));
+        let equations = ObservationEquations::of_all(self, values, pool);
         let known = self.model.groups_leave_open() && !candidates.move_fixed();
         // One of so many local blocks is tried, and stands for them all.
         let stride = if known { (layout.locals() / TRIED).max(1) } else { 1 };

@@ -3,7 +3,8 @@
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::problem::{Linearized, Model, Problem, Weighted};
+use super::equations::ObservationEquations;
+use super::problem::{Model, Problem, Weighted};
 use crate::normals::{Equations, GroupRows, TieRows};
 
 /// Equations a x = l of unit weight: first those of observations, in the order of groups and rows, then of ties and rows; then one for each
@@ -20,7 +21,7 @@ impl ObservationRows {
     /// At the given values, without the columns of unknowns that are fixed or held.
     pub fn new<M: Model>(problem: &Problem<M>, values: &[f64], held: &[usize], pool: &ThreadPool) -> Self {
         let layout = problem.layout();
-        let equations = pool.install(|| Linearized::new(problem, values, held, None));
+        let equations = ObservationEquations::new(problem, None, values, held, pool);
         let of_locals = problem.for_locals(pool, |buffers, local| {
             let mut found = Self::empty();
             for group in layout.groups_of(local) {

@@ -2,12 +2,9 @@
 
 use std::ops::Range;
 
-use rayon::ThreadPool;
 use smallvec::SmallVec;
 
-use super::group_step::GroupStep;
-use super::loss::Reweighting;
-use crate::normals::{Contribution, Equations, GroupRows, Layout, Prior, System, TieRows, dot};
+use crate::normals::{GroupRows, Layout, Prior, System, TieRows};
 
 /// How observations follow from unknowns.
 pub trait Model: Sync {
@@ -222,7 +219,7 @@ impl<M: Model> Problem<M> {
     }
 
     /// The equations of the unknowns themselves at the given values. A fixed or held unknown has an equation of its own,
-    /// x = 0 with unit weight, and no other (see [`Linearized`]); an outer one has none here.
+    /// x = 0 with unit weight, and no other (see [`super::equations`]); an outer one has none here.
     pub(super) fn prior_equations(&self, values: &[f64], held: &[usize]) -> Prior {
         let mut weight: Vec<f64> =
             self.sd.iter().map(|&sd| if sd == 0.0 { 1.0 } else { (sd * sd).recip() }).collect();
@@ -247,202 +244,6 @@ impl<M: Model> Problem<M> {
     }
 }
 
-/// The equations of a problem at given values of the unknowns: weighted to unit weight, by a loss besides, without fixed unknowns.
-pub(super) struct Linearized<'a, M: Model> {
-    problem: &'a Problem<M>,
-    prepared: M::Prepared,
-    /// Standard deviations of the observations; infinite for those that do not take part.
-    observation_sd: &'a [f64],
-    /// Which unknowns are fixed or held; None where none is.
-    fixed: Option<Vec<bool>>,
-    reweighting: Option<Reweighting>,
-    /// What systems below have left (see [`super::Part`]).
-    contributions: &'a [Contribution<'a>],
-}
-
-impl<'a, M: Model> Linearized<'a, M> {
-    pub fn new(
-        problem: &'a Problem<M>,
-        values: &[f64],
-        held: &[usize],
-        reweighting: Option<Reweighting>,
-    ) -> Self {
-        Self::prepared(problem, problem.model.prepare(values), held, reweighting)
-    }
-
-    /// Of values that are prepared already.
-    pub fn prepared(
-        problem: &'a Problem<M>,
-        prepared: M::Prepared,
-        held: &[usize],
-        reweighting: Option<Reweighting>,
-    ) -> Self {
-        let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
-        held.iter().for_each(|&unknown| fixed[unknown] = true);
-        let fixed = fixed.contains(&true).then_some(fixed);
-        let observation_sd = &problem.observation_sd;
-        Self { problem, prepared, observation_sd, fixed, reweighting, contributions: &[] }
-    }
-
-    /// The same with what systems below have left.
-    pub fn with_contributions(self, contributions: &'a [Contribution<'a>]) -> Self {
-        Self { contributions, ..self }
-    }
-
-    /// The same equations with other standard deviations of the observations.
-    pub fn with_deviations(self, observation_sd: &'a [f64]) -> Self {
-        Self { observation_sd, ..self }
-    }
-
-    /// The same with some unknowns as they are given by other standard deviations: the others stay as they are.
-    pub fn with_unknowns(mut self, unknowns: impl Iterator<Item = usize>, sd: &[f64]) -> Self {
-        if let Some(fixed) = &mut self.fixed {
-            unknowns.for_each(|unknown| fixed[unknown] = sd[unknown] == 0.0);
-        }
-        self
-    }
-
-    /// With the columns of fixed unknowns, and without a loss.
-    pub fn of_all(problem: &'a Problem<M>, values: &[f64]) -> Self {
-        let prepared = problem.model.prepare(values);
-        let observation_sd = &problem.observation_sd;
-        Self { problem, prepared, observation_sd, fixed: None, reweighting: None, contributions: &[] }
-    }
-
-    /// The problem that they are of.
-    pub fn problem(&self) -> &'a Problem<M> {
-        self.problem
-    }
-
-    /// Standard deviation of an observation.
-    pub fn deviation(&self, observation: usize) -> f64 {
-        self.observation_sd[observation]
-    }
-
-    /// The values that the equations are of, prepared.
-    pub fn at(&self) -> &M::Prepared {
-        &self.prepared
-    }
-
-    /// By how much a step lowers the weighted sum of squares of these equations and the priors: sum of Ax (2 l - Ax).
-    pub fn decrease(&self, pool: &ThreadPool, prior: &Prior, step: &[f64]) -> f64 {
-        let layout = self.problem.layout();
-        let observed = self.problem.for_locals(pool, |buffers, local| {
-            let mut sum = 0.0;
-            for group in layout.groups_of(local) {
-                let mut rows = buffers.rows(layout, group);
-                self.write(local, group, &mut rows);
-                let of_group = GroupStep::of(step, layout, local, group);
-                for row in 0..layout.rows() {
-                    let change = of_group.change(&rows, row);
-                    sum += change * (2.0 * rows.constant[row] - change);
-                }
-            }
-            sum
-        });
-        let tied = self.problem.for_ties(|tie, rows| {
-            self.write_tie(tie, rows);
-            let columns: Vec<f64> = layout.tie_columns(tie).map(|column| step[column]).collect();
-            let rows = rows.constant.iter().zip(rows.coefficients.chunks_exact(columns.len()));
-            let decrease = |(constant, coefficients): (&f64, &[f64])| {
-                let change = dot(coefficients, &columns);
-                change * (2.0 * constant - change)
-            };
-            rows.map(decrease).sum::<f64>()
-        });
-        let priors = step.iter().zip(&prior.weight).zip(&prior.right);
-        let between = prior.between.iter().map(|&(i, j, weight)| 2.0 * weight * step[i] * step[j]);
-        observed.iter().chain(&tied).sum::<f64>()
-            + priors.map(|((x, weight), right)| x * (2.0 * right - weight * x)).sum::<f64>()
-            - between.sum::<f64>()
-    }
-}
-
-impl<M: Model> Equations for Linearized<'_, M> {
-    #[inline(always)]
-    fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let layout = self.problem.layout();
-        self.problem.model.observe(&self.prepared, local, group, rows);
-        rows.weigh(&self.observation_sd[group * layout.rows()..][..layout.rows()]);
-        self.adapt(local, group, rows);
-    }
-
-    #[inline(always)]
-    fn write_alike(&self, locals: &[u32], groups: impl Fn(usize) -> usize, rows: &mut GroupRows<'_>) {
-        let model = &self.problem.model;
-        let written = model.observe_alike(&self.prepared, locals, &groups, self.observation_sd, rows);
-        // Most equations are as they shall be; to look for the parts of each takes a division.
-        if written && self.reweighting.is_none() && self.fixed.is_none() {
-            return;
-        }
-        for (t, &local) in locals.iter().enumerate() {
-            let mut rows = rows.part(t, locals.len());
-            if written {
-                self.adapt(local as usize, groups(t), &mut rows);
-            } else {
-                self.write(local as usize, groups(t), &mut rows);
-            }
-        }
-    }
-
-    fn write_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
-        let layout = self.problem.layout();
-        self.problem.model.observe_tie(&self.prepared, tie, rows);
-        let first = layout.groups() * layout.rows();
-        let sd = &self.observation_sd[first..][layout.tie_rows(tie)];
-        weigh(sd, rows.constant, [&mut *rows.coefficients]);
-        if let Some(reweighting) = self.reweighting {
-            reweighting.apply(rows.constant, &mut [&mut *rows.coefficients]);
-        }
-        if let Some(fixed) = &self.fixed {
-            leave_out(rows.coefficients, sd.len(), layout.tie_columns(tie).map(|unknown| fixed[unknown]));
-        }
-    }
-
-    fn contribution(&self, below: usize) -> Option<&Contribution<'_>> {
-        self.contributions.get(below)
-    }
-}
-
-impl<M: Model> Linearized<'_, M> {
-    /// Takes weight off equations of unit weight where a loss says so, and leaves out the columns of fixed unknowns.
-    #[inline(always)]
-    fn adapt(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let GroupRows { constant, local: own, kept, common } = rows;
-        if let Some(reweighting) = self.reweighting {
-            reweighting.apply(constant, &mut [&mut **own, &mut **kept, &mut **common]);
-        }
-        if let Some(fixed) = &self.fixed {
-            let (layout, count) = (self.problem.layout(), constant.len());
-            let of = |unknown: usize| fixed[unknown];
-            leave_out(own, count, layout.local_range(local).map(of));
-            leave_out(kept, count, layout.kept_range(layout.kept_of(group)).map(of));
-            leave_out(common, count, layout.common_columns(group).map(of));
-        }
-    }
-}
-
-impl GroupRows<'_> {
-    /// Gives the equations of a group unit weight.
-    #[inline(always)]
-    fn weigh(&mut self, sd: &[f64]) {
-        weigh(sd, self.constant, [&mut *self.local, &mut *self.kept, &mut *self.common]);
-    }
-}
-
-/// Gives equations unit weight.
-#[inline(always)]
-fn weigh<const N: usize>(sd: &[f64], constant: &mut [f64], mut parts: [&mut [f64]; N]) {
-    let widths = parts.each_ref().map(|part| part.len() / constant.len());
-    for (row, sd) in sd.iter().enumerate() {
-        constant[row] /= sd;
-        let weight = sd.recip();
-        for (part, width) in parts.iter_mut().zip(widths) {
-            part[row * width..][..width].iter_mut().for_each(|value| *value *= weight);
-        }
-    }
-}
-
 /// Puts the equations of unknowns that are weighted together in the place of those of each; none is of a held one.
 fn add_weighted(prior: &mut Prior, own: &Weighted, is_held: &dyn Fn(usize) -> bool) {
     for (i, unknown) in own.unknowns().enumerate().filter(|&(_, unknown)| !is_held(unknown)) {
@@ -451,14 +252,5 @@ fn add_weighted(prior: &mut Prior, own: &Weighted, is_held: &dyn Fn(usize) -> bo
         prior.right[unknown] = own.rows().zip(&own.constant).map(|(row, constant)| row[i] * constant).sum();
         let others = (0..i).filter(|&j| !is_held(own.first + j));
         prior.between.extend(others.map(|j| (unknown, own.first + j, product(j))));
-    }
-}
-
-/// Takes the columns of fixed unknowns out of some equations; `fixed` tells of each column whether it is.
-#[inline(always)]
-fn leave_out(part: &mut [f64], rows: usize, fixed: impl Iterator<Item = bool>) {
-    let width = part.len() / rows;
-    for (column, _) in fixed.enumerate().filter(|&(_, fixed)| fixed) {
-        (0..rows).for_each(|row| part[row * width + column] = 0.0);
     }
 }

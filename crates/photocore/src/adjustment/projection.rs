@@ -1,15 +1,16 @@
 //! What the residuals make of errors: products with R = I - A Q A^T, A being the equations in unit weight.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::factored::{Factored, linearized};
-use super::problem::{Linearized, Model, Problem, Weighted};
+use super::equations::ObservationEquations;
+use super::linearized::Linearized;
+use super::problem::{Model, Problem, Weighted};
 use super::result::AdjustError;
 use super::walk::Buffers;
-use crate::normals::{Equations, TieRows};
+use crate::normals::{Between, Equations, TieRows};
 
 /// Parts that the walk over the local blocks is made of, whatever the number of threads: so sums have the same bits.
 const PARTS: usize = 16;
@@ -25,7 +26,7 @@ impl<M> Problem<M> {
     }
 }
 
-impl Factored {
+impl Linearized {
     /// R z for columns z over the equations of [`Problem::equations`], one after the other; so are the products: what errors z, in
     /// standard deviations, leave as residuals. The same bits for any number of threads; a datum does not matter.
     ///
@@ -36,7 +37,7 @@ impl Factored {
         problem: &Problem<M>,
         mut columns: Vec<f64>,
         pool: &ThreadPool,
-        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+        between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
         let rows = Rows::new(self, problem, pool);
         let rights = pool.install(|| rows.transposed(&columns));
@@ -57,7 +58,7 @@ impl Factored {
 /// The equations at adjusted values, in unit weight.
 struct Rows<'a, M: Model> {
     problem: &'a Problem<M>,
-    equations: Linearized<'a, M>,
+    equations: ObservationEquations<'a, M>,
     /// Which unknowns are fixed or held.
     fixed: Vec<bool>,
     /// Those that are weighted together with others.
@@ -67,14 +68,14 @@ struct Rows<'a, M: Model> {
 }
 
 impl<'a, M: Model> Rows<'a, M> {
-    fn new(factored: &Factored, problem: &'a Problem<M>, pool: &ThreadPool) -> Self {
-        let Factored { values, held, loss, .. } = factored;
+    fn new(linearized: &Linearized, problem: &'a Problem<M>, pool: &ThreadPool) -> Self {
+        let Linearized { values, held, .. } = linearized;
         let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
         held.iter().for_each(|&unknown| fixed[unknown] = true);
         let together = problem.weighted(values);
         let mut alone: Vec<bool> = (0..fixed.len()).map(|i| problem.is_weighted(i) && !fixed[i]).collect();
         together.iter().for_each(|own| alone[own.unknowns()].fill(false));
-        let equations = linearized(problem, *loss, values, held, pool);
+        let equations = linearized.equations(problem, pool);
         Self { problem, equations, fixed, together, alone }
     }
 

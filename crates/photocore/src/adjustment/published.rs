@@ -16,27 +16,27 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let mut state = start;
         let mut previous: Option<f64> = None;
         for number in 1..=self.options.max_iterations {
-            let unknowns = state.unknowns.clone();
-            let Some(solved) = self.solve_unless_lost(state)? else {
-                return Ok(End::lost(unknowns, None));
+            let Some(step) = self.step(&state)? else {
+                return Ok(End::at(Status::Diverged, state.recycle()));
             };
-            let mut iteration =
-                Iteration { number, sum_of_squares: f64::NAN, largest_change: solved.change, damping: 0.0 };
+            let largest_change = state.linearized.change();
+            let mut iteration = Iteration { number, sum_of_squares: f64::NAN, largest_change, damping: 0.0 };
             if let Published::Length { first, count, limit } = rule {
-                let length = solved.step[first..first + count].iter().map(|dx| dx * dx).sum::<f64>().sqrt();
+                let length = step[first..first + count].iter().map(|dx| dx * dx).sum::<f64>().sqrt();
                 if length < limit || number == self.options.max_iterations {
                     let status = if length < limit { Status::Converged } else { Status::NotConverged };
-                    return Ok(End::after(status, unknowns, solved, iteration));
+                    return Ok(End::after(status, state, step, iteration));
                 }
             }
-            let values = self.problem.advanced(&unknowns, &solved.step);
-            state = self.form(values, 0.0)?;
-            let sum = state.sum_of_squares;
+            let next = self.form(self.problem.advanced(state.values(), &step), 0.0)?;
+            let sum = next.linearized.sum_of_squares;
             if !sum.is_finite() {
-                return Ok(End::at(Status::Diverged, unknowns, Some(solved.basis)));
+                return Ok(End::with(Status::Diverged, state));
             }
             iteration.sum_of_squares = sum;
-            self.accept(iteration, &unknowns, &state.unknowns)?;
+            self.accept(iteration, state.values(), next.values())?;
+            state.recycle();
+            state = next;
             if let Published::Percent(percent) = rule {
                 match previous.map(|before| (sum - before) / before * 100.0) {
                     Some(change) if change.abs() < percent => return self.stay(state, Status::Converged),

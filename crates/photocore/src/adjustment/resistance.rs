@@ -2,8 +2,9 @@
 
 use rayon::ThreadPool;
 
+use super::equations::ObservationEquations;
 use super::motions::{Candidates, Sums};
-use super::problem::{Linearized, Model, Problem};
+use super::problem::{Model, Problem};
 use super::walk::Buffers;
 
 /// Kinds of observations, by their numbers: groups are of the first.
@@ -27,7 +28,7 @@ impl<M: Model> Problem<M> {
         let moved = Candidates::by_unknown(&motions, values.len());
         let free = vec![false; values.len()];
         let candidates = Candidates::new(&motions, &moved, &free);
-        let equations = pool.install(|| Linearized::of_all(self, values));
+        let equations = ObservationEquations::of_all(self, values, pool);
         let mut sums: Vec<Sums> = (0..classes.count).map(|_| candidates.sums()).collect();
         let mut buffers = Buffers::default();
         if let Some(groups) = sums.first_mut() {

@@ -5,13 +5,14 @@ use std::time::Instant;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::datum::{Adjusted, AtTarget, Datum, Target, moved};
+use super::datum::{Adjusted, Basis, Datum, Target, moved};
+use super::equations::ObservationEquations;
+use super::linearized::{Forming, Inverting, Linearized};
 use super::loss::Reweighting;
 use super::method::{FIRST_DAMPING, Method, leaves_cofactors};
 use super::options::{Event, Iteration, Options, Phase, Status};
-use super::problem::{Linearized, Model, Problem};
-use super::result::{AdjustError, Adjustment, Seconds, unless_stopped};
-use crate::normals::{Cofactors, Factor, Inversion, Prior};
+use super::problem::{Model, Problem};
+use super::result::{AdjustError, Adjustment, Seconds};
 
 /// Whoever is told on the calling thread what is going on; breaking stops the work.
 pub type Watch<'a> = &'a mut dyn FnMut(Event) -> ControlFlow<()>;
@@ -71,12 +72,12 @@ pub fn adjust_in_datum<M: Model>(
     adjusted(problem, options, Some(Target { datum, reference }), pool, watch, false)
 }
 
-/// Adjusts, and keeps what tests of groups of observations need: [`Tried::of`] takes it over.
+/// Adjusts, and keeps what tests of groups of observations need: [`Leverages::of`] takes it over.
 ///
 /// # Errors
 /// Those of [`adjust`].
 ///
-/// [`Tried::of`]: super::Tried::of
+/// [`Leverages::of`]: super::Leverages::of
 pub fn adjust_by_groups<M: Model>(
     problem: &Problem<M>,
     options: &Options,
@@ -122,10 +123,10 @@ fn adjusted<M: Model>(
         }
     };
     let start = run.form(problem.initial.clone(), damping)?;
-    if !start.sum_of_squares.is_finite() {
+    let initial_sum_of_squares = start.linearized.sum_of_squares;
+    if !initial_sum_of_squares.is_finite() {
         return Err(AdjustError::NotFinite);
     }
-    let initial_sum_of_squares = start.sum_of_squares;
     let end = match options.method {
         Method::Full(rule) => run.full_steps(start, rule)?,
         Method::Damped(stop) => run.damped_steps(start, stop)?,
@@ -138,68 +139,62 @@ fn adjusted<M: Model>(
 /// a loss does no harm.
 const SHORT: f64 = 1.0;
 
-/// The problem linearized at some values, and its normal equations factored.
+/// Where the iterations are.
 pub(super) struct State<'a, M: Model> {
-    pub unknowns: Vec<f64>,
-    pub equations: Linearized<'a, M>,
-    pub prior: Prior,
-    pub factor: Factor,
-    pub damping: f64,
-    /// Whether the second-order term of the loss is taken in.
-    pub curved: bool,
-    pub sum_of_squares: f64,
-    /// Where the network was moved to its datum for it.
-    pub at_target: Option<AtTarget>,
+    pub equations: ObservationEquations<'a, M>,
+    pub linearized: Linearized,
+    /// The values before the network was moved to its datum, where it was.
+    before: Option<Vec<f64>>,
 }
 
 impl<M: Model> State<'_, M> {
+    pub fn values(&self) -> &[f64] {
+        &self.linearized.values
+    }
+
     /// The unknowns as the last step has left them.
     pub fn reached(&self) -> &[f64] {
-        self.at_target.as_ref().map_or(&self.unknowns, |at| &at.before)
+        self.before.as_deref().unwrap_or(self.values())
     }
-}
 
-/// What cofactors are computed from: the factor of the normal equations, and what they were formed from.
-pub(super) struct Basis<'a, M: Model> {
-    pub equations: Linearized<'a, M>,
-    pub prior: Prior,
-    pub factor: Factor,
-    pub at_target: Option<AtTarget>,
-}
+    /// Gives its memory back for the next one; its values.
+    pub fn recycle(self) -> Vec<f64> {
+        self.linearized.recycle(self.equations.problem())
+    }
 
-/// Normal equations solved.
-pub(super) struct Solved<'a, M: Model> {
-    pub basis: Basis<'a, M>,
-    pub step: Vec<f64>,
-    pub change: f64,
+    /// The unknowns that a step moves most.
+    pub fn moved(&self, step: &[f64]) -> Vec<usize> {
+        self.linearized.factor.moved(&self.equations.problem().system, step)
+    }
 }
 
 /// Where the iterations ended. There are no cofactors where the last values leave unknowns undetermined.
 pub(super) struct End<'a, M: Model> {
     pub status: Status,
     pub unknowns: Vec<f64>,
-    pub basis: Option<Basis<'a, M>>,
-    /// Why there is no basis.
+    /// What cofactors are computed from.
+    pub state: Option<State<'a, M>>,
+    /// Why there is none.
     pub undetermined: Option<AdjustError>,
     /// The last iteration and its step, still to be applied: the cofactors hold before it.
     pub last: Option<(Iteration, Vec<f64>)>,
 }
 
 impl<'a, M: Model> End<'a, M> {
-    /// At given values, with what their cofactors are computed from.
-    pub fn at(status: Status, unknowns: Vec<f64>, basis: Option<Basis<'a, M>>) -> Self {
-        Self { status, unknowns, basis, undetermined: None, last: None }
+    /// At given values, without cofactors.
+    pub fn at(status: Status, unknowns: Vec<f64>) -> Self {
+        Self { status, unknowns, state: None, undetermined: None, last: None }
+    }
+
+    /// At values with all that their cofactors are computed from.
+    pub fn with(status: Status, state: State<'a, M>) -> Self {
+        let unknowns = state.values().to_vec();
+        Self { state: Some(state), ..Self::at(status, unknowns) }
     }
 
     /// After one more step, with the cofactors of the equations that have given it.
-    pub fn after(status: Status, unknowns: Vec<f64>, solved: Solved<'a, M>, iteration: Iteration) -> Self {
-        let last = Some((iteration, solved.step));
-        Self { last, ..Self::at(status, unknowns, Some(solved.basis)) }
-    }
-
-    /// Diverged to values that leave unknowns undetermined.
-    pub fn lost(unknowns: Vec<f64>, undetermined: Option<AdjustError>) -> Self {
-        Self { undetermined, ..Self::at(Status::Diverged, unknowns, None) }
+    pub fn after(status: Status, state: State<'a, M>, step: Vec<f64>, iteration: Iteration) -> Self {
+        Self { last: Some((iteration, step)), ..Self::with(status, state) }
     }
 }
 
@@ -237,37 +232,40 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// Ends at the values reached, without a further step. Cofactors are those of the reweighted equations, whose weights can be
     /// told, without second-order term.
     pub(super) fn stay(&mut self, state: State<'a, M>, status: Status) -> Result<End<'a, M>, AdjustError> {
-        let unknowns = state.unknowns.clone();
-        let plain = state.damping == 0.0 && !state.curved;
+        let plain = state.linearized.damping() == 0.0 && !state.linearized.is_curved();
         self.curved = false;
-        let state = if plain { state } else { self.form(state.unknowns, 0.0)? };
-        match self.determined(&state.factor) {
-            Ok(()) => {
-                let State { equations, prior, factor, at_target, .. } = state;
-                let basis = Some(Basis { equations, prior, factor, at_target });
-                Ok(End::at(status, unknowns, basis))
-            }
-            Err(error) => {
-                let status = if status == Status::Converged { status } else { Status::Diverged };
-                Ok(End { status, ..End::lost(unknowns, Some(error)) })
-            }
-        }
+        let state = if plain { state } else { self.form(state.recycle(), 0.0)? };
+        let Some(error) = state.linearized.undetermined() else { return Ok(End::with(status, state)) };
+        let status = if status == Status::Converged { status } else { Status::Diverged };
+        Ok(End { undetermined: Some(error), ..End::at(status, state.recycle()) })
     }
 
-    /// Solves; None where an earlier step has led to values that leave unknowns undetermined. That the initial values do is an
+    /// The step; None where an earlier one has led to values that leave unknowns undetermined. That the initial values do is an
     /// error: then the observations do.
-    pub(super) fn solve_unless_lost(
-        &mut self,
-        state: State<'a, M>,
-    ) -> Result<Option<Solved<'a, M>>, AdjustError> {
-        match self.solve(state) {
-            Err(AdjustError::UndeterminedLocals(_) | AdjustError::Undetermined(_))
-                if !self.iterations.is_empty() =>
-            {
-                Ok(None)
-            }
-            solved => solved.map(Some),
+    pub(super) fn step(&mut self, state: &State<'a, M>) -> Result<Option<Vec<f64>>, AdjustError> {
+        match state.linearized.undetermined() {
+            Some(_) if !self.iterations.is_empty() => return Ok(None),
+            Some(error) => return Err(error),
+            None => {}
         }
+        let start = Instant::now();
+        let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
+        let step = state.linearized.step(&state.equations, &[], self.pool, &mut between)?;
+        self.seconds.solve += start.elapsed().as_secs_f64();
+        Ok(Some(step))
+    }
+
+    /// Solves the same equations for another right-hand side.
+    pub(super) fn solve_again(
+        &mut self,
+        state: &State<'a, M>,
+        right: &[f64],
+    ) -> Result<Vec<f64>, AdjustError> {
+        let start = Instant::now();
+        let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
+        let found = state.linearized.solve_again(&state.equations, right, self.pool, &mut between)?;
+        self.seconds.solve += start.elapsed().as_secs_f64();
+        Ok(found)
     }
 
     /// The weighted sum of squares, of losses where the options ask for a loss, at the given values.
@@ -291,14 +289,13 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a, M>, AdjustError> {
         let near = std::mem::take(&mut self.is_near);
-        let (unknowns, at_target) = match damping == 0.0 && near {
+        let (unknowns, basis, before) = match damping == 0.0 && near {
             true => self.at_its_target(unknowns),
-            false => (unknowns, None),
+            false => (unknowns, None, None),
         };
         let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
-        let rights = at_target.as_ref().map_or(&[][..], |at| &at.rights);
-        let state = self.formed(unknowns, prepared, damping, rights)?;
-        Ok(State { at_target, ..state })
+        let state = self.formed(unknowns, prepared, Forming { damping, basis, for_steps: true })?;
+        Ok(State { before, ..state })
     }
 
     /// Says that the next formation is that after a step, which will be the last one where full steps that converge quadratically say so.
@@ -310,191 +307,81 @@ impl<'a, M: Model> Run<'a, '_, M> {
         self.is_near = self.target.is_some() && next.is_some_and(|next| leaves_cofactors(next, unknowns));
     }
 
-    /// Moves the network to the datum that it is to end in; it stays where it cannot be moved there.
-    fn at_its_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<AtTarget>) {
-        let Some(Target { datum, reference }) = self.target else { return (unknowns, None) };
+    /// Moves the network to the datum that it is to end in; it stays where it cannot be moved there. Also where it was.
+    fn at_its_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<Basis>, Option<Vec<f64>>) {
+        let Some(Target { datum, reference }) = self.target else { return (unknowns, None, None) };
         let adjusted = Adjusted { unknowns: &unknowns, held: &self.datum, loss: None };
         match moved(self.problem, adjusted, datum, reference, self.pool) {
             Ok((there, basis)) => {
-                let rights = basis.rights(self.problem, there.len(), &self.datum, datum);
                 self.has_moved = true;
-                (there, Some(AtTarget { basis, rights, before: unknowns }))
+                (there, Some(basis), Some(unknowns))
             }
-            Err(_) => (unknowns, None),
+            Err(_) => (unknowns, None, None),
         }
     }
 
     /// The same at values that are prepared already.
-    pub(super) fn form_at(
+    pub(super) fn formed(
         &mut self,
         unknowns: Vec<f64>,
         prepared: M::Prepared,
-        damping: f64,
+        forming: Forming,
     ) -> Result<State<'a, M>, AdjustError> {
-        self.formed(unknowns, prepared, damping, &[])
-    }
-
-    /// The same with further right-hand sides.
-    fn formed(
-        &mut self,
-        unknowns: Vec<f64>,
-        prepared: M::Prepared,
-        damping: f64,
-        rights: &[f64],
-    ) -> Result<State<'a, M>, AdjustError> {
-        let start = Instant::now();
         let reweighting = self.options.loss.map(|loss| Reweighting { loss, curved: self.curved });
-        let equations = Linearized::prepared(self.problem, prepared, &self.datum, reweighting);
-        let prior = self.problem.prior_equations(&unknowns, &self.datum);
-        let total = self.problem.layout().locals();
-        let factored = {
-            let mut between = between(&mut *self.watch, Phase::Form, total);
-            let system = &self.problem.system;
-            match rights.is_empty() {
-                true => system.factor(self.pool, &equations, &prior, damping, &mut between),
-                false => system.factor_with(self.pool, &equations, &prior, rights, true, &mut between),
-            }
+        let equations = ObservationEquations::prepared(self.problem, prepared, &self.datum, reweighting);
+        let held = self.datum.clone();
+        let mut linearized = {
+            let mut between = between(&mut *self.watch, Phase::Form, self.problem.layout().locals());
+            Linearized::of(&equations, unknowns, held, forming, self.pool, &mut between)?
         };
-        let factor = unless_stopped(factored)?;
-        let seconds = start.elapsed().as_secs_f64();
-        self.seconds.form += seconds * factor.formation_share;
-        self.seconds.factor += seconds * (1.0 - factor.formation_share);
-        let sum_of_squares = match self.options.loss {
-            None => factor.sum_of_squares + self.problem.prior_sum_of_squares(&unknowns, 0..unknowns.len()),
-            Some(_) => self.objective(&unknowns),
-        };
+        self.seconds.add(&std::mem::take(&mut linearized.seconds));
         self.formations += 1;
-        let curved = self.curved;
-        let at_target = None;
-        Ok(State { unknowns, equations, prior, factor, damping, curved, sum_of_squares, at_target })
-    }
-
-    /// Whether everything is determined.
-    fn determined(&self, factor: &Factor) -> Result<(), AdjustError> {
-        if !factor.deficient_locals.is_empty() {
-            return Err(AdjustError::UndeterminedLocals(factor.deficient_locals.clone()));
+        if self.options.loss.is_some() {
+            linearized.sum_of_squares = self.objective(&linearized.values);
         }
-        factor.deficiency().map_or(Ok(()), |found| Err(AdjustError::Undetermined(found.blocks())))
-    }
-
-    fn solve(&mut self, state: State<'a, M>) -> Result<Solved<'a, M>, AdjustError> {
-        self.determined(&state.factor)?;
-        let State { equations, prior, factor, damping, at_target, .. } = state;
-        let start = Instant::now();
-        let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
-        let system = &self.problem.system;
-        let solved = system.solve(self.pool, &factor, &equations, &prior, damping, &mut between);
-        let step = unless_stopped(solved)?;
-        self.seconds.solve += start.elapsed().as_secs_f64();
-        let change = factor.decrease.sqrt();
-        Ok(Solved { basis: Basis { equations, prior, factor, at_target }, step, change })
-    }
-
-    /// Solves the same equations for another right-hand side.
-    pub(super) fn solve_again(
-        &mut self,
-        basis: &Basis<'a, M>,
-        damping: f64,
-        right: &[f64],
-    ) -> Result<Vec<f64>, AdjustError> {
-        let start = Instant::now();
-        let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
-        let Basis { equations, prior, factor, .. } = basis;
-        let system = &self.problem.system;
-        let solved = system.solve_again(self.pool, factor, equations, prior, damping, right, &mut between);
-        let found = unless_stopped(solved)?;
-        self.seconds.solve += start.elapsed().as_secs_f64();
-        Ok(found)
+        Ok(State { equations, linearized, before: None })
     }
 
     fn finish(mut self, mut end: End<'a, M>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
-        let problem = self.problem;
+        let (problem, options) = (self.problem, self.options);
         let mut unknowns = end.unknowns.clone();
-        let at_target = end.basis.as_mut().and_then(|basis| basis.at_target.take()).zip(self.target);
+        let basis = end.state.as_ref().and_then(|state| state.linearized.basis.as_ref());
+        let is_at_target = basis.is_some();
         if let Some((_, step)) = &mut end.last {
-            if let Some((at, target)) = &at_target {
-                at.basis.take(step, target.datum);
-            }
+            basis.into_iter().for_each(|basis| basis.take(step));
             problem.model.advance(&mut unknowns, step);
         }
-        let residuals = problem.residuals(self.pool, &unknowns);
+        let mut adjustment = Adjustment::at(problem, options.loss, unknowns, self.pool);
         if let Some((last, _)) = end.last {
-            let sum_of_squares =
-                self.observed_sum(&residuals) + problem.prior_sum_of_squares(&unknowns, 0..unknowns.len());
-            self.accept(Iteration { sum_of_squares, ..last }, &end.unknowns, &unknowns)?;
+            let reached = &adjustment.unknowns;
+            let sum_of_squares = self.observed_sum(&adjustment.residuals)
+                + problem.prior_sum_of_squares(reached, 0..reached.len());
+            self.accept(Iteration { sum_of_squares, ..last }, &end.unknowns, reached)?;
         }
-        let (mut cofactors, mut prior_redundancy, mut selected, mut lost) = (None, None, None, None);
-        let asked = self.options.covariance && (self.target.is_none() || at_target.is_some());
-        if let Some(basis) = end.basis.filter(|_| asked) {
-            let (mut found, redundancy) = self.cofactors(basis, &end.unknowns, &at_target)?;
-            lost = at_target.map(|(at, target)| {
-                let transformation = at.basis.transformation(found.further, target.datum);
-                self.pool.install(|| transformation.apply(problem.layout(), &mut found.cofactors))
-            });
-            (cofactors, prior_redundancy) = (Some(found.cofactors), Some(redundancy));
-            selected = self.by_groups.then_some(found.selected);
+        drop(end.unknowns);
+        let asked = options.covariance && (self.target.is_none() || is_at_target);
+        if let Some(State { equations, linearized, .. }) = end.state.filter(|_| asked) {
+            let what = if self.by_groups { Inverting::Groups } else { Inverting::Whole };
+            let mut between = between(&mut *self.watch, Phase::Invert, problem.layout().locals());
+            adjustment.put(problem, linearized.invert(&equations, what, self.pool, &mut between)?);
+            adjustment.redundancy_excess = options.loss.is_none().then(|| adjustment.excess());
         }
-        let redundancy: Option<Vec<f64>> = cofactors
-            .as_ref()
-            .map(|cofactors: &Cofactors| cofactors.equations.iter().map(|share| 1.0 - share).collect());
-        let counts = problem.counts(self.datum.len());
-        let all = redundancy.iter().chain(&prior_redundancy).flatten();
-        let excess = all.sum::<f64>() - counts.degrees_of_freedom() as f64;
+        self.seconds.add(&adjustment.seconds);
         Ok(Adjustment {
             status: end.status,
             initial_sum_of_squares,
             iterations: self.iterations,
             history: self.history,
             last_local_corrections: self.last_local_corrections,
-            weights: self
-                .options
-                .loss
-                .map(|loss| problem.group_squares(&residuals).map(|square| loss.weight(square)).collect()),
-            unknowns,
-            residuals,
-            redundancy_excess: (cofactors.is_some() && self.options.loss.is_none()).then_some(excess),
-            redundancy,
-            prior_redundancy,
-            cofactors,
-            lost,
-            selected,
             undetermined: end.undetermined,
-            counts,
+            counts: problem.counts(self.datum.len()),
             datum: self.datum,
             weak: self.weak,
             collapsed: self.collapsed,
-            operations: problem.system.symbolic().operations(problem.layout()),
             formations: self.formations,
             seconds: self.seconds,
-            ordering: problem.system.symbolic().ordering(),
-            predictions: problem.system.symbolic().predictions().to_vec(),
-            order: problem.system.symbolic().order().to_vec(),
+            ..adjustment
         })
-    }
-
-    /// Cofactors, and the redundancy number of each unknown as an observation of itself; `values` are those of the basis.
-    fn cofactors(
-        &mut self,
-        basis: Basis<'a, M>,
-        values: &[f64],
-        at_target: &Option<(AtTarget, Target<'a>)>,
-    ) -> Result<(Inversion, Vec<f64>), AdjustError> {
-        let Basis { equations, prior, factor, .. } = basis;
-        let start = Instant::now();
-        let mut between = between(&mut *self.watch, Phase::Invert, self.problem.layout().locals());
-        let system = &self.problem.system;
-        let mut found = unless_stopped(match self.by_groups {
-            true => system.invert_by_groups(self.pool, factor, &equations, &prior, &mut between),
-            false => {
-                let rights = at_target.as_ref().map_or(&[][..], |(at, _)| &at.rights);
-                system.invert_with(self.pool, factor, &equations, &prior, rights, &mut between)
-            }
-        })?;
-        let prior_redundancy = self.problem.finish_cofactors(&mut found.cofactors, &self.datum, values);
-        let seconds = start.elapsed().as_secs_f64();
-        self.seconds.invert = seconds * found.inversion_share;
-        self.seconds.cofactors = seconds * (1.0 - found.inversion_share);
-        Ok((found, prior_redundancy))
     }
 
     /// Whether a step has led local blocks to where they harm all others; keeps them.

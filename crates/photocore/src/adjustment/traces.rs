@@ -1,13 +1,12 @@
 //! Sums of squares of the elements of R = I - A Q A^T over groups of equations: what tests of sums and variance components need of it.
 
-use std::ops::ControlFlow;
-
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::factored::Factored;
+use super::linearized::Linearized;
 use super::problem::{Model, Problem};
 use super::result::AdjustError;
+use crate::normals::Between;
 
 /// How sums over R are found.
 #[derive(Debug, Clone, Copy)]
@@ -140,7 +139,7 @@ fn mixed(seed: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-impl Factored {
+impl Linearized {
     /// Sums of `R_ij^2` over every two groups: the Helmert matrix of variance components. The same bits for any number of threads.
     ///
     /// # Errors
@@ -151,7 +150,7 @@ impl Factored {
         groups: &EquationGroups,
         probing: &Probing,
         pool: &ThreadPool,
-        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+        between: Between<'_>,
     ) -> Result<GroupSquares, AdjustError> {
         let (numbered, count) = (Numbered::new(groups, &self.is_equation(problem)), groups.count);
         let (columns, exact) = numbered.columns(count, probing);
@@ -176,7 +175,7 @@ impl Factored {
         classes: usize,
         probing: &Probing,
         pool: &ThreadPool,
-        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+        between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
         let (numbered, classes) = (Numbered::new(groups, &self.is_equation(problem)), classes.max(1));
         let (columns, _) = numbered.columns(classes.min(groups.count), probing);
@@ -197,7 +196,7 @@ impl Factored {
         numbered: &Numbered<'_>,
         (columns, classes): (&[Column], usize),
         pool: &ThreadPool,
-        between: &mut dyn FnMut(usize) -> ControlFlow<()>,
+        between: Between<'_>,
         mut tell: impl FnMut(Column, &[f64]),
     ) -> Result<(), AdjustError> {
         let height = problem.equations().max(1);

@@ -2,11 +2,12 @@
 //! Tingleff 2004, section 3.2).
 
 use super::acceleration::PART;
+use super::linearized::Forming;
 use super::method::{FIRST_DAMPING, Stop};
 use super::options::{Iteration, Status};
 use super::problem::Model;
 use super::result::AdjustError;
-use super::run::{Basis, End, Run, Solved, State};
+use super::run::{End, Run, State};
 
 /// Less would leave the seven pivots of a network without datum among rounding errors.
 const LEAST_DAMPING: f64 = 1e-10;
@@ -94,20 +95,20 @@ impl<'a, M: Model> Run<'a, '_, M> {
         stop: Stop,
     ) -> Result<End<'a, M>, AdjustError> {
         let mut state = start;
-        let mut lowest = state.sum_of_squares;
-        let mut damping = Damping { value: state.damping, rise: 2.0, bends: false };
+        let mut lowest = state.linearized.sum_of_squares;
+        let mut damping = Damping { value: state.linearized.damping(), rise: 2.0, bends: false };
         let mut falls: Vec<f64> = vec![];
         while self.iterations.len() < self.options.max_iterations {
             if damping.value > MOST_DAMPING {
-                return self.rest(state.unknowns, Status::Diverged);
+                return self.rest(state.recycle(), Status::Diverged);
             }
-            let (unknowns, used) = (state.unknowns.clone(), state.damping);
-            let Some(solved) = self.solve_unless_lost(state)? else {
+            let used = state.linearized.damping();
+            let Some(step) = self.step(&state)? else {
                 damping.rise();
-                state = self.form(unknowns, damping.value)?;
+                state = self.form(state.recycle(), damping.value)?;
                 continue;
             };
-            let trial = self.tried(&unknowns, solved, used, lowest, damping.bends)?;
+            let (unknowns, trial) = self.trial(state, &step, lowest, damping.bends)?;
             let whole = used <= FIRST_DAMPING;
             let last = whole && (stop.at_change(trial.change) || stop.at_decrease(trial.predicted, lowest));
             let gain = trial.gain(lowest);
@@ -128,7 +129,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 if self.creeps(&falls, lowest, stop) {
                     return self.rest_in_valley(trial.unknowns, Status::Converged);
                 }
-                state = self.form_at(trial.unknowns, trial.prepared, damping.value)?;
+                let forming = Forming { damping: damping.value, for_steps: true, ..Forming::default() };
+                state = self.formed(trial.unknowns, trial.prepared, forming)?;
             } else if last || trial.predicted <= (ROUNDING * lowest).max(NEGLIGIBLE * NEGLIGIBLE) {
                 return self.rest(unknowns, Status::Converged);
             } else {
@@ -136,54 +138,50 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 state = self.form(unknowns, damping.value)?;
             }
         }
-        self.rest_in_valley(state.unknowns, Status::NotConverged)
+        self.rest_in_valley(state.recycle(), Status::NotConverged)
     }
 
-    /// Where a step leads, and by how much it was predicted to lower the sum of squares.
+    /// Where a step leads, and by how much it was predicted to lower the sum of squares; the values before it.
     ///
-    /// Where the valley bends, the step is accelerated; the plain one is tried besides where that is not good.
-    fn tried(
+    /// Where the valley bends, the step is accelerated; the plain one is taken for comparison where that is not good.
+    fn trial(
         &mut self,
-        before: &[f64],
-        solved: Solved<'a, M>,
-        damping: f64,
+        state: State<'a, M>,
+        step: &[f64],
         lowest: f64,
         bends: bool,
-    ) -> Result<Trial<M::Prepared>, AdjustError> {
-        let Solved { basis, step, change } = solved;
-        let predicted = basis.equations.decrease(self.pool, &basis.prior, &step);
-        let term = if bends { Some(self.second_order(before, &basis, &step, damping)?) } else { None };
-        basis.factor.recycle(&self.problem.system);
+    ) -> Result<(Vec<f64>, Trial<M::Prepared>), AdjustError> {
+        let change = state.linearized.change();
+        let predicted = state.equations.decrease(self.pool, &state.linearized.prior, step);
+        let term = if bends { Some(self.second_order(&state, step)?) } else { None };
+        let before = state.recycle();
         let trial = |step: &[f64], bend: Option<f64>| {
-            let unknowns = self.problem.advanced(before, step);
+            let unknowns = self.problem.advanced(&before, step);
             let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
             let sum_of_squares = self.objective_at(&unknowns, &prepared);
             Trial { unknowns, prepared, sum_of_squares, predicted, change, bend }
         };
-        let Some((term, square)) = term else { return Ok(trial(&step, None)) };
-        let bend = Some(square.max(0.0).sqrt() / change);
-        let along: Vec<f64> = step.iter().zip(&term).map(|(v, a)| v + 0.5 * a).collect();
-        let accelerated = trial(&along, bend);
-        if accelerated.gain(lowest) >= BENDS {
-            return Ok(accelerated);
-        }
-        let plain = trial(&step, bend);
-        let is_better = accelerated.sum_of_squares < plain.sum_of_squares;
-        Ok(if is_better { accelerated } else { plain })
+        let found = match term {
+            None => trial(step, None),
+            Some((term, square)) => {
+                let bend = Some(square.max(0.0).sqrt() / change);
+                let along: Vec<f64> = step.iter().zip(&term).map(|(v, a)| v + 0.5 * a).collect();
+                let accelerated = trial(&along, bend);
+                let good = accelerated.gain(lowest) >= BENDS;
+                let plain = (!good).then(|| trial(step, bend));
+                let lower = |plain: &Trial<_>| accelerated.sum_of_squares < plain.sum_of_squares;
+                plain.filter(|plain| !lower(plain)).unwrap_or(accelerated)
+            }
+        };
+        Ok((before, found))
     }
 
     /// The second-order term a of a step (see [`super::acceleration`]), and a^T (N + damping) a.
-    fn second_order(
-        &mut self,
-        before: &[f64],
-        basis: &Basis<'a, M>,
-        step: &[f64],
-        damping: f64,
-    ) -> Result<(Vec<f64>, f64), AdjustError> {
+    fn second_order(&mut self, state: &State<'a, M>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
         let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
-        let ahead = self.problem.residuals(self.pool, &self.problem.advanced(before, &part));
-        let right = basis.equations.bending(self.pool, &ahead, step);
-        let term = self.solve_again(basis, damping, &right)?;
+        let ahead = self.problem.residuals(self.pool, &self.problem.advanced(state.values(), &part));
+        let right = state.equations.bending(self.pool, &ahead, step);
+        let term = self.solve_again(state, &right)?;
         let square = right.iter().zip(&term).map(|(right, value)| right * value).sum();
         Ok((term, square))
     }
@@ -218,7 +216,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         self.accept(iteration, before, &trial.unknowns)?;
         let ends = self.has_collapsed(before, &trial.prepared)
             || largest_change < SHORT && self.has_run_off(before, &trial.prepared);
-        Ok(ends.then(|| End::at(Status::NotConverged, trial.unknowns.clone(), None)))
+        Ok(ends.then(|| End::at(Status::NotConverged, trial.unknowns.clone())))
     }
 
     /// Ends at the values reached, which steps go on to change, and finds what: a full step, in a datum, moves it by much more than
@@ -229,19 +227,18 @@ impl<'a, M: Model> Run<'a, '_, M> {
         }
         self.curved = false;
         self.hold(&unknowns);
-        let state = self.form(unknowns.clone(), 0.0)?;
-        let Some(Solved { basis, step, change }) = self.solve_unless_lost(state)? else {
-            return self.rest(unknowns, status);
+        let state = self.form(unknowns, 0.0)?;
+        let Some(step) = self.step(&state)? else {
+            return self.rest(state.recycle(), status);
         };
-        let system = &self.problem.system;
-        if basis.factor.largest_share(system, &step) > WEAK * change {
-            self.weak = basis.factor.moved(system, &step);
+        let linearized = &state.linearized;
+        if linearized.factor.largest_share(&self.problem.system, &step) > WEAK * linearized.change() {
+            self.weak = state.moved(&step);
         }
-        if self.options.covariance {
-            return Ok(End::at(status, unknowns, Some(basis)));
-        }
-        basis.factor.recycle(system);
-        Ok(End::at(status, unknowns, None))
+        Ok(match self.options.covariance {
+            true => End::with(status, state),
+            false => End::at(status, state.recycle()),
+        })
     }
 
     /// Holds a datum, unless one has been held from the beginning.
@@ -255,7 +252,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     fn rest(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a, M>, AdjustError> {
         self.hold(&unknowns);
         if !self.options.covariance {
-            return Ok(End::at(status, unknowns, None));
+            return Ok(End::at(status, unknowns));
         }
         self.curved = false;
         let state = self.form(unknowns, 0.0)?;

@@ -9,7 +9,9 @@ use super::model::Owner;
 use super::problem::Assembled;
 use super::state::{InnerConstraints, NetworkDatum, State};
 use super::{Network, NetworkError, Options, Solution};
-use crate::adjustment::{Adjusted, Classes, CofactorError, Datum, Event, Factored, InDatum, Phase};
+use crate::adjustment::{
+    Adjusted, Adjustment, Classes, CofactorError, Datum, Event, Inverted, Linearized, Phase,
+};
 use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::normals::Function;
 
@@ -35,7 +37,7 @@ pub enum Of {
 #[derive(Debug)]
 pub struct Covariances {
     pub(super) assembled: Assembled,
-    pub(super) factored: Factored,
+    pub(super) linearized: Linearized,
     /// How many images the network has.
     pub(super) images: usize,
     /// How many observations beside these.
@@ -71,19 +73,20 @@ impl Network {
         }
         let assembled = self.assembled_again(options, state, pool)?;
         let datum = datum.or(state.datum.as_ref());
-        let factored = {
+        let linearized = {
             let mut between = forming(watch, &assembled);
             let adjusted = state.adjusted(options);
             match datum {
                 None => {
                     let (problem, values, held) =
                         (&assembled.problem, state.unknowns.clone(), state.held.clone());
-                    Factored::form(problem, adjusted.loss, values, held, pool, &mut between)
+                    Linearized::form(problem, adjusted.loss, values, held, pool, &mut between)
+                        .and_then(Linearized::determined)
                         .map_err(|error| NetworkError::new(error, &assembled))?
                 }
                 Some(datum) => {
                     let (datum, _) = self.datum(&assembled, datum)?;
-                    Factored::in_datum(
+                    Linearized::in_datum(
                         &assembled.problem,
                         adjusted,
                         &datum,
@@ -100,7 +103,7 @@ impl Network {
         self.photos.iter().enumerate().for_each(|(index, photo)| photo_of_camera[photo.camera] = Some(index));
         Ok(Covariances {
             assembled,
-            factored,
+            linearized,
             images: self.images.len(),
             observations: self.observations.len(),
             point,
@@ -139,10 +142,10 @@ impl Network {
         let (problem, adjusted) = (&assembled.problem, state.adjusted(options));
         let found = {
             let mut between = forming(watch, &assembled);
-            InDatum::new(problem, adjusted, &carried, reference, pool, &mut between)?
+            Inverted::in_datum(problem, adjusted, &carried, reference, pool, &mut between)?
         };
-        let lost = found.lost;
-        let adjustment = found.into_adjustment(problem, state.held.clone(), adjusted.loss, pool);
+        let adjustment = Adjustment::inverted(problem, adjusted.loss, found, pool);
+        let lost = adjustment.lost.unwrap_or(0.0);
         let left_out = state.collapsed.clone();
         let mut solution = pool.install(|| Solution::new(self, options, &assembled, adjustment, left_out));
         solution.state.datum = Some(datum.clone());
@@ -318,7 +321,7 @@ impl Covariances {
             let mut right = vec![0.0; problem.layout().unknowns()];
             function.iter().for_each(|&(unknown, value)| right[unknown] += value);
             let go_on = &mut |_| ControlFlow::Continue(());
-            let found = self.factored.solve_for(problem, &right, pool, go_on);
+            let found = self.linearized.solve_for(problem, &right, pool, go_on);
             found.map_err(|error| NetworkError::new(error, &self.assembled))
         };
         self.functions(partials, of)?.iter().map(solve).collect()
@@ -334,7 +337,7 @@ impl Covariances {
         let problem = &self.assembled.problem;
         let total = problem.layout().locals();
         let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
-        let found = self.factored.cofactors(problem, rows, columns, self.memory, pool, &mut between);
+        let found = self.linearized.cofactors(problem, rows, columns, self.memory, pool, &mut between);
         found.map_err(|error| match error {
             CofactorError::Adjust(error) => NetworkError::new(error, &self.assembled),
             refused => NetworkError::Cofactors(refused),
@@ -380,7 +383,7 @@ impl Covariances {
                 let width = own.kind.unknowns().len();
                 let Some(block) = model.common_block[common] else { return Ok(vec![vec![]; width]) };
                 let range = model.of_block(block);
-                let by_unknowns = own.at(&self.factored.values()[range.clone()]).about_own_axes();
+                let by_unknowns = own.at(&self.linearized.values()[range.clone()]).about_own_axes();
                 let row = |i: usize| range.clone().zip(by_unknowns.row(i).iter().copied()).collect();
                 Ok((0..width).map(row).collect())
             }
@@ -407,7 +410,7 @@ impl Covariances {
     /// The pose of a photo that is mounted, by the unknowns of its frame and its sensor.
     fn mounted(&self, photo: usize, step: bool) -> Vec<Function> {
         let model = &self.assembled.problem.model;
-        let unknowns = &self.factored.values()[model.of_stations()];
+        let unknowns = &self.linearized.values()[model.of_stations()];
         let Some((orientation, own)) = model.on_frame(photo, unknowns) else { return vec![] };
         let reported = || model.reported(&orientation).1.unwrap_or_else(|| Matrix6::repeat(f64::NAN));
         let to = if step { Matrix6::identity() } else { reported() };
@@ -427,7 +430,7 @@ impl Covariances {
     fn attitude(&self, photo: usize, step: bool) -> Matrix3 {
         let model = &self.assembled.problem.model;
         let PoseNumbers::Angles(sense) = model.poses else { return Matrix3::identity() };
-        let pose = &self.factored.values()[model.of_block(photo)];
+        let pose = &self.linearized.values()[model.of_block(photo)];
         let (numbers, angles) = (AttitudeNumbers::OmegaPhiKappa(sense), [pose[3], pose[4], pose[5]]);
         match (model.turning_sense(photo).is_some(), step) {
             (true, true) | (false, false) => Matrix3::identity(),

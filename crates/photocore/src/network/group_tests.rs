@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::NetworkError;
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
-use crate::adjustment::{Few, GroupTest, Tried, Weighted};
+use crate::adjustment::{Few, GroupTest, Leverages, Weighted};
 use crate::normals::GroupCofactors;
 
 /// Tests of all suspects; the rows and square blocks of one stand after those of another.
@@ -144,7 +144,7 @@ impl Trial {
     fn test(
         &self,
         suspect: &Suspect,
-        found: &Tried,
+        found: &Leverages,
         groups: &GroupCofactors,
         weighted: &[Weighted],
     ) -> Option<Tested> {
@@ -196,7 +196,7 @@ impl Trial {
     }
 
     /// The test of an image of a local point: nearly all are.
-    fn image_test(&self, group: usize, found: &Tried, groups: &GroupCofactors) -> Option<Tested> {
+    fn image_test(&self, group: usize, found: &Leverages, groups: &GroupCofactors) -> Option<Tested> {
         let rows = 2 * group..2 * group + 2;
         if self.assembled.problem.observation_sd[rows.clone()].iter().any(|sd| sd.is_infinite()) {
             return None;
@@ -222,7 +222,7 @@ impl Trial {
     fn shares(
         &self,
         suspect: &Suspect,
-        found: &Tried,
+        found: &Leverages,
         groups: &GroupCofactors,
         weighted: &[Weighted],
         taking: &[usize],
@@ -286,7 +286,7 @@ impl Trial {
     }
 
     /// The cofactors of the unknowns of a point or block.
-    pub(super) fn cofactors_at(&self, found: &Tried, home: Home) -> DMatrix<f64> {
+    pub(super) fn cofactors_at(&self, found: &Leverages, home: Home) -> DMatrix<f64> {
         let (model, kept) = (&self.assembled.problem.model, &found.cofactors.kept);
         let width = self.unknowns_at(home).len();
         let values = match home {

@@ -44,11 +44,11 @@ impl Covariances {
         let problem = &self.assembled.problem;
         let total = problem.layout().locals();
         let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
-        let found = self.factored.group_squares(problem, &groups, probing, pool, &mut between);
+        let found = self.linearized.group_squares(problem, &groups, probing, pool, &mut between);
         found.map_err(|error| self.named(error))
     }
 
-    /// The same within each of many groups, which share the columns of so many classes (see [`crate::adjustment::Factored::own_squares`]).
+    /// The same within each of many groups, which share the columns of so many classes (see [`crate::adjustment::Linearized::own_squares`]).
     ///
     /// # Errors
     /// Those of [`Covariances::group_squares`].
@@ -64,7 +64,7 @@ impl Covariances {
         let problem = &self.assembled.problem;
         let total = problem.layout().locals();
         let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
-        let found = self.factored.own_squares(problem, &groups, classes, probing, pool, &mut between);
+        let found = self.linearized.own_squares(problem, &groups, classes, probing, pool, &mut between);
         found.map_err(|error| self.named(error))
     }
 
@@ -93,7 +93,7 @@ impl Covariances {
         }
         let total = problem.layout().locals();
         let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
-        let u = self.factored.project(problem, z, pool, &mut between).map_err(|error| self.named(error))?;
+        let u = self.linearized.project(problem, z, pool, &mut between).map_err(|error| self.named(error))?;
         let mut found = vec![0.0; columns.len()];
         for (found, u) in found.chunks_exact_mut(width).zip(u.chunks_exact(height)) {
             for (row, &image) in order.iter().enumerate() {

@@ -9,7 +9,7 @@ use super::error::{Combination, PosePart};
 use super::model::Owner;
 use super::problem::Assembled;
 use super::{Network, NetworkError};
-use crate::adjustment::{AdjustError, NormalEquations};
+use crate::adjustment::{AdjustError, Linearized};
 use crate::geometry::{PoseNumbers, Vector3};
 
 /// What takes part by less than this share of all, of n_ii x_i^2 summed up, is not named.
@@ -76,10 +76,10 @@ impl Network {
         let problem = &assembled.problem;
         let held = problem.to_hold(values, pool);
         let between = &mut |_| ControlFlow::Continue(());
-        let Ok(equations) = NormalEquations::form(problem, values, &held, pool, between) else {
+        let Ok(linearized) = Linearized::form(problem, None, values.to_vec(), held, pool, between) else {
             return error;
         };
-        let named = equations.combinations();
+        let named = linearized.combinations(problem.layout());
         if named.len() == combinations.len() {
             combinations
                 .iter_mut()

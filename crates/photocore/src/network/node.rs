@@ -1,8 +1,8 @@
 //! A node of the elimination tree of a network that is adjusted in parts: Helmert blocking (Helmert 1880; Wolf 1978).
 //!
 //! A node is a network of its own: the photos at home in it and those that other nodes eliminate after it, the points whose first photo in
-//! the order of elimination is at home here, all their images, and the observations at home likewise. See [`crate::adjustment::Part`] for
-//! what is done with it.
+//! the order of elimination is at home here, all their images, and the observations at home likewise. See
+//! [`crate::adjustment::Linearized::of_part`] for what is done with it.
 
 use rayon::ThreadPool;
 
@@ -10,7 +10,7 @@ use super::problem::Assembled;
 use super::solution::{observations, sums_of_squares};
 use super::surroundings::{BlockOf, Surroundings};
 use super::{Dropped, Image, Network, NetworkError, Options, Point, Solution, SumsOfSquares};
-use crate::adjustment::{Adjustment, Counts, Model, Part, PartError, Watch};
+use crate::adjustment::{Adjustment, Counts, Linearized, Model, PartError, Watch};
 use crate::normals::{Contribution, Operations, packed};
 
 /// A node, its blocks ordered; it has no values.
@@ -26,7 +26,7 @@ pub struct Node {
 /// A node at given values, what is at home in it eliminated.
 #[derive(Debug)]
 pub struct FormedNode {
-    part: Part,
+    part: Linearized,
 }
 
 /// What a node takes, from its pattern alone.
@@ -236,7 +236,7 @@ impl Node {
     ) -> Result<FormedNode, NetworkError> {
         self.check(&[state])?;
         let problem = &self.assembled.problem;
-        let part = Part::form(problem, state.to_vec(), contributions, damping, pool, watch);
+        let part = Linearized::of_part(problem, state.to_vec(), contributions, damping, pool, watch);
         Ok(FormedNode { part: part.map_err(|error| self.named(error))? })
     }
 
@@ -256,7 +256,7 @@ impl Node {
         pool: &ThreadPool,
         watch: Watch<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
-        formed.part.solve(&self.assembled.problem, outer, pool, watch).map_err(|error| self.named(error))
+        formed.part.solve_part(&self.assembled.problem, outer, pool, watch).map_err(|error| self.named(error))
     }
 
     /// What is adjusted here, with its cofactors, and the cofactors that each node below needs for its own: lower triangles, column by column.
@@ -276,7 +276,7 @@ impl Node {
     ) -> Result<(Solution, Vec<Vec<f64>>), NetworkError> {
         self.check(&[state])?;
         let problem = &self.assembled.problem;
-        let found = formed.part.invert(problem, outer, state.to_vec(), pool, watch);
+        let found = formed.part.invert_part(problem, outer, state.to_vec(), pool, watch);
         let (adjustment, below) = found.map_err(|error| self.named(error))?;
         Ok((self.told(adjustment, pool), below))
     }

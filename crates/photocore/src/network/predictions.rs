@@ -9,7 +9,7 @@ use super::NetworkError;
 use super::group_tests::{in_units, sub};
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
-use crate::adjustment::{TieCofactors, Tried, Weighted};
+use crate::adjustment::{Leverages, TieCofactors, Weighted};
 use crate::normals::{LocalCofactors, dot};
 
 /// What is out against what the rest predicts of it.
@@ -88,7 +88,7 @@ impl Trial {
         &self,
         suspects: &[usize],
         observation_sd: &[f64],
-        found: &Tried,
+        found: &Leverages,
         pool: &ThreadPool,
     ) -> Around {
         let problem = &self.assembled.problem;
@@ -115,7 +115,7 @@ impl Trial {
         suspect: &Suspect,
         out: &[usize],
         shares: &[f64],
-        found: &Tried,
+        found: &Leverages,
         weighted: &[Weighted],
     ) -> Option<Prediction> {
         let count = out.len();
@@ -219,7 +219,7 @@ impl Trial {
         &self,
         place: usize,
         (observation_sd, sd): (&[f64], &[f64]),
-        found: &Tried,
+        found: &Leverages,
         weighted: &[Weighted],
     ) -> (Vec<usize>, Vec<f64>) {
         let problem = &self.assembled.problem;

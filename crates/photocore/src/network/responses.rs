@@ -11,7 +11,7 @@ use super::covariance::{Covariances, Of};
 use super::model::Owner;
 use super::suspects::{Home, Row};
 use super::trial::Trial;
-use crate::adjustment::{AdjustError, NormalEquations, ObservationRows};
+use crate::adjustment::{AdjustError, Linearized, ObservationRows};
 use crate::geometry::{AttitudeNumbers, Matrix3};
 
 /// Right-hand sides at a time.
@@ -121,13 +121,13 @@ impl Trial {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let go_on = &mut |_| ControlFlow::Continue(());
         let failed = |error: AdjustError| NetworkError::new(error, &self.assembled);
-        let normal =
-            NormalEquations::form(problem, &found.values, &found.held, pool, go_on).map_err(failed)?;
+        let (values, held) = (found.values.clone(), found.held.clone());
+        let linearized = Linearized::form(problem, None, values, held, pool, go_on).map_err(failed)?;
         let equations = ObservationRows::new(problem, &found.values, &found.held, pool);
         let unknowns = problem.layout().unknowns();
         for (batch, some) in of.chunks(TOGETHER).enumerate() {
             let rights: Vec<f64> = some.iter().flat_map(|&row| equations.right(row, unknowns)).collect();
-            let solutions = normal.solve_for(&rights, go_on).map_err(failed)?;
+            let solutions = linearized.solve_for(problem, &rights, pool, go_on).map_err(failed)?;
             for (i, solution) in solutions.chunks_exact(unknowns).enumerate() {
                 take(batch * TOGETHER + i, solution, &equations);
             }

@@ -9,7 +9,7 @@ use super::{
     AdjustedCamera, AdjustedCommon, AdjustedObservation, AdjustedPhoto, AdjustedPoint, Converged, Dropped,
     KindSums, Network, NetworkError, Options, State, UnitVariance, WeakPoint,
 };
-use crate::adjustment::{Adjustment, Observed, Problem, Tried};
+use crate::adjustment::{Adjustment, Leverages, Observed, Problem};
 
 /// A redundancy of less is rounding.
 const LEAST_REDUNDANCY: f64 = 1e-9;
@@ -140,7 +140,7 @@ impl Solution {
         assembled: &Assembled,
         mut adjustment: Adjustment,
         collapsed: Vec<usize>,
-    ) -> (Self, Option<Tried>) {
+    ) -> (Self, Option<Leverages>) {
         let Assembled { problem, dropped, .. } = assembled;
         let unknowns = std::mem::take(&mut adjustment.unknowns);
         let observations = observations(network, problem, &adjustment);
@@ -202,7 +202,8 @@ impl Solution {
         let squares = solution.find_behind(assembled, &unknowns);
         let (model, points) = (&problem.model, &assembled.points[..]);
         solution.weak_points = network.weak_points(model, points, &solution.points, &squares);
-        let found = Tried::of(problem, &unknowns, &mut solution.adjustment);
+        let found = Leverages::of(&mut solution.adjustment, &unknowns);
+        let found = found.filter(|_| solution.adjustment.holds_after_last_step());
         solution.state.unknowns = unknowns;
         solution.adjustment.cofactors = None;
         solution.adjustment.release_observations();

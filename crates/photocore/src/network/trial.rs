@@ -7,7 +7,7 @@ use super::problem::Assembled;
 use super::state::State;
 use super::suspects::{Home, Row, Subject, Suspect};
 use super::{Network, NetworkError, Options};
-use crate::adjustment::{self, AdjustError, Loss, Method, Status, Stop, Tried, Watch, Weighted};
+use crate::adjustment::{self, AdjustError, Leverages, Loss, Method, Status, Stop, Watch, Weighted};
 use crate::geometry::PoseNumbers;
 
 /// A network tried without some of its observations.
@@ -28,7 +28,7 @@ pub struct Trial {
     pub(super) on_place: Vec<Vec<usize>>,
     /// What was held for a datum where the adjustment has ended.
     held: Vec<usize>,
-    found: Option<Tried>,
+    found: Option<Leverages>,
     /// Whether that is the network as its adjustment has ended, with everything in it.
     stands: bool,
 }
@@ -42,7 +42,7 @@ pub struct Trial {
 pub struct Converged {
     assembled: Assembled,
     options: adjustment::Options,
-    found: Tried,
+    found: Leverages,
 }
 
 /// What is out.
@@ -72,7 +72,7 @@ pub struct Outcome {
 }
 
 impl Converged {
-    pub(super) fn new(assembled: Assembled, options: adjustment::Options, found: Tried) -> Self {
+    pub(super) fn new(assembled: Assembled, options: adjustment::Options, found: Leverages) -> Self {
         assembled.problem.system.release();
         Self { assembled, options, found }
     }
@@ -121,7 +121,7 @@ impl Trial {
         assembled: Assembled,
         options: &adjustment::Options,
         held: Vec<usize>,
-        found: Option<Tried>,
+        found: Option<Leverages>,
     ) -> Self {
         let suspects = network.suspects(&assembled);
         let (mut row_starts, mut block_starts) = (vec![0], vec![0]);
@@ -185,13 +185,16 @@ impl Trial {
     /// # Errors
     /// Values that leave unknowns undetermined; an interruption, no memory.
     pub fn stand(&mut self, pool: &ThreadPool, watch: Watch<'_>) -> Result<Outcome, NetworkError> {
-        if let Some(found) = self.found.take_if(|_| self.stands) {
-            return self.keep(Ok(found));
-        }
-        self.take_out(Out::default());
-        let problem = &self.assembled.problem;
-        let found = Tried::at(problem, problem.initial.clone(), self.held.clone(), pool, watch);
-        self.keep(found)
+        let found = match self.found.take_if(|_| self.stands) {
+            Some(found) => found,
+            None => {
+                self.take_out(Out::default());
+                let problem = &self.assembled.problem;
+                Leverages::at(problem, problem.initial.clone(), self.held.clone(), pool, watch)
+                    .map_err(|error| NetworkError::new(error, &self.assembled))?
+            }
+        };
+        Ok(self.keep(found, Status::Converged, 0, vec![]))
     }
 
     /// Adjusts without what is out, from where the last trial has ended.
@@ -209,9 +212,16 @@ impl Trial {
     ) -> Result<Outcome, NetworkError> {
         self.stands = false;
         self.take_out(out);
-        let options = adjustment::Options { method: self.method(tolerance), ..self.options };
-        let found = Tried::adjust(&self.assembled.problem, &options, pool, watch);
-        self.keep(found)
+        let method = self.method(tolerance);
+        let options = adjustment::Options { method, covariance: true, loss: None, ..self.options };
+        let failed = |error| NetworkError::new(error, &self.assembled);
+        let adjusted = adjustment::adjust_by_groups(&self.assembled.problem, &options, pool, watch);
+        let mut adjusted = adjusted.map_err(failed)?;
+        let values = std::mem::take(&mut adjusted.unknowns);
+        let Some(found) = Leverages::of(&mut adjusted, &values) else {
+            return Err(failed(adjusted.undetermined.unwrap_or(AdjustError::NotFinite)));
+        };
+        Ok(self.keep(found, adjusted.status, adjusted.iterations.len(), adjusted.collapsed))
     }
 
     /// Adjusts with a robust loss from where the last trial has ended, and stays there: the factors by which it has changed the weights
@@ -283,19 +293,24 @@ impl Trial {
         }
     }
 
-    fn keep(&mut self, found: Result<Tried, AdjustError>) -> Result<Outcome, NetworkError> {
-        let found = found.map_err(|error| NetworkError::new(error, &self.assembled))?;
+    fn keep(
+        &mut self,
+        found: Leverages,
+        status: Status,
+        iterations: usize,
+        collapsed: Vec<usize>,
+    ) -> Outcome {
         self.assembled.problem.initial.clone_from(&found.values);
         let points = &self.assembled.points;
         let outcome = Outcome {
-            status: found.status,
-            iterations: found.iterations,
-            sum_of_squares: found.sum_of_squares,
+            status,
+            iterations,
+            sum_of_squares: found.sum_of_squares(&self.assembled.problem),
             degrees_of_freedom: found.degrees_of_freedom(&self.assembled.problem),
-            collapsed: found.collapsed.iter().map(|&local| points[local]).collect(),
+            collapsed: collapsed.into_iter().map(|local| points[local]).collect(),
         };
         self.found = Some(found);
-        Ok(outcome)
+        outcome
     }
 
     /// Weights of zero for what is out; points and photos that are out stay where they are.
@@ -325,7 +340,7 @@ impl Trial {
         }
     }
 
-    pub(super) fn found(&self) -> Result<&Tried, NetworkError> {
+    pub(super) fn found(&self) -> Result<&Leverages, NetworkError> {
         self.found.as_ref().ok_or(NetworkError::State)
     }
 

@@ -72,7 +72,7 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use crate::adjustment::{self, AdjustError, Event, NormalEquations, Phase, Problem};
+use crate::adjustment::{self, AdjustError, Event, Linearized, Phase, Problem};
 use crate::geometry::Station;
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
@@ -229,8 +229,9 @@ impl Calibration {
         if options.whole && adjusted.cofactors.is_some() {
             let total = problem.layout().locals();
             let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
-            let normal = NormalEquations::form(&problem, &adjusted.unknowns, &[], pool, &mut between);
-            whole = of_parameters(&normal.map_err(|error| self.named(&problem, error, pool))?);
+            let values = adjusted.unknowns.clone();
+            let normal = Linearized::form(&problem, None, values, vec![], pool, &mut between);
+            whole = of_parameters(&normal.map_err(|error| self.named(&problem, error, pool))?, &problem);
         }
         Solution::new(self, options, &problem, adjusted, whole)
     }
@@ -242,20 +243,20 @@ impl Calibration {
     /// A calibration that contradicts itself; stars without images at the initial values.
     pub fn without_effect(&self, pool: &ThreadPool) -> Result<Vec<usize>, StellarError> {
         let problem = self.problem(1.0, Partials::Exact)?;
-        let normal = self.formed(&problem, &[], pool)?;
-        Ok(parameters_of(&problem, normal.without_effect()))
+        let normal = self.formed(&problem, vec![], pool)?;
+        Ok(parameters_of(&problem, normal.without_effect(problem.layout())))
     }
 
     /// The normal equations at the initial values, some unknowns held.
-    fn formed<'a>(
+    fn formed(
         &self,
-        problem: &'a Problem<StarImages<'a>>,
-        held: &'a [usize],
-        pool: &'a ThreadPool,
-    ) -> Result<NormalEquations<'a, StarImages<'a>>, StellarError> {
+        problem: &Problem<StarImages<'_>>,
+        held: Vec<usize>,
+        pool: &ThreadPool,
+    ) -> Result<Linearized, StellarError> {
         let failed = |error| self.named(problem, error, pool);
-        let normal =
-            NormalEquations::form(problem, &problem.initial, held, pool, &mut go_on).map_err(failed)?;
+        let normal = Linearized::form(problem, None, problem.initial.clone(), held, pool, &mut go_on)
+            .map_err(failed)?;
         if normal.sum_of_squares().is_finite() { Ok(normal) } else { Err(failed(AdjustError::NotFinite)) }
     }
 
@@ -274,8 +275,9 @@ impl Calibration {
             }
             // The initial values are those that leave parameters undetermined.
             AdjustError::Undetermined(_) => {
-                let normal = NormalEquations::form(problem, &problem.initial, &[], pool, &mut go_on);
-                let found = normal.map_or(vec![], |normal| normal.undetermined());
+                let initial = problem.initial.clone();
+                let normal = Linearized::form(problem, None, initial, vec![], pool, &mut go_on);
+                let found = normal.map_or(vec![], |normal| normal.undetermined_unknowns(problem.layout()));
                 let named = found.into_iter().map(|unknowns| parameters_of(problem, unknowns));
                 StellarError::Undetermined(named.collect())
             }
@@ -367,8 +369,8 @@ impl Calibration {
 
 /// Natural logarithm of the determinant of the normal equations reduced to the parameters, and the cofactors of every two parameters;
 /// None where some are not determined.
-fn of_parameters(normal: &NormalEquations<'_, StarImages<'_>>) -> Option<(f64, Vec<f64>)> {
-    normal.log_determinant().map(|log_determinant| (log_determinant, normal.cofactors()))
+fn of_parameters(normal: &Linearized, problem: &Problem<StarImages<'_>>) -> Option<(f64, Vec<f64>)> {
+    normal.log_determinant().map(|log_determinant| (log_determinant, normal.reduced_cofactors(problem)))
 }
 
 /// The parameters among unknowns.

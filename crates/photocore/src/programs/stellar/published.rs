@@ -43,23 +43,22 @@ impl Calibration {
     /// Stars or parameters that are not determined, stars without images.
     pub fn correction(&self, tolerances: &Tolerances, pool: &ThreadPool) -> Result<Correction, StellarError> {
         let problem = self.problem(1.0, Partials::Published(*tolerances))?;
-        let first = self.formed(&problem, &[], pool)?;
-        let idle = first.without_effect();
-        let normal = if idle.is_empty() { first } else { self.formed(&problem, &idle, pool)? };
-        if !normal.undetermined_locals().is_empty() {
-            let locals = normal.undetermined_locals().to_vec();
-            return Err(self.named(&problem, AdjustError::UndeterminedLocals(locals), pool));
+        let (first, layout) = (self.formed(&problem, vec![], pool)?, problem.layout());
+        let idle = first.without_effect(layout);
+        let normal = if idle.is_empty() { first } else { self.formed(&problem, idle.clone(), pool)? };
+        if let Some(error @ AdjustError::UndeterminedLocals(_)) = normal.undetermined() {
+            return Err(self.named(&problem, error, pool));
         }
         let undetermined = || {
-            let combinations = normal.undetermined().into_iter();
+            let combinations = normal.undetermined_unknowns(layout).into_iter();
             StellarError::Undetermined(combinations.map(|each| parameters_of(&problem, each)).collect())
         };
-        let (log_determinant, cofactors) = of_parameters(&normal).ok_or_else(undetermined)?;
+        let (log_determinant, cofactors) = of_parameters(&normal, &problem).ok_or_else(undetermined)?;
         Ok(Correction {
-            parameters: normal.corrections(),
+            parameters: normal.reduced_corrections(layout),
             cofactors,
             log_determinant,
-            without_effect: parameters_of(&problem, idle.clone()),
+            without_effect: parameters_of(&problem, idle),
         })
     }
 

@@ -1,4 +1,4 @@
-//! A problem where some observations are tried without: adjusted from its last values, with all that tests of groups need.
+//! What tests of groups of observations need of a problem at adjusted values: residuals, cofactors, and leverages a Q a^T of any equations.
 //!
 //! What is left out has an infinite standard deviation: its equations stand in the normal equations with weight zero, so that pattern,
 //! order and symbolic factorisation stay, and cofactors of what is out are inside the pattern too.
@@ -7,16 +7,17 @@ use nalgebra::DMatrix;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::method::NEGLIGIBLE;
-use super::options::{Event, Options, Phase, Status};
-use super::problem::{Linearized, Model, Problem};
-use super::result::{AdjustError, Adjustment, unless_stopped};
-use super::run::{Watch, adjust_by_groups};
+use super::equations::ObservationEquations;
+use super::linearized::{Forming, Inverted, Inverting, Linearized};
+use super::options::Phase;
+use super::problem::{Model, Problem};
+use super::result::{AdjustError, Adjustment};
+use super::run::{Watch, between};
 use crate::normals::{Cofactors, Equations, LocalCofactors, Prior, SelectedInverse, TieRows};
 
 /// A problem at adjusted values, with cofactors of everything inside the pattern of its normal equations.
 #[derive(Debug)]
-pub struct Tried {
+pub struct Leverages {
     /// The unknowns, in the order of the layout.
     pub values: Vec<f64>,
     /// Those of them that were held for a datum.
@@ -25,14 +26,6 @@ pub struct Tried {
     pub residuals: Vec<f64>,
     /// Cofactors, those of groups among them.
     pub cofactors: Cofactors,
-    /// Weighted sum of squares of what takes part.
-    pub sum_of_squares: f64,
-    /// How the iterations have ended.
-    pub status: Status,
-    /// How many there were.
-    pub iterations: usize,
-    /// Local blocks that have run to where they harm all others (see [`Model::collapsed`]).
-    pub collapsed: Vec<usize>,
     selected: SelectedInverse,
 }
 
@@ -45,59 +38,16 @@ pub struct TieCofactors {
     pub blocks: Vec<(usize, Vec<f64>)>,
 }
 
-impl Tried {
-    /// Adjusts a problem from its initial values.
-    ///
-    /// # Errors
-    /// Those of [`super::adjust`]; values that leave unknowns undetermined.
-    pub fn adjust<M: Model>(
-        problem: &Problem<M>,
-        options: &Options,
-        pool: &ThreadPool,
-        watch: Watch<'_>,
-    ) -> Result<Self, AdjustError> {
-        let options = Options { covariance: true, loss: None, ..*options };
-        let found = adjust_by_groups(problem, &options, pool, watch)?;
-        let (Some(cofactors), Some(selected)) = (found.cofactors, found.selected) else {
-            return Err(found.undetermined.unwrap_or(AdjustError::NotFinite));
-        };
-        Ok(Self {
-            sum_of_squares: total(problem, &found.residuals, &found.unknowns),
-            values: found.unknowns,
-            held: found.datum,
-            residuals: found.residuals,
-            cofactors,
-            status: found.status,
-            iterations: found.iterations.len(),
-            collapsed: found.collapsed,
-            selected,
-        })
-    }
-
-    /// Takes over where [`adjust_by_groups`] has converged at given values, without forming anything again: the cofactors of the
-    /// adjustment, which were formed before its last step, and its residuals. None where it has not converged, or this step is so long
-    /// that cofactors after it are others; such a problem is for [`Tried::at`].
-    pub fn of<M: Model>(problem: &Problem<M>, values: &[f64], adjustment: &mut Adjustment) -> Option<Self> {
-        let last = adjustment.iterations.last().map_or(0.0, |iteration| iteration.largest_change);
-        let plain = adjustment.weights.is_none() && adjustment.lost.is_none();
-        let settled = adjustment.status == Status::Converged && last <= NEGLIGIBLE && plain;
-        let selected = adjustment.selected.take().filter(|_| settled)?;
-        let cofactors = adjustment.cofactors.take()?;
+impl Leverages {
+    /// Takes over what an adjustment by groups ([`super::adjust_by_groups`]) has kept, at the values where it ended; None where it has
+    /// kept nothing.
+    pub fn of(adjustment: &mut Adjustment, values: &[f64]) -> Option<Self> {
+        let (selected, cofactors) = (adjustment.selected.take()?, adjustment.cofactors.take()?);
         let residuals = std::mem::take(&mut adjustment.residuals);
-        Some(Self {
-            sum_of_squares: total(problem, &residuals, values),
-            values: values.to_vec(),
-            held: adjustment.datum.clone(),
-            residuals,
-            cofactors,
-            status: Status::Converged,
-            iterations: 0,
-            collapsed: vec![],
-            selected,
-        })
+        Some(Self { values: values.to_vec(), held: adjustment.datum.clone(), residuals, cofactors, selected })
     }
 
-    /// Takes a problem as it stands at given values, some unknowns held there.
+    /// Takes a problem as it is at given values, some unknowns held there.
     ///
     /// # Errors
     /// Values that leave unknowns undetermined; an interruption, no memory.
@@ -108,33 +58,19 @@ impl Tried {
         pool: &ThreadPool,
         watch: Watch<'_>,
     ) -> Result<Self, AdjustError> {
-        let total_locals = problem.layout().locals();
-        let mut between = |done| watch(Event::Progress { phase: Phase::Form, done, total: total_locals });
-        let equations = pool.install(|| Linearized::new(problem, &values, &held, None));
-        let prior = problem.prior_equations(&values, &held);
-        let system = &problem.system;
-        let factor = unless_stopped(system.factor_with(pool, &equations, &prior, &[], false, &mut between))?;
-        if !factor.deficient_locals.is_empty() {
-            return Err(AdjustError::UndeterminedLocals(factor.deficient_locals.clone()));
-        }
-        if let Some(deficiency) = factor.deficiency() {
-            return Err(AdjustError::Undetermined(deficiency.blocks()));
-        }
-        let found = unless_stopped(system.invert_by_groups(pool, factor, &equations, &prior, &mut between))?;
-        let mut cofactors = found.cofactors;
-        problem.finish_cofactors(&mut cofactors, &held, &values);
+        let mut between = between(watch, Phase::Form, problem.layout().locals());
+        let equations = ObservationEquations::new(problem, None, &values, &held, pool);
+        let formed = Linearized::of(&equations, values, held, Forming::default(), pool, &mut between)?;
+        let found = formed.determined()?.invert(&equations, Inverting::Groups, pool, &mut between)?;
+        let Inverted { values, held, cofactors, selected, .. } = found;
         let residuals = problem.residuals(pool, &values);
-        Ok(Self {
-            sum_of_squares: total(problem, &residuals, &values),
-            values,
-            held,
-            residuals,
-            cofactors,
-            status: Status::Converged,
-            iterations: 0,
-            collapsed: vec![],
-            selected: found.selected,
-        })
+        Ok(Self { values, held, residuals, cofactors, selected })
+    }
+
+    /// Weighted sum of squares of what takes part.
+    pub fn sum_of_squares<M: Model>(&self, problem: &Problem<M>) -> f64 {
+        let priors = problem.prior_sum_of_squares(&self.values, 0..self.values.len());
+        problem.sum_of_squares(&self.residuals) + priors
     }
 
     /// Observations that take part, those of unknowns themselves among them, minus unknowns.
@@ -215,7 +151,12 @@ impl Tried {
         ties.iter().map(|&tie| self.of_tie(problem, &asked, tie)).collect()
     }
 
-    fn of_tie<M: Model>(&self, problem: &Problem<M>, asked: &Linearized<'_, M>, tie: usize) -> TieCofactors {
+    fn of_tie<M: Model>(
+        &self,
+        problem: &Problem<M>,
+        asked: &ObservationEquations<'_, M>,
+        tie: usize,
+    ) -> TieCofactors {
         let layout = problem.layout();
         let (each, width) = (&layout.ties()[tie], layout.tie_columns(tie).count());
         let (mut constant, mut coefficients) = (vec![0.0; each.rows], vec![0.0; each.rows * width]);
@@ -260,12 +201,8 @@ impl Tried {
         problem: &'a Problem<M>,
         observation_sd: &'a [f64],
         pool: &ThreadPool,
-    ) -> (Linearized<'a, M>, Linearized<'a, M>, Prior) {
-        let at = || pool.install(|| Linearized::new(problem, &self.values, &self.held, None));
+    ) -> (ObservationEquations<'a, M>, ObservationEquations<'a, M>, Prior) {
+        let at = || ObservationEquations::new(problem, None, &self.values, &self.held, pool);
         (at(), at().with_deviations(observation_sd), problem.prior_equations(&self.values, &self.held))
     }
-}
-
-fn total<M: Model>(problem: &Problem<M>, residuals: &[f64], values: &[f64]) -> f64 {
-    problem.sum_of_squares(residuals) + problem.prior_sum_of_squares(values, 0..values.len())
 }

@@ -1,0 +1,383 @@
+//! A problem linearized at given values, its normal equations factored once for any number of questions: steps, determinants, what is not
+//! determined, solutions for any right-hand sides, covariances of anything with anything, the inverse where it has elements.
+
+use std::time::Instant;
+
+use rayon::ThreadPool;
+use thiserror::Error;
+
+use super::datum::Basis;
+use super::equations::ObservationEquations;
+use super::loss::{Loss, Reweighting};
+use super::problem::{Model, Problem};
+use super::result::{AdjustError, Seconds, gib, unless_stopped};
+use super::transformation::Transformation;
+use crate::normals::{Between, Cofactors, Factor, Function, Inversion, Layout, Prior, SelectedInverse};
+
+/// The normal equations of a problem at given values, factored, in the datum of the unknowns that are held or in any other.
+#[derive(Debug)]
+pub struct Linearized {
+    pub(super) values: Vec<f64>,
+    pub(super) held: Vec<usize>,
+    reweighting: Option<Reweighting>,
+    damping: f64,
+    pub(super) prior: Prior,
+    pub(super) factor: Factor,
+    pub(super) sum_of_squares: f64,
+    /// The datum that cofactors are to be taken to: its right-hand sides are reduced already.
+    pub(super) basis: Option<Basis>,
+    /// What takes cofactors there.
+    pub(super) transformation: Option<Transformation>,
+    /// What forming and factoring have taken.
+    pub(super) seconds: Seconds,
+}
+
+/// How normal equations are formed.
+#[derive(Default)]
+pub(super) struct Forming {
+    /// A fraction of their diagonal that is added to it.
+    pub damping: f64,
+    /// The datum that cofactors will be asked for in.
+    pub basis: Option<Basis>,
+    /// Whether steps will be asked for: what the elimination of local blocks leaves is then cached.
+    pub for_steps: bool,
+}
+
+/// What is inverted of normal equations.
+#[derive(Clone, Copy)]
+pub(super) enum Inverting<'a> {
+    /// All of them.
+    Whole,
+    /// All of them, with what the equations of each group have to do with each other.
+    Groups,
+    /// Those of a part, with the inverse over its outer unknowns: a lower triangle, column by column.
+    Part(&'a [f64]),
+}
+
+/// The inverse normal matrix of a problem at given values, where it has elements.
+#[derive(Debug)]
+pub struct Inverted {
+    /// The values that it is of.
+    pub(super) values: Vec<f64>,
+    /// The unknowns that were held there.
+    pub(super) held: Vec<usize>,
+    pub(super) cofactors: Cofactors,
+    /// Redundancy numbers of the unknowns as observations of themselves (zero unless weighted).
+    pub(super) prior_redundancy: Vec<f64>,
+    pub(super) selected: SelectedInverse,
+    /// About how large a part of a variance rounding may be, where cofactors were taken to another datum: large numbers cancel where the old
+    /// one is far from the new one, or short.
+    pub lost: Option<f64>,
+    /// What forming, factoring and inverting have taken.
+    pub(super) seconds: Seconds,
+}
+
+/// Why there are no cofactors of what was asked for.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum CofactorError {
+    /// They would take more memory than they may.
+    #[error("these cofactors take {} of memory, and {} are free: ask for fewer at a time", gib(*.needed), gib(*.available))]
+    Memory {
+        /// Bytes that they would take.
+        needed: usize,
+        /// Bytes that they may take.
+        available: usize,
+    },
+    /// What ends adjustments.
+    #[error(transparent)]
+    Adjust(#[from] AdjustError),
+}
+
+impl Linearized {
+    /// Forms and factors the normal equations at given values, some unknowns held there; weights are those that the loss has left.
+    ///
+    /// Whether everything is determined is for the caller to ask.
+    ///
+    /// # Errors
+    /// An interruption, no memory.
+    pub fn form<M: Model>(
+        problem: &Problem<M>,
+        loss: Option<Loss>,
+        values: Vec<f64>,
+        held: Vec<usize>,
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<Self, AdjustError> {
+        let equations = ObservationEquations::new(problem, loss, &values, &held, pool);
+        Self::of(&equations, values, held, Forming::default(), pool, between)
+    }
+
+    /// The same of equations that are there already.
+    pub(super) fn of<M: Model>(
+        equations: &ObservationEquations<'_, M>,
+        values: Vec<f64>,
+        held: Vec<usize>,
+        Forming { damping, basis, for_steps }: Forming,
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<Self, AdjustError> {
+        let (start, problem) = (Instant::now(), equations.problem());
+        let prior = problem.prior_equations(&values, &held);
+        let rights = basis.as_ref().map_or(vec![], |basis| basis.rights(problem, &held));
+        let system = &problem.system;
+        let factor = unless_stopped(match for_steps && rights.is_empty() {
+            true => system.factor(pool, equations, &prior, damping, between),
+            false => system.factor_with(pool, equations, &prior, &rights, for_steps, between),
+        })?;
+        let sum_of_squares = factor.sum_of_squares + problem.prior_sum_of_squares(&values, 0..values.len());
+        let (took, share) = (start.elapsed().as_secs_f64(), factor.formation_share);
+        let seconds = Seconds { form: took * share, factor: took * (1.0 - share), ..Seconds::default() };
+        let (reweighting, transformation) = (equations.reweighting(), None);
+        Ok(Self {
+            values,
+            held,
+            reweighting,
+            damping,
+            prior,
+            factor,
+            sum_of_squares,
+            basis,
+            transformation,
+            seconds,
+        })
+    }
+
+    /// The values that the equations are of.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Weighted sum of squares of the observations at these values, weighted unknowns among them; not finite where some cannot be computed.
+    pub fn sum_of_squares(&self) -> f64 {
+        self.sum_of_squares
+    }
+
+    /// By how much a full step lowers it, as the linearized equations predict.
+    pub fn decrease(&self) -> f64 {
+        self.factor.decrease
+    }
+
+    /// No unknown changes by more than this multiple of its standard deviation in a full step.
+    pub(super) fn change(&self) -> f64 {
+        self.factor.decrease.sqrt()
+    }
+
+    /// The fraction of the diagonal that was added to it.
+    pub(super) fn damping(&self) -> f64 {
+        self.damping
+    }
+
+    /// Whether the second-order term of a loss is taken in.
+    pub(super) fn is_curved(&self) -> bool {
+        self.reweighting.is_some_and(|reweighting| reweighting.curved)
+    }
+
+    /// Why the observations do not determine all unknowns.
+    pub fn undetermined(&self) -> Option<AdjustError> {
+        if !self.factor.deficient_locals.is_empty() {
+            return Some(AdjustError::UndeterminedLocals(self.factor.deficient_locals.clone()));
+        }
+        self.factor.deficiency().map(|found| AdjustError::Undetermined(found.blocks()))
+    }
+
+    /// The same, of which all unknowns are determined.
+    ///
+    /// # Errors
+    /// Unknowns that are not.
+    pub fn determined(self) -> Result<Self, AdjustError> {
+        self.undetermined().map_or(Ok(self), Err)
+    }
+
+    /// Combinations of unknowns, none of them local, that the observations do not determine: for each the unknowns that take part in
+    /// it, ascending.
+    pub fn undetermined_unknowns(&self, layout: &Layout) -> Vec<Vec<usize>> {
+        self.factor.deficiency().map_or(vec![], |found| found.unknowns(layout))
+    }
+
+    /// The same with all unknowns, how each combination moves them, and their diagonal elements of the normal equations.
+    pub fn combinations(&self, layout: &Layout) -> Vec<Vec<(usize, f64, f64)>> {
+        self.factor.deficiency().map_or(vec![], |found| found.combinations(layout))
+    }
+
+    /// The unknowns, none of them local, that no observation and no weight touches, ascending.
+    pub fn without_effect(&self, layout: &Layout) -> Vec<usize> {
+        self.factor.without_effect(layout)
+    }
+
+    /// Natural logarithm of the determinant, the local unknowns reduced out; None where it is zero.
+    pub fn log_determinant(&self) -> Option<f64> {
+        self.factor.log_determinant()
+    }
+
+    /// The corrections of the unknowns that are not local, in the order of the layout.
+    pub fn reduced_corrections(&self, layout: &Layout) -> Vec<f64> {
+        self.factor.reduced_corrections(layout)
+    }
+
+    /// The cofactors of every two unknowns that are not local, in the order of the layout, row by row; zero for those that are fixed or
+    /// held.
+    pub fn reduced_cofactors<M>(&self, problem: &Problem<M>) -> Vec<f64> {
+        let layout = problem.layout();
+        let (first, count) = (layout.all_locals().end, layout.unknowns() - layout.all_locals().end);
+        let mut rights = vec![0.0; count * count];
+        for k in 0..count {
+            // What is fixed or held stands in the normal equations by itself, with unit weight.
+            rights[k * (count + 1)] = f64::from(u8::from(self.is_free(problem, first + k)));
+        }
+        self.factor.solve_reduced(layout, &rights)
+    }
+
+    /// Whether an unknown is neither fixed nor held.
+    fn is_free<M>(&self, problem: &Problem<M>, unknown: usize) -> bool {
+        problem.sd[unknown] != 0.0 && !self.held.contains(&unknown)
+    }
+
+    /// The cofactors f^T Q g of linear functions of the unknowns (a priori unit weight): a matrix row by row, of every two of `rows`, or
+    /// of `rows` with `columns`. The same bits for any number of threads.
+    ///
+    /// # Errors
+    /// More memory than there may be (None: any number of bytes); an interruption.
+    pub fn cofactors<M: Model>(
+        &self,
+        problem: &Problem<M>,
+        rows: &[Function],
+        columns: Option<&[Function]>,
+        memory: Option<usize>,
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<Vec<f64>, CofactorError> {
+        let unmoved = |functions: &[Function]| -> Vec<Function> {
+            functions.iter().map(|function| self.unmoved(problem, function)).collect()
+        };
+        let (free, others) = (unmoved(rows), columns.map(unmoved));
+        let system = &problem.system;
+        let reduced = {
+            let equations = self.equations(problem, pool);
+            unless_stopped(system.reduce(pool, &equations, &self.prior, &free, others.as_deref(), between))?
+        };
+        let needed = system.memory_of(&reduced);
+        if let Some(available) = memory.filter(|&available| needed > available) {
+            return Err(CofactorError::Memory { needed, available });
+        }
+        let mut matrix = unless_stopped(system.cofactors_of(pool, &self.factor, &reduced, between))?;
+        if let Some(transformation) = &self.transformation {
+            transformation.apply_to_functions(rows, columns, &mut matrix);
+        }
+        Ok(matrix)
+    }
+
+    /// What a function takes of unknowns that are neither held nor fixed: the cofactors of others are zero in this datum.
+    fn unmoved<M>(&self, problem: &Problem<M>, function: &Function) -> Function {
+        let stays = |unknown: usize| self.transformation.as_ref().is_some_and(|to| to.stays(unknown));
+        let moves = |unknown: usize| self.is_free(problem, unknown) && !stays(unknown);
+        function.iter().filter(|&&(unknown, _)| moves(unknown)).copied().collect()
+    }
+
+    /// Solves for right-hand sides over all unknowns, one after the other; so are the solutions.
+    ///
+    /// # Errors
+    /// An interruption, no memory.
+    pub fn solve_for<M: Model>(
+        &self,
+        problem: &Problem<M>,
+        rights: &[f64],
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<Vec<f64>, AdjustError> {
+        let Self { factor, prior, damping, .. } = self;
+        let equations = self.equations(problem, pool);
+        unless_stopped(problem.system.solve_for(pool, factor, &equations, prior, *damping, rights, between))
+    }
+
+    /// Solves for one right-hand side, with what was cached for steps.
+    pub(super) fn solve_again<M: Model>(
+        &self,
+        equations: &ObservationEquations<'_, M>,
+        right: &[f64],
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<Vec<f64>, AdjustError> {
+        let Self { factor, prior, damping, .. } = self;
+        let system = &equations.problem().system;
+        unless_stopped(system.solve_again(pool, factor, equations, prior, *damping, right, between))
+    }
+
+    /// The step of all unknowns; of a part with the outer ones as they are given.
+    pub(super) fn step<M: Model>(
+        &self,
+        equations: &ObservationEquations<'_, M>,
+        outer: &[f64],
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<Vec<f64>, AdjustError> {
+        let Self { factor, prior, damping, .. } = self;
+        let system = &equations.problem().system;
+        unless_stopped(system.solve_below(pool, factor, equations, prior, *damping, outer, between))
+    }
+
+    /// The selected inverse, in the datum that it was formed for.
+    pub(super) fn invert<M: Model>(
+        self,
+        equations: &ObservationEquations<'_, M>,
+        what: Inverting<'_>,
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<Inverted, AdjustError> {
+        let (start, problem) = (Instant::now(), equations.problem());
+        let Self { values, held, prior, factor, basis, mut seconds, .. } = self;
+        let system = &problem.system;
+        let found = match what {
+            Inverting::Whole => {
+                let rights = basis.as_ref().map_or(vec![], |basis| basis.rights(problem, &held));
+                system.invert_with(pool, factor, equations, &prior, &rights, between)
+            }
+            Inverting::Groups => system.invert_by_groups(pool, factor, equations, &prior, between),
+            Inverting::Part(outer) => system.invert_below(pool, factor, equations, &prior, outer, between),
+        };
+        let Inversion { mut cofactors, selected, further, inversion_share } = unless_stopped(found)?;
+        let prior_redundancy = problem.finish_cofactors(&mut cofactors, &held, &values);
+        let lost = basis.map(|basis| {
+            let transformation = basis.transformation(further);
+            pool.install(|| transformation.apply(problem.layout(), &mut cofactors))
+        });
+        let took = start.elapsed().as_secs_f64();
+        (seconds.invert, seconds.cofactors) = (took * inversion_share, took * (1.0 - inversion_share));
+        Ok(Inverted { values, held, cofactors, prior_redundancy, selected, lost, seconds })
+    }
+
+    /// Solves for the right-hand sides of its datum: cofactors are then those in it.
+    pub(super) fn take_to_datum<M: Model>(
+        &mut self,
+        problem: &Problem<M>,
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<(), AdjustError> {
+        let Some(basis) = self.basis.take() else { return Ok(()) };
+        let rights = basis.rights(problem, &self.held);
+        let equations = self.equations(problem, pool);
+        let found =
+            problem.system.solve_further(pool, &self.factor, &equations, &self.prior, &rights, between);
+        let columns = unless_stopped(found)?;
+        let (count, d) = (self.values.len(), columns.len() / self.values.len().max(1));
+        let row = |unknown: usize| (0..d).map(move |k| k * count + unknown);
+        let w = (0..count).flat_map(row).map(|at| columns[at]).collect();
+        self.transformation = Some(basis.transformation(w));
+        Ok(())
+    }
+
+    /// The observation equations again: it takes a pass over unknowns, and they are not kept.
+    pub(super) fn equations<'a, M: Model>(
+        &self,
+        problem: &'a Problem<M>,
+        pool: &ThreadPool,
+    ) -> ObservationEquations<'a, M> {
+        let loss = self.reweighting.map(|reweighting| reweighting.loss);
+        ObservationEquations::new(problem, loss, &self.values, &self.held, pool)
+    }
+
+    /// Gives its memory back for the next ones; its values.
+    pub(super) fn recycle<M>(self, problem: &Problem<M>) -> Vec<f64> {
+        self.factor.recycle(&problem.system);
+        self.values
+    }
+}
