@@ -178,7 +178,12 @@ impl Phases {
         }
         let prior = Prior { right: vec![0.0; weight.len()], weight, between: vec![] };
         let equations = Linear::new(block);
-        Self { pool: pool(), system: System::new(layout, Ordering::Auto), equations, prior }
+        Self {
+            pool: pool(),
+            system: System::new(layout, Ordering::Auto).expect("a system"),
+            equations,
+            prior,
+        }
     }
 
     fn factor(&self) -> Factor {
@@ -276,7 +281,11 @@ fn phases(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group(format!("normals/{size}"));
     group.bench_function("order", |bencher| {
         let layout = || system.layout().clone();
-        bencher.iter_batched(layout, |layout| System::new(layout, Ordering::Auto), BatchSize::PerIteration);
+        bencher.iter_batched(
+            layout,
+            |layout| System::new(layout, Ordering::Auto).expect("a system"),
+            BatchSize::PerIteration,
+        );
     });
     let factor = phases.factor();
     group.bench_function("solve", |bencher| {

@@ -37,7 +37,7 @@ fn system(photos: usize) -> (System, Prior) {
     let layout = Layout::new(2, 3, &vec![DIM; photos], pointers, kept).expect("a layout");
     let unknowns = layout.unknowns();
     (
-        System::new(layout, Ordering::Auto),
+        System::new(layout, Ordering::Auto).expect("a system"),
         Prior { weight: vec![100.0; unknowns], right: vec![0.0; unknowns], between: vec![] },
     )
 }

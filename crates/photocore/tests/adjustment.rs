@@ -99,7 +99,7 @@ fn problem() -> Problem<Frames> {
     Problem {
         observation_sd: vec![1e-3; 2 * measured.len()],
         model: Frames { measured, frame_of },
-        system: System::new(layout, Ordering::Auto),
+        system: System::new(layout, Ordering::Auto).unwrap(),
         prior: initial.clone(),
         initial,
         sd: vec![f64::INFINITY; UNKNOWNS],

@@ -206,7 +206,7 @@ fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
 /// Solution, every selected block, local cofactors and adjusted equations against the dense inverse.
 fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let pool = pool(2);
-    let system = System::new(dense.layout.clone(), ordering);
+    let system = System::new(dense.layout.clone(), ordering).unwrap();
     let layout = system.layout();
     let factor = done(system.factor(&pool, dense, &dense.prior, 0.0, &mut go));
     assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
@@ -481,10 +481,11 @@ fn what_is_joined_to_everything_is_eliminated_last() {
         let layout = with_cameras(strips, length, 0, true);
         let plain = block(strips, length, 0).layout;
         for ordering in &ALL[2..] {
-            let system = System::new(layout.clone(), *ordering);
+            let system = System::new(layout.clone(), *ordering).unwrap();
             assert_eq!(system.symbolic().order().last(), Some(&strips), "{ordering:?}");
-            let cost =
-                |layout: &Layout| System::new(layout.clone(), *ordering).symbolic().operations(layout).factor;
+            let cost = |layout: &Layout| {
+                System::new(layout.clone(), *ordering).unwrap().symbolic().operations(layout).factor
+            };
             // Thirteen more unknowns in every front, of twenty to a hundred.
             let (with, without) = (cost(&layout), cost(&plain));
             assert!(with < 4.0 * without, "{ordering:?}: {with} beside {without}");
@@ -504,7 +505,7 @@ fn what_a_shared_camera_and_photos_leave_open_is_named() {
     for row in 0..dense.right.len() {
         dense.matrix[(row, own)] = dense.matrix[(row, photo)];
     }
-    let system = System::new(layout, Ordering::Auto);
+    let system = System::new(layout, Ordering::Auto).unwrap();
     let factor = done(system.factor(&pool(2), &dense, &dense.prior, 0.0, &mut go));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.blocks(), vec![vec![5, camera]]);
@@ -523,7 +524,7 @@ fn same_bits(plain: Layout) {
     let rights: Vec<f64> = (0..20 * dense.layout.unknowns()).map(|k| (k % 17) as f64 - 8.0).collect();
     let run = |threads: usize| {
         let pool = pool(threads);
-        let system = System::new(dense.layout.clone(), Ordering::Auto);
+        let system = System::new(dense.layout.clone(), Ordering::Auto).unwrap();
         let factor = done(system.factor(&pool, &dense, &dense.prior, 0.0, &mut go));
         let solution = done(system.solve(&pool, &factor, &dense, &dense.prior, 0.0, &mut go));
         let more = done(system.solve_for(&pool, &factor, &dense, &dense.prior, 0.0, &rights, &mut go));
@@ -558,7 +559,7 @@ fn what_the_equations_do_not_determine_is_named() {
     for row in 0..dense.right.len() {
         dense.matrix[(row, range.start + 4)] = dense.matrix[(row, range.start + 1)];
     }
-    let system = System::new(layout, Ordering::ReverseCuthillMckee);
+    let system = System::new(layout, Ordering::ReverseCuthillMckee).unwrap();
     let factor = done(system.factor(&pool(2), &dense, &dense.prior, 0.0, &mut go));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.defect(), 1);
@@ -570,7 +571,7 @@ fn local_block_without_equations_is_named() {
     let layout = Layout::new(2, 3, &[6, 6], vec![0, 2, 2, 4], vec![0, 1, 0, 1]).unwrap();
     let mut dense = Dense::new(layout.clone(), 5);
     dense.prior.weight[layout.local_range(1)].fill(0.0);
-    let system = System::new(layout, Ordering::Auto);
+    let system = System::new(layout, Ordering::Auto).unwrap();
     let factor = done(system.factor(&pool(1), &dense, &dense.prior, 0.0, &mut go));
     assert_eq!(factor.deficient_locals, vec![1]);
 }

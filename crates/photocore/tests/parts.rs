@@ -180,7 +180,7 @@ fn upward<'a>(
     for p in 0..cut.parent.len() {
         let mut piece = piece(all, cut, p);
         piece.below = cut.children(p).iter().map(|&child| left[child].take().unwrap()).collect();
-        let system = System::new(piece.layout.clone(), ordering);
+        let system = System::new(piece.layout.clone(), ordering).unwrap();
         let mut factor = done(system.factor(pool, &piece, &piece.prior, 0.0, &mut go));
         assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
         let contribution = factor.take_contribution();
@@ -203,7 +203,7 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     let pool = pool(2);
     let cut = Cut::new(tree, &touched(&layout), node_of);
     let all = whole(layout, seed);
-    let system = System::new(all.layout.clone(), ordering);
+    let system = System::new(all.layout.clone(), ordering).unwrap();
     let factor = done(system.factor(&pool, &all, &all.prior, 0.0, &mut go));
     let expected = done(system.solve(&pool, &factor, &all, &all.prior, 0.0, &mut go));
     let (sum, decrease) = (factor.sum_of_squares, factor.decrease);
@@ -352,7 +352,7 @@ fn bits_of_a_node_do_not_depend_on_the_number_of_threads() {
         let mut numbers = vec![];
         for p in 0..2 {
             let piece = piece(&all, &cut, p);
-            let system = System::new(piece.layout.clone(), Ordering::Auto);
+            let system = System::new(piece.layout.clone(), Ordering::Auto).unwrap();
             let mut factor = done(system.factor(&pool, &piece, &piece.prior, 0.0, &mut go));
             let Contribution { matrix, right, diagonal } = factor.take_contribution();
             numbers.extend([matrix, right, diagonal].concat());

@@ -99,7 +99,7 @@ fn network(held: Vec<usize>) -> Problem<Trilateration> {
     Problem {
         observation_sd: vec![SD; lengths.len()],
         model: Trilateration { layout: layout.clone(), lengths, held },
-        system: System::new(layout, Ordering::Auto),
+        system: System::new(layout, Ordering::Auto).unwrap(),
         prior: initial.clone(),
         initial,
         sd: vec![f64::INFINITY; unknowns],

@@ -36,7 +36,7 @@
 //! let layout = Layout::new(1, 1, &[1, 1], vec![0, 2, 4, 6], vec![0, 1, 0, 1, 0, 1])?;
 //! let problem = Problem {
 //!     model: Levelling { readings },
-//!     system: System::new(layout, Ordering::Auto),
+//!     system: System::new(layout, Ordering::Auto)?,
 //!     observation_sd: vec![0.001; 6],
 //!     initial: vec![100.0, 0.0, 0.0, 0.0, 0.0],
 //!     prior: vec![0.0; 5],

@@ -218,7 +218,7 @@ impl Network {
         let layout = layout(&model, places)?.with_held(&held).as_part(outer, below)?;
         let problem = Problem {
             observation_sd,
-            system: System::new(layout, options.ordering),
+            system: System::new(layout, options.ordering)?,
             initial,
             prior,
             sd,

@@ -65,7 +65,7 @@ impl System {
     pub(super) fn rows_of(&self, supernode: usize, blocks: &[u32]) -> Vec<usize> {
         let rows = |&block: &u32| {
             let position = self.symbolic.position(block as usize);
-            let row = self.symbolic.panel_row(supernode, position).unwrap_or_default();
+            let row = self.symbolic.row_of(supernode, position);
             row..row + self.symbolic.dim(position)
         };
         blocks.iter().flat_map(rows).collect()

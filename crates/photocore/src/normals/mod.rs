@@ -33,7 +33,7 @@
 //!
 //! // Three local and two kept unknowns; the first local one is held at zero by an equation of its own.
 //! let layout = Layout::new(1, 1, &[1, 1], vec![0, 2, 4, 6], vec![0, 1, 0, 1, 0, 1])?;
-//! let system = System::new(layout, Ordering::Auto);
+//! let system = System::new(layout, Ordering::Auto)?;
 //! let prior = Prior { weight: vec![1.0, 0.0, 0.0, 0.0, 0.0], right: vec![0.0; 5], between: vec![] };
 //! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
 //! let mut go_on = |_| ControlFlow::Continue(());
@@ -67,6 +67,7 @@ mod minimum_degree;
 mod open_front;
 mod ordering;
 mod panels;
+mod pattern;
 mod products;
 mod room;
 mod selected;

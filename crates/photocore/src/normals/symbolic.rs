@@ -276,10 +276,17 @@ impl Symbolic {
     /// Row of the panel of `supernode` at which the block at `position` starts, if it is in its pattern.
     pub(crate) fn panel_row(&self, supernode: usize, position: usize) -> Option<usize> {
         let s = &self.supernodes[supernode];
+        let is_in_it = s.blocks.contains(&position) || s.rows.binary_search(&position).is_ok();
+        is_in_it.then(|| self.row_of(supernode, position))
+    }
+
+    /// The same of a block that goes to the front of the supernode: it is in the pattern, which a [`System`](super::System) checks once.
+    pub(crate) fn row_of(&self, supernode: usize, position: usize) -> usize {
+        let s = &self.supernodes[supernode];
         if s.blocks.contains(&position) {
-            return Some(self.offset[position] - self.offset[s.blocks.start]);
+            return self.offset[position] - self.offset[s.blocks.start];
         }
-        s.rows.binary_search(&position).ok().map(|index| s.row_offset[index])
+        s.row_offset[s.rows.partition_point(|&row| row < position)]
     }
 
     /// Where the coupled rows of a supernode stand in the front of its parent (own blocks, then coupled blocks):
@@ -289,9 +296,7 @@ impl Symbolic {
         let Some(parent) = s.parent else { return Vec::new() };
         let mut runs: Vec<(usize, usize, usize)> = Vec::with_capacity(s.rows.len());
         for (index, &row) in s.rows.iter().enumerate() {
-            // The pattern of a column is contained in its parent's: that is what makes it the parent.
-            let Some(to) = self.panel_row(parent, row) else { continue };
-            let (from, count) = (s.row_offset[index] - s.width, self.dim(row));
+            let (to, from, count) = (self.row_of(parent, row), s.row_offset[index] - s.width, self.dim(row));
             match runs.last_mut() {
                 Some(last) if last.0 + last.2 == from && last.1 + last.2 == to => last.2 += count,
                 _ => runs.push((from, to, count)),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::homes::Homes;
 use super::incidence::Incidence;
-use super::layout::Layout;
+use super::layout::{Layout, LayoutError};
 use super::ordering::Ordering;
 use super::room::{made_of_results, numbers_at};
 use super::symbolic::Symbolic;
@@ -29,8 +29,16 @@ pub struct System {
 
 impl System {
     /// Orders a layout.
-    pub fn new(layout: Layout, ordering: Ordering) -> Self {
-        let symbolic = Arc::new(Symbolic::new(&layout, ordering));
+    ///
+    /// # Errors
+    /// [`LayoutError::Pattern`], where the order contradicts the layout.
+    pub fn new(layout: Layout, ordering: Ordering) -> Result<Self, LayoutError> {
+        let symbolic = Symbolic::new(&layout, ordering);
+        Self::with_pattern(layout, symbolic)
+    }
+
+    pub(super) fn with_pattern(layout: Layout, symbolic: Symbolic) -> Result<Self, LayoutError> {
+        let symbolic = Arc::new(symbolic);
         let incidence = Incidence::new(&layout, &symbolic);
         let ties = Homes::new(layout.ties().iter().map(|tie| &tie.kept), &symbolic);
         let contributions = Homes::new(layout.contributions().iter(), &symbolic);
@@ -44,7 +52,7 @@ impl System {
         let is_part = symbolic.open().is_some() || !layout.contributions().is_empty();
         let workspace = if is_part { Workspace::frugal() } else { Workspace::default() };
         let keeps = kept.iter().sum::<usize>() <= made_of_results(&layout);
-        Self {
+        let system = Self {
             layout,
             symbolic,
             incidence,
@@ -54,7 +62,9 @@ impl System {
             workspace,
             keeps,
             kept: if keeps { kept } else { Vec::new() },
-        }
+        };
+        system.check_pattern()?;
+        Ok(system)
     }
 
     /// The unknowns and groups.

@@ -38,8 +38,7 @@ impl TieEquations {
         let mut columns = Vec::new();
         for &block in &each.kept {
             let position = symbolic.position(block as usize);
-            // Every block of a tie is in the pattern of its home.
-            let row = symbolic.panel_row(home, position).unwrap_or_default();
+            let row = symbolic.row_of(home, position);
             columns.extend(row..row + symbolic.dim(position));
         }
         let border = system.border_row(home);

@@ -76,7 +76,7 @@ fn run(certified: &Certified, start: &[f64], method: Method) -> Result<Adjustmen
     let initial = [&[0.0], start].concat();
     let problem = Problem {
         model: Curve { name: certified.name, x: certified.x, y: certified.y },
-        system: System::new(layout, Ordering::Input),
+        system: System::new(layout, Ordering::Input).unwrap(),
         observation_sd: vec![certified.residual_sd; count],
         prior: initial.clone(),
         sd: [vec![0.0], vec![f64::INFINITY; start.len()]].concat(),

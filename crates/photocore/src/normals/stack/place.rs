@@ -30,8 +30,7 @@ impl Stack {
         let common = self.place_commons(system, first as usize);
         let (mut kept, mut coupling) = (0, self.start);
         for slot in &mut self.slots {
-            // Every kept block of a local block is in the pattern of its home.
-            slot.row = symbolic.panel_row(self.home, slot.position).unwrap_or_default();
+            slot.row = symbolic.row_of(self.home, slot.position);
             slot.constants = slot.groups.start * rows * depth;
             (slot.kept, slot.coupling) = (kept, coupling);
             kept += slot.groups.len() * rows * depth * slot.dim;
@@ -116,7 +115,7 @@ impl Stack {
         let all = self.parts.iter().map(|part| (part.position, part.unknowns.clone()));
         let segment = |(position, unknowns): (usize, Range<usize>)| Segment {
             position,
-            row: symbolic.panel_row(self.home, position).unwrap_or_default() + unknowns.start,
+            row: symbolic.row_of(self.home, position) + unknowns.start,
             unknowns,
             coupling: 0,
             runs: SmallVec::new(),

@@ -228,7 +228,7 @@ impl Calibration {
         let sd = self.points.iter().flat_map(|point| point.sd).chain(free);
         Ok(Problem {
             observation_sd: measurements.iter().flat_map(|m| m.sd).collect(),
-            system: System::new(layout, Ordering::Auto),
+            system: System::new(layout, Ordering::Auto)?,
             prior: initial.clone(),
             initial,
             sd: sd.chain(self.coefficient_sd.iter().flatten().copied()).collect(),

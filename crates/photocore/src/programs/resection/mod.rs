@@ -309,7 +309,7 @@ impl Resection {
         let with_photo = |pose: &Pose| [&own[..], &pose.counted_from(origin).unknowns()].concat();
         let photo_sd = [self.position.sd, self.attitude.sd].concat();
         Ok(Problem {
-            system: System::new(layout, Ordering::Input),
+            system: System::new(layout, Ordering::Input)?,
             observation_sd: points.iter().flat_map(|point| point.xy_sd).collect(),
             initial: with_photo(start),
             prior: with_photo(&known),

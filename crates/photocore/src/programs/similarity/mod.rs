@@ -272,7 +272,7 @@ fn problem(
     let layout = Layout::new(3, 3, &[CHANGES], (0..=count).collect(), vec![0; count])?;
     Ok(Problem {
         model: AsControl::new(stations, start),
-        system: System::new(layout, Ordering::Input),
+        system: System::new(layout, Ordering::Input)?,
         observation_sd: stations.iter().flat_map(|station| station.model_sd).collect(),
         initial,
         prior,

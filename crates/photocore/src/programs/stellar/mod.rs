@@ -354,7 +354,7 @@ impl Calibration {
             sd: model.stars.iter().flat_map(of_star).chain(held).collect(),
             prior: locals(|star| star.catalogue),
             initial: locals(|star| star.place),
-            system: System::new(layout, Ordering::Auto),
+            system: System::new(layout, Ordering::Auto)?,
             model,
         })
     }

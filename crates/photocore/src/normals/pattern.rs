@@ -1,0 +1,62 @@
+//! Whether the pattern of the factor contains what goes to each front: checked once, for all who look up rows in it.
+
+use super::layout::LayoutError;
+use super::system::System;
+
+impl System {
+    /// Refuses a pattern that lacks a block which equations, a system below or a child of the elimination tree bring to a front.
+    pub(super) fn check_pattern(&self) -> Result<(), LayoutError> {
+        let (layout, symbolic, incidence) = (&self.layout, &*self.symbolic, &self.incidence);
+        let mut in_front = vec![usize::MAX; symbolic.blocks()];
+        for (front, s) in symbolic.supernodes().iter().enumerate() {
+            s.blocks.clone().chain(s.rows.iter().copied()).for_each(|position| in_front[position] = front);
+            let has = |position: usize| in_front[position] == front;
+            let have = |blocks: &[u32]| blocks.iter().all(|&block| has(symbolic.position(block as usize)));
+            let children =
+                s.children.iter().all(|&child| symbolic.supernodes()[child].rows.iter().all(|&row| has(row)));
+            let ties = self.ties.at(front).iter().all(|&tie| have(&layout.ties()[tie as usize].kept));
+            let below = &self.contributions;
+            let below = below.at(front).iter().all(|&part| have(&layout.contributions()[part as usize]));
+            // Local blocks of one stack touch the same.
+            let locals = incidence.stacks_at(front).iter().all(|locals| {
+                let local = locals[0] as usize;
+                let further = |&common: &u32| have(layout.further_of(incidence.group_with(common)));
+                incidence.positions_of(layout, local).iter().all(|&position| has(position as usize))
+                    && incidence.members(incidence.set_of(local)).iter().all(further)
+            });
+            let border = layout.border_dim() == 0 || has(symbolic.blocks() - 1);
+            if !(children && ties && below && locals && border) {
+                return Err(LayoutError::Pattern { front });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::normals::{Layout, Ordering, Symbolic, Tie};
+
+    /// Three local blocks that are each seen from one of three kept blocks; a fourth kept block is nobody's.
+    fn apart() -> Layout {
+        Layout::new(1, 1, &[1, 1, 1, 1], vec![0, 1, 2, 3], vec![0, 1, 2]).unwrap()
+    }
+
+    #[test]
+    fn a_pattern_that_lacks_what_goes_to_a_front_is_refused() {
+        let tie = Tie { rows: 1, kept: vec![0, 2], border: 0..0 };
+        let together = [
+            Layout::new(1, 1, &[1, 1, 1, 1], vec![0, 2, 3], vec![0, 1, 2]).unwrap(),
+            apart().with_further(vec![0, 0, 0, 1], vec![3]).unwrap(),
+            apart().with_ties(vec![tie]).unwrap(),
+            apart().as_part(vec![], vec![vec![1, 2]]).unwrap(),
+        ];
+        for layout in together {
+            let its_own = Symbolic::new(&layout, Ordering::Input);
+            assert!(System::with_pattern(layout.clone(), its_own).is_ok());
+            let found = System::with_pattern(layout, Symbolic::new(&apart(), Ordering::Input));
+            assert!(matches!(found, Err(LayoutError::Pattern { .. })));
+        }
+    }
+}
