@@ -10,7 +10,7 @@ use crate::normals::GroupRows;
 const LANES: usize = 8;
 /// So many images at the least are worth it.
 pub(super) const FEWEST: usize = 2;
-/// Parameters that a camera has at the most.
+/// Parameters that a camera has at the most: images of others are computed one by one.
 const PARAMETERS: usize = 16;
 
 /// A number of each of the images.
@@ -34,6 +34,7 @@ pub(super) fn write_in_lanes<'s, C: CameraModel>(
     rows: &mut GroupRows<'_>,
 ) -> bool {
     if C::IN_LANES
+        && C::PARAMETERS.len() <= PARAMETERS
         && let Some(pose) = orientation.stepping_pose()
     {
         let mut lanes = Input::default();
@@ -181,6 +182,7 @@ fn put(target: &mut [f64], columns: &[Lanes], t: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::camera::{Perspective, Unit};
     use crate::geometry::{Camera, Matrix3, ObjectSpace, Point, rotation};
 
     /// The rows of so many images that have their camera in common with others.
@@ -257,5 +259,66 @@ mod tests {
         for (name, parameters) in cameras {
             compare(&Camera::named(name, parameters).unwrap(), &orientation);
         }
+    }
+
+    /// A camera of one parameter more than there is room for, without effect all but the first.
+    #[derive(Clone, Copy)]
+    struct Wide([f64; PARAMETERS + 1]);
+
+    impl Wide {
+        fn plain(&self) -> Perspective {
+            Perspective { principal_distance: self.0[0] }
+        }
+    }
+
+    impl CameraModel for Wide {
+        type Parameters = [f64; PARAMETERS + 1];
+
+        const NAME: &'static str = "wide";
+        const PARAMETERS: &'static [(&'static str, Unit)] = &[("c", Unit::Image); PARAMETERS + 1];
+        const IN_LANES: bool = true;
+        const FORMULA: &'static str = "image = c (P1, P2) / P3";
+
+        fn with_parameters(parameters: Self::Parameters) -> Self {
+            Self(parameters)
+        }
+
+        fn parameters(&self) -> Self::Parameters {
+            self.0
+        }
+
+        fn scale(&self) -> f64 {
+            self.plain().scale()
+        }
+
+        fn image(&self, u: &Vector3) -> [f64; 2] {
+            self.plain().image(u)
+        }
+
+        fn linearize(&self, u: &Vector3) -> geometry::camera::Image<Self::Parameters> {
+            let geometry::camera::Image { xy, by_u, by_parameters } = self.plain().linearize(u);
+            let widened = |[by_c]: [f64; 1]| std::array::from_fn(|k| if k == 0 { by_c } else { 0.0 });
+            geometry::camera::Image { xy, by_u, by_parameters: by_parameters.map(widened) }
+        }
+
+        fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
+            self.plain().direction(xy)
+        }
+    }
+
+    #[test]
+    fn images_of_a_camera_with_more_parameters_than_lanes_hold_are_left_to_others() {
+        let mut camera = Wide([0.0; PARAMETERS + 1]);
+        camera.0[0] = -152.7;
+        let attitude: Matrix3 = rotation([0.02, -0.03, 1.1]).transpose();
+        let orientation = Orientation::stepping(ObjectSpace::Rectangular, [3.0, -4.0, 150.0], &attitude);
+        let point = Point::new(ObjectSpace::Rectangular, [1.0, 2.0, 3.0]);
+        let image =
+            Image { photo: 0, point: 0, xy: camera.image(&orientation.sight(&point)), sd: [0.004; 2] };
+        let sight = |_| Sight { point: &point, image: &image, sd: image.sd };
+        let found = rows_of(FEWEST, PARAMETERS + 1, |rows| {
+            assert!(!write_in_lanes(&orientation, &camera, FEWEST, &sight, rows));
+        });
+        assert!(found.iter().all(|&value| value == 0.0));
     }
 }
