@@ -221,7 +221,7 @@ def test_the_report_begins_with_the_problems(result):
     assert report.startswith("photogram ")
     assert "A BLOCK OF TWO STRIPS" in report.split("\n")[0]
     titles = list(sections(report))
-    assert titles[:4] == ["Verdict", "Problems", "Adjustment", "Residuals"]
+    assert titles[:5] == ["Verdict", "What to do next", "Problems", "Adjustment", "Residuals"]
     problems = sections(report)["Problems"]
     assert any("left out, pass point on one photo: SINGLE" in line for line in problems)
 

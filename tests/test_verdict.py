@@ -10,8 +10,8 @@ import pytest
 
 from photogram import adjust, resect
 from photogram.geometry import project
-from photogram.show.judgement import advice, judged
-from photogram.show.sections import verdict_section
+from photogram.show.judgement import judged
+from photogram.show.sections import verdict_sections
 from photogram.simulation import simulate
 from photogram.statistics import Findings, Removed, global_test, group_tests, verdict
 from photogram.statistics.findings import Agreement, GroupFactor, Systematic, by_t, by_w, of_groups
@@ -181,8 +181,9 @@ def test_no_probability_is_lost():
     assert made.tests[1].p == 0.0
     assert made.tests[1].log10_p == pytest.approx(-(400**2) / 2 / math.log(10), rel=1e-3)
     assert math.isfinite(made.tests[0].log10_p)
-    title, lines = verdict_section(made)
-    assert title == "Verdict"
+    (title, lines), (other, next_lines) = verdict_sections(made)
+    assert (title, other) == ("Verdict", "What to do next")
+    assert next_lines == list(made.next)
     # The report says that it is tiny, the document how tiny.
     assert any("< 1e-99" in line and "rejected" in line for line in lines)
 
@@ -230,6 +231,7 @@ def test_a_good_block(simulated):
         "exit",
         "warning",
         "lines",
+        "next",
         "tests",
         "removed",
         "rivals",
@@ -427,9 +429,7 @@ EXCLUSIVE = (
 def page_words(made):
     """Return all sentences that a page says of a verdict, small letters."""
     told = judged(made)
-    snooping, calibration = "`--snoop` takes them out", "`--self-calibrate all`"
-    told_next = advice(made, check="`photogram check`", snoop=snooping, calibrate=calibration)
-    _, lines = verdict_section(made)
+    (_, lines), (_, told_next) = verdict_sections(made)
     text = [line for line in lines if not line.startswith("test ") and "  " not in line.strip()]
     return told, told_next, " | ".join([told.mark, told.headline, *told.lines, *told_next, *text]).lower()
 
@@ -440,7 +440,12 @@ def test_no_two_sentences_contradict_each_other(first):
         (each, other) for each in SITUATIONS for other in ("nothing", "check wrong", "lens")
     ]:
         situation = {**SITUATIONS[first], **SITUATIONS[second], **SITUATIONS[third]}
-        base = {**vars(findings(good())), "snoop": "--snoop", "calibrate": "--self-calibrate all"}
+        ways = {
+            "snoop": "--snoop",
+            "take_out": "`--snoop` takes them out",
+            "calibrate": "--self-calibrate all",
+        }
+        base = {**vars(findings(good())), **ways}
         made = verdict(Findings(**{**base, **situation}))
         told, told_next, words = page_words(made)
         case = (first, second, third, words)

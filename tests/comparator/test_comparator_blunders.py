@@ -190,7 +190,7 @@ def test_the_command_withholds_what_outliers_spoil(run, tmp_path, exchanged):
     result = run(*exchanged, "--out", out, "--json", document)
     assert refused(result, 4)
     assert "are labels exchanged?" in result.output
-    assert "the correction is withheld: outliers make it unusable" in result.output
+    assert "the correction is withheld: Gross errors: outliers change corrected coordinates" in result.output
     assert [path.name for path in out.iterdir()] == ["listing.txt"]
     made = json.loads(document.read_bytes())
     assert (made["usable"], made["correction"], made["joint"]["correction"]) == (False, None, None)

@@ -157,8 +157,8 @@ class Orientation(Shown, Brief):
 
     @property
     def usable(self) -> bool:
-        """Whether the values can be used: it converged, and nothing grave was found."""
-        return self.converged and not self.grave
+        """Whether the values can be used: `verdict` says why not."""
+        return self.verdict.usable
 
     @property
     def decided_by_w(self) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.plot import figure
 from photogram.show.angles import ARCSEC
-from photogram.show.judgement import advice, judged, remarks_section, tests_section
+from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.page import (
     Cell,
     Column,
@@ -53,29 +53,9 @@ def orientation_page(result: Orientation) -> Page:
         what="Absolute orientation of a model",
         title="",
         judgements=[judged(result.verdict)],
-        advice=_advice(result),
+        advice=result.verdict.next,
         highlights=_highlights(result),
         sections=sections,
-    )
-
-
-def _advice(result: Orientation) -> list[str]:
-    others = []
-    if result.degrees_of_freedom == 0:
-        others.append("Seven known coordinates are just enough: one more makes errors visible.")
-    if not result.weighted and result.usable:
-        others.append(
-            "Give standard deviations where they are known: the residuals are tested as a whole then."
-        )
-    if result.alternatives:
-        scale = significant(result.alternatives[0].scale, 6)
-        others.append(
-            f"Another orientation fits as well, with the scale {scale}: only you know which is meant."
-        )
-    return advice(
-        result.verdict,
-        snoop="`--reject ID` leaves the control of a station out; compare what it does to the others.",
-        others=others,
     )
 
 

@@ -11,7 +11,7 @@ from photogram.absolute_orientation.cards import restart_record, transformation_
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
-from photogram.show.sections import Section, composed, headline, verdict_section
+from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 from photogram.show.ways import report_of
 
 __all__ = ["report", "summary"]
@@ -38,8 +38,8 @@ def report(result: Orientation) -> str:
 def summary(result: Orientation) -> list[Section]:
     """Return what a reader wants first, as titled sections, the verdict first."""
     return [
-        verdict_section(result.verdict),
-        ("Problems", result.problems or ["none"]),
+        *verdict_sections(result.verdict),
+        ("Problems", problems_or_none(result.problems, result.verdict)),
         ("Orientation", _figures(result)),
         ("Parameters: x = s A X + B", _parameters(result)),
         ("Control: residuals u = s X - A^T (x - B), known components", _control(result)),

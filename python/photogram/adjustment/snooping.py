@@ -285,6 +285,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     """Return a block without what is out, from where the last trial has ended.
 
     Points start where their rays meet; what was given of them stays, for check points are compared with it.
+    Of control that is out nothing stays: what is taken for a gross error checks nothing.
     """
     core = trial.core
     kinds, subjects = core.subjects
@@ -296,7 +297,9 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     images = np.ones(len(block.image_xy), dtype=bool)
     images[subject[gone[IMAGE]]] = False
     point_sd = block.point_sd.copy()
-    point_sd[subject[gone[CONTROL]], components[gone[CONTROL]]] = np.inf
+    point_positions = block.point_positions.copy()
+    control = subject[gone[CONTROL]], components[gone[CONTROL]]
+    point_sd[control], point_positions[control] = np.inf, np.nan
     position_sd, attitude_sd = block.photo_position_sd.copy(), block.photo_attitude_sd.copy()
     position_sd[subject[gone[POSITION]], components[gone[POSITION]]] = np.inf
     attitude_sd[subject[gone[ATTITUDE]], components[gone[ATTITUDE]]] = np.inf
@@ -317,6 +320,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
         photo_attitudes_observed=_observed(block.photo_attitudes, attitudes, attitude_sd),
         photo_position_sd=position_sd,
         photo_attitude_sd=attitude_sd,
+        point_positions=point_positions,
         point_sd=point_sd,
         image_photos=block.image_photos[images],
         image_points=block.image_points[images],

@@ -27,7 +27,7 @@ from photogram.checks.findings import Check, Finding, Level, Section
 from photogram.checks.gross import Suspects, disproved, gross, without
 from photogram.checks.heights import two_ray_heights
 from photogram.checks.key_numbers import key_numbers
-from photogram.checks.left_out import held_values, points_left_out
+from photogram.checks.left_out import disagreeing, held_values, points_left_out
 from photogram.checks.lenses import half_pixel, lenses_estimated, lenses_put_right
 from photogram.checks.orientation import orientation, spare_explained
 from photogram.checks.positions import Wrong, wrong_positions
@@ -192,6 +192,8 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     if edited.first is not None and edited.last is not None:
         named = {point for each in [*errors.findings, *edited.section.findings] for point in each.points}
         edited.section.findings[:0] = held_values(edited.first) + points_left_out(edited.last, named)
+        if edited.last.converged:
+            edited.section.findings += disagreeing(edited.last)
     sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
     sections += _after_adjustment(oriented, edited, misleading, words)
     if edited.last is not None and edited.last.converged:

@@ -33,6 +33,11 @@ CONVENTIONS = frozenset(
     }
 )
 """Kinds of findings that are mistakes in what the data of a whole set mean."""
+_CORRECT = (
+    "Correct what the first finding names, and check again: one mistake may hide another, and explain it.",
+)
+_LOOK = ("Look at what was found first.",)
+_ADJUST = ("Adjust: `photogram adjust`, or `photogram giant` for a GIANT project.",)
 SHOWN = 40
 """Findings of one level that a section of the text shows at most; the JSON document has all."""
 
@@ -165,6 +170,7 @@ class Check(Brief):
             exit=exit_code,
             warning=bool(grave or look),
             lines=tuple(each.text for each in [*grave[1:], *look]),
+            next=_CORRECT if grave else (*_LOOK, *_ADJUST) if look else _ADJUST,
             tests=tests,
             hints=hints,
         )
@@ -173,7 +179,8 @@ class Check(Brief):
         """Return the check as text."""
         grave, look = len(self.grave), len(self.findings) - len(self.grave)
         head = f"{headline('check', self.title)}\n{grave} grave, {look} to look at"
-        return composed(head, ((section.title, section.text()) for section in self.sections))
+        sections = [(section.title, section.text()) for section in self.sections]
+        return composed(head, [("What to do next", list(self.verdict.next)), *sections])
 
     def to_html(self) -> bytes:
         """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).

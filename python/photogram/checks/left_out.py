@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from photogram.checks.findings import Finding
+from photogram.checks.findings import Finding, Level
 from photogram.results.findings import HARMFUL
 from photogram.results.held import HELD
 from photogram.results.result import Result
+from photogram.show.ways import findings_of
+from photogram.statistics.evidence import WITHHELD, Evidence
 
-__all__ = ["held_values", "points_left_out"]
+__all__ = ["disagreeing", "held_values", "points_left_out"]
 
 
 def points_left_out(result: Result, named: Collection[str]) -> list[Finding]:
@@ -45,3 +47,13 @@ def held_values(result: Result) -> list[Finding]:
         " by any observation; give it a standard deviation"
     )
     return [Finding("held-value", "grave", text, photos, points, {"statistic": value})]
+
+
+def disagreeing(result: Result) -> list[Finding]:
+    """Name the check points that disagree with the adjustment, as its verdict does."""
+    evidence = Evidence(findings_of(result))
+    levels: tuple[tuple[Level, float], ...] = (("grave", WITHHELD), ("look", evidence.found.level))
+    for level, limit in levels:
+        if said := evidence.disagreement(limit):
+            return [Finding("check-points", level, f"check points disagree with the adjustment: {said}")]
+    return []

@@ -39,7 +39,7 @@ def check_page(found: Check) -> Page:
         what="Check of a network before its adjustment",
         title=found.title,
         judgements=[replace(judged(verdict), lines=())],  # the table of findings has them
-        advice=_advice(found),
+        advice=verdict.next,
         highlights=[
             Fact("Grave", f"{grave}", tone="bad" if grave else ""),
             Fact("To look at", f"{look}", tone="look" if look else ""),
@@ -53,16 +53,6 @@ _INTRO = (
     " explains others is put"
     " right before the next step looks, so that each is named once. Nothing was changed in the files."
 )
-
-
-def _advice(found: Check) -> list[str]:
-    if found.grave:
-        first = found.grave[0].text
-        return [
-            first[:1].upper() + first[1:],
-            "Correct the input, and check again: one mistake may hide another.",
-        ]
-    return ["Adjust: `photogram adjust`, or `photogram giant` for a GIANT project."]
 
 
 def _table(found: Check) -> Table:

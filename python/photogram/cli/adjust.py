@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from photogram.cli.components import UnitVarianceName
-from photogram.cli.console import NOT_CONVERGED, output, print_remark, print_sections
+from photogram.cli.console import NOT_CONVERGED, ON_TOP, output, print_remark, print_sections
 from photogram.cli.division import WHOLE, Parts
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Writes, with_job
@@ -227,7 +227,7 @@ def adjust(
             files |= {f"in_crs/{name}": content for name, content in found.items()}
         if removed is not None:
             files["removed.csv"] = removed.table().to_csv(index=False).encode()
-        taken = [] if removed is None else removed.sections()[1:]
+        taken = [] if removed is None else removed.sections()[ON_TOP:]
         sheets = {} if xlsx is None else {xlsx: _workbook(result)}
         page = html_files(job, "adjust", place, html is not None, lambda: page_of(told))
         job.finish(
@@ -389,5 +389,5 @@ def _same_format(project: Project, name: str) -> dict[str, bytes]:
 def _summary(result: Result, taken: list[tuple[str, list[str]]]) -> list[tuple[str, list[str]]]:
     from photogram.results.report import summary
 
-    verdict, *others = summary(result)
-    return [each for each in (verdict, *taken, *others) if each[1]]
+    sections = summary(result)
+    return [*sections[:ON_TOP], *taken, *sections[ON_TOP:]]

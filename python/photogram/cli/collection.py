@@ -18,7 +18,7 @@ from photogram.cli.components import (
     with_components_page,
     with_weights,
 )
-from photogram.cli.console import print_sections
+from photogram.cli.console import ON_TOP, print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
 from photogram.cli.maps import CloudFile, CloudOrigin, point_clouds
@@ -204,13 +204,12 @@ def collection(
         sections = [
             ("File", [f"{job.shown(problem)}: {found.title}"]),
             *with_weights(log.sections() if log else [], made),
-            *with_components(summary(result), estimates)[1 if log else 0 :],
+            *with_components(summary(result), estimates)[ON_TOP if log else 0 :],
         ]
-        whole = (section for section in sections if section[1])
         job.finish(
             written,
             as_data(result, parquet),
             point_clouds(result, ply, ply_origin),
-            summary=lambda: print_sections(whole, "the report"),
+            summary=lambda: print_sections(sections, "the report"),
             code=(estimates or told).verdict.exit_code(strict=strict),
         )

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import output, print_remark, print_withheld
+from photogram.cli.console import output, print_remark, print_sections, print_withheld
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Former, Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Quiet, default_out, out_option
@@ -165,13 +165,13 @@ def comparator(
 
 
 def _withheld(calibrations: list[Calibration], folder: Path) -> None:
-    """Say which corrections outliers spoil, and which files of earlier runs are not of this one."""
+    """Say which corrections must not be used, and which files of earlier runs are not of this one."""
     for number, calibration in enumerate(calibrations, 1):
         if calibration.usable:
             continue
         print_withheld(
             f"comparator {calibration.session.comparator}: the correction is withheld:"
-            " outliers make it unusable",
+            f" {calibration.verdict.headline}",
             _corrections(calibration, _place(folder, number, len(calibrations))),
         )
 
@@ -268,14 +268,18 @@ def _summarize(calibrations: list[Calibration]) -> None:
 
 def _summarize_one(calibration: Calibration) -> None:
     from photogram.comparator.listing.summary import summary_page
+    from photogram.show.sections import problems_or_none
 
     session = calibration.session
     output.print(f"[bold]Comparator {session.comparator}, {len(calibration.cases)} cases[/]")
-    output.print("[bold]Verdict[/]")
-    output.print(f"  {escape(calibration.verdict.headline)}")
-    output.print("[bold]Problems[/]")
-    for text in [message.text for message in calibration.messages] or ["none"]:
-        output.print(f"  {escape(text)}")
+    verdict = calibration.verdict
+    told = problems_or_none([message.text for message in calibration.messages], verdict)
+    sections = [
+        ("Verdict", [verdict.headline]),
+        ("What to do next", list(verdict.next)),
+        ("Problems", told),
+    ]
+    print_sections(sections, "listing.txt", len(told))
     for line in summary_page(calibration)[4:]:
         output.print(escape(line))
     if calibration.joint:
@@ -368,6 +372,7 @@ def compare(
     """
     with job:
         from photogram.comparator import compare as compared
+        from photogram.show.sections import verdict_sections
         from photogram.show.ways import page_of
 
         if example:
@@ -389,10 +394,7 @@ def compare(
         documents = {json: found.to_json()} if json is not None else {}
 
         def summarize() -> None:
-            output.print("[bold]Verdict[/]")
-            output.print(
-                escape("\n".join(f"  {line}" for line in (found.verdict.headline, *found.verdict.lines)))
-            )
+            print_sections(verdict_sections(found.verdict), "the report")
             output.print(escape(found.report()), end="")
 
         job.finish(written, documents, summary=summarize, code=found.verdict.exit)

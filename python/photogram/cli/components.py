@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from photogram.cli.console import ON_TOP
 from photogram.cli.job import Job
 
 if TYPE_CHECKING:
@@ -101,18 +102,18 @@ def with_weights(sections: list[Section], made: Cleaned | None) -> list[Section]
     """Return the sections of snooping, with what became of the weights below its verdict."""
     if made is None:
         return sections
-    return [*sections[:1], ("Weights", made.report().splitlines()), *sections[1:]]
+    return [*sections[:ON_TOP], ("Weights", made.report().splitlines()), *sections[ON_TOP:]]
 
 
 def with_components(sections: list[Section], found: VarianceComponents | None) -> list[Section]:
-    """Return a summary, whose first section is the verdict, with what components say in its place."""
+    """Return a summary, on top of which the verdict stands, with what components say in its place."""
     if found is None:
         return sections
     from photogram.results.components import component_lines, statement
-    from photogram.show.sections import verdict_section
+    from photogram.show.sections import verdict_sections
 
     own = [
-        verdict_section(found.verdict),
+        *verdict_sections(found.verdict),
         ("Variance components", [*statement(found), *component_lines(found)]),
     ]
-    return [*own, *sections[1:]]
+    return [*own, *sections[ON_TOP:]]

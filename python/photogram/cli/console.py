@@ -35,6 +35,9 @@ NOT_CONVERGED = 3
 SHOWN = 24
 """Lines of a section that the summary of a command shows at most."""
 
+ON_TOP = 2
+"""Sections with which summaries of verdicts begin: the verdict, and what to do next."""
+
 EXTRAS = {
     "jinja2": "report",
     "matplotlib": "plots",
@@ -56,8 +59,10 @@ output = Console(highlight=False, soft_wrap=True)
 
 
 def print_sections(summary: Iterable[Section], whole: str, most: int = SHOWN) -> None:
-    """Print titled sections, of each at most `most` lines; `whole` says where the others are."""
+    """Print titled sections with lines, of each at most `most`; `whole` says where the others are."""
     for title, lines in summary:
+        if not lines:
+            continue
         output.print(f"[bold]{escape(title)}[/]")
         for line in lines[:most]:
             output.print(f"  {escape(line)}")

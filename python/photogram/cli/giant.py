@@ -20,7 +20,7 @@ from photogram.cli.components import (
     with_components_page,
     with_weights,
 )
-from photogram.cli.console import SHOWN, errors, print_sections
+from photogram.cli.console import ON_TOP, SHOWN, errors, print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.maps import CloudFile, CloudOrigin, MapFile, check_maps, drawn_maps, point_clouds
@@ -230,7 +230,7 @@ def giant(
             summary=lambda: print_sections(
                 [
                     *with_weights(log.sections() if log else [], made),
-                    *with_components(summary(result), found)[1 if log else 0 :],
+                    *with_components(summary(result), found)[ON_TOP if log else 0 :],
                 ],
                 "report.txt",
             ),

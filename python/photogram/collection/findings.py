@@ -17,6 +17,11 @@ from photogram.statistics.outliers import Observations
 
 __all__ = ["collection_findings", "names", "tested_observations"]
 
+NO_DATUM = (
+    "Nothing gives the network a datum: shapes and relative precision can be used, absolute positions and the"
+    " scale mean nothing."
+)
+
 
 @findings_of.register(AdjustedCollection)
 def collection_findings(result: AdjustedCollection) -> Findings:
@@ -35,6 +40,10 @@ def collection_findings(result: AdjustedCollection) -> Findings:
         systematic=_patterns(result),
         remarks=unseen(result),
         snoop="--snoop (photogram.snoop)",
+        check="`photogram.check` of the collection",
+        take_out="`--snoop` (`photogram.snoop`) takes gross errors out one after the other; `--loss huber`"
+        " or `cauchy` lowers their weights.",
+        if_usable=[NO_DATUM] if result.datum else [],
     )
 
 

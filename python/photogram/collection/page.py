@@ -23,7 +23,7 @@ from photogram.results.page.parts import (
 from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import CONDITION_NOTE, RATIO_NOTE, chosen_rows
 from photogram.results.weakest import weakest_photos, weakest_points
-from photogram.show.judgement import advice, judged, remarks_section
+from photogram.show.judgement import judged, remarks_section
 from photogram.show.page import (
     Cell,
     Column,
@@ -76,7 +76,7 @@ def collection_page(result: AdjustedCollection) -> Page:
         what="Adjustment of a collection of photos",
         title="",
         judgements=[judged(result.verdict)],
-        advice=_advice(result),
+        advice=result.verdict.next,
         highlights=_highlights(result),
         sections=sections,
         phases=result.seconds,
@@ -88,25 +88,6 @@ _REDUNDANCY = (
     " the rest"
     " goes into the unknowns."
 )
-
-
-def _advice(result: AdjustedCollection) -> list[str]:
-    others = []
-    if result.verdict.usable and result.datum:
-        others.append(
-            "Nothing gives the network a datum: shapes and relative precision can be used, absolute positions"
-            " and the scale mean nothing."
-        )
-    elif result.verdict.usable and result.verdict.code == "accepted":
-        others.append("Nothing needs to be done.")
-    return advice(
-        result.verdict,
-        check="`photogram.check` of the collection",
-        snoop="`--snoop` (`photogram.snoop`) takes gross errors out one after the other; `--loss huber`"
-        " or `cauchy` lowers"
-        " their weights.",
-        others=others,
-    )
 
 
 def _highlights(result: AdjustedCollection) -> list[Fact]:

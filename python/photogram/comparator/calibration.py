@@ -180,8 +180,8 @@ class Calibration(Judged, Brief):
 
     @property
     def usable(self) -> bool:
-        """Whether the correction may be used: outliers do not falsify it by more than its uncertainty."""
-        return not self.screening.harmful
+        """Whether the correction may be used: `verdict` says why not."""
+        return self.verdict.usable
 
     @property
     def correction(self) -> Correction:

@@ -37,11 +37,18 @@ def comparator_findings(calibration: Calibration) -> Findings:
         observations=[readings],
         degrees_of_freedom=screening.freedom,
         untested="readings have no standard deviation of their own",
-        spoiled=""
-        if calibration.usable
-        else f"outliers change corrected coordinates by {screening.change_um:.1f} um (root mean square),"
-        f" and a coordinate is uncertain by {screening.sigma_um:.3f} um",
+        spoiled=f"outliers change corrected coordinates by {screening.change_um:.1f} um (root mean square),"
+        f" and a coordinate is uncertain by {screening.sigma_um:.3f} um"
+        if screening.harmful
+        else "",
         systematic=_grids(calibration.joint) if calibration.joint else [],
+        if_usable=[
+            "Correct measurements with `photogram comparator correct correction.json FILE`.",
+            "Keep the document of `--json`: `photogram comparator compare` finds what changes over years.",
+        ],
+        if_withheld=[
+            "The correction is withheld: measure the readings that are named again, or leave them out."
+        ],
     )
 
 

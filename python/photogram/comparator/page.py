@@ -10,7 +10,7 @@ from photogram.comparator.calibration import Calibration
 from photogram.comparator.polynomial import TERMS
 from photogram.comparator.variance import AxisSigma
 from photogram.show.angles import ARCSEC
-from photogram.show.judgement import advice, judged, remarks_section, tests_section
+from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.page import (
     Cell,
     Column,
@@ -56,7 +56,7 @@ def calibration_page(calibration: Calibration) -> Page:
         what="Calibration of a comparator",
         title=f"Comparator {session.comparator}, {len(calibration.cases)} cases{date}",
         judgements=[judged(calibration.verdict)],
-        advice=advice(calibration.verdict, others=_next(calibration)),
+        advice=calibration.verdict.next,
         highlights=_highlights(calibration),
         sections=sections,
     )
@@ -77,15 +77,6 @@ _POLYNOMIALS = (
     " its argument from -1 to 1 over the measured range, so that its coefficient is its effect at the edge."
 )
 _JOINT = "All cases, comparator, polynomials and grid in one adjustment, with the accuracy of the grid."
-
-
-def _next(calibration: Calibration) -> list[str]:
-    if not calibration.usable:
-        return ["The correction is withheld: measure the readings that are named again, or leave them out."]
-    return [
-        "Correct measurements with `photogram comparator correct correction.json FILE`.",
-        "Keep the document of `--json`: `photogram comparator compare` finds what changes over years.",
-    ]
 
 
 def _highlights(calibration: Calibration) -> list[Fact]:

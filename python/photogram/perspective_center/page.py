@@ -10,7 +10,7 @@ import numpy as np
 from photogram.perspective_center.batch import Run
 from photogram.perspective_center.plot import figure
 from photogram.perspective_center.solution import INTERIOR, PerspectiveCenter
-from photogram.show.judgement import advice, judged, remarks_section
+from photogram.show.judgement import judged, remarks_section
 from photogram.show.page import (
     Cell,
     Column,
@@ -46,7 +46,7 @@ def run_page(run: Run) -> Page:
         what="Perspective centre of a projector",
         title=run.results[0].grid.title if run.results else "",
         judgements=judgements,
-        advice=list(dict.fromkeys(each for one in run.results for each in advice(one.verdict))),
+        advice=list(dict.fromkeys(each for one in run.results for each in one.verdict.next)),
         highlights=[fact for each in run.results for fact in _highlights(each)],
         sections=sections,
     )

@@ -32,6 +32,7 @@ def summary(result: PerspectiveCenter) -> list[str]:
         f" {how}, {len(result.cycles)} iterations"
     ]
     lines.append(f"  verdict: {result.verdict.headline}")
+    lines += [f"  next: {each}" for each in result.verdict.next]
     if not result.converged:
         lines.append(f"  {NOT_CONVERGED}")
     errors = result.standard_errors

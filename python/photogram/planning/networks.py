@@ -16,7 +16,7 @@ from photogram.errors import InputError, RankError
 from photogram.io import json
 from photogram.network.block import Block
 from photogram.planning.pattern import Pattern
-from photogram.planning.text import report
+from photogram.planning.text import report, what_next
 from photogram.show.ways import html_of
 from photogram.statistics.reliability import TESTABLE, noncentrality
 
@@ -106,6 +106,7 @@ class Plan:
             },
             "noncentrality": noncentrality(),
             "unchecked_below": TESTABLE,
+            "next": what_next(self.patterns),
             "patterns": [_pattern(pattern) for pattern in self.patterns],
         }
         return json.to_json(document)

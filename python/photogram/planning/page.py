@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from photogram.planning.pattern import Pattern
 from photogram.planning.plot import figure
 from photogram.planning.statistics import PointQuality
-from photogram.planning.text import remarks
+from photogram.planning.text import remarks, what_next
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
 from photogram.show.page import (
@@ -46,7 +46,7 @@ def plan_page(patterns: Sequence[Pattern]) -> Page:
         what="Prediction of a network before it is flown",
         title=patterns[0].block.title,
         judgements=[_judgement(patterns)],
-        advice=_advice(patterns),
+        advice=what_next(patterns),
         highlights=_highlights(patterns),
         sections=sections,
     )
@@ -97,27 +97,6 @@ def _judgement(patterns: Sequence[Pattern]) -> Judgement:
         f"“{best}” gives heights {heights[worst] / heights[best]:.2f} times better than “{worst}”:"
         f" rms {significant(heights[best], 3)} against {significant(heights[worst], 3)} {unit}",
     )
-
-
-def _advice(patterns: Sequence[Pattern]) -> list[str]:
-    found = []
-    for pattern in patterns:
-        unchecked = pattern.points[-1].unchecked
-        if pattern.new_points.any() and unchecked > 0.01:
-            found.append(
-                f"“{pattern.name}”: gross errors of {100 * unchecked:.0f} percent of the image"
-                " coordinates could not be"
-                " found. More rays a point (more overlap) make them checked."
-            )
-        weak = [quality for quality in pattern.control if quality.held and quality.redundancy < 0.2]
-        if weak:
-            named = ", ".join(quality.component for quality in weak)
-            found.append(
-                f"“{pattern.name}”: control in {named} is hardly checked by the network; more of it, or"
-                " check points"
-                " beside it, would show its errors."
-            )
-    return found
 
 
 def _highlights(patterns: Sequence[Pattern]) -> list[Fact]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import compress
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from photogram.planning.statistics import PointQuality
@@ -14,12 +15,14 @@ from photogram.show.sections import composed, headline
 if TYPE_CHECKING:
     from photogram.planning.pattern import Pattern
 
-__all__ = ["remarks", "report"]
+__all__ = ["remarks", "report", "what_next"]
 
 _NOTICED = 1.005
 """Ratio of standard deviations that two decimals show."""
 _HEAD = 3
 """Lines of a block before its first row: its name, headings, units."""
+_WIDEST = 108
+"""Characters of a sentence in a line."""
 _LABEL, _GAP = 11, "    "
 
 # A column: its heading, its unit, and the text of its cell.
@@ -30,6 +33,7 @@ def report(patterns: Sequence[Pattern]) -> str:
     """Return the tables of a plan."""
     unit = patterns[0].block.linear_unit
     sections = [
+        ("What to do next", [line for each in what_next(patterns) for line in wrap(each, _WIDEST)]),
         ("Network", _network(patterns)),
         (f"New points: expected standard deviations, {unit}", _standard_deviations(patterns, unit)),
         ("New points: the same, divided by the sd of image coordinates on the ground", _multiples(patterns)),
@@ -56,6 +60,28 @@ def _network(patterns: Sequence[Pattern]) -> list[str]:
     blocks = [[pattern.name, *(cell(pattern) for _, cell in rows)] for pattern in patterns]
     labels = ["", *(name for name, _ in rows)]
     return [*_labelled(labels, [_column(block) for block in blocks]), *remarks(patterns)]
+
+
+def what_next(patterns: Sequence[Pattern]) -> list[str]:
+    """Return what to do next: what would make the network check itself."""
+    found = []
+    for pattern in patterns:
+        unchecked = pattern.points[-1].unchecked
+        if pattern.new_points.any() and unchecked > 0.01:
+            found.append(
+                f"“{pattern.name}”: gross errors of {100 * unchecked:.0f} percent of the image"
+                " coordinates could not be"
+                " found. More rays a point (more overlap) make them checked."
+            )
+        weak = [quality for quality in pattern.control if quality.held and quality.redundancy < 0.2]
+        if weak:
+            named = ", ".join(quality.component for quality in weak)
+            found.append(
+                f"“{pattern.name}”: control in {named} is hardly checked by the network; more of it, or"
+                " check points"
+                " beside it, would show its errors."
+            )
+    return found
 
 
 def remarks(patterns: Sequence[Pattern]) -> list[str]:

@@ -93,7 +93,15 @@ def _findings(found: VarianceComponents) -> Findings:
         if not each.held
     ]
     given = findings_of(found.first)
-    return replace(findings_of(found.result), global_test=given.global_test, components=estimated)
+    first = statement(found)[0]
+    told = [f"{first[:1].upper()}{first[1:]}."]
+    return replace(
+        findings_of(found.result),
+        global_test=given.global_test,
+        components=estimated,
+        if_usable=told,
+        if_withheld=(),
+    )
 
 
 @columns_of.register(VarianceComponents)
@@ -156,6 +164,7 @@ def _report(found: VarianceComponents) -> str:
     """Return the components as text: what to do first."""
     sections: list[Section] = [
         ("Verdict", [f"{found.verdict.headline}.", *statement(found)]),
+        ("What to do next", list(found.verdict.next)),
         ("Variance components", component_lines(found)),
         ("Groups that were merged or held", list(found.estimate.messages)),
     ]

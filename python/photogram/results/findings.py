@@ -58,13 +58,36 @@ def block_findings(result: Result) -> Findings:
         checks=result.check_points.agreement,
         systematic=[] if intersected else _patterns(result),
         intersected=intersected,
+        scaled=result.unit_variance != "unity",
         remarks=[*unseen(result), *_left_out(result), *_on_checks(result)],
         hints=result.hints,
         exchanged=result.exchanged,
         set_aside=_set_aside(result),
         snoop="" if intersected else "--snoop (photogram.snoop)",
         calibrate=how_to_calibrate(result.block),
+        check="`photogram check` (`photogram.check`)",
+        take_out=""
+        if intersected
+        else "`--snoop` (`photogram.snoop`) takes gross errors out one after the other, and says which cannot"
+        " be told apart.",
+        if_usable=_unproved(result),
     )
+
+
+def _unproved(result: Result) -> list[str]:
+    """Say what nothing proves of a block: its accuracy without check points, points with two rays."""
+    found = []
+    if not (result.used_points & (result.point_kinds == "check")).any():
+        found.append(
+            "There are no check points. Leave some control out (no standard deviation), and compare it:"
+            " that is the only independent proof of the accuracy."
+        )
+    if few := int(np.count_nonzero(result.point_rays == 2)):
+        found.append(
+            f"{few} of {np.count_nonzero(result.used_points)} points have two rays only: an error"
+            " across the base shows, one along it does not."
+        )
+    return found
 
 
 def left_open(result: AdjustedNetwork) -> list[str]:

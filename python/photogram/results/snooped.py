@@ -13,7 +13,7 @@ from photogram.io import json
 from photogram.results.exchanged import Exchange
 from photogram.results.network import AdjustedNetwork
 from photogram.show.brief import Brief, Rows, few
-from photogram.show.sections import Section, composed, headline, verdict_section
+from photogram.show.sections import Section, composed, headline, verdict_sections
 from photogram.show.ways import Judged, html_of
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival
@@ -149,15 +149,14 @@ class Snooped(Brief, Judged):
 
     def sections(self) -> list[Section]:
         """Return the log as titled sections of a report."""
-        return [
-            verdict_section(self.verdict),
-            ("Data snooping", self._head()),
-            ("Taken out, in order", self._log()),
-        ]
+        return [*verdict_sections(self.verdict), *self._own()]
+
+    def _own(self) -> list[Section]:
+        return [("Data snooping", self._head()), ("Taken out, in order", self._log())]
 
     def report(self) -> str:
         """Return the report: that of the network without what was taken out, then the log of that."""
-        return self.judged.report() + "\n" + composed(headline("data snooping"), self.sections()[1:])
+        return self.judged.report() + "\n" + composed(headline("data snooping"), self._own())
 
     def _head(self) -> list[str]:
         outcome, settings = self.outcome, self.settings
@@ -278,7 +277,7 @@ def _said(standing: Standing) -> str:
     test = global_test(standing.weighted_sum_of_squares, standing.degrees_of_freedom)
     if test is None:
         return "undefined: no degrees of freedom"
-    said = "too high" if test.rejected_high else "too low" if test.rejected_low else "accepted"
+    said = "too high" if test.rejected_high else "too low" if test.rejected_low else "as expected"
     expected = f"{test.limits[0]:.3f} to {test.limits[1]:.3f}"
     freedom = standing.degrees_of_freedom
     return f"{test.variance:.4f} with {freedom} degrees of freedom, expected {expected}: {said}"

@@ -10,7 +10,7 @@ from photogram.statistics.evidence import Test
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
 
-__all__ = ["Section", "composed", "headline", "problems", "verdict_section"]
+__all__ = ["Section", "composed", "headline", "problems", "problems_or_none", "verdict_sections"]
 
 Section = tuple[str, list[str]]
 """A title and lines."""
@@ -27,13 +27,18 @@ def composed(head: str, sections: Iterable[Section]) -> str:
     return "\n\n".join([head, *parts]) + "\n"
 
 
-def verdict_section(verdict: Verdict) -> Section:
-    """Return what stands on top of every report: the verdict in a sentence, remarks, and the tests."""
+def verdict_sections(verdict: Verdict) -> list[Section]:
+    """Return what stands on top of every report: the verdict, and what to do next."""
+    return [("Verdict", _judged(verdict)), ("What to do next", list(verdict.next))]
+
+
+def _judged(verdict: Verdict) -> list[str]:
+    """Return the verdict in a sentence, remarks, and the tests."""
     lines = [f"{verdict.headline}.", *(f"{line[:1].upper()}{line[1:]}." for line in verdict.lines)]
     if verdict.tests:
         lines += [f"{'test':<54}{'value':>14}{'limits':>20}{'p':>10}{'level':>10}{'tests':>8}"]
         lines += [line for test in verdict.tests for line in _test_lines(test)]
-    return "Verdict", lines
+    return lines
 
 
 def _test_lines(test: Test) -> list[str]:
@@ -57,6 +62,7 @@ def problems(
     messages: Sequence[Message],
     status: str,
     variance_of_unit_weight: float | None,
+    verdict: Verdict,
     test: GlobalTest | None = None,
 ) -> list[str]:
     """Return what keeps a reader from using the values of an adjustment, or should make them careful.
@@ -70,4 +76,11 @@ def problems(
         found.insert(0, f"the adjustment has {status}: do not use these values")
     if variance_of_unit_weight is None:
         found.append("there are no degrees of freedom: covariances are scaled by 1")
-    return found or ["none"]
+    return problems_or_none(found, verdict)
+
+
+def problems_or_none(messages: Iterable[Message | str], verdict: Verdict) -> list[str]:
+    """Return messages, or that there are none: beside the verdict, where that has something to say."""
+    found = [str(message) for message in messages]
+    good = verdict.usable and not verdict.warning and all(test.accepted for test in verdict.tests)
+    return found or ["none" if good else "none beside those of the verdict"]

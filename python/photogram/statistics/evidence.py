@@ -239,7 +239,12 @@ class Evidence:
     def accepted(self) -> tuple[str, str]:
         """Return code and headline where nothing is wrong."""
         if self.test is None:
-            return "not-tested", f"Not tested as a whole ({self.found.untested}); no single test rejects"
+            single = (
+                "test of an observation"
+                if any(e.significant for e in self.found.systematic)
+                else "single test"
+            )
+            return "not-tested", f"Not tested as a whole ({self.found.untested}); no {single} rejects"
         low, high = self.test.limits
         how = "agree with the given standard deviations"
         if self.test.rejected_high or self.test.rejected_low:

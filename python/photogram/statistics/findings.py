@@ -299,6 +299,8 @@ class Findings:
         What a start has taken out and does not fit the adjusted network either; None for nothing.
     intersected
         Whether all photos are held where they are given, so that errors of these are in all residuals.
+    scaled
+        Whether covariances are scaled by the unit variance of the residuals.
     computed
         Whether observations could be tested, that is, whether their redundancy numbers were computed.
     remarks
@@ -306,6 +308,12 @@ class Findings:
     snoop, calibrate
         How gross errors are taken out, and how cameras are estimated, with this program; nothing where it
         cannot.
+    check
+        How the program looks for mistakes of the input, as part of a sentence.
+    take_out
+        How gross errors are taken out, in a sentence of what to do next.
+    if_usable, if_withheld
+        What else is to be done next where nothing forbids the use, and where something does: sentences.
     level
         Of the global test, and of all single tests together.
     """
@@ -327,8 +335,13 @@ class Findings:
     snooped: Removed | None = None
     set_aside: Removed | None = None
     intersected: bool = False
+    scaled: bool = True
     computed: bool = True
     remarks: Sequence[str] = ()
     snoop: str = ""
     calibrate: str = ""
+    check: str = "look at units, names and signs"
+    take_out: str = ""
+    if_usable: Sequence[str] = ()
+    if_withheld: Sequence[str] = ()
     level: float = LEVEL

@@ -15,6 +15,7 @@ from photogram.messages import counted, listed
 from photogram.statistics.evidence import NAMED, WITHHELD, Evidence, Test
 from photogram.statistics.findings import Findings
 from photogram.statistics.limits import NOTABLE_FACTOR
+from photogram.statistics.next_steps import next_steps
 
 __all__ = ["EXIT_NOT_CONVERGED", "EXIT_NOT_USABLE", "Test", "Verdict", "verdict", "worst"]
 
@@ -51,6 +52,8 @@ class Verdict:
         Whether a user should look although the exit code is 0; `--strict` makes it 4.
     lines
         What else is to be said.
+    next
+        What to do next, in sentences.
     tests
         The global test, the largest test value of every kind of observation, tests of patterns.
     removed, rivals, hints
@@ -62,6 +65,7 @@ class Verdict:
     exit: int
     warning: bool
     lines: tuple[str, ...]
+    next: tuple[str, ...]
     tests: tuple[Test, ...]
     removed: tuple[Any, ...] = ()
     rivals: tuple[str, ...] = ()
@@ -118,11 +122,17 @@ def verdict(found: Findings) -> Verdict:
             *found.remarks,
             *_exchanged(found, fitting),
         ),
+        next=next_steps(first.code, found, usable=usable, take_out=_can_be_taken_out(evidence)),
         tests=tuple(evidence.tests()),
         removed=tuple(found.snooped.removed) if found.snooped else (),
         rivals=tuple(found.snooped.rivals) if found.snooped else (),
         hints=tuple(found.hints),
     )
+
+
+def _can_be_taken_out(e: Evidence) -> bool:
+    """Return whether what looks gross is an observation, and nothing was taken out yet."""
+    return e.found.snooped is None and not (e.gross and e.gross[0][1].held)
 
 
 def _exchanged(found: Findings, lines: list[_Line]) -> list[str]:
@@ -184,10 +194,9 @@ def _gross_errors(e: Evidence) -> _Line | None:
     if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
         return None
     text = f"Gross errors likely: {'; '.join([*e.found.exchanged, e.named(e.gross)])}"
-    _, first, _ = e.gross[0]
-    if first.held:
+    if e.gross[0][1].held:
         text += "; what is held is no observation: give it a standard deviation"
-    elif e.found.snoop:
+    elif e.found.snoop and e.found.status == "converged":
         text += f"; {e.found.snoop} takes them out"
     return _Line("gross-errors", text, EXIT_NOT_USABLE)
 
@@ -256,7 +265,8 @@ def _common_factor(e: Evidence) -> _Line | None:
         return None
     text = f"Weights too optimistic: standard deviations are too small by about {e.interval()}"
     if e.factor <= LARGEST_FACTOR:
-        return _Line("weights", f"{text}; covariances are scaled by the unit variance", warning=True)
+        scaled = "; covariances are scaled by the unit variance" if e.found.scaled else ""
+        return _Line("weights", f"{text}{scaled}", warning=True)
     return _Line("weights", text, EXIT_NOT_USABLE)
 
 

@@ -13,7 +13,7 @@ from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 from photogram.stellar.nights import CalibratedNight
 from photogram.stellar.outliers import studentized
-from photogram.stellar.result import Result
+from photogram.stellar.result import SIGNIFICANT, Result
 
 __all__ = ["night_findings", "plate_findings"]
 
@@ -44,8 +44,24 @@ def plate_findings(result: Result) -> Findings:
         untested="the mean error of unit weight is not given"
         if not problem.options.mean_error
         else "no degrees of freedom",
+        scaled=not problem.options.mean_error,
         spoiled=result.spoiled,
+        if_usable=[
+            *_not_significant(result),
+            "camera.json holds the calibrated camera: blocks take it with its covariance"
+            " (`photogram.camera_from`).",
+        ],
+        if_withheld=["camera.json is withheld: no block may take this camera."],
     )
+
+
+def _not_significant(result: Result) -> list[str]:
+    """Name terms of the distortion that a calibration does better without."""
+    weak = [name for name, ratio in result.significance().items() if ratio < SIGNIFICANT]
+    if not weak:
+        return []
+    named = ", ".join(weak)
+    return [f"Distortion terms that are not significant: {named}. A calibration without them is simpler."]
 
 
 @findings_of.register(CalibratedNight)
@@ -81,4 +97,9 @@ def night_findings(result: CalibratedNight) -> Findings:
             *(f"exposure {name} (by chance {odds:.1g})" for name, odds in result.doubtful.items()),
             *(["more exposures are left out than take part"] if result.mostly_left_out else []),
         ],
+        if_usable=[
+            "camera.json holds the calibrated camera; so do camera.yaml and camera-ros.yaml of lenses they"
+            " know."
+        ],
+        if_withheld=["The files of the camera are withheld: no block may take this camera."],
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
-from photogram.show.sections import Section, composed, headline, verdict_section
+from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 from photogram.stellar import tables
 from photogram.stellar.lens_tests import LEVEL, equal
 from photogram.stellar.parameters import GROUPS, INDEX
@@ -37,8 +37,8 @@ def listing(result: Result) -> str:
 def summary(result: Result) -> list[Section]:
     """Return what a reader wants first: verdict, problems and figures."""
     return [
-        verdict_section(result.verdict),
-        ("Problems", [str(message) for message in result.messages] or ["none"]),
+        *verdict_sections(result.verdict),
+        ("Problems", problems_or_none(result.messages, result.verdict)),
         ("Adjustment", _adjustment(result)),
     ]
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.show.angles import ARCSEC
-from photogram.show.judgement import advice, judged, remarks_section, tests_section
+from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.page import (
     Cell,
     Column,
@@ -57,20 +57,14 @@ def night_page(result: CalibratedNight) -> Page:
         tests_section(result.verdict),
         remarks_section(result.messages),
     ]
-    ready = (
-        "camera.json holds the calibrated camera; so do camera.yaml and camera-ros.yaml of lenses they know."
-    )
     return Page(
         what="Calibration of a camera by exposures of the sky",
         title=result.night.title,
         judgements=[judged(result.verdict)],
-        advice=advice(result.verdict, others=[ready if result.usable else _WITHHELD]),
+        advice=result.verdict.next,
         highlights=_highlights(result),
         sections=sections,
     )
-
-
-_WITHHELD = "The files of the camera are withheld: no block may take this camera."
 
 
 def _highlights(result: CalibratedNight) -> list[Fact]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from photogram.show.angles import ARCSEC
-from photogram.show.sections import Section, composed, headline, verdict_section
+from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE
 from photogram.stellar.nights import SIGNIFICANT, CalibratedNight, Night
 from photogram.stellar.odds import ACCEPTED, LOG_ODDS
@@ -40,8 +40,8 @@ def report(result: CalibratedNight) -> str:
 def summary(result: CalibratedNight) -> list[Section]:
     """Return what a reader wants first: verdict, problems, figures, the camera."""
     return [
-        verdict_section(result.verdict),
-        ("Problems", [str(message) for message in result.messages] or ["none"]),
+        *verdict_sections(result.verdict),
+        ("Problems", problems_or_none(result.messages, result.verdict)),
         ("Adjustment", _adjustment(result)),
         ("Camera", _camera(result)),
     ]

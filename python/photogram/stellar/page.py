@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.show.angles import ARCSEC
-from photogram.show.judgement import advice, judged, remarks_section, tests_section
+from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.page import (
     Cell,
     Column,
@@ -58,7 +58,7 @@ def plate_page(result: Result) -> Page:
         what="Calibration of a camera by a plate with stars",
         title=result.problem.labels.get("title", ""),
         judgements=[judged(result.verdict)],
-        advice=advice(result.verdict, others=_next(result)),
+        advice=result.verdict.next,
         highlights=_highlights(result),
         sections=sections,
     )
@@ -77,24 +77,6 @@ def plate_pictures(drawn: dict) -> list[Drawing]:  # type: ignore[type-arg]
         Drawing(f"picture-{name}", name[:1].upper() + name[1:], "", lambda figure=figure: figure)  # type: ignore[misc]
         for name, figure in drawn.items()
     ]
-
-
-def _next(result: Result) -> list[str]:
-    weak = [name for name, ratio in result.significance().items() if ratio < 1.96]
-    found = []
-    if weak:
-        found.append(
-            f"Distortion terms that are not significant: {', '.join(weak)}. A calibration without them is"
-            " simpler."
-        )
-    if result.verdict.usable:
-        found.append(
-            "camera.json holds the calibrated camera: blocks take it with its covariance"
-            " (`photogram.camera_from`)."
-        )
-    else:
-        found.append("camera.json is withheld: no block may take this camera.")
-    return found
 
 
 _UNIT = "of a plate coordinate of weight 1"

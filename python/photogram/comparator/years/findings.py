@@ -29,11 +29,13 @@ def comparison_findings(comparison: Comparison) -> Findings:
         return f"{axis} of point {point} of case {case} of {record}"
 
     test = comparison.together.test
+    grid = "Give the next calibration the adjusted grid: `--grid grid-NUMBER.csv`."
     return Findings(
         status="converged",
         observations=[Tested("readings of the grids", values, name, "w")],
         degrees_of_freedom=test.degrees_of_freedom,
         global_test=test,
+        spoiled="" if test.problem() is None else "readings do not agree with the grids and with each other",
         changed=[f"{whose}: {text}" for whose, own in comparison.histories.items() for text in own.changed],
         systematic=[own.systematic(whose) for whose, own in comparison.histories.items()],
         remarks=[
@@ -41,5 +43,11 @@ def comparison_findings(comparison: Comparison) -> Findings:
             f" ({counted(len(own.occasions), 'calibration')}, {len(own.series)} quantities)"
             for whose, own in comparison.histories.items()
             if not own.changed
+        ],
+        if_usable=[grid],
+        if_withheld=[
+            "The grids are withheld: readings do not agree with them and with each other."
+            if test.problem()
+            else f"What changed is the comparator, not the grids. {grid}"
         ],
     )

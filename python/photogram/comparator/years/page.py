@@ -6,7 +6,7 @@ import numpy as np
 
 from photogram.comparator.years.comparison import Comparison
 from photogram.show.history import control_charts, series_table, values_table
-from photogram.show.judgement import advice, judged, tests_section
+from photogram.show.judgement import judged, tests_section
 from photogram.show.page import Column, Drawing, Fact, Page, Part, Row, Section, Table, significant
 
 __all__ = ["comparison_page"]
@@ -31,7 +31,7 @@ def comparison_page(comparison: Comparison) -> Page:
         what="Calibrations of comparators over years",
         title=f"{len(comparison.calibrations)} calibrations, {first} to {last}",
         judgements=[judged(comparison.verdict)],
-        advice=advice(comparison.verdict, others=_next(comparison)),
+        advice=comparison.verdict.next,
         highlights=[
             Fact(
                 f"Grid {plate}, a coordinate",
@@ -54,12 +54,6 @@ _GRIDS = (
     " comparator of its own. Absolute scale and odd shapes that look alike in grid and comparator come from"
     " the given coordinates."
 )
-
-
-def _next(comparison: Comparison) -> list[str]:
-    if comparison.usable_grids:
-        return ["Give the next calibration the adjusted grid: `--grid grid-NUMBER.csv`."]
-    return ["The grids are withheld: readings do not agree with them and with each other."]
 
 
 def _charts(comparison: Comparison) -> list[Part]:

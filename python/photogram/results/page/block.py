@@ -10,7 +10,6 @@ import numpy as np
 from photogram.results.findings import axes, tested_observations
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
-from photogram.results.lenses import how_to_calibrate
 from photogram.results.page.cameras import cameras_section
 from photogram.results.page.frame import block_frame, degrees
 from photogram.results.page.observed import Images, worst_images, worst_of
@@ -34,7 +33,7 @@ from photogram.results.page.tables import (
 from photogram.results.report import image_unit, problems_of
 from photogram.results.result import Result
 from photogram.results.unknowns import unknown_lines
-from photogram.show.judgement import advice, judged, remarks_section
+from photogram.show.judgement import judged, remarks_section
 from photogram.show.page import Column, Drawing, Fact, Facts, Page, Part, Section, Table, significant
 from photogram.statistics.findings import by_w
 from photogram.statistics.reliability import TESTABLE
@@ -75,7 +74,7 @@ def block_page(result: Result) -> Page:
         what="Adjustment of a block of photos",
         title=block.title,
         judgements=[judged(result.verdict)],
-        advice=_advice(result),
+        advice=result.verdict.next,
         highlights=_highlights(result),
         sections=sections,
         phases=result.seconds,
@@ -88,36 +87,6 @@ def block_images(result: Result) -> Images:
     unit, factor = image_unit(result)
     return Images(
         block.image_photos, block.photo_ids, block.point_ids, unit.replace("um", "µm"), factor, block.image_xy
-    )
-
-
-def _advice(result: Result) -> list[str]:
-    others = []
-    check = result.used_points & (result.point_kinds == "check")
-    if result.verdict.usable and not check.any():
-        others.append(
-            "There are no check points. Leave some control out (no standard deviation), and compare it:"
-            " that is the only independent proof of the accuracy."
-        )
-    few = int(np.count_nonzero(result.point_rays == 2))
-    if few and result.verdict.usable:
-        others.append(
-            f"{few} of {np.count_nonzero(result.used_points)} points have two rays only: an error"
-            " across the base shows, one along it does not."
-        )
-    if result.verdict.usable and not others:
-        others.append("Nothing needs to be done.")
-    return advice(
-        result.verdict,
-        check="`photogram check` (`photogram.check`)",
-        snoop="`--snoop` (`photogram.snoop`) takes gross errors out one after the other, and says which"
-        " cannot be told apart.",
-        calibrate=f"Let the cameras be estimated: `photogram adjust ... {how}`."
-        if (how := how_to_calibrate(result.block)).startswith("--")
-        else f"Give it {how}."
-        if how
-        else "",
-        others=others,
     )
 
 

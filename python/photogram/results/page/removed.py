@@ -18,7 +18,6 @@ def snooped_page(found: Snooped) -> Page:
     gone = Fact("Taken out", f"{len(found.removed)}", note=f"of {len(found.suspects)} groups of observations")
     return replace(
         page,
-        advice=[each for each in page.advice if "--snoop" not in each],
         highlights=[gone, *page.highlights],
         sections=[_log(found), *page.sections],
     )

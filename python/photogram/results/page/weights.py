@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from photogram.results.components import VarianceComponents, statement
 from photogram.results.components_picture import figure_of_components
-from photogram.show.judgement import advice, judged
+from photogram.show.judgement import judged
 from photogram.show.page import Column, Drawing, Page, Part, Remarks, Row, Section, Table
 from photogram.statistics.components import Component
 
@@ -25,12 +25,11 @@ def weighed_page(found: VarianceComponents, page: Page) -> Page:
     page
         That of the adjustment.
     """
-    told = _sentences(statement(found))
     section = Section("components", "Variance components", _parts(found), _INTRO)
     return replace(
         page,
         judgements=[judged(found.verdict)],
-        advice=advice(found.verdict, check="`photogram check` (`photogram.check`)", others=told[:1]),
+        advice=found.verdict.next,
         sections=[section, *page.sections],
     )
 
