@@ -109,11 +109,6 @@ def with_components(sections: list[Section], found: VarianceComponents | None) -
     """Return a summary, on top of which the verdict stands, with what components say in its place."""
     if found is None:
         return sections
-    from photogram.results.components import component_lines, statement
-    from photogram.show.sections import verdict_sections
+    from photogram.results.components import component_sections
 
-    own = [
-        *verdict_sections(found.verdict),
-        ("Variance components", [*statement(found), *component_lines(found)]),
-    ]
-    return [*own, *sections[ON_TOP:]]
+    return [*component_sections(found), *sections[ON_TOP:]]

@@ -10,7 +10,7 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.results.network import AdjustedNetwork
 from photogram.show.brief import Brief
-from photogram.show.sections import Section, composed, headline
+from photogram.show.sections import Section, composed, headline, verdict_sections
 from photogram.show.ways import Shown, axes_of, columns_of, document_of, findings_of, report_of
 from photogram.statistics.components import Component, Estimate
 from photogram.statistics.findings import Findings, GroupFactor
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from photogram.plots.panels import Where
 
-__all__ = ["VarianceComponents", "component_lines", "statement"]
+__all__ = ["VarianceComponents", "component_lines", "component_sections", "statement"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -162,13 +162,14 @@ def _document(found: VarianceComponents) -> bytes:
 @report_of.register(VarianceComponents)
 def _report(found: VarianceComponents) -> str:
     """Return the components as text: what to do first."""
-    sections: list[Section] = [
-        ("Verdict", [f"{found.verdict.headline}.", *statement(found)]),
-        ("What to do next", list(found.verdict.next)),
-        ("Variance components", component_lines(found)),
-        ("Groups that were merged or held", list(found.estimate.messages)),
-    ]
-    return composed(headline("variance components"), sections)
+    held = ("Groups that were merged or held", list(found.estimate.messages))
+    return composed(headline("variance components"), [*component_sections(found), held])
+
+
+def component_sections(found: VarianceComponents) -> list[Section]:
+    """Return what a reader wants first, as titled sections: verdict, what to do next, components."""
+    lines = [*statement(found), *component_lines(found)]
+    return [*verdict_sections(found.verdict), ("Variance components", lines)]
 
 
 def statement(found: VarianceComponents) -> list[str]:

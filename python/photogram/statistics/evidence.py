@@ -276,7 +276,7 @@ class Evidence:
         """Say which test decides on single observations."""
         if not self.found.computed:
             return ["single observations are not tested: redundancy numbers were not computed"]
-        if not self.number:
+        if not self.number or self.found.degrees_of_freedom < 1:
             return []
         found = {each.statistic for each in self.found.observations if self._count(each)}
         what = " and ".join(meaning for statistic, meaning in STATISTICS.items() if statistic in found)
