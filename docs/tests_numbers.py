@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram import adjust, simulate
 from photogram.network.block import Block
-from photogram.show.sections import verdict_section
+from photogram.show.sections import verdict_sections
 from photogram.statistics import (
     b_method,
     bonferroni,
@@ -87,7 +87,8 @@ def _block() -> Block:
 
 
 def _verdict(block: Block) -> list[str]:
-    lines = verdict_section(adjust(block).verdict)[1]
+    (_, told), (title, steps) = verdict_sections(adjust(block).verdict)
+    lines = [*told, "", title, "-" * len(title), *steps]
     return [part for line in lines for part in textwrap.wrap(line, 130, subsequent_indent="  ") or [""]]
 
 

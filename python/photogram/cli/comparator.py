@@ -128,7 +128,7 @@ def comparator(
     """Calibrate a comparator from measurements of a grid plate.
 
     Writes listing.txt, report.html (pictures), correction.json and the corrected grid of each plate. Where
-    outliers make the correction unusable, correction and grid are withheld, and the exit code is 4.
+    the verdict forbids the use (outliers), correction and grid are withheld, and the exit code is 4.
     """
     with job:
         from photogram.comparator import Options, calibrate, find_grid, read

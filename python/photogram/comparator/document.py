@@ -35,7 +35,7 @@ CONVENTIONS = {
     "correlation_percent": "as the listing: 100 where one coordinate does not vary (correlation: null)",
     "correction": "linear parameters and polynomials; covariance of scale_x, scale_y, nonorthogonality_rad,"
     " nine coefficients of x, nine of y (micrometres, arguments (x - centre) / half range); null where"
-    " outliers make it unusable",
+    " the verdict forbids its use",
     "screening": "measured points that do not agree with the adjustment of the others; off_um: measured less"
     " expected; change_um: what they change corrected coordinates by",
 }
