@@ -25,6 +25,12 @@ def strip(control, observations=()):
     )
 
 
+def two_strips(control):
+    """Return the strip with one beside it that sees the same points."""
+    centres = np.concatenate([STRIP, STRIP + [0.0, 400.0, 0.0]])
+    return of.block(centres, np.zeros((12, 3)), BELOW, (), dict.fromkeys(control, SURE))
+
+
 def gnss(centres, arm=(0.0, 0.0, 0.0), drift=None):
     shift = Shift("s")
     return [
@@ -39,8 +45,9 @@ def flight(turns=0.0):
     return of.block(centres, angles, of.flat_field(200.0), (), of.IN_SPACE, observations=observed)
 
 
-def one_place():
-    random, stations = of.drawn(4), np.zeros((5, 3))
+def one_place(base=0.0):
+    random = of.drawn(4)
+    stations = base * np.eye(5, 3)
     views = [0.0, 0.0, 1.0] + 0.3 * random.standard_normal((5, 3))
     angles = of.looking(views, [0.0, 0.0, 0.0], random.uniform(-3, 3, 5))
     return of.block(stations, angles, of.cloud(15, 0.5) - [0.0, 0.0, 5.0])
@@ -54,6 +61,12 @@ def ring(free, elevation=0.0):
     return of.block(*of.ring(elevation), of.cloud(), free)
 
 
+def two_rings():
+    rings = [of.ring(elevation) for elevation in (0.0, 0.6)]
+    centres, angles = (np.concatenate(each) for each in zip(*rings, strict=True))
+    return of.block(centres, angles, of.cloud(), ["c", "xp", "yp", "b1", "b2"])
+
+
 def pair(free, meeting=True):
     angles = of.looking(PAIR, [0.0, 0.0, 0.0]) if meeting else np.zeros((2, 3))
     return of.block(PAIR, angles, of.cloud(25), free)
@@ -62,8 +75,12 @@ def pair(free, meeting=True):
 HIGHER = "principal distance and flying height of all photos.*convergent photos, observed heights"
 POINT = "principal point and position or tilt of all photos: the principal point given, convergent"
 SAME_WAY = "all photos look in the same direction.*a photo that is tilted.*four control points not on a plane"
-ROLL = "roll of the strip about the line of its control.*one height aside"
-NOT_TURNED = "no photo is turned about its axis.*every second photo turned by 90 degrees, b1 held at 0"
+ROLL = "roll of the strip about the line of its control.*one height aside.*a second strip with control of its own"
+NOT_TURNED = (
+    "no photo is turned about its axis.*every second photo turned by 90 degrees, b1 held at 0.*two rings of"
+    " different height"
+)
+ONE_PLACE = "all photos were taken from one place.*a base between the photos.*points at infinity"
 TOGETHER = "lever arm and shift move together.*the lever arm measured"
 TAKES = "the drift of a strip takes.*control at both ends, two points each"
 TWO = "two photos determine at most two numbers of the camera.*a third photo from aside, inclined and turned"
@@ -76,8 +93,9 @@ SET_UPS = {
     "3 c, xp, yp": (lambda: of.block(*ALIKE, of.cloud(), ["c", "xp", "yp"]), 3, [f"yp of.*{SAME_WAY}"]),
     "3 all": (lambda: of.block(*ALIKE, of.cloud(), ["c", "xp", "yp", "b1", "b2"]), 5, [SAME_WAY]),
     "4 control": (lambda: strip(LINE), 1, ["moving all 6 photos", ROLL]),
+    "4 a second strip tied to it": (lambda: two_strips(LINE), 1, [ROLL]),
     "4 positions": (lambda: of.block(STRIP, np.zeros((6, 3)), BELOW, positions_sd=0.05), 1, [ROLL]),
-    "5 one place": (one_place, None, ["all photos were taken from one place.*a base between the photos"]),
+    "5 one place": (one_place, None, [ONE_PLACE]),
     "6 c, b1": (lambda: ring(["c", "b1"]), 1, [f"c, b1 of camera: {NOT_TURNED}"]),
     "6 yp": (lambda: ring(["yp"]), 1, [f"yp of camera.*{NOT_TURNED}"]),
     "6 from above": (lambda: ring(["c", "yp", "b1"], 0.6), 2, [NOT_TURNED]),
@@ -128,8 +146,11 @@ REMEDIES = {
         ALIKE[0], ALIKE[1] + np.eye(6)[:, :1] * [0.3, 0.0, 0.0], of.cloud(), ["c", "xp", "yp"]
     ),
     "4 a height aside": lambda: strip((*LINE, 0)),
+    "4 a second strip with control": lambda: two_strips((*LINE, 5, 23)),
+    "5 a base": lambda: one_place(base=0.005),
     "6 turned": lambda: of.block(*of.ring(turned=True), of.cloud(), ["c", "xp", "yp", "b1", "b2"]),
     "6 b1 alone": lambda: ring(["b1"]),
+    "6 two rings": two_rings,
     "8 corners": lambda: strip((0, 2, 24, 26), gnss(STRIP, drift=Drift("d"))),
 }
 

@@ -113,7 +113,9 @@ def one_place(block: Block, photos: Sequence[int]) -> str:
         return ""
     return (
         ": all photos were taken from one place, directions are determined, distances of points are not; a"
-        " base between the photos, or depths from control or distances, point by point, would determine them"
+        " base between the photos, or depths from control or distances, point by point, would determine them;"
+        " if only the camera is asked for, points at infinity do, which are directions only (stars: photogram"
+        " stellar-camera)"
     )
 
 
@@ -214,8 +216,9 @@ def _of_unknowns(kinds: set[str], photos: int, at: Setting) -> str:
     if photos == at.photos > 0 and at.on_line:
         return (
             "roll of the strip about the line of its control: heights beside the line are not determined; one"
-            " height aside of it, GNSS and control whose lines do not coincide, or roll from an IMU with a"
-            " known boresight"
+            " height aside of it, GNSS and control whose lines do not coincide, roll from an IMU with a known"
+            " boresight, or a second strip with control of its own (one that is only tied to the first rolls"
+            " with it)"
         )
     return ""
 
@@ -319,7 +322,7 @@ def _of_setting(names: set[str], at: Setting) -> str:
         return (
             "no photo is turned about its axis: the ratio of the two image scales cannot be separated from a"
             " stretch of the object along the axis of the ring, nor yp from its growing towards one end:"
-            " every second photo turned by 90 degrees, b1 held at 0 and yp or c given, or distances along"
-            " and across the axis"
+            " every second photo turned by 90 degrees, b1 held at 0 and yp or c given, two rings of different"
+            " height (weaker), or distances along and across the axis"
         )
     return ""
