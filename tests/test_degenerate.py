@@ -27,7 +27,8 @@ def strip(control, observations=()):
 
 def two_strips(control):
     """Return the strip with one beside it that sees the same points."""
-    centres = np.concatenate([STRIP, STRIP + [0.0, 400.0, 0.0]])
+    beside = np.array([0.0, 400.0, 0.0])
+    centres = np.concatenate([STRIP, STRIP + beside])
     return of.block(centres, np.zeros((12, 3)), BELOW, (), dict.fromkeys(control, SURE))
 
 
@@ -75,7 +76,7 @@ def pair(free, meeting=True):
 HIGHER = "principal distance and flying height of all photos.*convergent photos, observed heights"
 POINT = "principal point and position or tilt of all photos: the principal point given, convergent"
 SAME_WAY = "all photos look in the same direction.*a photo that is tilted.*four control points not on a plane"
-ROLL = "roll of the strip about the line of its control.*one height aside.*a second strip with control of its own"
+ROLL = "roll of the strip about the line of its control.*one height aside.*a second strip with control of"
 NOT_TURNED = (
     "no photo is turned about its axis.*every second photo turned by 90 degrees, b1 held at 0.*two rings of"
     " different height"
