@@ -6,7 +6,7 @@ import networks
 import numpy as np
 import pytest
 
-from photogram import adjust_started, first_values, formats
+from photogram import adjust, adjust_started, first_values, formats
 from shared_data import SHARED
 
 CAMCAL = SHARED / "camcal"
@@ -46,6 +46,23 @@ def test_the_calibration_has_the_published_digits(calibrated):
     assert [float(f"{own:.3g}") for own in poses.ravel()] == [float(each) for each in published[9:135]]
     known = [float(each) for each in printed("Value", 10)]
     np.testing.assert_allclose([-camera.values[0], *camera.values[3:8]], [known[0], *known[5:10]], rtol=3e-6)
+
+
+def test_its_control_is_held_at_what_the_images_contradict(calibrated):
+    """The sheet is not flat: a corner that is let go is 2.6 mm, 40 standard deviations, off."""
+    assert (calibrated.verdict.code, calibrated.verdict.exit) == ("gross-errors", 4)
+    headline = calibrated.verdict.headline
+    said = re.search(r"1\) control point 1004, which is held \(T = (\d+)\)", headline)
+    assert "held without error is no observation: give it a standard deviation (--sd control=...)" in headline
+    block = calibrated.block
+    row = block.point_ids.index("1004")
+    sd = block.point_sd.copy()
+    sd[row] = np.inf
+    free = adjust(block.replace(point_sd=sd), unit_variance="unity")
+    apart, cofactors = free.point_positions[row] - block.point_positions[row], free.point_cofactors[row]
+    assert 0.0025 < -apart[2] < 0.0027
+    assert -apart[2] > 35 * cofactors[2, 2] ** 0.5
+    assert float(said[1]) == pytest.approx(apart @ np.linalg.solve(cofactors, apart), rel=0.01)
 
 
 def started(wrong, *, seed=3):
@@ -96,4 +113,5 @@ def test_the_command_takes_all_that_fits_in(run, tmp_path, options, said):
     path = str(CAMCAL / "camcaldemo.xml")
     done = run("adjust", path, "--out", str(tmp_path / "out"), "--no-html", *options)
     assert f"67 images do not fit and {said}" in done.output
+    assert done.exit_code == 4
     assert "image points                        2074 used of 2074" in done.output

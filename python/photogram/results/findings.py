@@ -64,6 +64,7 @@ def block_findings(result: Result) -> Findings:
         exchanged=result.exchanged,
         set_aside=_set_aside(result),
         snoop="" if intersected else "--snoop (photogram.snoop)",
+        weigh="--sd control=...",
         calibrate=how_to_calibrate(result.block),
         check="`photogram check` (`photogram.check`)",
         take_out=""

@@ -305,9 +305,9 @@ class Findings:
         Whether observations could be tested, that is, whether their redundancy numbers were computed.
     remarks
         Sentences that stand below the headline.
-    snoop, calibrate
-        How gross errors are taken out, and how cameras are estimated, with this program; nothing where it
-        cannot.
+    snoop, weigh, calibrate
+        How gross errors are taken out, held control gets a standard deviation and cameras are estimated, with
+        this program; nothing where it cannot.
     check
         How the program looks for mistakes of the input, as part of a sentence.
     take_out
@@ -339,6 +339,7 @@ class Findings:
     computed: bool = True
     remarks: Sequence[str] = ()
     snoop: str = ""
+    weigh: str = ""
     calibrate: str = ""
     check: str = "look at units, names and signs"
     take_out: str = ""

@@ -194,8 +194,10 @@ def _gross_errors(e: Evidence) -> _Line | None:
     if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
         return None
     text = f"Gross errors likely: {'; '.join([*e.found.exchanged, e.named(e.gross)])}"
-    if e.gross[0][1].held:
-        text += "; what is held is no observation: give it a standard deviation"
+    _, first, place = e.gross[0]
+    if first.held:
+        text += "; what is held without error is no observation: give it a standard deviation"
+        text += f" ({e.found.weigh})" if e.found.weigh and "control point" in first.name(place) else ""
     elif e.found.snoop and e.found.status == "converged":
         text += f"; {e.found.snoop} takes them out"
     return _Line("gross-errors", text, EXIT_NOT_USABLE)
