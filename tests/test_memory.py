@@ -230,7 +230,9 @@ print(*said)
 def test_short_addresses_are_an_error_and_no_abort(room):
     """Two adjustments at once in threads of Python, with addresses for so many threads of the core.
 
-    Between what is less than the buffers and what is enough for both, one may end before the other begins.
+    What a thread takes is an upper bound (buffers, stack, reserve), and is given back when it ends: between
+    what is less than the buffers alone and what is enough for both, an adjustment has its addresses where the
+    other does not hold them at that moment, so that each may end either way; an abort is never right.
     """
     own = memory.addresses_of_a_thread() or 160 << 20
     command = [sys.executable, "-c", SHORT, str(int(room * own) + (64 << 20))]
