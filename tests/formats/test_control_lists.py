@@ -84,6 +84,20 @@ def test_a_list_is_adjusted_as_delivered_or_with_the_option_that_the_message_nam
     np.testing.assert_allclose(lengths, truth, atol=0.03)
 
 
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+@pytest.mark.parametrize("name", ["excel_utf16.txt", "german_bom.csv"])
+def test_two_bytes_a_character_are_read_without_a_mark(name, encoding, tmp_path):
+    """Zeros stand in alternate places: between them are the bytes of the text, umlauts among them."""
+    delivered = LISTS / name
+    text = delivered.read_bytes().decode("utf-16" if "utf16" in name else "utf-8-sig")
+    (tmp_path / name).write_bytes(text.encode(encoding))
+    sd = {"control": (0.01,)}
+    expected, found = (with_control(block(), each, sd, None) for each in (delivered, tmp_path / name))
+    assert found.block.point_ids == expected.block.point_ids
+    for each in ("point_positions", "point_sd"):
+        np.testing.assert_array_equal(getattr(found.block, each), getattr(expected.block, each))
+
+
 @pytest.mark.parametrize(
     ("heading", "column"),
     [

@@ -99,19 +99,20 @@ def test_records_may_be_long_and_are_cut_after_column_80(sound, tmp_path):
     )
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
 @pytest.mark.parametrize("name", ["COMMON", "IMAGES"])
-def test_text_of_two_bytes_a_character_is_read_by_its_mark(name, sound, tmp_path):
-    files = sound[0] | {name: sound[0][name].decode().encode("utf-16")}
+def test_text_of_two_bytes_a_character_is_read_with_and_without_its_mark(name, encoding, sound, tmp_path):
+    files = sound[0] | {name: sound[0][name].decode().encode(encoding)}
     block = read_project(written(tmp_path / "wide", files)).to_block()
     plain = read_project(written(tmp_path / "plain", sound[0])).to_block()
     np.testing.assert_array_equal(block.image_xy, plain.image_xy)
 
 
-@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-32"])
+@pytest.mark.parametrize("encoding", ["utf-32", "utf-32-le", "utf-32-be"])
 @pytest.mark.parametrize("name", ["COMMON", "IMAGES"])
 def test_other_encodings_are_named(name, encoding, sound, tmp_path):
     files = sound[0] | {name: sound[0][name].decode().encode(encoding)}
-    with pytest.raises(InputError, match=r"UTF-(16|32)") as caught:
+    with pytest.raises(InputError, match=r"UTF-32") as caught:
         read_project(written(tmp_path, files))
     assert caught.value.file.name == name
 

@@ -12,6 +12,9 @@ from photogram.io.sheets import sheet_text
 
 __all__ = ["read_bytes", "read_lines", "read_text", "reading"]
 
+HEAD = 4096
+"""Bytes in which text of two bytes a character is told, where it has no mark."""
+
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
@@ -37,7 +40,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Read a text file: UTF-8, UTF-16 with its mark, else that of Windows; any line ends become line feeds.
+    """Read a text file: UTF-8, UTF-16, else that of Windows; any line ends become line feeds.
 
     The first sheet of an Excel workbook is text, too: a line a row, tabs between its cells.
 
@@ -54,13 +57,23 @@ def read_text(path: Path) -> str:
 
 
 def _decoded(data: bytes) -> str:
-    wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    for encoding in ("utf-16" if wide else "utf-8-sig", "cp1252"):
+    for encoding in (_wide(data) or "utf-8-sig", "cp1252"):
         try:
             return data.decode(encoding)
         except UnicodeDecodeError:
             continue
     return data.decode("latin-1")
+
+
+def _wide(data: bytes) -> str | None:
+    """Return the encoding of two bytes a character: by its mark, else by zeros in alternate places."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    head = data[:HEAD]
+    even, odd = head[::2].count(0), head[1::2].count(0)
+    if (even and odd) or 4 * max(even, odd) <= len(head):
+        return None
+    return "utf-16-le" if odd else "utf-16-be"
 
 
 def read_lines(path: Path) -> list[str]:

@@ -43,12 +43,12 @@ class Source:
         Raises
         ------
         InputError
-            The file cannot be read or is UTF-32 or UTF-16 without its mark, or a record holds a tab or
+            The file cannot be read or is UTF-32, or a record holds a tab or
             another control character, which would move its columns.
         """
         lines = read_lines(path)
         if sum(line.count("\0") for line in lines) > WIDE * sum(map(len, lines)):
-            error = "text of two or four bytes a character (UTF-16, UTF-32): save it as UTF-8"
+            error = "text of four bytes a character (UTF-32), or damaged text of two: save it as UTF-8"
             raise InputError(error, file=path)
         source = cls(path, [line[:WIDTH] for line in lines])
         for number, line in enumerate(source.lines, 1):
