@@ -37,7 +37,7 @@ def test_import_and_help_load_no_numbers(program, tmp_path):
 @pytest.mark.parametrize("command", ["giant", "adjust"])
 def test_examples_load_what_they_need(command, tmp_path):
     program = COMMAND.format(arguments=[command, "--example", "--no-html", "--quiet"])
-    others = ("photogram.comparator", "photogram.stellar")
+    others = ("photogram.comparator", "photogram.stellar", "photogram.collection", "photogram.distributed")
     assert loaded(program, (*HEAVY, *others, "photogram._photocore"), tmp_path) == ["photogram._photocore"]
 
 

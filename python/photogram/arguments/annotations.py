@@ -140,11 +140,13 @@ def _checks(function: Callable[..., Any], names: dict[str, Any]) -> dict[str, Ch
     checks: dict[str, Check] = {"": _anything}
     known = _Names(names)
     for name, annotation in inspect.get_annotations(function).items():
+        if name == "return":
+            continue
         try:
             hint = eval(annotation, {}, known) if isinstance(annotation, str) else annotation
         except NameError:
             continue
-        if name != "return" and (check := _check_of(hint)):
+        if check := _check_of(hint):
             checks[name] = check
     return checks
 

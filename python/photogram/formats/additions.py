@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.adjustment.prediction import at_adjusted, computed_images
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns
-from photogram.formats.control_lists import ControlList, read_control_list
-from photogram.formats.exchanged import check_systems
 from photogram.formats.images import from_corner, to_corner
 from photogram.formats.intersection import intersected
 from photogram.formats.pixels import corner_of, pixel_table
@@ -29,6 +27,9 @@ from photogram.io.delimited import ColumnTable, Names
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 from photogram.results.result import Result
+
+if TYPE_CHECKING:
+    from photogram.formats.control_lists import ControlList
 
 __all__ = [
     "deviations",
@@ -124,6 +125,8 @@ def repeated_remarks(project: Project, result: Result) -> list[Message]:
     used = result.used_images[first] if result.converged and len(result.used_images) else first[:0] > 0
     if not used.any():
         return []
+    from photogram.adjustment.prediction import at_adjusted, computed_images
+
     block, sd = project.block, project.block.image_sd[first][used]
     there = at_adjusted(result).replace(
         image_photos=block.image_photos[first][used],
@@ -359,6 +362,9 @@ def with_control(
     InputError
         A table at fault; none of its points has an image.
     """
+    from photogram.formats.control_lists import read_control_list
+    from photogram.formats.exchanged import check_systems
+
     settings = bare_settings(
         path,
         {"control": path},

@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from photogram.collection.formats import bal
 from photogram.errors import InputError
 from photogram.formats.collections import cannot_hold, collection_of, project_of
 from photogram.formats.format import Format, Wishes
@@ -33,6 +32,8 @@ def _recognises(path: Path) -> bool:
 
 def read(path: Path, wishes: Wishes) -> Project:
     """Read a problem, packed by bzip2 or gzip or not; photos and points are called by their numbers."""
+    from photogram.collection.formats import bal
+
     del wishes
     found = bal.FORMAT.read(path, pieces(path))
     return project_of(found, path, TITLE, [str(row) for row in range(len(found.photo_parameters))])
@@ -40,6 +41,8 @@ def read(path: Path, wishes: Wishes) -> Project:
 
 def write(project: Project) -> Mapping[str, bytes]:
     """Return the file of a problem."""
+    from photogram.collection.formats import bal
+
     return {FILE: bal.FORMAT.to_bytes(collection_of(project)[0])}
 
 

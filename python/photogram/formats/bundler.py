@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from photogram.collection.formats import bundler
 from photogram.errors import InputError
 from photogram.formats.collections import cannot_hold, collection_of, project_of
 from photogram.formats.format import Format, Wishes
@@ -35,6 +34,8 @@ def _recognises(path: Path) -> bool:
 
 def read(path: Path, wishes: Wishes) -> Project:
     """Read a Bundle file of version 0.3, and the list of photos beside it."""
+    from photogram.collection.formats import bundler
+
     del wishes
     place = _place(path)
     found = bundler.FORMAT.read(place, pieces(place))
@@ -53,6 +54,8 @@ def read(path: Path, wishes: Wishes) -> Project:
 
 def write(project: Project) -> Mapping[str, bytes]:
     """Return `bundle.out` and `list.txt`."""
+    from photogram.collection.formats import bundler
+
     found, names = collection_of(project)
     return {FILE: bundler.FORMAT.to_bytes(found), LIST: "".join(f"{name}\n" for name in names).encode()}
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.collection.collection import Collection
 from photogram.errors import InputError
 from photogram.formats.intersection import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
@@ -17,6 +17,9 @@ from photogram.formats.project import Project, Size, assembled
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
+
+if TYPE_CHECKING:
+    from photogram.collection.collection import Collection
 
 __all__ = ["cannot_hold", "collection_of", "project_of"]
 
@@ -104,6 +107,8 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
     InputError
         No photo with a pose that shows a point with a position.
     """
+    from photogram.collection.collection import Collection
+
     block = project.block
     cameras, photo_cameras = known_cameras(block)
     sizes = project.sizes

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from photogram.arguments.annotations import check_arguments
-from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.saved import KIND as COLLECTION
-from photogram.collection.saved import read_collection_result
 from photogram.errors import InputError
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import DatumName, Options, Project
@@ -21,14 +18,12 @@ from photogram.results.saved import SUMMARY, read_summary
 from photogram.results.saved_block import KIND as BLOCK
 from photogram.results.saved_block import read_block_result
 
+if TYPE_CHECKING:
+    from photogram.collection.adjusted import AdjustedCollection
+
 __all__ = ["FORMAT", "TITLE", "read_result"]
 
 TITLE = "result as data (Parquet)"
-
-_READERS: Mapping[str, Callable[[Path, Mapping[str, Any]], Result | AdjustedCollection]] = {
-    BLOCK: read_block_result,
-    COLLECTION: read_collection_result,
-}
 
 
 def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
@@ -49,13 +44,20 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
     ModuleNotFoundError
         pyarrow is not installed.
     """
+    from photogram.collection.saved import KIND as COLLECTION
+    from photogram.collection.saved import read_collection_result
+
+    readers: Mapping[str, Callable[[Path, Mapping[str, Any]], Result | AdjustedCollection]] = {
+        BLOCK: read_block_result,
+        COLLECTION: read_collection_result,
+    }
     folder = Path(directory)
     document = read_summary(folder)
     kind = document["kind"]
-    if kind not in _READERS:
+    if kind not in readers:
         raise InputError(f"keeps a result of a kind that is not known: {kind!r}", file=folder / SUMMARY)
     try:
-        return _READERS[kind](folder, document)
+        return readers[kind](folder, document)
     except InputError:
         raise
     except (LookupError, TypeError, ValueError) as error:

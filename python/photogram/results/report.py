@@ -306,7 +306,7 @@ def _datum(result: Result) -> list[str]:
 
 
 def _photos(result: Result) -> list[str]:
-    (position, sd_position), lengths = _position_formats(result), _lengths(result)
+    (position, sd_position), long = _position_formats(result), _long_format(result)
     lines = [
         *_datum(result),
         f"{'photo':<10}{_position_head(result)}{'omega deg':>15}{'phi deg':>15}{'kappa deg':>15}",
@@ -322,7 +322,7 @@ def _photos(result: Result) -> list[str]:
     for name, values, angles, sd in rows:
         lines.append(f"{name:<10}{position(values)}" + "".join(f"{angle:>15.7f}" for angle in angles))
         turns = "".join(f"{each / ARCSEC:>15.3f}" for each in sd[3:])
-        lines.append(f"{'':<10}{sd_position(sd[:3])}{turns}{_long(result, sd, lengths)}")
+        lines.append(f"{'':<10}{sd_position(sd[:3])}{turns}{long(sd)}")
     return lines
 
 
@@ -336,7 +336,7 @@ def _held_cameras(result: Result) -> list[str]:
 
 
 def _points(result: Result) -> list[str]:
-    (position, sd_position), lengths = _position_formats(result), _lengths(result)
+    (position, sd_position), long = _position_formats(result), _long_format(result)
     lines = [
         *_datum(result),
         f"{'point':<10}{_position_head(result)}  rays  kind",
@@ -353,7 +353,7 @@ def _points(result: Result) -> list[str]:
     for name, values, sd, rays, kind in rows:
         if rays:
             lines.append(f"{name:<10}{position(values)}  {rays:>4}  {kind}")
-            lines.append(f"{'':<10}{sd_position(sd)}{_long(result, sd, lengths)}")
+            lines.append(f"{'':<10}{sd_position(sd)}{long(sd)}")
     return lines
 
 
@@ -416,9 +416,12 @@ def _beside(result: Result, outward: Floats) -> list[str]:
     return [f" ({each:.4f} {unit})" if result.block.geographic else "" for each in lengths[:2]] + [""]
 
 
-def _long(result: Result, sd: Sequence[float], lengths: Floats) -> str:
-    """Write the standard deviations in plan as lengths, where they are angles."""
-    return "".join(f"{sd[k] * lengths[k]:>15.4f}" for k in (0, 1)) if result.block.geographic else ""
+def _long_format(result: Result) -> Callable[[Sequence[float]], str]:
+    """How standard deviations in plan are written as lengths, where they are angles."""
+    if not result.block.geographic:
+        return lambda sd: ""
+    by_x, by_y, _ = _lengths(result).tolist()
+    return lambda sd: f"{sd[0] * by_x:>15.4f}{sd[1] * by_y:>15.4f}"
 
 
 def _lengths(result: Result) -> Floats:
