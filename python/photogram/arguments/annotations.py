@@ -205,6 +205,8 @@ def _several(hint: Any) -> Check | None:
         _name if kind is object else _check_of(kind) or _anything for kind in inner if kind is not Ellipsis
     ]
 
+    of_numbers = {*checks} == {number}
+
     def several(name: str, value: Any) -> Any:
         if isinstance(value, str | bytes) or not isinstance(value, Iterable):
             raise _refused(name, value, "a sequence")
@@ -213,6 +215,8 @@ def _several(hint: Any) -> Check | None:
         elements = list(value)
         if fixed and len(elements) != len(checks):
             raise _refused(name, value, f"a sequence of {len(checks)}")
+        if of_numbers and {*map(type, elements)} == {float}:  # as nearly all are: nothing to convert
+            return tuple(elements) if origin is tuple else elements
         all_checks = checks if fixed else checks * len(elements)
         found = [
             check(f"{name}[{k}]", each)

@@ -122,8 +122,8 @@ def _images(block: Block, cameras: list[str]) -> list[ImageFrame]:
     frames = []
     for photo, name in enumerate(block.photo_ids):
         rows = order[bounds[photo] : bounds[photo + 1]]
-        sd = np.unique(block.image_sd[rows], axis=0)
-        if len(sd) > 1:
+        sd = block.image_sd[rows]
+        if (sd != sd[:1]).any():
             raise InputError(
                 f"the images of photo {name} differ in standard deviation; IMAGES has one pair for a frame"
             )

@@ -55,9 +55,12 @@ def _alike(block: Block) -> list[Message]:
     """
     messages = []
     for what, names in (("photos", block.photo_ids), ("points", block.point_ids)):
+        plain = [*map(plain_name, names)]
+        if len(set(plain)) == len(names):
+            continue
         groups: dict[str, list[str]] = {}
-        for name in names:
-            groups.setdefault(plain_name(name), []).append(name)
+        for alike, name in zip(plain, names, strict=True):
+            groups.setdefault(alike, []).append(name)
         pairs = [" and ".join(map(repr, group)) for group in groups.values() if len(group) > 1]
         if pairs:
             messages.append(

@@ -36,6 +36,8 @@ def _column(column: Any) -> Any:
         if kind := _ARRAYS.get(column.dtype.kind):
             return np.ascontiguousarray(column, dtype=kind)
         column = column.tolist()
+    if {*map(type, column)} == {str}:
+        return column
     return [each if isinstance(each, str) else _cell(each) for each in column]
 
 
