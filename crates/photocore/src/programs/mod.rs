@@ -1,6 +1,7 @@
 //! The photogrammetric models beside the network.
 
 pub mod comparator;
+pub mod features;
 pub mod first_values;
 pub mod relative_orientation;
 pub mod resection;
