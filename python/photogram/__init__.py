@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from photogram.planning import Plan, plan
     from photogram.results.components import VarianceComponents
     from photogram.results.differences import Differences, differences
+    from photogram.results.features import Feature, Features, Quantity
+    from photogram.results.fitting import features
     from photogram.results.group_sums import GroupSums, group_sums
     from photogram.results.iteration import Iteration
     from photogram.results.model_tests import compare, score_test, terms_test
@@ -60,6 +62,8 @@ __all__ = [
     "Camera",
     "Cleaned",
     "Differences",
+    "Feature",
+    "Features",
     "FirstValues",
     "GroupSums",
     "InnerConstraints",
@@ -73,6 +77,7 @@ __all__ = [
     "Plan",
     "Pose",
     "Progress",
+    "Quantity",
     "RankError",
     "Refraction",
     "Resection",
@@ -91,6 +96,7 @@ __all__ = [
     "compare",
     "differences",
     "eliminate_terms",
+    "features",
     "first_values",
     "group_sums",
     "hints",
@@ -116,6 +122,8 @@ _HOMES = {
     "VarianceComponents": "results.components",
     "VarianceFunction": "results.variance_function",
     "Differences": "results.differences",
+    "Feature": "results.features",
+    "Features": "results.features",
     "FirstValues": "adjustment.first_values",
     "GroupSums": "results.group_sums",
     "InnerConstraints": "network.datum",
@@ -129,6 +137,7 @@ _HOMES = {
     "Plan": "planning",
     "Pose": "adjustment.resection",
     "Progress": "adjustment.adjustment",
+    "Quantity": "results.features",
     "RankError": "errors",
     "Refraction": "network.refraction",
     "Resection": "adjustment.resection",
@@ -146,6 +155,7 @@ _HOMES = {
     "compare": "results.model_tests",
     "differences": "results.differences",
     "eliminate_terms": "adjustment.elimination",
+    "features": "results.fitting",
     "score_test": "results.model_tests",
     "terms_test": "results.model_tests",
     "first_values": "adjustment.first_values",

@@ -1932,6 +1932,35 @@ def refraction(
     (n,) true minus observed zenith distance, radians.
     """
 
+def measured_feature(
+    kind: str, points: _Floats, covariance: _Floats
+) -> tuple[list[tuple[str, bool]], _Floats, _Floats, _Floats, tuple[float, int] | None]:
+    """Fit a feature to points, with all that follows from their covariance (docs/features.md).
+
+    Parameters
+    ----------
+    kind
+        `distance`, `line`, `plane`, `circle`, `sphere` or `cylinder`.
+    points
+        (n, 3), any unit of length.
+    covariance
+        (3n, 3n) of all coordinates, those of a point together.
+
+    Returns
+    -------
+    Names of q quantities, and whether each is a length (else a component of a unit vector); (q,) values;
+    (q, q) their covariance; (n, 4) deviations of points, radial (of a plane along its normal) and axial, each
+    with its standard deviation; statistic and degrees of freedom of their test, None where there is none.
+
+    Raises
+    ------
+    InputError
+        Too few points, points that do not determine the feature, or several as well, what is not finite,
+        arrays of other shapes.
+    ValueError
+        Another kind.
+    """
+
 def nearest_points(points: _Floats, others: _Floats, limit: float, but: _Indices | None = None) -> _Indices:
     """Return the nearest of the others for each point of a plane, (n,); -1 where none is near enough.
 

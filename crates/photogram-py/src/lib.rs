@@ -6,6 +6,7 @@ mod camera;
 mod commons;
 mod comparator;
 mod distributions;
+mod features;
 mod geometry;
 mod matching;
 mod memory;
@@ -32,6 +33,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     distributions::register(module)?;
     attitude::register(module)?;
+    features::register(module)?;
     geometry::register(module)?;
     camera::register(module)?;
     commons::register(module)?;

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from photogram.formats import Project
     from photogram.results.snooped import Snooped
 
-__all__ = ["adjust"]
+__all__ = ["adjust", "adjusted_block", "started_block"]
 
 
 class DatumName(StrEnum):
@@ -167,6 +167,7 @@ def adjust(
     with job:
         from photogram import Result
         from photogram.formats.additions import held_points, self_calibrated
+        from photogram.results.fitting import with_features
         from photogram.show.ways import page_of
 
         pictures = Pictures(job, plots, plot_format, target)
@@ -190,7 +191,7 @@ def adjust(
             from photogram.formats.placing import check_place
 
             check_place(project.block, crs)
-        block, started = _started(project, keep_all=keep_all)
+        block, started = started_block(project, keep_all=keep_all)
         if divided.plan:
             from photogram.distributed.entrance import plan_in_parts
 
@@ -208,14 +209,17 @@ def adjust(
                 raise typer.BadParameter("goes without --datum and --loss", param_hint="--snoop")
             aside: tuple[str, ...] = ()
             if started is not None and (started.set_aside.any() or started.missing):
-                first = _adjusted(job, project, started, datum, loss, ordering, threads, divided.division)
+                first = adjusted_block(
+                    job, project, started, datum, loss, ordering, threads, divided.division
+                )
                 block, aside = first.block, first.set_aside
             removed = _snooped(job, project, block, threads, snooping.options)
             assert isinstance(removed.result, Result)
-            removed = replace(removed, result=replace(removed.result, set_aside=aside))
+            kept = with_features(replace(removed.result, set_aside=aside), project.features)
+            removed = replace(removed, result=kept)
             result = cast("Result", removed.judged)
         else:
-            result = _adjusted(
+            result = adjusted_block(
                 job, project, started or block, datum, loss, ordering, threads, divided.division
             )
         told = removed or result
@@ -268,7 +272,7 @@ def _on_disk(job: Job, path: Path, target: Path, divided: Parts, threads: int | 
     return True
 
 
-def _started(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | None]:
+def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | None]:
     """Return the block with poses for all its photos, and the first values where it needed any."""
     import numpy as np
 
@@ -296,7 +300,7 @@ def _snooped(
         )
 
 
-def _adjusted(
+def adjusted_block(
     job: Job,
     project: Project,
     block: Block | FirstValues,
@@ -306,9 +310,11 @@ def _adjusted(
     threads: int | None,
     division: Division,
 ) -> Result:
+    """Adjust a block as its project says, but for what a user chooses, with its features."""
     from photogram import FirstValues, InnerConstraints, InputError, MinimumConstraints, adjust_started
     from photogram import adjust as adjust_block
     from photogram.formats.additions import repeated_remarks
+    from photogram.results.fitting import with_features
 
     options = project.options
     chosen = datum.value if datum is not None else options.datum
@@ -336,7 +342,8 @@ def _adjusted(
             file=project.path,
         )
     again = repeated_remarks(project, result) if not isinstance(block, FirstValues) else []
-    return replace(result, messages=[*project.messages, *again, *result.messages])
+    told = replace(result, messages=[*project.messages, *again, *result.messages])
+    return with_features(told, project.features)
 
 
 def _files(

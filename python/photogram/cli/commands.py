@@ -18,6 +18,7 @@ from photogram.cli import (
     collection,
     comparator,
     convert,
+    features,
     giant,
     info,
     new,
@@ -76,6 +77,7 @@ app.command(cls=Command, epilog=ADJUST)(adjust.adjust)
 app.command("check", cls=Command)(check_project.check_project)
 app.command(cls=Command)(info.info)
 app.command(cls=Command)(convert.convert)
+app.command(cls=Command)(features.features)
 app.command(cls=Command)(new.new)
 app.add_typer(giant_app)
 app.add_typer(orientation_app)

@@ -21,6 +21,7 @@ PANELS = {
     " water_refraction water_level water_index limits invert extrapolate components"
     " together calibrate",
     "Gross errors": "snoop level fdr unit_weight",
+    "Features": "distance line plane circle sphere cylinder k coverage",
     "In parts": "cluster workers parts memory run plan",
     "Simulated block": "strips photos_per_strip forward_overlap side_overlap principal_distance frame_size"
     " flying_height relief points_per_photo crab tilt control_spacing control_sd image_sd"

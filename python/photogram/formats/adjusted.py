@@ -11,10 +11,11 @@ from photogram.arguments.types import Floats
 from photogram.formats.project import Project
 from photogram.io.csv_text import csv_text
 from photogram.io.sheets import workbook
+from photogram.results.features import Features
 from photogram.results.result import Result
 from photogram.show.ways import columns_of
 
-__all__ = ["adjusted", "excel_file", "table_files"]
+__all__ = ["adjusted", "excel_file", "feature_files", "table_files"]
 
 _TABLES = {
     "photos": "photo",
@@ -26,6 +27,8 @@ _TABLES = {
     "observations": "observation",
     "cameras": "camera",
     "unknowns": "unknown",
+    "features": "feature",
+    "feature_deviations": "deviation",
 }
 """File and kind of each table."""
 
@@ -53,6 +56,12 @@ def table_files(result: Result) -> Mapping[str, bytes]:
             "point", used, result.point_covariances[result.used_points], names[:3], result
         )
     return files
+
+
+def feature_files(features: Features) -> Mapping[str, bytes]:
+    """Return the tables of features as text of commas, by the names of files."""
+    tables = {"features.csv": features.columns(), "feature_deviations.csv": features.deviation_columns()}
+    return {name: csv_text(columns) for name, columns in tables.items() if columns["feature"]}
 
 
 def excel_file(result: Result) -> bytes:

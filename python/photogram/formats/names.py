@@ -50,6 +50,10 @@ def with_names(project: Project, path: Path) -> Project:
         block=project.block.replace(point_ids=ids, observations=project.block.observations),
         messages=messages,
         details=details,
+        features={
+            each: (kind, [new.get(point, point) for point in points])
+            for each, (kind, points) in project.features.items()
+        },
     )
 
 

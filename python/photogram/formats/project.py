@@ -22,6 +22,7 @@ from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation
 from photogram.network.rigs import Mount
+from photogram.results.features import Definition
 from photogram.show.brief import Brief
 
 __all__ = ["DatumName", "Frame", "Options", "Project", "Size", "assembled"]
@@ -100,6 +101,8 @@ class Project(Brief):
         files.
     repeated
         Second images of points on photos, which were left out.
+    features
+        What is to be fitted to adjusted points, as :func:`photogram.features` takes it.
     """
 
     block: Block
@@ -115,6 +118,7 @@ class Project(Brief):
     details: Mapping[str, Any] = field(default_factory=dict)
     sd_taken: bool = False
     repeated: Repeated = field(default_factory=Repeated)
+    features: Mapping[str, Definition] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         given = self.block.in_frame(self.frame)

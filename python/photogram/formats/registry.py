@@ -234,6 +234,7 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
     return [
         *([] if chosen.geographic else topocentric_remarks(project)),
         *chosen.cannot_hold(_fitting(project, chosen)),
+        *([f"{len(project.features)} features"] if project.features and chosen.name != "plain" else []),
         *(nominal_pixels(project) if chosen.pixels else []),
     ]
 

@@ -21,7 +21,7 @@ from photogram.results.saved_block import read_block_result
 if TYPE_CHECKING:
     from photogram.collection.adjusted import AdjustedCollection
 
-__all__ = ["FORMAT", "TITLE", "read_result"]
+__all__ = ["FORMAT", "TITLE", "is_result", "read_result"]
 
 TITLE = "result as data (Parquet)"
 
@@ -64,7 +64,8 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
         raise InputError(f"does not hold together: {error}", file=folder / SUMMARY) from None
 
 
-def _recognises(path: Path) -> bool:
+def is_result(path: Path) -> bool:
+    """Return whether a folder has a result."""
     return path.is_dir() and (path / SUMMARY).is_file() and (path / "state.parquet").is_file()
 
 
@@ -91,9 +92,10 @@ def _project(path: Path, wishes: Wishes) -> Project:
             loss=None if result.loss is None else losses[result.loss[0]],
             unit_variance=variances.get(result.unit_variance, "constrained"),
         ),
+        features={} if result.features is None else result.features.definitions,
     )
 
 
-FORMAT = Format(name="results", title=TITLE, recognises=_recognises, read=_project)
+FORMAT = Format(name="results", title=TITLE, recognises=is_result, read=_project)
 
 check_arguments(globals(), ["read_result"])

@@ -32,6 +32,13 @@ _DESCRIPTIONS = {
     "unknown": "name of the unknown",
     "component": "which of its components",
     "parameter": "which of its parameters",
+    "feature": "name of the feature",
+    "quantity": "what is said of it",
+    "points": "number of points",
+    "direction": "of the deviation",
+    "deviation": "distance of the point from the feature",
+    "k": "coverage factor",
+    "expanded": "expanded uncertainty, k times the standard deviation",
     "model": "model of the camera",
     "unit": "unit of the numbers of this row; empty for plain numbers",
     "rays": "number of images",
@@ -59,9 +66,13 @@ _DESCRIPTIONS = {
 }
 _RENAMED = {"standardized": "test", "d": "difference"}
 _SUFFIXES = ("_deg", "_rad", "_px", "_mm")
-_TEXTS = ("photo", "point", "camera", "kind", "of", "unknown", "component", "parameter", "model", "unit")
+_TEXTS = (
+    *("photo", "point", "camera", "kind", "of", "unknown", "component", "parameter", "model", "unit"),
+    *("feature", "quantity", "direction"),
+)
 _PLAIN = ("redundancy", "test", "rays", "images", "assumed", "statistic", "probability")
-_OF_ROW = ("given", "sd_given", "value", "change", "sd", "residual")
+_COUNTS = ("points", "k")
+_OF_ROW = ("given", "sd_given", "value", "change", "sd", "residual", "expanded", "deviation")
 
 
 def plain_name(name: str) -> str:
@@ -98,7 +109,7 @@ def plain_columns(table: Mapping[str, Any], linear_unit: str) -> list[Column]:
 
 
 def _unit(name: str, plain: str, linear_unit: str) -> str:
-    if plain.startswith(_PLAIN):
+    if plain.startswith(_PLAIN) or plain in _COUNTS:
         return "1"
     if plain in _OF_ROW:
         return "as the column unit says"

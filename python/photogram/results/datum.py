@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ResultDatum", "datum_messages", "datum_of", "inner_datum", "refused", "relative_datum"]
 
+ANGLES = tuple(name.removesuffix("_deg") for name in ATTITUDE_COLUMNS)
 NOTABLE_LOSS = 1e-9
 """A larger part of a variance that is rounding is told."""
 
@@ -82,6 +83,14 @@ class ResultDatum:
     def is_chosen(self) -> bool:
         """Whether standard deviations would be others in another datum."""
         return self.kind not in ("observations", "minimal control")
+
+    @property
+    def has_chosen_scale(self) -> bool:
+        """Whether nothing but the datum gives lengths."""
+        # Minimum constraints hold the scale by one coordinate of a photo that holds nothing else.
+        photos = [photo for photo, _ in self.held]
+        alone = any(photos.count(photo) == 1 and unknown not in ANGLES for photo, unknown in self.held)
+        return self.scale or (self.kind == "minimum constraints" and alone)
 
     def document(self) -> dict[str, Any]:
         """Return what the JSON document says of it."""

@@ -10,6 +10,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.io import json
 from photogram.results.calibration_report import calibration_members
+from photogram.results.features_report import features_document
 from photogram.results.report import problems_of
 from photogram.results.result import Result, SumsByKind
 from photogram.results.weakest import weakest_photos, weakest_points
@@ -75,6 +76,7 @@ def _document(result: Result) -> dict[str, Any]:
             else {}
         ),
         **({"unknowns": _unknowns(result)} if result.unknowns else {}),
+        **({} if result.features is None else {"features": features_document(result.features)}),
         "points": _points(result),
         "observations": _observations(result),
         "observations_beside_images": _beside_images(result),

@@ -11,6 +11,7 @@ import numpy as np
 from photogram.network.geometry import lengths_of_units
 from photogram.network.structuring import structure
 from photogram.results.calibration_report import calibration_sections
+from photogram.results.features_report import features_sections
 from photogram.results.findings import axes, tested_observations
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
@@ -89,6 +90,7 @@ def summary(result: Result) -> list[Section]:
         *verdict_sections(result.verdict),
         ("Problems", problems_of(result)),
         ("Adjustment", _adjustment(result)),
+        *features_sections(result.features),
         ("Residuals", _residuals(result)),
         (f"Image coordinates with |standardized residual| > {_BLUNDER:g}, largest first", _suspects(result)),
     ]

@@ -38,6 +38,7 @@ from photogram.statistics.limits import GlobalTest, global_test
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram.results.features import Features
     from photogram.results.network_trial import NetworkTrial
 
 __all__ = ["Redundancies", "Result", "SumsByKind", "SumsOfSquares"]
@@ -131,6 +132,9 @@ class Result(AdjustedNetwork):
     set_aside
         What first values took out and does not fit the adjusted block either: photos, images, by name; see
         :func:`photogram.adjust_started`.
+    features
+        Features through adjusted points that reports and tables show, as :func:`photogram.features` gives
+        them, in the datum of the result; None without.
     """
 
     block: Block
@@ -152,6 +156,7 @@ class Result(AdjustedNetwork):
     hints: tuple[str, ...] = ()
     exchanged: tuple[str, ...] = ()
     set_aside: tuple[str, ...] = ()
+    features: Features | None = None
 
     WHOLE: ClassVar[bool] = True
     """Whether the normal equations of all of it may be asked again."""
@@ -177,6 +182,7 @@ class Result(AdjustedNetwork):
             hints=(),
             exchanged=(),
             set_aside=(),
+            features=None,
             options=options,
             datum=datum,
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),
@@ -278,6 +284,7 @@ class Result(AdjustedNetwork):
             unknowns=adjusted_unknowns(block, solution, self.covariance_scale),
             datum=datum,
             state=solution.state,
+            features=None,
             messages=[*datum_messages(block, datum, self.point_rays), *kept],
         )
 

@@ -23,6 +23,7 @@ from photogram.network.unknowns import Unknown
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.columns import plain_columns
 from photogram.results.datum import ResultDatum
+from photogram.results.features import Feature, Features, Quantity
 from photogram.results.iteration import Iteration
 from photogram.results.kinds import ObservedKind
 from photogram.results.result import Redundancies, Result, SumsOfSquares
@@ -50,11 +51,14 @@ _CLASSES = (
     AdjustedUnknown,
     Camera,
     CoreOptions,
+    Feature,
+    Features,
     Frame,
     Iteration,
     Message,
     Mount,
     ObservedKind,
+    Quantity,
     Redundancies,
     Refraction,
     ResultDatum,
@@ -69,6 +73,8 @@ _TABLES = {
     "observations": "observation",
     "cameras": "camera",
     "unknowns": "unknown",
+    "features": "feature",
+    "feature_deviations": "deviation",
 }
 """Tables for people, and the kind that each is in `results.tables`."""
 

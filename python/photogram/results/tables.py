@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.network.block import ATTITUDE_COLUMNS, position_columns
+from photogram.results.features import Features
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.results.result import Result
 from photogram.show.ways import columns_of
@@ -135,6 +136,16 @@ def _unknowns(result: Result) -> dict[str, Any]:
     return {name: [row[k] for row in rows] for k, name in enumerate((*names, "standardized"))}
 
 
+def _features(result: Result) -> dict[str, Any]:
+    """`value`, `sd`, `k`, and `expanded`, k times sd, of each quantity."""
+    return (result.features or Features(())).columns()
+
+
+def _deviations(result: Result) -> dict[str, Any]:
+    """Distances of points from their features, in each direction, with `sd`."""
+    return (result.features or Features(())).deviation_columns()
+
+
 _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "photo": _photos,
     "point": _points,
@@ -145,6 +156,8 @@ _TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
     "observation": _beside_images,
     "camera": _cameras,
     "unknown": _unknowns,
+    "feature": _features,
+    "deviation": _deviations,
 }
 
 

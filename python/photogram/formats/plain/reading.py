@@ -27,6 +27,7 @@ from photogram.io.delimited import ColumnTable
 from photogram.messages import Message, listed, quoted
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Attitude, Control, Observation
+from photogram.results.features import named_points
 
 __all__ = [
     "SETTINGS",
@@ -136,7 +137,12 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         spheroid=Spheroid(*transform.frame.ellipsoid) if transform.frame.kind == "geographic" else None,
         photo_to_ground=settings.attitude == "omega_phi_kappa" and settings.rotation == "photo_to_object",
         details={"settings": settings},
-    ).replace(sd_taken=True)
+    ).replace(sd_taken=True, features=settings.features)
+    for name, (_, wanted) in settings.features.items():
+        try:
+            named_points(wanted, points.names)
+        except InputError as error:
+            raise InputError(f"the feature {name}: {error.message}", file=settings.path) from None
     if control is not None and given is not None:
         from photogram.formats.exchanged import check_systems
 

@@ -18,6 +18,7 @@ from photogram.formats.project import DatumName, Frame, Options
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
 from photogram.messages import Message, listed, nearest
+from photogram.results.features import KINDS, Definition
 
 __all__ = ["TABLES", "Settings", "bare_settings", "read_settings", "unread_tables"]
 
@@ -105,6 +106,7 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
     "tables": TABLES,
     "adjust": ("datum", "loss", "unit_variance"),
     **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
+    "features": (),
 }
 
 
@@ -132,6 +134,8 @@ class Settings:
         Of tables whose coordinates are not in the frame.
     columns
         What is said of the columns of tables of points, as `--columns` and `--roles` say it.
+    features
+        By their names, as :func:`photogram.features` takes them.
     """
 
     path: Path
@@ -150,6 +154,7 @@ class Settings:
     tables: Mapping[str, Path]
     crs: Mapping[str, str]
     columns: Mapping[str, Columns] = field(default_factory=dict)
+    features: Mapping[str, Definition] = field(default_factory=dict)
 
 
 def read_settings(path: Path) -> Settings:
@@ -192,6 +197,7 @@ def read_settings(path: Path) -> Settings:
         tables=_tables(file),
         crs={name: file.text(name, "crs") for name in WITH_CRS if file.has(name, "crs")},
         columns={name: file.columns(name) for name in WITH_CRS if name in file.content},
+        features={name: file.feature(name) for name in file.content.get("features", {})},
     )
 
 
@@ -277,7 +283,7 @@ class _File:
             if not isinstance(values, dict):
                 self.fail(section, f"{section} is no section")
             for key in values:
-                if key not in _KEYS[section]:
+                if section != "features" and key not in _KEYS[section]:
                     self.fail(key, f"[{section}] has no key {key}{nearest(key, _KEYS[section])}")
 
     def has(self, section: str, key: str) -> bool:
@@ -318,6 +324,18 @@ class _File:
             return columns_given(self.text(table, "columns"), self.text(table, "roles"))
         except InputError as error:
             self.fail("columns" if "--columns" in error.message else "roles", error.message.replace("--", ""))
+
+    def feature(self, name: str) -> Definition:
+        """Return the kind of a feature, and the points that it goes through."""
+        value = self.value("features", name, None)
+        if not isinstance(value, dict) or len(value) != 1:
+            self.fail(name, f'the feature {name} is {{ circle = ["point", "point", ...] }}, not {value!r}')
+        (kind, points), *_ = value.items()
+        if kind not in KINDS:
+            self.fail(name, f"the feature {name}: there is no {kind}{nearest(kind, KINDS)}")
+        if not isinstance(points, list) or not all(isinstance(each, str) for each in points):
+            self.fail(name, f"the feature {name} goes through a list of names, not {points!r}")
+        return kind, tuple(points)
 
     def origin(self) -> tuple[float, float, float] | None:
         """Return latitude, longitude, height."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -20,6 +21,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Control, Position
+from photogram.results.features import Definition
 
 __all__ = ["attitude_matrices", "camera_table", "cannot_hold", "control_table", "known_cameras", "write"]
 
@@ -111,19 +113,16 @@ def write(project: Project) -> Mapping[str, bytes]:
 
 def _settings(project: Project, image_y: str) -> str:
     block, frame, options = project.block, project.frame, project.options
-    name = block.title.replace("\\", "\\\\").replace('"', '\\"')
-    printed = "".join(each if each.isprintable() else " " for each in name)
     lines = [
         "[project]",
         f"format = {VERSION}",
-        f'name = "{printed}"',
+        f"name = {_quoted(block.title)}",
         "",
         "[frame]",
         f'kind = "{frame.kind}"',
     ]
     if frame.crs:
-        quoted = frame.crs.replace("\\", "\\\\").replace('"', '\\"')
-        lines.append(f'crs = "{quoted}"')
+        lines.append(f"crs = {_quoted(frame.crs)}")
     if frame.origin is not None:
         lines.append(f"origin = [{', '.join(map(repr, frame.origin))}]")
     if block.spheroid is not None:
@@ -137,7 +136,22 @@ def _settings(project: Project, image_y: str) -> str:
     if options.datum is not None:
         lines.append(f'datum = "{options.datum}"')
     lines += [f'loss = "{options.loss or "none"}"', f'unit_variance = "{options.unit_variance}"', ""]
+    if project.features:
+        lines += ["[features]", *(_feature(*each) for each in project.features.items()), ""]
     return "\n".join(lines)
+
+
+def _feature(name: str, definition: Definition) -> str:
+    kind, points = definition
+    # Strings of JSON are strings of TOML.
+    texts = [json.dumps(each, ensure_ascii=False) for each in (name, *points)]
+    return f"{texts[0]} = {{ {kind} = [{', '.join(texts[1:])}] }}"
+
+
+def _quoted(text: str) -> str:
+    """Return a text between quotation marks; what does not print is a space."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(each if each.isprintable() else " " for each in escaped) + '"'
 
 
 def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from photogram.results.findings import axes, tested_observations
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.page.cameras import cameras_section
+from photogram.results.page.features import features_section
 from photogram.results.page.frame import block_frame, degrees
 from photogram.results.page.observed import Images, worst_images, worst_of
 from photogram.results.page.parts import (
@@ -52,6 +53,7 @@ def block_page(result: Result) -> Page:
     photos, points = block.image_photos[worst].tolist(), block.image_points[worst].tolist()
     sections = [
         _network_section(result, pictures),
+        features_section(result.features),
         _size_section(result),
         _residuals_section(pictures),
         _redundancy_section(result, pictures),

@@ -1,0 +1,140 @@
+"""`photogram features`: distances, lines, planes, circles, spheres, cylinders through adjusted points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from photogram.cli.adjust import adjusted_block, started_block
+from photogram.cli.console import print_sections
+from photogram.cli.division import WHOLE
+from photogram.cli.job import Job, Writes, with_job
+from photogram.cli.options import JsonFile, OrderingName, Quiet, Strict, Threads, out_option
+from photogram.cli.projects import (
+    NOTHING,
+    Additions,
+    Example,
+    ProjectPath,
+    project_path,
+    read_project,
+    with_additions,
+    with_options,
+)
+
+if TYPE_CHECKING:
+    from photogram import Result
+    from photogram.formats import Project
+    from photogram.results.features import Definition
+
+__all__ = ["features"]
+
+Given = list[str] | None
+
+
+def _option(kind: str, what: str) -> Any:
+    return typer.Option(f"--{kind}", metavar="NAME=POINT,..", help=what, show_default=False)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Features, with the options that say what they go through; all may be given more than once."""
+
+    distance: Annotated[Given, _option("distance", "Between two points.")] = None
+    line: Annotated[Given, _option("line", "Through 2 or more points: axis, straightness.")] = None
+    plane: Annotated[Given, _option("plane", "Through 3 or more: normal, flatness.")] = None
+    circle: Annotated[
+        Given, _option("circle", "Through 3 or more: diameter, centre, normal, roundness; bore='hole-*'.")
+    ] = None
+    sphere: Annotated[Given, _option("sphere", "Through 4 or more: diameter, centre, sphericity.")] = None
+    cylinder: Annotated[Given, _option("cylinder", "Through 6 or more: diameter, axis, cylindricity.")] = None
+
+    def definitions(self) -> dict[str, Definition]:
+        """Return what is asked for, by its name."""
+        found: dict[str, Definition] = {}
+        for each in fields(self):
+            for given in getattr(self, each.name) or ():
+                name, equals, points = (part.strip() for part in given.partition("="))
+                if not (name and equals and points):
+                    raise typer.BadParameter(f"{given} is not NAME=POINT,...", param_hint=f"--{each.name}")
+                if name in found:
+                    raise typer.BadParameter(f"two features are called {name}", param_hint=f"--{each.name}")
+                found[name] = (each.name, [point.strip() for point in points.split(",")])
+        return found
+
+
+@with_job
+@with_options("wanted", Wanted)
+@with_additions()
+def features(
+    job: Job,
+    path: ProjectPath = None,
+    example: Example = False,
+    wanted: Wanted = Wanted(),  # frozen
+    k: Annotated[float, typer.Option("-k", metavar="K", min=0.01, help="Coverage factor: U = k sd.")] = 2.0,
+    coverage: Annotated[
+        float | None,
+        typer.Option(
+            metavar="P",
+            min=0.01,
+            max=0.999999,
+            help="A probability in place of -k: 0.95. k is Student's where the unit weight is estimated.",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, Writes.DIRECTORY, out_option("Directory for tables of values and of deviations.")
+    ] = None,
+    json: JsonFile = None,
+    added: Additions = NOTHING,
+    threads: Threads = None,
+    strict: Strict = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.
+
+    PATH is a result that `photogram adjust --parquet` has written, or a project, which is adjusted first.
+    Those of its [features] are fitted where no option names others.
+    """
+    path = project_path(job, path)
+    with job:
+        from photogram import Result, read_result
+        from photogram import features as fitted
+        from photogram.formats.adjusted import feature_files
+        from photogram.formats.results import is_result
+        from photogram.io.json import to_json
+        from photogram.results.features_report import features_document, features_sections
+        from photogram.show.sections import verdict_section
+
+        definitions = wanted.definitions()
+        if is_result(path):
+            job.reads(path)
+            result = read_result(path)
+            if not isinstance(result, Result):
+                raise typer.BadParameter("points of a collection have no names", param_hint="PATH")
+            declared = {} if result.features is None else result.features.definitions
+        else:
+            project = read_project(job, path, added)
+            declared = dict(project.features)
+            result = _adjusted(job, project.replace(features={}), threads)
+        if not (definitions or declared):
+            raise typer.BadParameter("name what to fit: --circle bore=p1,p2,p3 ...", param_hint="PATH")
+        found = fitted(result, definitions or declared, k=k, coverage=coverage)
+        verdict = result.verdict
+        job.finish(
+            {} if out is None else {out / name: each for name, each in feature_files(found).items()},
+            {} if json is None else {json: to_json(features_document(found))},
+            summary=lambda: print_sections(
+                [verdict_section(verdict), *features_sections(found)], "--json FILE"
+            ),
+            code=verdict.exit_code(strict=strict),
+        )
+
+
+def _adjusted(job: Job, project: Project, threads: int | None) -> Result:
+    block, started = started_block(project, keep_all=False)
+    return adjusted_block(
+        job, project, started or block, None, None, OrderingName.AUTO, threads, WHOLE.division
+    )

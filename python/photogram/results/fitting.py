@@ -1,0 +1,161 @@
+"""Fitting features to the points of a result, with their joint covariance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.annotations import check_arguments
+from photogram.errors import AdjustmentError, InputError
+from photogram.messages import Message
+from photogram.results.covariance import Covariances
+from photogram.results.features import (
+    KINDS,
+    Definition,
+    Feature,
+    Features,
+    Quantity,
+    directions,
+    named_points,
+)
+from photogram.results.result import Result
+from photogram.statistics.distributions import critical_student, log_chi_square, log_fisher
+
+__all__ = ["features", "with_features"]
+
+
+def features(
+    result: Result,
+    definitions: Mapping[str, Definition],
+    *,
+    k: float = 2.0,
+    coverage: float | None = None,
+) -> Features:
+    """Fit features to adjusted points: distances, lines, planes, circles, spheres, cylinders.
+
+    A feature is the one from which the squares of the distances of its points sum to the least (Gaussian
+    associated feature); everything has the standard deviation that follows from the joint covariance of the
+    points (docs/features.md).
+
+    Parameters
+    ----------
+    result
+        An adjusted block with rectangular coordinates.
+    definitions
+        By the names of features a kind (`distance`, `line`, `plane`, `circle`, `sphere`, `cylinder`) with
+        names of points, or patterns of names: `{"bore": ("circle", ["hole-*"])}`.
+    k
+        The coverage factor of U = k sd.
+    coverage
+        A probability, 0.95 for example, in place of k: k is Student's with the degrees of freedom of the
+        variance of unit weight, normal where that is known.
+
+    Raises
+    ------
+    InputError
+        Kinds or points that are not there, too few points, points that do not determine a feature.
+    AdjustmentError, OutOfMemoryError, KeyboardInterrupt
+        As :meth:`Result.covariances`.
+    """
+    fitted, empty = _fitting(result, k, coverage)
+    return replace(empty, features=tuple(fitted(name, each) for name, each in definitions.items()))
+
+
+def with_features(result: Result, definitions: Mapping[str, Definition]) -> Result:
+    """Return a result with features; what keeps one from being fitted is told in its messages."""
+    if not definitions:
+        return result
+    found, messages = [], []
+    try:
+        fitted, empty = _fitting(result, 2.0, None)
+    except (InputError, AdjustmentError) as error:
+        messages = [Message(f"no features: {error}")]
+        return replace(result, messages=[*result.messages, *messages])
+    for name, each in definitions.items():
+        try:
+            found.append(fitted(name, each))
+        except InputError as error:
+            messages.append(Message(error.message))
+    told = [*result.messages, *messages, *(Message(each) for each in empty.remarks)]
+    return replace(result, messages=told, features=replace(empty, features=tuple(found)))
+
+
+def _fitting(
+    result: Result, k: float, coverage: float | None
+) -> tuple[Callable[[str, Definition], Feature], Features]:
+    """Return what fits a feature, and all that features have in common."""
+    if result.geographic:
+        raise InputError("features have rectangular coordinates: these are longitudes and latitudes")
+    known = result.unit_variance == "unity" or result.variance_of_unit_weight is None
+    freedom = math.inf if known else result.degrees_of_freedom
+    if coverage is not None:
+        if not 0 < coverage < 1:
+            raise InputError(f"coverage is a probability between 0 and 1, not {coverage}")
+        k = critical_student(1.0 - coverage, freedom)
+    if not 0 < k < math.inf:
+        raise InputError(f"k is a positive number, not {k}")
+    remarks: tuple[str, ...] = ()
+    if result.datum.has_chosen_scale:
+        remarks = (
+            "nothing gives the network a scale: lengths of features, and their standard deviations, are only"
+            " those of its datum (a distance gives a scale)",
+        )
+    covariances = result.covariances()
+    return (
+        lambda name, definition: _fitted(result, covariances, name, definition, k, freedom),
+        Features((), k, coverage, freedom, remarks),
+    )
+
+
+def _fitted(
+    result: Result, covariances: Covariances, name: str, definition: Definition, k: float, freedom: float
+) -> Feature:
+    kind, wanted = definition
+    try:
+        if kind not in KINDS:
+            raise InputError(f"{kind!r} is none of {', '.join(KINDS)}")
+        block = result.block
+        points = named_points(wanted, block.point_ids)
+        if kind == "distance" and len(points) != 2:
+            raise InputError(f"a distance takes 2 points, not {len(points)}")
+        places = {point: row for row, point in enumerate(block.point_ids)}
+        rows = np.array([places[point] for point in points], dtype=np.int64)
+        for point, used in zip(points, result.used_points[rows].tolist(), strict=True):
+            if not used:
+                raise InputError(f"the point {point} did not take part in the adjustment")
+        names, values, covariance, deviations, test = _photocore.measured_feature(
+            kind, result.point_positions[rows], covariances.covariance(("point", points))
+        )
+    except InputError as error:
+        raise InputError(f"feature {name}: {error.message or error}") from None
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    quantities = tuple(
+        Quantity(own, value, deviation, k * deviation, block.linear_unit if is_length else "")
+        for (own, is_length), value, deviation in zip(names, values.tolist(), sd.tolist(), strict=True)
+    )
+    count = len(directions(kind))
+    found = Feature(
+        name,
+        kind,
+        tuple(points),
+        quantities,
+        covariance,
+        deviations[:, 0 : 2 * count : 2],
+        deviations[:, 1 : 2 * count : 2],
+    )
+    if test is None:
+        return found
+    statistic, beyond = test
+    log = (
+        log_chi_square(statistic, beyond)
+        if math.isinf(freedom)
+        else log_fisher(statistic / beyond, beyond, freedom)
+    )
+    return replace(found, statistic=statistic, freedom=beyond, probability=math.exp(float(log)))
+
+
+check_arguments(globals(), ["features"])
