@@ -40,7 +40,7 @@ DIAMETER = 0.40006
 EXAMPLE = Path(__file__).resolve().parents[1] / "python" / "photogram" / "examples" / "flange"
 PROJECT = """\
 # Targets on a part, photographed from all around; scale bars, no control. Replace the tables by your own:
-# `photogram adjust .` adjusts it; docs/tutorials/metrology.md goes on to a diameter, docs/formats.md has all.
+# `photogram adjust .` adjusts it; docs/tutorials/metrology.md goes on to a decision, docs/formats.md has all.
 # cameras.csv: sd_NAME = inf makes a parameter of the lens unknown. photos.csv: nothing need be known of them.
 # images.csv: centres of targets in pixels. distances.csv: the certified lengths of the bars.
 [project]
@@ -51,6 +51,8 @@ images = 0.06                       # pixels: centres of ellipses
 distances = 0.000005                # metres: the bars' certificates
 [adjust]
 datum = "inner"                     # no control: the network is as free as can be
+[features]                          # through points: distance, line, plane, circle, sphere or cylinder
+bore = { circle = ["hole-*"] }
 """
 
 

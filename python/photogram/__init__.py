@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from photogram.planning import Plan, plan
     from photogram.results.components import VarianceComponents
     from photogram.results.differences import Differences, differences
-    from photogram.results.features import Feature, Features, Quantity
+    from photogram.results.features import Feature, Features
     from photogram.results.fitting import features
     from photogram.results.group_sums import GroupSums, group_sums
     from photogram.results.iteration import Iteration
@@ -77,7 +77,6 @@ __all__ = [
     "Plan",
     "Pose",
     "Progress",
-    "Quantity",
     "RankError",
     "Refraction",
     "Resection",
@@ -137,7 +136,6 @@ _HOMES = {
     "Plan": "planning",
     "Pose": "adjustment.resection",
     "Progress": "adjustment.adjustment",
-    "Quantity": "results.features",
     "RankError": "errors",
     "Refraction": "network.refraction",
     "Resection": "adjustment.resection",

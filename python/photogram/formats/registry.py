@@ -15,7 +15,7 @@ from photogram.formats.project import Project
 from photogram.formats.topocentric import in_topocentric, topocentric_remarks
 from photogram.io.files import reading
 from photogram.memory import turned
-from photogram.messages import listed
+from photogram.messages import counted, listed
 
 __all__ = ["FORMATS", "cannot_hold", "read", "recognised", "target", "to_files"]
 
@@ -234,7 +234,7 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
     return [
         *([] if chosen.geographic else topocentric_remarks(project)),
         *chosen.cannot_hold(_fitting(project, chosen)),
-        *([f"{len(project.features)} features"] if project.features and chosen.name != "plain" else []),
+        *([counted(len(project.features), "feature")] if project.features and chosen.name != "plain" else []),
         *(nominal_pixels(project) if chosen.pixels else []),
     ]
 

@@ -21,7 +21,7 @@ __all__ = ["KINDS", "Definition", "Feature", "Features", "Quantity", "named_poin
 T = TypeVar("T", "Quantity", "Feature")
 KINDS = ("distance", "line", "plane", "circle", "sphere", "cylinder")
 
-Definition = tuple[str, Sequence[str]]
+Definition = tuple[str, str | Sequence[str]]
 """A kind with the points that it goes through: names, or patterns such as `hole-*`."""
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import shown
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
 from photogram.results.covariance import Covariances
@@ -114,12 +115,14 @@ def _fitting(
 def _fitted(
     result: Result, covariances: Covariances, name: str, definition: Definition, k: float, freedom: float
 ) -> Feature:
-    kind, wanted = definition
     try:
+        if not (isinstance(definition, Sequence) and len(definition) == 2) or isinstance(definition, str):
+            raise InputError(f"{shown(definition)} is no kind with points: ('circle', ['hole-*'])")
+        kind, wanted = definition
         if kind not in KINDS:
             raise InputError(f"{kind!r} is none of {', '.join(KINDS)}")
         block = result.block
-        points = named_points(wanted, block.point_ids)
+        points = named_points([wanted] if isinstance(wanted, str) else wanted, block.point_ids)
         if kind == "distance" and len(points) != 2:
             raise InputError(f"a distance takes 2 points, not {len(points)}")
         places = {point: row for row, point in enumerate(block.point_ids)}
