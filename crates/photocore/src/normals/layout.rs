@@ -118,12 +118,12 @@ pub enum LayoutError {
     Tie {
         /// The tie.
         tie: usize,
+    },
     /// The pattern of the factor lacks a block that equations touch: the order of elimination contradicts the layout.
     #[error("the pattern of the factor lacks blocks that go to its front {front}")]
     Pattern {
         /// The supernode whose front it is.
         front: usize,
-    },
     },
 }
 
