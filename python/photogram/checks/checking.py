@@ -192,12 +192,12 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     if edited.first is not None and edited.last is not None:
         named = {point for each in [*errors.findings, *edited.section.findings] for point in each.points}
         edited.section.findings[:0] = held_values(edited.first) + points_left_out(edited.last, named)
-        if edited.last.converged:
-            edited.section.findings += disagreeing(edited.last)
     sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
     sections += _after_adjustment(oriented, edited, misleading, words)
     if edited.last is not None and edited.last.converged:
         sets.findings += half_pixel(edited.last, adjusted)
+        if not any(each.level == "grave" for section in sections for each in section.findings):
+            edited.section.findings += disagreeing(edited.last)
     if not exact:
         for section in sections:
             if section is not sets:

@@ -50,7 +50,7 @@ def held_values(result: Result) -> list[Finding]:
 
 
 def disagreeing(result: Result) -> list[Finding]:
-    """Name the check points that disagree with the adjustment, as its verdict does."""
+    """Name check points that disagree with the adjustment, as its verdict does, where nothing explains it."""
     evidence = Evidence(findings_of(result))
     levels: tuple[tuple[Level, float], ...] = (("grave", WITHHELD), ("look", evidence.found.level))
     for level, limit in levels:
