@@ -195,7 +195,8 @@ def _control(
     sd, check_sd = np.full((len(index), 3), np.inf), None
     control: dict[int, GroundPoint] = {}
     placed: set[str] = set()
-    alike = {plain_name(name): name for name in index}
+    is_complete = all(point.name in index for point in project.ground)
+    alike = {} if is_complete else {plain_name(name): name for name in index}
     for point in project.ground:
         if point.name in placed:
             messages.append(

@@ -73,4 +73,4 @@ def written(name: str, writer: Callable[[], list[str]]) -> list[str]:
 
 def to_bytes(records: Iterable[str]) -> bytes:
     """Return records as the bytes of a text file."""
-    return "".join(f"{record}\n" for record in records).encode()
+    return "\n".join([*records, ""]).encode()

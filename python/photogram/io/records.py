@@ -47,10 +47,13 @@ class Source:
             another control character, which would move its columns.
         """
         lines = read_lines(path)
-        if sum(line.count("\0") for line in lines) > WIDE * sum(map(len, lines)):
+        text = "".join(lines)
+        if text.count("\0") > WIDE * len(text):
             error = "text of four bytes a character (UTF-32), or damaged text of two: save it as UTF-8"
             raise InputError(error, file=path)
         source = cls(path, [line[:WIDTH] for line in lines])
+        if "".join(source.lines).isprintable():
+            return source
         for number, line in enumerate(source.lines, 1):
             if not line.isprintable():
                 what = next(character for character in line if not character.isprintable())
