@@ -1379,8 +1379,8 @@ class BlockSolution(_NetworkSolution):
         """
 
     @property
-    def lost_digits(self) -> float:
-        """About how large a part of the variances rounding may be in the datum that it was taken to."""
+    def relative_error(self) -> float:
+        """Relative error, by rounding, of the variances in the datum that it was taken to, about."""
 
     @property
     def minimal_control(self) -> bool:

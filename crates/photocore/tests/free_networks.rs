@@ -297,7 +297,7 @@ fn cofactors_of_everything_go_over_to_any_datum() {
         assert!(
             there.variance_of_unit_weight.unwrap() / minimal.variance_of_unit_weight.unwrap() - 1.0 < 1e-9
         );
-        assert!(there.lost_digits > 0.0 && there.lost_digits < 1e-9, "{:e}", there.lost_digits);
+        assert!(there.relative_error > 0.0 && there.relative_error < 1e-9, "{:e}", there.relative_error);
     }
 }
 

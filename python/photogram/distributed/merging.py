@@ -163,7 +163,7 @@ def _rest(
         "weak_cameras": [],
         "weak_unknowns": [],
         "datum": [],
-        "lost_digits": 0.0,
+        "relative_error": 0.0,
         "minimal_control": False,
         "adjusted_unknowns": _unknowns(block, details),
         "cameras": _cameras(block, owners, details),

@@ -133,7 +133,7 @@ def datum_of(block: Block, solution: BlockSolution, row: DatumRow | None = None)
         points=tuple(block.point_ids[point] for point in points if used[point]),
         photos=tuple(block.photo_ids[photo] for photo in photos),
         scale=scale and is_open,
-        lost=solution.lost_digits,
+        lost=solution.relative_error,
         attitudes=tuple(block.photo_ids[photo] for photo in attitudes),
         row=row,
     )

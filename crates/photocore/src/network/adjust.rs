@@ -137,7 +137,7 @@ impl Network {
             undetermined.map(|error| self.name(error, &assembled, &solution.state.unknowns, pool));
         solution.minimal_control = minimal;
         solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
-        solution.lost_digits = lost;
+        solution.relative_error = lost;
         solution.dropped.extend(leaving.harmful);
         solution.dropped.sort_unstable_by_key(|dropped| dropped.point);
         solution.converged =

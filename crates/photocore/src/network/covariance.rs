@@ -149,7 +149,7 @@ impl Network {
         let left_out = state.collapsed.clone();
         let mut solution = pool.install(|| Solution::new(self, options, &assembled, adjustment, left_out));
         solution.state.datum = Some(datum.clone());
-        solution.lost_digits = lost;
+        solution.relative_error = lost;
         Ok(solution)
     }
 

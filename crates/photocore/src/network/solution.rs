@@ -111,8 +111,8 @@ pub struct Solution {
     pub variance_of_unit_weight: Option<f64>,
     /// Where the adjustment has ended: what covariances are computed from, and other datums.
     pub state: State,
-    /// About how large a part of the variances rounding may be, in a datum that they were taken to; zero otherwise.
-    pub lost_digits: f64,
+    /// Relative error, by rounding, of the variances in a datum that they were taken to, about; zero otherwise.
+    pub relative_error: f64,
     /// Whether control and weights of poses are exactly what a datum takes: they check nothing, and another datum may be chosen.
     pub minimal_control: bool,
     /// Where the adjustment has converged, the problem with its cofactors: tests of it form nothing again.
@@ -189,7 +189,7 @@ impl Solution {
                 datum: None,
                 released: false,
             },
-            lost_digits: 0.0,
+            relative_error: 0.0,
             minimal_control: false,
             converged: None,
             collapsed,

@@ -243,8 +243,8 @@ solution_class! {
     /// An adjusted block.
     BlockSolution, "block", {
         #[getter]
-        fn lost_digits(&self) -> f64 {
-            self.solution.lost_digits
+        fn relative_error(&self) -> f64 {
+            self.solution.relative_error
         }
 
         #[getter]
