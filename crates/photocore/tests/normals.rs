@@ -8,8 +8,8 @@ use std::ops::ControlFlow;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use photocore::normals::{
-    Equations, Factor, Function, GroupRows, Layout, Ordering, Prior, SelectedInverse, Stopped, System, Tie,
-    TieRows,
+    Equations, Factor, Function, GroupRows, Layout, LayoutError, Ordering, Prior, SelectedInverse, Stopped,
+    System, Tie, TieRows,
 };
 use proptest::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -574,6 +574,21 @@ fn local_block_without_equations_is_named() {
     let system = System::new(layout, Ordering::Auto).unwrap();
     let factor = done(system.factor(&pool(1), &dense, &dense.prior, 0.0, &mut go));
     assert_eq!(factor.deficient_locals, vec![1]);
+}
+
+#[test]
+fn more_than_can_be_numbered_is_refused() {
+    let many = u32::MAX as usize;
+    for kept in [[many, 1], [usize::MAX, usize::MAX]] {
+        let found = Layout::new(2, 3, &kept, vec![0, 1], vec![0]);
+        assert!(matches!(found, Err(LayoutError::TooMany(_))), "{kept:?}");
+    }
+    let layout = Layout::new(2, 3, &[6], vec![0, 1], vec![0]).unwrap();
+    for border in [many - 9, usize::MAX] {
+        let found = layout.clone().with_border(border, vec![0..1]);
+        assert!(matches!(found, Err(LayoutError::TooMany(_))), "{border}");
+    }
+    assert!(layout.with_border(many - 10, vec![0..1]).is_ok());
 }
 
 #[test]

@@ -14,6 +14,8 @@ use thiserror::Error;
 ///
 /// Kernels are made for the main blocks, so what nearly every group touches belongs among the further ones: a block that is further
 /// in any group is the main one of none.
+///
+/// Of blocks, groups, ties and unknowns there are fewer than `u32::MAX` each: it is checked here, and whoever numbers them keeps 32 bits.
 #[derive(Debug, Clone)]
 pub struct Layout {
     rows: usize,
@@ -58,6 +60,9 @@ pub struct Tie {
 /// A layout that contradicts itself.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum LayoutError {
+    /// More blocks, groups, ties or unknowns than 32 bits number.
+    #[error("{0} blocks, equations or unknowns are more than can be numbered")]
+    TooMany(usize),
     /// A local block has no size or more than three unknowns.
     #[error("local blocks have {0} unknowns; 1, 2 or 3 are possible")]
     LocalDimension(usize),
@@ -113,17 +118,17 @@ pub enum LayoutError {
     /// Outer blocks beside a border, or a list of outer or contributed blocks with one that does not exist or is there twice.
     #[error("outer or contributed blocks do not exist, are named twice or stand beside a border")]
     Outer,
-    /// A tie without equations or unknowns, or one that names a block twice or unknowns that do not exist.
-    #[error("tie {tie} has no equations or unknowns, or names a block twice or one that does not exist")]
-    Tie {
-        /// The tie.
-        tie: usize,
-    },
     /// The pattern of the factor lacks a block that equations touch: the order of elimination contradicts the layout.
     #[error("the pattern of the factor lacks blocks that go to its front {front}")]
     Pattern {
         /// The supernode whose front it is.
         front: usize,
+    },
+    /// A tie without equations or unknowns, or one that names a block twice or unknowns that do not exist.
+    #[error("tie {tie} has no equations or unknowns, or names a block twice or one that does not exist")]
+    Tie {
+        /// The tie.
+        tie: usize,
     },
 }
 
@@ -145,6 +150,9 @@ impl Layout {
         if !(1..=3).contains(&local_dim) {
             return Err(LayoutError::LocalDimension(local_dim));
         }
+        let in_kept = kept_dims.iter().fold(0, |sum: usize, &dim| sum.saturating_add(dim));
+        let unknowns = group_ptr.len().saturating_mul(local_dim).saturating_add(in_kept);
+        [kept_dims.len(), group_kept.len(), unknowns].into_iter().try_for_each(numbered)?;
         let rising = group_ptr.is_sorted() && group_ptr.first() == Some(&0);
         if !rising || group_ptr.last() != Some(&group_kept.len()) {
             return Err(LayoutError::GroupPointers(group_kept.len()));
@@ -222,6 +230,7 @@ impl Layout {
         if ranges.len() != self.groups() {
             return Err(LayoutError::GroupPointers(self.groups()));
         }
+        numbered(self.all_kept().end.saturating_add(dim))?;
         if let Some(group) =
             ranges.iter().position(|range| range.end as usize > dim || range.start > range.end)
         {
@@ -234,6 +243,7 @@ impl Layout {
 
     /// Adds ties; after the border, which they may touch.
     pub fn with_ties(mut self, ties: Vec<Tie>) -> Result<Self, LayoutError> {
+        numbered(ties.len())?;
         let sound = |tie: &Tie| {
             let mut kept = tie.kept.clone();
             kept.sort_unstable();
@@ -306,6 +316,7 @@ impl Layout {
     /// * `outer`: kept blocks that stay, in an order of their own: a system above eliminates them;
     /// * `contributions`: for each system below the kept blocks that it leaves something for, in its order.
     pub fn as_part(mut self, outer: Vec<u32>, contributions: Vec<Vec<u32>>) -> Result<Self, LayoutError> {
+        numbered(contributions.len())?;
         let sound = |blocks: &[u32]| {
             let mut seen = vec![false; self.kept()];
             let fresh = |&block: &u32| {
@@ -524,6 +535,11 @@ impl Layout {
     pub fn border_range(&self) -> Range<usize> {
         self.kept_offset[self.kept()]..self.unknowns()
     }
+}
+
+/// Refuses more than 32 bits number; the greatest of their numbers stands for none.
+fn numbered(count: usize) -> Result<(), LayoutError> {
+    if count < u32::MAX as usize { Ok(()) } else { Err(LayoutError::TooMany(count)) }
 }
 
 /// The runs of what is not held.
