@@ -253,6 +253,7 @@ fn adjust(criterion: &mut Criterion) {
         start: Start::Intersected,
         hold_unused: false,
         memory: None,
+        reserved: 0,
         minimum: None,
         screens: Screens::default(),
     };

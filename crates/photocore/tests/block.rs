@@ -90,6 +90,23 @@ fn adjust(block: &Network) -> Result<Solution, NetworkError> {
     block.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))
 }
 
+/// A core that is called from Rust needs no room for what an interpreter loads; a caller that does says so.
+#[test]
+fn memory_is_that_of_the_adjustment_and_what_the_caller_takes() {
+    let room = |memory, reserved| {
+        let options = Options { memory: Some(memory), reserved, ..Options::default() };
+        let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        sound().adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).map(drop)
+    };
+    assert_eq!(room(16 << 20, 0), Ok(()));
+    match room(16 << 20, 12 << 20) {
+        Err(NetworkError::Memory { needed, available }) => {
+            assert!(needed > 20 << 20 && available == 16 << 20, "{needed}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
 #[test]
 fn positions_too_large_for_double_precision_are_named() {
     for value in [1e308, 1e101, -1e16] {

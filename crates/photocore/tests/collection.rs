@@ -186,6 +186,7 @@ fn adjusted_from(
         start,
         hold_unused: true,
         memory: None,
+        reserved: 0,
         minimum: None,
         screens: Screens::default(),
     };

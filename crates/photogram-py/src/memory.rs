@@ -21,6 +21,8 @@ use pyo3::prelude::*;
 
 import_exception!(photogram.errors, OutOfMemoryError);
 
+/// What Python loads with the first adjustment, and room that the allocator keeps.
+pub const LOADED: usize = 40 << 20;
 /// Kept for allocations that fail: addresses only, no page of it is ever touched.
 const RESERVE: usize = 64 << 20;
 /// Left free beside the reserve when threads are started, for their stacks.

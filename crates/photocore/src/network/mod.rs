@@ -297,6 +297,8 @@ pub struct Options {
     pub hold_unused: bool,
     /// Bytes that the adjustment may take (see [`crate::normals::System::memory`]); None for any number.
     pub memory: Option<usize>,
+    /// Bytes of these that the caller takes besides: an interpreter for what it loads.
+    pub reserved: usize,
     /// What to hold where nothing else gives a datum; None for what is best held.
     pub minimum: Option<Minimum>,
     /// What may leave for the good of the rest.
@@ -313,6 +315,7 @@ impl Default for Options {
             start: Start::default(),
             hold_unused: false,
             memory: None,
+            reserved: 0,
             minimum: None,
             screens: Screens::default(),
         }

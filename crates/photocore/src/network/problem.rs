@@ -43,7 +43,7 @@ pub(super) struct Reached {
 impl Assembled {
     /// Refuses what takes more memory than it may.
     pub fn check_memory(&self, options: &Options) -> Result<(), NetworkError> {
-        let needed = self.problem.system.memory();
+        let needed = options.reserved + self.problem.system.memory();
         match options.memory {
             Some(available) if needed > available => Err(NetworkError::Memory { needed, available }),
             _ => Ok(()),
@@ -53,7 +53,8 @@ impl Assembled {
     /// Whether there is room for what tests of groups need besides.
     pub fn may_keep(&self, options: &Options) -> bool {
         let system = &self.problem.system;
-        options.memory.is_none_or(|available| system.memory() + system.memory_of_groups() <= available)
+        let needed = options.reserved + system.memory() + system.memory_of_groups();
+        options.memory.is_none_or(|available| needed <= available)
     }
 
     /// Squares of the distances of all points from the nearest station that sees them, at the first values, and their median.

@@ -8,24 +8,18 @@ use super::workspace::Workspace;
 
 /// Of a number.
 const BYTES: usize = size_of::<f64>();
-/// Bytes for what does not grow with the problem, threads among them;
+/// Bytes for what does not grow with the problem, threads among them.
 const BASE: usize = 8 << 20;
-/// and where a whole network is adjusted, for what Python loads first and for room that the allocator keeps.
-const AT_FIRST: usize = 40 << 20;
 
 impl System {
     /// Bytes that forming, factoring, solving and inverting take at the most, the problem itself and its results counted: the
     /// factor, the fronts that wait for each other, and vectors.
     pub fn memory(&self) -> usize {
-        AT_FIRST + self.memory_of_fronts() + BYTES * vectors(&self.layout)
-    }
-
-    /// Of these, those of the factor and the fronts, and what does not grow with the problem.
-    fn memory_of_fronts(&self) -> usize {
         let mut buffers = Buffers::of(&self.workspace);
         self.walk_up(&mut buffers);
         self.walk_down(&mut buffers);
-        BASE + BYTES * (self.workspace.capacity(self.symbolic.values()) + buffers.most)
+        let of_fronts = self.workspace.capacity(self.symbolic.values()) + buffers.most;
+        BASE + BYTES * (of_fronts + vectors(&self.layout))
     }
 
     /// The same of a part of a larger system, which is released once it is formed.

@@ -13,6 +13,7 @@ use crate::arrays::{check_lengths, indices, rows};
 use crate::camera::named;
 use crate::commons::{CommonRow, MountRow, common, mount};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
+use crate::memory::LOADED;
 use crate::observations::{Group, observations};
 use crate::options::{named_loss, named_ordering, unknown};
 
@@ -125,6 +126,7 @@ fn block_network(
         start: if points_given { Start::Given } else { Start::Intersected },
         hold_unused: false,
         memory,
+        reserved: LOADED,
         minimum: minimum.map(|(photo, coordinate)| Minimum { photo, coordinate }),
         screens: Screens::default(),
     };

@@ -17,6 +17,7 @@ use super::tables::Told;
 use super::trial::{NetworkTrial, tried};
 use super::{CollectionError, failure, images, points, said};
 use crate::arrays::{check_lengths, rows, slices, table};
+use crate::memory::LOADED;
 use crate::options::{named_loss, named_ordering, unknown};
 use crate::work::{Workers, watched};
 
@@ -186,6 +187,7 @@ fn collection_network(
         start: Start::Given,
         hold_unused: true,
         memory,
+        reserved: LOADED,
         minimum: None,
         screens: Screens::default(),
     };
