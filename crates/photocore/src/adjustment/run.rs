@@ -386,13 +386,13 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     /// Whether a step has led local blocks to where they harm all others; keeps them.
     pub(super) fn has_collapsed(&mut self, before: &[f64], after: &M::Prepared) -> bool {
-        self.collapsed = self.problem.model.collapsed(before, after);
+        self.collapsed = self.pool.install(|| self.problem.model.collapsed(before, after));
         !self.collapsed.is_empty()
     }
 
     /// Whether a step has led local blocks out of the whole; keeps them.
     pub(super) fn has_run_off(&mut self, before: &[f64], after: &M::Prepared) -> bool {
-        self.collapsed = self.problem.model.run_off(before, after);
+        self.collapsed = self.pool.install(|| self.problem.model.run_off(before, after));
         !self.collapsed.is_empty()
     }
 

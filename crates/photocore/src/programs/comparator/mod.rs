@@ -172,7 +172,7 @@ impl Calibration {
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, CalibrationError> {
         self.check()?;
-        let problem = self.problem()?;
+        let problem = pool.install(|| self.problem())?;
         let cases = self.cases.len();
         let adjusted = adjustment::adjust(&problem, options, pool, watch).map_err(|error| match error {
             AdjustError::UndeterminedLocals(points) => CalibrationError::UndeterminedPoints(points),

@@ -261,7 +261,7 @@ impl Resection {
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solved, ResectionError> {
         let origin = self.origin(&start);
-        let problem = self.problem(&start, origin)?;
+        let problem = pool.install(|| self.problem(&start, origin))?;
         let adjusted = adjustment::adjust(&problem, options, pool, watch);
         let adjustment = adjusted.map_err(|error| match error {
             AdjustError::Interrupted => ResectionError::Interrupted,

@@ -220,7 +220,7 @@ fn adjust(
         return Err(SimilarityError::Scale(start.scale));
     }
     let weighted = Weighted::new(stations, &chosen)?;
-    let problem = problem(&weighted.stations, &start, options.scale.is_some())?;
+    let problem = pool.install(|| problem(&weighted.stations, &start, options.scale.is_some()))?;
     let engine = adjustment::Options {
         method: adjustment::Method::Damped(Stop::Fraction(options.tolerance)),
         max_iterations: if cycles.is_some() { 0 } else { options.max_iterations },

@@ -222,7 +222,7 @@ impl Calibration {
         pool: &ThreadPool,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, StellarError> {
-        let problem = self.problem(options.unit, Partials::Exact)?;
+        let problem = pool.install(|| self.problem(options.unit, Partials::Exact))?;
         let adjusted = adjustment::adjust(&problem, &options.adjustment, pool, watch)
             .map_err(|error| self.named(&problem, error, pool))?;
         let mut whole = None;
@@ -242,7 +242,7 @@ impl Calibration {
     /// # Errors
     /// A calibration that contradicts itself; stars without images at the initial values.
     pub fn without_effect(&self, pool: &ThreadPool) -> Result<Vec<usize>, StellarError> {
-        let problem = self.problem(1.0, Partials::Exact)?;
+        let problem = pool.install(|| self.problem(1.0, Partials::Exact))?;
         let normal = self.formed(&problem, vec![], pool)?;
         Ok(parameters_of(&problem, normal.without_effect(problem.layout())))
     }

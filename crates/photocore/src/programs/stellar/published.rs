@@ -42,7 +42,7 @@ impl Calibration {
     /// # Errors
     /// Stars or parameters that are not determined, stars without images.
     pub fn correction(&self, tolerances: &Tolerances, pool: &ThreadPool) -> Result<Correction, StellarError> {
-        let problem = self.problem(1.0, Partials::Published(*tolerances))?;
+        let problem = pool.install(|| self.problem(1.0, Partials::Published(*tolerances)))?;
         let (first, layout) = (self.formed(&problem, vec![], pool)?, problem.layout());
         let idle = first.without_effect(layout);
         let normal = if idle.is_empty() { first } else { self.formed(&problem, idle.clone(), pool)? };
