@@ -16,7 +16,10 @@ use faer::{Accum, Mat, Par};
 use photocore::adjustment;
 use photocore::geometry::{self, Bal, ObjectSpace, Orientation, Perspective, PoseNumbers, RotationSense};
 use photocore::network::{Camera, Image, Network, Options, Photo, Point, Screens, Start, UnitVariance};
-use photocore::normals::{Equations, Factor, GroupRows, Layout, Ordering, Prior, Stopped, System};
+use photocore::normals::{
+    Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, Ordering, Prior, SolveOptions,
+    Stopped, System,
+};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Rows and columns of the dense product.
@@ -187,7 +190,7 @@ impl Phases {
     }
 
     fn factor(&self) -> Factor {
-        done(self.system.factor(&self.pool, &self.equations, &self.prior, 0.0, &mut go))
+        done(self.system.factor(&self.pool, &self.equations, &self.prior, &FactorOptions::default(), &mut go))
     }
 
     /// Multiply-adds of the formation with its reduction, and of the cofactors of points and image points, from the numbers of
@@ -290,14 +293,17 @@ fn phases(criterion: &mut Criterion) {
     });
     let factor = phases.factor();
     group.bench_function("solve", |bencher| {
-        bencher.iter(|| done(system.solve(pool, &factor, equations, prior, 0.0, &mut go)));
+        bencher
+            .iter(|| done(system.solve(pool, &factor, equations, prior, &SolveOptions::default(), &mut go)));
     });
     // Formation, reduction and factorisation go together, front by front; so do the selected inverse and the cofactors.
     group.throughput(elements(formation + predicted.factor));
     group.bench_function("factor", |bencher| bencher.iter(|| phases.factor()));
     group.throughput(elements(predicted.inverse + cofactors));
     group.bench_function("invert", |bencher| {
-        let invert = |factor: Factor| done(system.invert(pool, factor, equations, prior, &mut go));
+        let invert = |factor: Factor| {
+            done(system.invert(pool, factor, equations, prior, &InvertOptions::default(), &mut go))
+        };
         bencher.iter_batched(|| phases.factor(), invert, BatchSize::PerIteration);
     });
     group.finish();

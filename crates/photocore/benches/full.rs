@@ -11,7 +11,7 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::{Mat, Par};
-use photocore::normals::{Equations, GroupRows, Layout, Ordering, Prior, System};
+use photocore::normals::{Equations, FactorOptions, GroupRows, Layout, Ordering, Prior, System};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Unknowns of a photograph.
@@ -45,7 +45,8 @@ fn system(photos: usize) -> (System, Prior) {
 /// Time of the factorisation alone.
 fn factor(pool: &ThreadPool, system: &System, prior: &Prior) -> Duration {
     let start = Instant::now();
-    let done = system.factor(pool, &Anything, prior, 0.0, &mut |_| ControlFlow::Continue(()));
+    let done =
+        system.factor(pool, &Anything, prior, &FactorOptions::default(), &mut |_| ControlFlow::Continue(()));
     let elapsed = start.elapsed();
     match done {
         ControlFlow::Continue(factor) => elapsed.mul_f64(1.0 - factor.formation_share),

@@ -8,8 +8,8 @@ use std::ops::ControlFlow;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use photocore::normals::{
-    Equations, Factor, Function, GroupRows, Layout, LayoutError, Ordering, Prior, SelectedInverse, Stopped,
-    System, Tie, TieRows,
+    Equations, Factor, FactorOptions, Function, GroupRows, InvertOptions, Layout, LayoutError, Ordering,
+    Prior, SelectedInverse, SolveOptions, Stopped, System, Tie, TieRows,
 };
 use proptest::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -122,6 +122,10 @@ fn done<T>(flow: ControlFlow<Stopped, T>) -> T {
     }
 }
 
+fn solved_for(rights: &[f64]) -> SolveOptions<'_> {
+    SolveOptions { rights: Some(rights), ..SolveOptions::default() }
+}
+
 const ALL: [Ordering; 6] = [
     Ordering::Auto,
     Ordering::Input,
@@ -208,13 +212,13 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let pool = pool(2);
     let system = System::new(dense.layout.clone(), ordering).unwrap();
     let layout = system.layout();
-    let factor = done(system.factor(&pool, dense, &dense.prior, 0.0, &mut go));
+    let factor = done(system.factor(&pool, dense, &dense.prior, &FactorOptions::default(), &mut go));
     assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
-    let solution = done(system.solve(&pool, &factor, dense, &dense.prior, 0.0, &mut go));
+    let solution = done(system.solve(&pool, &factor, dense, &dense.prior, &SolveOptions::default(), &mut go));
     let rights = vec![1.0; 11 * layout.unknowns()];
-    let alone = done(system.factor_with(&pool, dense, &dense.prior, &rights, false, &mut go));
-    let written = done(system.solve(&pool, &alone, dense, &dense.prior, 0.0, &mut go));
-    let further = done(system.solve_further(&pool, &alone, dense, &dense.prior, &rights, &mut go));
+    let alone = done(system.factor(&pool, dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
+    let written = done(system.solve(&pool, &alone, dense, &dense.prior, &SolveOptions::default(), &mut go));
+    let further = done(system.solve(&pool, &alone, dense, &dense.prior, &solved_for(&rights), &mut go));
     let cholesky = dense.normal_matrix().llt(faer::Side::Lower).unwrap();
     let ones = cholesky.solve(Mat::<f64>::full(layout.unknowns(), 1, 1.0));
     for (i, value) in further.iter().enumerate() {
@@ -228,7 +232,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
         assert_close(written[i], *value, 1e-12 * expected.norm_max(), "solution from the equations");
     }
     let right: Vec<f64> = dense.normal_right().col(0).iter().copied().collect();
-    let again = done(system.solve_again(&pool, &factor, dense, &dense.prior, 0.0, &right, &mut go));
+    let again = done(system.solve(&pool, &factor, dense, &dense.prior, &solved_for(&right), &mut go));
     for (value, other) in again.iter().zip(&solution) {
         assert_close(*value, *other, 1e-11 * expected.norm_max(), "solution for its right-hand side");
     }
@@ -243,7 +247,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
     compare_columns(dense, &system, &factor, &inverse);
     compare_functions(dense, &system, &factor, &inverse);
-    let found = done(system.invert(&pool, factor, dense, &dense.prior, &mut go));
+    let found = done(system.invert(&pool, factor, dense, &dense.prior, &InvertOptions::default(), &mut go));
     let (cofactors, selected) = (found.cofactors, found.selected);
     compare_blocks(layout, &selected, &inverse);
     let l = layout.local_dim();
@@ -325,7 +329,7 @@ fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Ma
         rights[columns.len() * unknowns + column] = 1.0;
     }
     let pool = pool(2);
-    let solved = done(system.solve_for(&pool, factor, dense, &dense.prior, 0.0, &rights, &mut go));
+    let solved = done(system.solve(&pool, factor, dense, &dense.prior, &solved_for(&rights), &mut go));
     let largest = inverse.norm_max();
     for i in 0..unknowns {
         let mut sum = 0.0;
@@ -506,7 +510,7 @@ fn what_a_shared_camera_and_photos_leave_open_is_named() {
         dense.matrix[(row, own)] = dense.matrix[(row, photo)];
     }
     let system = System::new(layout, Ordering::Auto).unwrap();
-    let factor = done(system.factor(&pool(2), &dense, &dense.prior, 0.0, &mut go));
+    let factor = done(system.factor(&pool(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.blocks(), vec![vec![5, camera]]);
     assert_eq!(deficiency.unknowns(system.layout()), vec![vec![photo, own]]);
@@ -525,17 +529,23 @@ fn same_bits(plain: Layout) {
     let run = |threads: usize| {
         let pool = pool(threads);
         let system = System::new(dense.layout.clone(), Ordering::Auto).unwrap();
-        let factor = done(system.factor(&pool, &dense, &dense.prior, 0.0, &mut go));
-        let solution = done(system.solve(&pool, &factor, &dense, &dense.prior, 0.0, &mut go));
-        let more = done(system.solve_for(&pool, &factor, &dense, &dense.prior, 0.0, &rights, &mut go));
+        let factor = done(system.factor(&pool, &dense, &dense.prior, &FactorOptions::default(), &mut go));
+        let solution =
+            done(system.solve(&pool, &factor, &dense, &dense.prior, &SolveOptions::default(), &mut go));
+        let more = done(system.solve(&pool, &factor, &dense, &dense.prior, &solved_for(&rights), &mut go));
+        let alone = done(system.factor(&pool, &dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
+        let written = done(system.solve(&pool, &alone, &dense, &dense.prior, &solved_for(&rights), &mut go));
         let functions: Vec<Function> =
             (0..dense.layout.unknowns()).step_by(3).map(|unknown| vec![(unknown, 1.0)]).collect();
         let reduced = done(system.reduce(&pool, &dense, &dense.prior, &functions, None, &mut go));
         let of_functions = done(system.cofactors_of(&pool, &factor, &reduced, &mut go));
-        let cofactors = done(system.invert(&pool, factor, &dense, &dense.prior, &mut go)).cofactors;
+        let cofactors =
+            done(system.invert(&pool, factor, &dense, &dense.prior, &InvertOptions::default(), &mut go))
+                .cofactors;
         let numbers = [
             solution,
             more,
+            written,
             of_functions,
             cofactors.local,
             cofactors.kept,
@@ -560,7 +570,7 @@ fn what_the_equations_do_not_determine_is_named() {
         dense.matrix[(row, range.start + 4)] = dense.matrix[(row, range.start + 1)];
     }
     let system = System::new(layout, Ordering::ReverseCuthillMckee).unwrap();
-    let factor = done(system.factor(&pool(2), &dense, &dense.prior, 0.0, &mut go));
+    let factor = done(system.factor(&pool(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.defect(), 1);
     assert_eq!(deficiency.blocks(), vec![vec![3]]);
@@ -572,7 +582,7 @@ fn local_block_without_equations_is_named() {
     let mut dense = Dense::new(layout.clone(), 5);
     dense.prior.weight[layout.local_range(1)].fill(0.0);
     let system = System::new(layout, Ordering::Auto).unwrap();
-    let factor = done(system.factor(&pool(1), &dense, &dense.prior, 0.0, &mut go));
+    let factor = done(system.factor(&pool(1), &dense, &dense.prior, &FactorOptions::default(), &mut go));
     assert_eq!(factor.deficient_locals, vec![1]);
 }
 

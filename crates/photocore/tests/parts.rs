@@ -9,8 +9,8 @@ use std::ops::ControlFlow;
 
 use cut::{Cut, TREES};
 use photocore::normals::{
-    Contribution, Equations, Factor, GroupRows, Layout, LayoutError, Ordering, Prior, Stopped, System, Tie,
-    TieRows,
+    Contribution, Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, LayoutError, Ordering,
+    Prior, SolveOptions, Stopped, System, Tie, TieRows,
 };
 use proptest::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -181,7 +181,7 @@ fn upward<'a>(
         let mut piece = piece(all, cut, p);
         piece.below = cut.children(p).iter().map(|&child| left[child].take().unwrap()).collect();
         let system = System::new(piece.layout.clone(), ordering).unwrap();
-        let mut factor = done(system.factor(pool, &piece, &piece.prior, 0.0, &mut go));
+        let mut factor = done(system.factor(pool, &piece, &piece.prior, &FactorOptions::default(), &mut go));
         assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
         let contribution = factor.take_contribution();
         let outer = system.symbolic().outer_unknowns();
@@ -204,10 +204,10 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     let cut = Cut::new(tree, &touched(&layout), node_of);
     let all = whole(layout, seed);
     let system = System::new(all.layout.clone(), ordering).unwrap();
-    let factor = done(system.factor(&pool, &all, &all.prior, 0.0, &mut go));
-    let expected = done(system.solve(&pool, &factor, &all, &all.prior, 0.0, &mut go));
+    let factor = done(system.factor(&pool, &all, &all.prior, &FactorOptions::default(), &mut go));
+    let expected = done(system.solve(&pool, &factor, &all, &all.prior, &SolveOptions::default(), &mut go));
     let (sum, decrease) = (factor.sum_of_squares, factor.decrease);
-    let cofactors = done(system.invert(&pool, factor, &all, &all.prior, &mut go));
+    let cofactors = done(system.invert(&pool, factor, &all, &all.prior, &InvertOptions::default(), &mut go));
     let nodes = upward(&all, &cut, ordering, &pool);
     let sums = nodes.iter().map(|(.., factor)| factor.sum_of_squares).sum();
     assert_close(sums, sum, 1e-12 * sum, "sum of squares");
@@ -221,14 +221,28 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     let mut handed: Vec<(Vec<f64>, Vec<f64>)> = vec![Default::default(); nodes.len()];
     for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
         let (outer_step, outer_cofactors) = std::mem::take(&mut handed[p]);
-        let step = done(system.solve_below(&pool, &factor, &piece, &piece.prior, 0.0, &outer_step, &mut go));
+        let step = done(system.solve(
+            &pool,
+            &factor,
+            &piece,
+            &piece.prior,
+            &SolveOptions { outer: &outer_step, ..SolveOptions::default() },
+            &mut go,
+        ));
         let own = system.layout();
         let unknowns = piece.locals.iter().flat_map(|&local| all.layout.local_range(local));
         let unknowns = unknowns.chain(piece.kept.iter().flat_map(|&block| all.layout.kept_range(block)));
         for (x, unknown) in step.iter().zip(unknowns) {
             assert_close(*x, expected[unknown], 1e-9 * largest, "solution");
         }
-        let found = done(system.invert_below(&pool, factor, &piece, &piece.prior, &outer_cofactors, &mut go));
+        let found = done(system.invert(
+            &pool,
+            factor,
+            &piece,
+            &piece.prior,
+            &InvertOptions { outer: &outer_cofactors, ..InvertOptions::default() },
+            &mut go,
+        ));
         for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
             let outer_step = own.unknowns_of(blocks).map(|unknown| step[unknown]).collect();
             handed[child] = (outer_step, found.selected.triangle(own, blocks));
@@ -353,7 +367,8 @@ fn bits_of_a_node_do_not_depend_on_the_number_of_threads() {
         for p in 0..2 {
             let piece = piece(&all, &cut, p);
             let system = System::new(piece.layout.clone(), Ordering::Auto).unwrap();
-            let mut factor = done(system.factor(&pool, &piece, &piece.prior, 0.0, &mut go));
+            let mut factor =
+                done(system.factor(&pool, &piece, &piece.prior, &FactorOptions::default(), &mut go));
             let Contribution { matrix, right, diagonal } = factor.take_contribution();
             numbers.extend([matrix, right, diagonal].concat());
             assert!(factor.take_contribution().matrix.is_empty(), "handed out once");

@@ -19,12 +19,12 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use super::equations::ObservationEquations;
-use super::linearized::{Forming, Inverted, Inverting, Linearized};
+use super::linearized::{Inverted, Linearized};
 use super::loss::Loss;
 use super::problem::{Model, Motions, Problem};
 use super::result::AdjustError;
 use super::transformation::Transformation;
-use crate::normals::Between;
+use crate::normals::{Between, FactorOptions, InvertOptions};
 
 /// A datum of a network whose observations leave one open.
 #[derive(Debug, Clone, Default)]
@@ -94,25 +94,16 @@ impl Linearized {
         pool: &ThreadPool,
         between: Between<'_>,
     ) -> Result<Self, DatumError> {
-        let mut linearized = Self::moved(problem, adjusted, datum, reference, pool, between)?;
-        linearized.take_to_datum(problem, pool, between)?;
-        Ok(linearized)
-    }
-
-    /// The same on the way to Q B.
-    fn moved<M: Model>(
-        problem: &Problem<M>,
-        adjusted: Adjusted<'_>,
-        datum: &Datum,
-        reference: &[f64],
-        pool: &ThreadPool,
-        between: Between<'_>,
-    ) -> Result<Self, DatumError> {
         let (unknowns, basis) = moved(problem, adjusted, datum, reference, pool)?;
         let Adjusted { held, loss, .. } = adjusted;
         let equations = ObservationEquations::new(problem, loss, &unknowns, held, pool);
-        let forming = Forming { basis: Some(basis), ..Forming::default() };
-        Ok(Self::of(&equations, unknowns, held.to_vec(), forming, pool, between)?.determined()?)
+        let options = FactorOptions::default();
+        let formed = Self::of(&equations, unknowns, held.to_vec(), &options, pool, between)?;
+        let mut linearized = formed.determined()?;
+        linearized.basis = Some(basis);
+        linearized.take_to_datum(&equations, pool, between)?;
+        linearized.factor.forget();
+        Ok(linearized)
     }
 }
 
@@ -129,9 +120,9 @@ impl Inverted {
         pool: &ThreadPool,
         between: Between<'_>,
     ) -> Result<Self, DatumError> {
-        let linearized = Linearized::moved(problem, adjusted, datum, reference, pool, between)?;
+        let linearized = Linearized::in_datum(problem, adjusted, datum, reference, pool, between)?;
         let equations = linearized.equations(problem, pool);
-        Ok(linearized.invert(&equations, Inverting::Whole, pool, between)?)
+        Ok(linearized.invert(&equations, &InvertOptions::default(), pool, between)?)
     }
 }
 
@@ -179,9 +170,12 @@ impl Basis {
         }
     }
 
-    /// The transformation, with W = Q B.
-    pub fn transformation(self, w: Vec<f64>) -> Transformation {
+    /// The transformation, with the columns of W = Q B, one after the other.
+    pub fn transformation(self, columns: &[f64]) -> Transformation {
         let Self { carriers, b, t, d, condition } = self;
+        let count = t.len() / d.max(1);
+        let row = |unknown: usize| (0..d).map(move |k| k * count + unknown);
+        let w: Vec<f64> = (0..count).flat_map(row).map(|at| columns[at]).collect();
         let of_carrier = |row: usize| w[carriers[row] * d..][..d].iter().copied();
         let of_carriers = by_columns(d, carriers.len(), of_carrier);
         let common = product(b.transpose(), of_carriers.transpose());

@@ -8,12 +8,14 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::equations::ObservationEquations;
-use super::linearized::{Forming, Inverted, Inverting, Linearized};
+use super::linearized::{Inverted, Linearized};
 use super::options::Phase;
 use super::problem::{Model, Problem};
 use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
-use crate::normals::{Cofactors, Equations, LocalCofactors, Prior, SelectedInverse, TieRows};
+use crate::normals::{
+    Cofactors, Equations, FactorOptions, InvertOptions, LocalCofactors, Prior, SelectedInverse, TieRows,
+};
 
 /// A problem at adjusted values, with cofactors of everything inside the pattern of its normal equations.
 #[derive(Debug)]
@@ -60,8 +62,10 @@ impl Leverages {
     ) -> Result<Self, AdjustError> {
         let mut between = between(watch, Phase::Form, problem.layout().locals());
         let equations = ObservationEquations::new(problem, None, &values, &held, pool);
-        let formed = Linearized::of(&equations, values, held, Forming::default(), pool, &mut between)?;
-        let found = formed.determined()?.invert(&equations, Inverting::Groups, pool, &mut between)?;
+        let forming = FactorOptions::UNCACHED;
+        let formed = Linearized::of(&equations, values, held, &forming, pool, &mut between)?.determined()?;
+        let inverting = InvertOptions { by_groups: true, ..InvertOptions::default() };
+        let found = formed.invert(&equations, &inverting, pool, &mut between)?;
         let Inverted { values, held, cofactors, selected, .. } = found;
         let residuals = problem.residuals(pool, &values);
         Ok(Self { values, held, residuals, cofactors, selected })

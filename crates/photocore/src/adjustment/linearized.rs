@@ -12,7 +12,10 @@ use super::loss::{Loss, Reweighting};
 use super::problem::{Model, Problem};
 use super::result::{AdjustError, Seconds, gib, unless_stopped};
 use super::transformation::Transformation;
-use crate::normals::{Between, Cofactors, Factor, Function, Inversion, Layout, Prior, SelectedInverse};
+use crate::normals::{
+    Between, Cofactors, Factor, FactorOptions, Function, Inversion, InvertOptions, Layout, Prior,
+    SelectedInverse, SolveOptions,
+};
 
 /// The normal equations of a problem at given values, factored, in the datum of the unknowns that are held or in any other.
 #[derive(Debug)]
@@ -20,38 +23,15 @@ pub struct Linearized {
     pub(super) values: Vec<f64>,
     pub(super) held: Vec<usize>,
     reweighting: Option<Reweighting>,
-    damping: f64,
     pub(super) prior: Prior,
     pub(super) factor: Factor,
     pub(super) sum_of_squares: f64,
-    /// The datum that cofactors are to be taken to: its right-hand sides are reduced already.
+    /// The datum that cofactors are to be taken to.
     pub(super) basis: Option<Basis>,
     /// What takes cofactors there.
     pub(super) transformation: Option<Transformation>,
-    /// What forming and factoring have taken.
+    /// What all that was done so far has taken.
     pub(super) seconds: Seconds,
-}
-
-/// How normal equations are formed.
-#[derive(Default)]
-pub(super) struct Forming {
-    /// A fraction of their diagonal that is added to it.
-    pub damping: f64,
-    /// The datum that cofactors will be asked for in.
-    pub basis: Option<Basis>,
-    /// Whether steps will be asked for: what the elimination of local blocks leaves is then cached.
-    pub for_steps: bool,
-}
-
-/// What is inverted of normal equations.
-#[derive(Clone, Copy)]
-pub(super) enum Inverting<'a> {
-    /// All of them.
-    Whole,
-    /// All of them, with what the equations of each group have to do with each other.
-    Groups,
-    /// Those of a part, with the inverse over its outer unknowns: a lower triangle, column by column.
-    Part(&'a [f64]),
 }
 
 /// The inverse normal matrix of a problem at given values, where it has elements.
@@ -68,7 +48,7 @@ pub struct Inverted {
     /// About how large a part of a variance rounding may be, where cofactors were taken to another datum: large numbers cancel where the old
     /// one is far from the new one, or short.
     pub lost: Option<f64>,
-    /// What forming, factoring and inverting have taken.
+    /// What all of it has taken.
     pub(super) seconds: Seconds,
 }
 
@@ -104,7 +84,7 @@ impl Linearized {
         between: Between<'_>,
     ) -> Result<Self, AdjustError> {
         let equations = ObservationEquations::new(problem, loss, &values, &held, pool);
-        Self::of(&equations, values, held, Forming::default(), pool, between)
+        Self::of(&equations, values, held, &FactorOptions::UNCACHED, pool, between)
     }
 
     /// The same of equations that are there already.
@@ -112,32 +92,25 @@ impl Linearized {
         equations: &ObservationEquations<'_, M>,
         values: Vec<f64>,
         held: Vec<usize>,
-        Forming { damping, basis, for_steps }: Forming,
+        options: &FactorOptions,
         pool: &ThreadPool,
         between: Between<'_>,
     ) -> Result<Self, AdjustError> {
         let (start, problem) = (Instant::now(), equations.problem());
         let prior = problem.prior_equations(&values, &held);
-        let rights = basis.as_ref().map_or(vec![], |basis| basis.rights(problem, &held));
-        let system = &problem.system;
-        let factor = unless_stopped(match for_steps && rights.is_empty() {
-            true => system.factor(pool, equations, &prior, damping, between),
-            false => system.factor_with(pool, equations, &prior, &rights, for_steps, between),
-        })?;
+        let factor = unless_stopped(problem.system.factor(pool, equations, &prior, options, between))?;
         let sum_of_squares = factor.sum_of_squares + problem.prior_sum_of_squares(&values, 0..values.len());
         let (took, share) = (start.elapsed().as_secs_f64(), factor.formation_share);
         let seconds = Seconds { form: took * share, factor: took * (1.0 - share), ..Seconds::default() };
-        let (reweighting, transformation) = (equations.reweighting(), None);
         Ok(Self {
             values,
             held,
-            reweighting,
-            damping,
+            reweighting: equations.reweighting(),
             prior,
             factor,
             sum_of_squares,
-            basis,
-            transformation,
+            basis: None,
+            transformation: None,
             seconds,
         })
     }
@@ -164,7 +137,7 @@ impl Linearized {
 
     /// The fraction of the diagonal that was added to it.
     pub(super) fn damping(&self) -> f64 {
-        self.damping
+        self.factor.damping
     }
 
     /// Whether the second-order term of a loss is taken in.
@@ -284,84 +257,56 @@ impl Linearized {
         pool: &ThreadPool,
         between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
-        let Self { factor, prior, damping, .. } = self;
-        let equations = self.equations(problem, pool);
-        unless_stopped(problem.system.solve_for(pool, factor, &equations, prior, *damping, rights, between))
+        let options = SolveOptions { rights: Some(rights), ..SolveOptions::default() };
+        self.solve(&self.equations(problem, pool), &options, pool, between)
     }
 
-    /// Solves for one right-hand side, with what was cached for steps.
-    pub(super) fn solve_again<M: Model>(
+    /// The step of all unknowns, or what else the options ask for.
+    pub(super) fn solve<M: Model>(
         &self,
         equations: &ObservationEquations<'_, M>,
-        right: &[f64],
+        options: &SolveOptions<'_>,
         pool: &ThreadPool,
         between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
-        let Self { factor, prior, damping, .. } = self;
-        let system = &equations.problem().system;
-        unless_stopped(system.solve_again(pool, factor, equations, prior, *damping, right, between))
+        let Self { factor, prior, .. } = self;
+        unless_stopped(equations.problem().system.solve(pool, factor, equations, prior, options, between))
     }
 
-    /// The step of all unknowns; of a part with the outer ones as they are given.
-    pub(super) fn step<M: Model>(
-        &self,
-        equations: &ObservationEquations<'_, M>,
-        outer: &[f64],
-        pool: &ThreadPool,
-        between: Between<'_>,
-    ) -> Result<Vec<f64>, AdjustError> {
-        let Self { factor, prior, damping, .. } = self;
-        let system = &equations.problem().system;
-        unless_stopped(system.solve_below(pool, factor, equations, prior, *damping, outer, between))
-    }
-
-    /// The selected inverse, in the datum that it was formed for.
+    /// The selected inverse, in the datum that it was taken to.
     pub(super) fn invert<M: Model>(
         self,
         equations: &ObservationEquations<'_, M>,
-        what: Inverting<'_>,
+        options: &InvertOptions<'_>,
         pool: &ThreadPool,
         between: Between<'_>,
     ) -> Result<Inverted, AdjustError> {
         let (start, problem) = (Instant::now(), equations.problem());
-        let Self { values, held, prior, factor, basis, mut seconds, .. } = self;
-        let system = &problem.system;
-        let found = match what {
-            Inverting::Whole => {
-                let rights = basis.as_ref().map_or(vec![], |basis| basis.rights(problem, &held));
-                system.invert_with(pool, factor, equations, &prior, &rights, between)
-            }
-            Inverting::Groups => system.invert_by_groups(pool, factor, equations, &prior, between),
-            Inverting::Part(outer) => system.invert_below(pool, factor, equations, &prior, outer, between),
-        };
-        let Inversion { mut cofactors, selected, further, inversion_share } = unless_stopped(found)?;
+        let Self { values, held, prior, factor, transformation, mut seconds, .. } = self;
+        let found = problem.system.invert(pool, factor, equations, &prior, options, between);
+        let Inversion { mut cofactors, selected, inversion_share } = unless_stopped(found)?;
         let prior_redundancy = problem.finish_cofactors(&mut cofactors, &held, &values);
-        let lost = basis.map(|basis| {
-            let transformation = basis.transformation(further);
-            pool.install(|| transformation.apply(problem.layout(), &mut cofactors))
-        });
+        let lost = transformation
+            .map(|transformation| pool.install(|| transformation.apply(problem.layout(), &mut cofactors)));
         let took = start.elapsed().as_secs_f64();
         (seconds.invert, seconds.cofactors) = (took * inversion_share, took * (1.0 - inversion_share));
         Ok(Inverted { values, held, cofactors, prior_redundancy, selected, lost, seconds })
     }
 
-    /// Solves for the right-hand sides of its datum: cofactors are then those in it.
+    /// Solves for the right-hand sides of its datum, where it has one: cofactors are then those in it.
     pub(super) fn take_to_datum<M: Model>(
         &mut self,
-        problem: &Problem<M>,
+        equations: &ObservationEquations<'_, M>,
         pool: &ThreadPool,
         between: Between<'_>,
     ) -> Result<(), AdjustError> {
         let Some(basis) = self.basis.take() else { return Ok(()) };
-        let rights = basis.rights(problem, &self.held);
-        let equations = self.equations(problem, pool);
-        let found =
-            problem.system.solve_further(pool, &self.factor, &equations, &self.prior, &rights, between);
-        let columns = unless_stopped(found)?;
-        let (count, d) = (self.values.len(), columns.len() / self.values.len().max(1));
-        let row = |unknown: usize| (0..d).map(move |k| k * count + unknown);
-        let w = (0..count).flat_map(row).map(|at| columns[at]).collect();
-        self.transformation = Some(basis.transformation(w));
+        let start = Instant::now();
+        let rights = basis.rights(equations.problem(), &self.held);
+        let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
+        let columns = self.solve(equations, &options, pool, between)?;
+        self.transformation = Some(basis.transformation(&columns));
+        self.seconds.solve += start.elapsed().as_secs_f64();
         Ok(())
     }
 

@@ -9,12 +9,12 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use super::equations::ObservationEquations;
-use super::linearized::{Forming, Inverting, Linearized};
+use super::linearized::Linearized;
 use super::options::Phase;
 use super::problem::{Model, Problem};
 use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
-use crate::normals::{Contribution, packed};
+use crate::normals::{Contribution, FactorOptions, InvertOptions, SolveOptions, packed};
 
 /// Why a part is not formed, solved or inverted.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -53,9 +53,9 @@ impl Linearized {
         }
         let equations =
             ObservationEquations::new(problem, None, &values, &[], pool).with_contributions(contributions);
-        let forming = Forming { damping, for_steps: true, ..Forming::default() };
+        let options = FactorOptions { damping, ..FactorOptions::default() };
         let mut between = between(watch, Phase::Form, layout.locals());
-        let formed = Self::of(&equations, values, vec![], forming, pool, &mut between)?;
+        let formed = Self::of(&equations, values, vec![], &options, pool, &mut between)?;
         // The factor waits for the way down, perhaps with those of many others.
         problem.system.release();
         Ok(formed)
@@ -81,7 +81,8 @@ impl Linearized {
             return Err(PartError::Foreign);
         }
         let mut between = between(watch, Phase::Solve, problem.layout().locals());
-        Ok(self.step(&self.equations(problem, pool), outer, pool, &mut between)?)
+        let options = SolveOptions { outer, ..SolveOptions::default() };
+        Ok(self.solve(&self.equations(problem, pool), &options, pool, &mut between)?)
     }
 
     /// The adjustment of what is at home in a part, and the cofactors of the unknowns of each part below: lower triangles, column by column.
@@ -106,7 +107,8 @@ impl Linearized {
         let inverted = {
             let equations = part.equations(problem, pool);
             let mut between = between(watch, Phase::Invert, layout.locals());
-            part.invert(&equations, Inverting::Part(outer), pool, &mut between)?
+            let options = InvertOptions { outer, ..InvertOptions::default() };
+            part.invert(&equations, &options, pool, &mut between)?
         };
         problem.system.release();
         let below = layout.contributions().iter().map(|blocks| inverted.selected.triangle(layout, blocks));

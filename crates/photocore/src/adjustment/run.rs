@@ -7,12 +7,13 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::datum::{Adjusted, Basis, Datum, Target, moved};
 use super::equations::ObservationEquations;
-use super::linearized::{Forming, Inverting, Linearized};
+use super::linearized::Linearized;
 use super::loss::Reweighting;
 use super::method::{FIRST_DAMPING, Method, leaves_cofactors};
 use super::options::{Event, Iteration, Options, Phase, Status};
 use super::problem::{Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
+use crate::normals::{FactorOptions, InvertOptions, SolveOptions};
 
 /// Whoever is told on the calling thread what is going on; breaking stops the work.
 pub type Watch<'a> = &'a mut dyn FnMut(Event) -> ControlFlow<()>;
@@ -250,7 +251,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
         }
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
-        let step = state.linearized.step(&state.equations, &[], self.pool, &mut between)?;
+        let step =
+            state.linearized.solve(&state.equations, &SolveOptions::default(), self.pool, &mut between)?;
         self.seconds.solve += start.elapsed().as_secs_f64();
         Ok(Some(step))
     }
@@ -263,7 +265,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
     ) -> Result<Vec<f64>, AdjustError> {
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
-        let found = state.linearized.solve_again(&state.equations, right, self.pool, &mut between)?;
+        let options = SolveOptions { rights: Some(right), ..SolveOptions::default() };
+        let found = state.linearized.solve(&state.equations, &options, self.pool, &mut between)?;
         self.seconds.solve += start.elapsed().as_secs_f64();
         Ok(found)
     }
@@ -294,7 +297,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
             false => (unknowns, None, None),
         };
         let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
-        let state = self.formed(unknowns, prepared, Forming { damping, basis, for_steps: true })?;
+        let mut state = self.formed(unknowns, prepared, damping)?;
+        state.linearized.basis = basis;
         Ok(State { before, ..state })
     }
 
@@ -325,14 +329,15 @@ impl<'a, M: Model> Run<'a, '_, M> {
         &mut self,
         unknowns: Vec<f64>,
         prepared: M::Prepared,
-        forming: Forming,
+        damping: f64,
     ) -> Result<State<'a, M>, AdjustError> {
         let reweighting = self.options.loss.map(|loss| Reweighting { loss, curved: self.curved });
         let equations = ObservationEquations::prepared(self.problem, prepared, &self.datum, reweighting);
         let held = self.datum.clone();
         let mut linearized = {
             let mut between = between(&mut *self.watch, Phase::Form, self.problem.layout().locals());
-            Linearized::of(&equations, unknowns, held, forming, self.pool, &mut between)?
+            let options = FactorOptions { damping, ..FactorOptions::default() };
+            Linearized::of(&equations, unknowns, held, &options, self.pool, &mut between)?
         };
         self.seconds.add(&std::mem::take(&mut linearized.seconds));
         self.formations += 1;
@@ -360,10 +365,15 @@ impl<'a, M: Model> Run<'a, '_, M> {
         }
         drop(end.unknowns);
         let asked = options.covariance && (self.target.is_none() || is_at_target);
-        if let Some(State { equations, linearized, .. }) = end.state.filter(|_| asked) {
-            let what = if self.by_groups { Inverting::Groups } else { Inverting::Whole };
-            let mut between = between(&mut *self.watch, Phase::Invert, problem.layout().locals());
-            adjustment.put(problem, linearized.invert(&equations, what, self.pool, &mut between)?);
+        if let Some(State { equations, mut linearized, .. }) = end.state.filter(|_| asked) {
+            let locals = problem.layout().locals();
+            {
+                let mut between = between(&mut *self.watch, Phase::Solve, locals);
+                linearized.take_to_datum(&equations, self.pool, &mut between)?;
+            }
+            let what = InvertOptions { by_groups: self.by_groups, ..InvertOptions::default() };
+            let mut between = between(&mut *self.watch, Phase::Invert, locals);
+            adjustment.put(problem, linearized.invert(&equations, &what, self.pool, &mut between)?);
             adjustment.redundancy_excess = options.loss.is_none().then(|| adjustment.excess());
         }
         self.seconds.add(&adjustment.seconds);

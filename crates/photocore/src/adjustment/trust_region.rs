@@ -2,7 +2,6 @@
 //! Tingleff 2004, section 3.2).
 
 use super::acceleration::PART;
-use super::linearized::Forming;
 use super::method::{FIRST_DAMPING, Stop};
 use super::options::{Iteration, Status};
 use super::problem::Model;
@@ -129,8 +128,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 if self.creeps(&falls, lowest, stop) {
                     return self.rest_in_valley(trial.unknowns, Status::Converged);
                 }
-                let forming = Forming { damping: damping.value, for_steps: true, ..Forming::default() };
-                state = self.formed(trial.unknowns, trial.prepared, forming)?;
+                state = self.formed(trial.unknowns, trial.prepared, damping.value)?;
             } else if last || trial.predicted <= (ROUNDING * lowest).max(NEGLIGIBLE * NEGLIGIBLE) {
                 return self.rest(unknowns, Status::Converged);
             } else {

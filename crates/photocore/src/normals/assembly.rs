@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::equations::{Equations, Prior};
+use super::equations::Prior;
 use super::front::Front;
 use super::incidence::Stacks;
 use super::panels::Handover;
-use super::stack::Stack;
+use super::stack::{Gathered, Stack};
 use super::system::System;
 use super::tie_equations::TieEquations;
 use super::vectorised::LANES;
@@ -14,13 +14,11 @@ use super::watch::Control;
 use super::workspace::reserved;
 
 /// What is formed.
-pub(super) struct Formation<'a, E> {
+pub(super) struct Formation<'a> {
     pub system: &'a System,
-    pub equations: &'a E,
+    pub equations: &'a dyn Gathered,
     pub prior: &'a Prior,
     pub damping: f64,
-    /// Over all unknowns, one after the other.
-    pub rights: &'a [f64],
     /// Whether to keep what [`System::solve`] needs of the local blocks.
     pub keeps: bool,
     pub control: &'a Control,
@@ -41,7 +39,7 @@ const MANY: usize = 256;
 /// Stacks gathered by several threads before they are added to the front.
 const WAVE: usize = 64;
 
-impl<E: Equations> Formation<'_, E> {
+impl Formation<'_> {
     /// Adds what the local blocks at home in a supernode leave, in their order; None without memory.
     pub(super) fn assemble(
         &self,
@@ -112,9 +110,8 @@ impl<E: Equations> Formation<'_, E> {
     }
 
     fn fill(&self, stack: &mut Stack, run: &[u32]) {
-        stack.gather(self.system, self.equations, run);
+        self.equations.gather(stack, self.system, run);
         stack.eliminate(&self.system.layout, self.prior, self.damping);
-        stack.reduce(&self.system.layout, self.rights);
         self.control.count(run.len());
     }
 

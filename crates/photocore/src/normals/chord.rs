@@ -5,11 +5,12 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::eliminated::OfHome;
+use super::eliminated::Reduced;
 use super::equations::{Equations, Prior, TieRows};
 use super::factor::Factor;
-use super::further::of_others;
+use super::stack::Gathered;
 use super::system::System;
+use super::vectorised::dot;
 use super::watch::{Between, Control, Stopped, watched};
 
 impl System {
@@ -28,37 +29,43 @@ impl System {
         prior: &Prior,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, (Vec<f64>, f64)> {
+        let equations: &dyn Gathered = equations;
         watched(pool, between, |control| {
-            let mut others = control.allocated(of_others(self, &prior.right))?;
+            let mut others = control.allocated(self.of_others(&prior.right))?;
             self.add_rights_of_ties(equations, &mut others);
-            let homes = 0..factor.eliminated.len();
-            let found: Vec<OfHome> = homes
-                .into_par_iter()
-                .map(|index| self.rights_at_home(equations, prior, index, control))
-                .collect();
-            self.solve_reduced(factor, found, others, control)
+            let homes = (0..factor.eliminated.len()).into_par_iter();
+            let found: Vec<Reduced<1>> =
+                homes.map(|index| self.rights_at_home(equations, prior, index, control)).collect();
+            // One after the other in a fixed order, whichever thread has found them.
+            found.iter().for_each(|found| found.add_to(&mut others, self.symbolic.unknowns()));
+            let reduced = others.clone();
+            factor.solve_columns(&mut others);
+            let own: Vec<Vec<[f64; 1]>> = found.into_iter().map(|found| found.own).collect();
+            // With N = L L^T, r^T x is the square of L^-1 r, of which the local blocks have their parts.
+            let squares = own.iter().map(|own| dot(own.as_flattened(), own.as_flattened()));
+            let decrease = dot(&reduced, &others) + squares.sum::<f64>();
+            let elimination = self.elimination(factor, equations, prior, control);
+            Some((elimination.complete(Some(own), &others, 1)?, decrease))
         })
     }
 
     /// What the local blocks at home in a supernode have as right-hand sides, and what they leave to others. Their normal matrices are those of the
     /// equations: to form them takes less time than to read what the factor has kept.
-    fn rights_at_home<E: Equations>(
+    fn rights_at_home(
         &self,
-        equations: &E,
+        equations: &dyn Gathered,
         prior: &Prior,
         index: usize,
         control: &Control,
-    ) -> OfHome {
-        let (mut stack, mut found) = (self.workspace.stack(), OfHome::default());
+    ) -> Reduced<1> {
+        let (mut stack, mut found) = (self.workspace.stack(), Reduced::default());
         for run in self.incidence.stacks_at(index).iter().take_while(|_| !control.stopped()) {
-            stack.gather(self, equations, run);
+            equations.gather(&mut stack, self, run);
             stack.eliminate_from_rights(&self.layout, prior);
-            found.own.extend_from_slice(&stack.reduced);
+            found.own.extend_from_slice(stack.reduced.as_chunks().0);
             let start = found.values.len();
-            stack.ranges(&self.symbolic).for_each(|range| {
-                found.room(range);
-            });
-            stack.add_rights_of_others(&self.layout, &mut found.values[start..]);
+            stack.ranges(&self.symbolic).for_each(|range| found.room(0, range));
+            stack.add_rights_of_others(&self.layout, found.values[start..].as_flattened_mut());
             control.count(run.len());
         }
         self.workspace.put_back_stack(stack);
@@ -66,7 +73,7 @@ impl System {
     }
 
     /// Adds A^T l of ties to a right-hand side in the order of elimination.
-    fn add_rights_of_ties<E: Equations>(&self, equations: &E, others: &mut [f64]) {
+    fn add_rights_of_ties(&self, equations: &dyn Gathered, others: &mut [f64]) {
         let (layout, symbolic) = (&self.layout, &*self.symbolic);
         let (mut constant, mut coefficients) = (Vec::new(), Vec::new());
         for (index, tie) in layout.ties().iter().enumerate() {

@@ -1,46 +1,53 @@
-//! What the elimination of local blocks leaves, kept from the formation to the solution: it need not evaluate any equation again.
+//! What the elimination of local blocks leaves: cached from the formation to the solution, or found from the equations again.
+//! Right-hand sides are reduced by it, and the local blocks are solved from it.
 
 use std::ops::Range;
 
 use pulp::Simd;
+use rayon::prelude::*;
 use smallvec::SmallVec;
 
+use super::equations::Prior;
+use super::incidence::Stacks;
 use super::layout::Layout;
 use super::panels::skip_ref;
-use super::stack::{Stack, parts_of, united};
+use super::stack::{Gathered, Stack, parts_of, united};
 use super::system::System;
 use super::triangle::Triangle;
-use super::vectorised::{Kernel, Rows, add_right, dot, dot_by_fours, run, size};
+use super::vectorised::{Kernel, Rows, dot_by_fours, dot_columns, run, size, subtract_rights};
+use super::watch::Control;
+use super::workspace::Eliminated;
+
+/// Stacks that a thread takes at a time where they are eliminated again.
+const CHUNK: usize = 64;
 
 impl Stack {
     /// Appends what the elimination has left: V, v and L.
-    pub fn keep(&self, layout: &Layout, kept: &mut Vec<f64>) {
-        kept.extend_from_slice(self.coupling());
-        let end = kept.len();
-        kept.resize(end + self.numbers_beside(layout), 0.0);
-        self.write_beside(layout, &mut kept[end..]);
+    pub fn keep(&mut self, layout: &Layout, cached: &mut Vec<f64>) {
+        let end = self.end + self.numbers_beside(layout) - self.start;
+        cached.extend_from_slice(&self.eliminated(layout)[..end]);
     }
 
-    /// Leaves V in its buffer and writes v and L behind it; the V of the next stack goes behind these.
+    /// Leaves it in its buffer; the V of the next stack goes behind it.
     pub fn keep_in_place(&mut self, layout: &Layout) {
-        let mut kept = std::mem::take(&mut self.coupling);
-        self.write_beside(layout, &mut kept[self.end..]);
+        self.eliminated(layout);
         self.start = self.end + self.numbers_beside(layout);
-        self.coupling = kept;
+    }
+
+    /// Writes v and L behind V: all that the elimination has left, in front of what no one reads for its value.
+    pub fn eliminated(&mut self, layout: &Layout) -> &[f64] {
+        let l = layout.local_dim();
+        let (own, rest) = self.coupling[self.end..].split_at_mut(self.reduced.len());
+        own.copy_from_slice(&self.reduced);
+        let triangles = rest.chunks_exact_mut(Triangle::numbers(l));
+        self.triangles.iter().zip(triangles).for_each(|(triangle, numbers)| triangle.write_to(l, numbers));
+        &self.coupling[self.start..]
     }
 
     /// Numbers in v and L.
     pub(super) fn numbers_beside(&self, layout: &Layout) -> usize {
         let l = layout.local_dim();
         self.locals.len() * (l + Triangle::numbers(l))
-    }
-
-    fn write_beside(&self, layout: &Layout, kept: &mut [f64]) {
-        let (own, rest) = kept.split_at_mut(self.reduced.len());
-        own.copy_from_slice(&self.reduced);
-        let l = layout.local_dim();
-        let triangles = rest.chunks_exact_mut(Triangle::numbers(l));
-        self.triangles.iter().zip(triangles).for_each(|(triangle, numbers)| triangle.write_to(l, numbers));
     }
 }
 
@@ -95,6 +102,18 @@ impl Coupled {
         if index < self.main { size::<D>(width) } else { width }
     }
 
+    /// Numbers in V, v and L of so many local blocks.
+    fn numbers(&self, layout: &Layout, depth: usize) -> usize {
+        let l = layout.local_dim();
+        depth * (l * (self.all_width() + 1) + Triangle::numbers(l))
+    }
+
+    /// Unknowns in all ranges.
+    #[inline(always)]
+    fn all_width(&self) -> usize {
+        self.ranges.iter().map(Range::len).sum()
+    }
+
     /// Unknowns of every main block, where all have the same number.
     fn main_dim(&self) -> Option<usize> {
         let dim = self.ranges[..self.main].first()?.len();
@@ -102,133 +121,284 @@ impl Coupled {
     }
 }
 
-/// Solves for the local blocks of a stack with the others in place, x = L^-T (v - V x_o), and adds them to `found`; what is kept of the
-/// stack is taken off the front of `kept`, and so is v of `own` where there is another right-hand side. `others` are in the order of
-/// elimination.
-pub(super) fn solve<'k>(
-    system: &System,
-    locals: &[u32],
-    coupled: &mut Coupled,
-    kept: &mut &'k [f64],
-    own: Option<&mut &'k [f64]>,
-    others: &[f64],
-    found: &mut Vec<f64>,
-) {
-    let Some(&first) = locals.first() else { return };
-    coupled.find(system, first);
-    let dim = coupled.main_dim();
-    run(&system.layout, dim, Solve { coupled, depth: locals.len(), kept, own, others, found });
+/// What the elimination of a stack has left.
+#[derive(Clone, Copy)]
+pub(super) struct Batch<'a> {
+    coupled: &'a Coupled,
+    /// How many local blocks.
+    depth: usize,
+    /// V, v and L; what follows is read, and not used.
+    numbers: &'a [f64],
 }
 
-/// Parts of a right-hand side that the local blocks of one home make.
-#[derive(Default)]
-pub(super) struct OfHome {
-    /// Local block by local block.
-    pub own: Vec<f64>,
-    /// Of other unknowns, which stand in `ranges`, stack by stack.
-    pub values: Vec<f64>,
-    ranges: Vec<Range<usize>>,
-}
-
-impl OfHome {
-    /// Appends zeros for coupled unknowns; returns where their values start.
-    pub fn room(&mut self, range: Range<usize>) -> usize {
-        let start = self.values.len();
-        self.values.resize(start + range.len(), 0.0);
-        self.ranges.push(range);
-        start
+impl<'a> Batch<'a> {
+    /// Of a stack that is eliminated.
+    pub fn new(system: &System, stack: &'a mut Stack, coupled: &'a mut Coupled) -> Self {
+        let depth = stack.locals.len();
+        stack.locals.iter().take(1).for_each(|&first| coupled.find(system, first));
+        Self { coupled, depth, numbers: stack.eliminated(&system.layout) }
     }
 
-    /// Adds the part of the others to a right-hand side in the order of elimination.
-    pub fn add_to(&self, others: &mut [f64]) {
+    /// V, with what follows it, and the triangles L.
+    #[inline(always)]
+    fn parts<const L: usize>(self) -> (&'a [f64], impl Iterator<Item = Triangle>) {
+        let triangles = &self.numbers[L * self.depth * (self.coupled.all_width() + 1)..];
+        let triangles = triangles.chunks_exact(Triangle::numbers(L)).take(self.depth);
+        (self.numbers, triangles.map(|numbers| Triangle::of(L, numbers)))
+    }
+
+    /// v, the right-hand side that the equations have.
+    fn right(self, layout: &Layout) -> &'a [f64] {
+        let count = layout.local_dim() * self.depth;
+        &self.numbers[count * self.coupled.all_width()..][..count]
+    }
+
+    /// Reduces the right-hand sides that `found` has from `start` on for the local blocks: they become L^-1 r, and -V^T L^-1 r of the
+    /// others is appended as that of some right-hand sides.
+    pub fn reduce<const C: usize>(self, layout: &Layout, block: usize, start: usize, found: &mut Reduced<C>) {
+        run(layout, self.coupled.main_dim(), Reduce { batch: self, block, start, found });
+    }
+
+    /// Solves for the local blocks, whose right-hand sides are reduced, with the others in place: x = L^-T (L^-1 r - V x_o). `others` are
+    /// in the order of elimination.
+    pub fn solve<const C: usize>(self, layout: &Layout, others: &[[f64; C]], own: &mut [[f64; C]]) {
+        run(layout, self.coupled.main_dim(), Solve { batch: self, others, own });
+    }
+}
+
+/// Right-hand sides, C of them at a time, reduced by some local blocks.
+#[derive(Default)]
+pub(super) struct Reduced<const C: usize> {
+    /// Those of the local blocks: stack by stack, of each stack C right-hand sides after the other.
+    pub own: Vec<[f64; C]>,
+    /// What the others lose, range by range.
+    pub values: Vec<[f64; C]>,
+    /// Which right-hand sides, and where the unknowns stand in the order of elimination.
+    ranges: Vec<(usize, Range<usize>)>,
+}
+
+impl<const C: usize> Reduced<C> {
+    /// Appends zeros for other unknowns of the right-hand sides of a block.
+    pub fn room(&mut self, block: usize, range: Range<usize>) {
+        self.values.resize(self.values.len() + range.len(), [0.0; C]);
+        self.ranges.push((block, range));
+    }
+
+    /// What the others lose of one right-hand side, with their places in the order of elimination.
+    pub fn entries(&self) -> Vec<(usize, f64)> {
+        let places = self.ranges.iter().flat_map(|(_, range)| range.clone());
+        places.zip(self.values.as_flattened().iter().copied()).collect()
+    }
+
+    /// Adds the part of the others to right-hand sides of so many unknowns in the order of elimination, one after the other.
+    pub fn add_to(&self, others: &mut [f64], count: usize) {
         let mut values = &self.values[..];
-        for range in &self.ranges {
+        for (block, range) in &self.ranges {
             let own = skip_ref(&mut values, range.len());
-            others[range.clone()].iter_mut().zip(own).for_each(|(right, value)| *right += value);
+            let columns = others[block * C * count..].chunks_exact_mut(count).take(C);
+            for (k, column) in columns.enumerate() {
+                column[range.clone()].iter_mut().zip(own).for_each(|(right, value)| *right += value[k]);
+            }
         }
     }
 }
 
-/// Reduces another right-hand side by a stack, whose local blocks have the last of `found`: they become L^-1 r, and -V^T L^-1 r of the others is
-/// appended. What is kept of the stack is taken off the front of `kept`.
-pub(super) fn reduce(
-    system: &System,
-    locals: &[u32],
-    coupled: &mut Coupled,
-    kept: &mut &[f64],
-    found: &mut OfHome,
-) {
-    let Some(&first) = locals.first() else { return };
-    coupled.find(system, first);
-    run(&system.layout, coupled.main_dim(), Reduce { depth: locals.len(), coupled, kept, found });
+/// The elimination of all local blocks: cached, or to be done again.
+pub(super) struct Elimination<'a> {
+    pub system: &'a System,
+    pub cached: &'a Eliminated,
+    pub equations: &'a dyn Gathered,
+    pub prior: &'a Prior,
+    pub damping: f64,
+    pub control: &'a Control,
 }
 
-struct Reduce<'a, 'k> {
-    depth: usize,
-    coupled: &'a Coupled,
-    kept: &'a mut &'k [f64],
-    found: &'a mut OfHome,
+/// Stacks at home in a supernode that one thread takes.
+type Part<'a> = (usize, Stacks<'a>);
+
+impl Elimination<'_> {
+    /// All stacks in the order of the incidence: what is cached at a supernode is read from its start.
+    pub fn parts(&self) -> Vec<Part<'_>> {
+        let at = |home: usize| self.system.incidence.stacks_at(home);
+        let homes = 0..=self.system.symbolic.supernode_count();
+        match self.cached.is_empty() {
+            true => homes
+                .flat_map(|home| at(home).parts(CHUNK).into_iter().map(move |part| (home, part)))
+                .collect(),
+            false => homes.map(|home| (home, at(home))).collect(),
+        }
+    }
+
+    fn reader(&self) -> Reader<'_> {
+        Reader { elimination: self, cached: None, stack: Stack::default(), coupled: Coupled::default() }
+    }
+
+    /// Reduces right-hand sides over all unknowns, one after the other: part by part.
+    pub fn reduce<const C: usize>(&self, rights: &[f64]) -> Vec<Reduced<C>> {
+        let layout = &self.system.layout;
+        let unknowns = layout.unknowns().max(1);
+        let reduce = |reader: &mut Reader<'_>, (home, stacks): Part<'_>| {
+            let mut found = Reduced::default();
+            reader.begin(home);
+            for locals in stacks.iter().take_while(|_| !self.control.stopped()) {
+                let (start, count) = (found.own.len(), locals.len() * layout.local_dim());
+                for rights in rights.chunks(C * unknowns) {
+                    let own = locals.iter().flat_map(|&local| layout.local_range(local as usize));
+                    let row = |unknown: usize| {
+                        std::array::from_fn(|k| {
+                            rights.get(k * unknowns + unknown).copied().unwrap_or_default()
+                        })
+                    };
+                    found.own.extend(own.map(row));
+                }
+                let idle = |own: &[[f64; C]]| own.as_flattened().iter().all(|&value| value == 0.0);
+                if idle(&found.own[start..]) {
+                    reader.pass(locals);
+                    continue;
+                }
+                let batch = reader.next(locals);
+                for (block, start) in (start..found.own.len()).step_by(count).enumerate() {
+                    if !idle(&found.own[start..][..count]) {
+                        batch.reduce(layout, block, start, &mut found);
+                    }
+                }
+            }
+            found
+        };
+        self.parts().into_par_iter().map_init(|| self.reader(), reduce).collect()
+    }
+
+    /// Solves for all local blocks, part by part as they are reduced, with the others in place: `others` are in the order of elimination, C
+    /// solutions after the other. `own` are the right-hand sides reduced; None for the one that the equations have.
+    pub fn solve<const C: usize>(
+        &self,
+        own: Option<Vec<Vec<[f64; C]>>>,
+        others: &[Vec<[f64; C]>],
+    ) -> Vec<Vec<[f64; C]>> {
+        let (layout, parts) = (&self.system.layout, self.parts());
+        let is_given = own.is_some();
+        let own = own.unwrap_or_else(|| vec![Vec::new(); parts.len()]);
+        let solve = |reader: &mut Reader<'_>, ((home, stacks), mut own): (Part<'_>, Vec<[f64; C]>)| {
+            let mut at = 0;
+            reader.begin(home);
+            own.reserve(if is_given { 0 } else { stacks.locals() * layout.local_dim() });
+            for locals in stacks.iter().take_while(|_| !self.control.stopped()) {
+                let (batch, count) = (reader.next(locals), locals.len() * layout.local_dim());
+                for others in others {
+                    if !is_given {
+                        own.extend(batch.right(layout).iter().map(|&value| [value; C]));
+                    }
+                    batch.solve(layout, others, &mut own[at..at + count]);
+                    at += count;
+                }
+                self.control.count(locals.len());
+            }
+            own
+        };
+        parts.into_par_iter().zip(own).map_init(|| self.reader(), solve).collect()
+    }
 }
 
-impl Kernel for Reduce<'_, '_> {
+/// What the elimination of stacks has left, one after the other.
+struct Reader<'a> {
+    elimination: &'a Elimination<'a>,
+    cached: Option<&'a [f64]>,
+    stack: Stack,
+    coupled: Coupled,
+}
+
+impl Reader<'_> {
+    /// Begins with the stacks at home in a supernode, or a part of those that are not cached.
+    fn begin(&mut self, home: usize) {
+        self.cached = self.elimination.cached.get(home).map(|cached| &cached[..]);
+    }
+
+    /// The next stack: that of these local blocks.
+    fn next(&mut self, locals: &[u32]) -> Batch<'_> {
+        let Elimination { system, equations, prior, damping, .. } = *self.elimination;
+        self.coupled.find(system, locals[0]);
+        let (coupled, depth) = (&self.coupled, locals.len());
+        let numbers = match &mut self.cached {
+            Some(cached) => {
+                let here = *cached;
+                skip_ref(cached, coupled.numbers(&system.layout, depth));
+                here
+            }
+            None => {
+                equations.gather(&mut self.stack, system, locals);
+                self.stack.eliminate(&system.layout, prior, damping);
+                self.stack.eliminated(&system.layout)
+            }
+        };
+        Batch { coupled, depth, numbers }
+    }
+
+    /// Passes over it.
+    fn pass(&mut self, locals: &[u32]) {
+        if self.cached.is_some() {
+            self.next(locals);
+        }
+    }
+}
+
+struct Reduce<'a, const C: usize> {
+    batch: Batch<'a>,
+    block: usize,
+    start: usize,
+    found: &'a mut Reduced<C>,
+}
+
+impl<const C: usize> Kernel for Reduce<'_, C> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
-        let Self { coupled, kept, found, .. } = self;
-        let count = L * self.depth;
-        let width: usize = coupled.ranges.iter().map(Range::len).sum();
-        // What follows V is read, and not used.
-        let mut coupling = *kept;
-        skip_ref(kept, count * width + count);
-        let triangles = skip_ref(kept, self.depth * Triangle::numbers(L));
-        let start = found.own.len() - count;
-        let own = found.own[start..].as_chunks_mut::<L>().0;
-        for (own, numbers) in own.iter_mut().zip(triangles.chunks_exact(Triangle::numbers(L))) {
-            Triangle::of(L, numbers).forward::<L>(own, 1);
+        let Self { batch, block, start, found } = self;
+        let (mut coupling, triangles) = batch.parts::<L>();
+        let (coupled, count) = (batch.coupled, L * batch.depth);
+        let Reduced { own, values, ranges } = found;
+        let own = &mut own[start..start + count];
+        for (own, triangle) in own.as_chunks_mut::<L>().0.iter_mut().zip(triangles) {
+            triangle.forward::<L>(own.as_flattened_mut(), C);
         }
         for (index, range) in coupled.ranges.iter().enumerate() {
-            let width = coupled.width::<D>(index);
+            let (width, end) = (coupled.width::<D>(index), values.len());
+            values.resize(end + width, [0.0; C]);
+            ranges.push((block, range.clone()));
             let rows = Rows { values: coupling, width, stride: width, count };
-            let first = found.room(range.clone());
-            add_right(simd, &mut found.values[first..], None, -1.0, rows, &found.own[start..]);
+            subtract_rights(simd, &mut values[end..], rows, own);
             skip_ref(&mut coupling, count * width);
         }
     }
 }
 
-struct Solve<'a, 'k> {
-    coupled: &'a Coupled,
-    depth: usize,
-    kept: &'a mut &'k [f64],
-    own: Option<&'a mut &'k [f64]>,
-    others: &'a [f64],
-    found: &'a mut Vec<f64>,
+struct Solve<'a, const C: usize> {
+    batch: Batch<'a>,
+    others: &'a [[f64; C]],
+    own: &'a mut [[f64; C]],
 }
 
-impl Kernel for Solve<'_, '_> {
+impl<const C: usize> Kernel for Solve<'_, C> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
-        let (count, start) = (L * self.depth, self.found.len());
-        let width: usize = self.coupled.ranges.iter().map(Range::len).sum();
-        let coupling = skip_ref(self.kept, count * width);
-        let reduced = skip_ref(self.kept, count);
-        self.found.extend_from_slice(self.own.map_or(reduced, |own| skip_ref(own, count)));
-        let triangles = skip_ref(self.kept, self.depth * Triangle::numbers(L));
-        let own = &mut self.found[start..];
-        let mut at = 0;
-        for (index, range) in self.coupled.ranges.iter().enumerate() {
-            let width = self.coupled.width::<D>(index);
-            let x = &self.others[range.start..][..width];
+        let Self { batch, others, own } = self;
+        let (coupling, triangles) = batch.parts::<L>();
+        let (coupled, mut at) = (batch.coupled, 0);
+        for (index, range) in coupled.ranges.iter().enumerate() {
+            let width = coupled.width::<D>(index);
+            let x = &others[range.start..][..width];
             let rows = own.iter_mut().zip(coupling[at..].chunks_exact(width.max(1)));
+            let subtract = |own: &mut [f64; C], product: [f64; C]| {
+                own.iter_mut().zip(product).for_each(|(value, product)| *value -= product);
+            };
             // The width of a main block is known where this is compiled: its sum needs no loop.
-            if index < self.coupled.main {
-                rows.for_each(|(value, row)| *value -= dot(row, x));
+            if index < coupled.main {
+                rows.for_each(|(own, row)| subtract(own, dot_columns(row, x)));
             } else {
-                rows.for_each(|(value, row)| *value -= dot_by_fours(row, x));
+                rows.for_each(|(own, row)| subtract(own, dot_by_fours(row, x)));
             }
-            at += count * width;
+            at += L * batch.depth * width;
         }
-        for (own, numbers) in own.chunks_exact_mut(L).zip(triangles.chunks_exact(Triangle::numbers(L))) {
-            Triangle::of(L, numbers).backward::<L>(own, 1);
+        for (own, triangle) in own.as_chunks_mut::<L>().0.iter_mut().zip(triangles) {
+            triangle.backward::<L>(own.as_flattened_mut(), C);
         }
     }
 }

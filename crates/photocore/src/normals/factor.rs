@@ -6,19 +6,18 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use faer::MatMut;
-use pulp::Simd;
 use rayon::ThreadPool;
 
 use super::assembly::{Formation, Sums};
 use super::dense::{Pivots, factor_front};
 use super::equations::{Equations, Prior};
 use super::front::Front;
-use super::further::{blocks_of, of_others, subtract_sides};
 use super::layout::Layout;
+use super::options::FactorOptions;
 use super::panels::{Handover, Panels, lock};
+use super::stack::Gathered;
 use super::symbolic::Supernode;
 use super::system::System;
-use super::vectorised::{Kernel, Side, dot_in_lanes, run_unsized};
 use super::watch::{Between, Control, Stopped, watched};
 use super::workspace::Eliminated;
 
@@ -28,10 +27,10 @@ pub struct Factor {
     pub(super) panels: Panels,
     /// L^-1 n, in the order of elimination; of outer unknowns n as the others leave it.
     pub(super) right: Vec<f64>,
-    /// Right-hand sides that it was formed with, the local blocks reduced out, in the order of elimination, one after the other.
-    pub(super) further: Vec<f64>,
-    /// What the elimination of the local blocks has left, for [`System::solve`]; empty where it is not kept.
+    /// What the elimination of the local blocks has left, for [`System::solve`]; empty where it is not cached.
     pub(super) eliminated: Eliminated,
+    /// The fraction of the diagonal of the normal equations that was added to it.
+    pub damping: f64,
     /// Diagonal of the normal equations before any elimination, in the order of elimination.
     pub(super) diagonal: Vec<f64>,
     /// Lost pivots, in the order of elimination.
@@ -53,7 +52,6 @@ struct Update {
     matrix: Vec<f64>,
     right: Vec<f64>,
     diagonal: Vec<f64>,
-    sides: Vec<Side>,
 }
 
 /// What a visit to a supernode leaves to the result.
@@ -64,8 +62,6 @@ struct Visited {
     /// Own part of L^-1 n and of the diagonal.
     right: Vec<f64>,
     diagonal: Vec<f64>,
-    /// What the local blocks take off further right-hand sides.
-    sides: Vec<Side>,
     formation: f64,
     factorisation: f64,
 }
@@ -74,52 +70,34 @@ struct Visited {
 /// itself would make of it, is less than a unit in the last place; weights that alone make a datum (GIANT's default of 60000 m for a
 /// station) leave a hundred.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
 impl System {
-    /// Forms the normal equations, with the local blocks reduced out, and factors them. `damping` is added to the diagonal of the normal
-    /// equations as a fraction of it. The result has the same bits for any number of threads: every value is summed by one
-    /// thread, in an order that depends on the pattern only.
+    /// Forms the normal equations, with the local blocks reduced out, and factors them. The result has the same bits for any number of
+    /// threads: every value is summed by one thread, in an order that depends on the pattern only.
     ///
     /// Whether everything is determined is for the caller to ask: see [`Factor::deficient_locals`] and [`Factor::deficiency`].
-    ///
-    /// What the elimination of the local blocks leaves is kept for [`System::solve`], where that takes no more memory than results will.
     pub fn factor<E: Equations>(
         &self,
         pool: &ThreadPool,
         equations: &E,
         prior: &Prior,
-        damping: f64,
+        options: &FactorOptions,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Factor> {
-        self.factored(pool, equations, prior, damping, &[], true, between)
+        self.factored(pool, equations, prior, *options, between)
     }
 
-    /// The same, undamped, with further right-hand sides over all unknowns, one after the other: they are reduced on the way, and wait to
-    /// be solved for ([`System::solve_further`], [`System::invert_with`]). `keeps`: whether [`System::solve`] will be asked for a solution.
-    pub fn factor_with<E: Equations>(
+    fn factored(
         &self,
         pool: &ThreadPool,
-        equations: &E,
+        equations: &dyn Gathered,
         prior: &Prior,
-        rights: &[f64],
-        keeps: bool,
-        between: Between<'_>,
-    ) -> ControlFlow<Stopped, Factor> {
-        self.factored(pool, equations, prior, 0.0, rights, keeps, between)
-    }
-
-    fn factored<E: Equations>(
-        &self,
-        pool: &ThreadPool,
-        equations: &E,
-        prior: &Prior,
-        damping: f64,
-        rights: &[f64],
-        keeps: bool,
+        FactorOptions { damping, cached }: FactorOptions,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Factor> {
         watched(pool, between, |control| {
-            let keeps = keeps && self.keeps;
-            let formation = Formation { system: self, equations, prior, damping, rights, keeps, control };
+            let keeps = cached && self.keeps;
+            let formation = Formation { system: self, equations, prior, damping, keeps, control };
             let mut given_up = Vec::new();
             loop {
                 let factor = formation.factor(&given_up)?;
@@ -139,7 +117,7 @@ impl System {
     }
 }
 
-impl<E: Equations> Formation<'_, E> {
+impl Formation<'_> {
     /// Forms and factors; the pivots `given_up`, in the order of elimination, count as lost whatever they are. None without memory.
     fn factor(&self, given_up: &[usize]) -> Option<Factor> {
         let symbolic = &self.system.symbolic;
@@ -160,8 +138,8 @@ impl<E: Equations> Formation<'_, E> {
         let mut factor = Factor {
             panels,
             right: Vec::with_capacity(symbolic.unknowns()),
-            further: self.control.allocated(of_others(self.system, self.rights))?,
             eliminated: Vec::new(),
+            damping: self.damping,
             diagonal: Vec::with_capacity(symbolic.unknowns()),
             lost: Vec::new(),
             doubtful: Vec::new(),
@@ -171,11 +149,10 @@ impl<E: Equations> Formation<'_, E> {
             formation_share: 1.0,
         };
         let (mut formation, mut factorisation) = (0.0, 0.0);
-        let none = Front::new(0, 0, &mut [], Vec::new(), 0);
+        let none = Front::new(0, 0, &mut [], Vec::new());
         let homeless = self.assemble(&mut { none }, symbolic.supernode_count(), &kept)?;
         for (index, visited) in visited.into_values().flatten().enumerate() {
             factor.add(visited.sums, self.keeps);
-            subtract_sides(&mut factor.further, factor.right.len(), symbolic.unknowns(), &visited.sides);
             if symbolic.open() != Some(index) {
                 factor.decrease += visited.right.iter().map(|v| v * v).sum::<f64>();
             }
@@ -207,8 +184,7 @@ impl<E: Equations> Formation<'_, E> {
         let s = &symbolic.supernodes()[index];
         let start = Instant::now();
         let update = self.control.allocated(self.system.workspace.lower_zeros(s.below()))?;
-        let further = blocks_of(&self.system.layout, self.rights);
-        let mut front = Front::new(s.width, s.height(), panel, update, further);
+        let mut front = Front::new(s.width, s.height(), panel, update);
         for &child in &s.children {
             if let Some(update) = updates.take(child) {
                 front.add(&update, &symbolic.rows_in_parent(child));
@@ -229,11 +205,10 @@ impl<E: Equations> Formation<'_, E> {
             let own = given_up.iter().filter_map(|&pivot| pivot.checked_sub(first));
             pivots = front.factor(&own.filter(|&column| column < s.width).collect::<Vec<_>>(), self.control);
         }
-        let Front { width, update, mut right, mut diagonal, mut sides, .. } = front;
+        let Front { width, update, mut right, mut diagonal, .. } = front;
         if s.parent.is_some() {
             let (right, diagonal) = (right.split_off(width), diagonal.split_off(width));
-            let sides = sides.split_off(width * further);
-            updates.put(index, Update { matrix: update, right, diagonal, sides });
+            updates.put(index, Update { matrix: update, right, diagonal });
         }
         Some(Visited {
             sums,
@@ -241,7 +216,6 @@ impl<E: Equations> Formation<'_, E> {
             doubtful: pivots.doubtful.into_iter().map(|column| first + column).collect(),
             right,
             diagonal,
-            sides,
             formation,
             factorisation: start.elapsed().as_secs_f64() - formation,
         })
@@ -268,10 +242,6 @@ impl Front<'_> {
                 let column = to_column + k;
                 self.right[column] += child.right[from_column + k];
                 self.diagonal[column] += child.diagonal[from_column + k];
-                let further = self.further;
-                let taken = &child.sides[(from_column + k) * further..][..further];
-                let own = self.sides[column * further..][..further].as_flattened_mut();
-                own.iter_mut().zip(taken.as_flattened()).for_each(|(sum, value)| *sum += value);
                 let source = &child.matrix[(from_column + k) * order..][..order];
                 let (target, shift) = if column < width {
                     (&mut self.panel[column * height..][..height], 0)
@@ -314,13 +284,13 @@ impl Factor {
         }
     }
 
-    /// Whether it has kept what the elimination of the local blocks has left.
+    /// Whether it has cached what the elimination of the local blocks has left.
     pub fn has_kept(&self) -> bool {
         !self.eliminated.is_empty()
     }
 
-    /// Gives back what was kept for [`System::solve`].
-    pub(super) fn forget_locals(&mut self) {
+    /// Gives that back.
+    pub fn forget(&mut self) {
         self.eliminated = Vec::new();
     }
 
@@ -362,26 +332,6 @@ impl Factor {
             diagonal.filter(|&(_, &n)| n == 0.0).map(|(unknown, _)| unknown).collect();
         found.sort_unstable();
         found
-    }
-
-    /// Diagonal of the normal equations of the unknowns of kept blocks before any elimination, in the order of the layout.
-    pub(super) fn information(&self, layout: &Layout) -> Vec<f64> {
-        let kept = layout.all_kept();
-        let mut information = vec![0.0; kept.len()];
-        let diagonal = self.unknowns(layout).zip(&self.diagonal);
-        diagonal
-            .filter(|(unknown, _)| kept.contains(unknown))
-            .for_each(|(unknown, &n)| information[unknown - kept.start] = n);
-        information
-    }
-
-    /// The corrections of the unknowns that are not local, in the order of the layout; of a whole system.
-    pub fn reduced_corrections(&self, layout: &Layout) -> Vec<f64> {
-        let (first, mut x) = (layout.all_locals().end, self.right.clone());
-        self.solve_backward(&mut x);
-        let mut corrections = vec![0.0; x.len()];
-        self.unknowns(layout).zip(&x).for_each(|(unknown, &x)| corrections[unknown - first] = x);
-        corrections
     }
 
     /// Natural logarithm of the determinant of the normal equations, the local unknowns reduced out; None where it is zero.
@@ -427,36 +377,5 @@ impl Factor {
         x[pivot] = 1.0;
         self.solve_backward(&mut x);
         x
-    }
-
-    /// x := L^-T x; outer unknowns stay as they are.
-    pub(super) fn solve_backward(&self, x: &mut [f64]) {
-        run_unsized(Backward { panels: &self.panels, x });
-    }
-}
-
-struct Backward<'a> {
-    panels: &'a Panels,
-    x: &'a mut [f64],
-}
-
-impl Kernel for Backward<'_> {
-    #[inline(always)]
-    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
-        let Self { panels, x } = self;
-        let (symbolic, mut own) = (&*panels.symbolic, Vec::new());
-        for (index, s) in symbolic.closed().iter().enumerate().rev() {
-            let first = symbolic.first_unknown(index);
-            own.clear();
-            own.extend_from_slice(&x[first..first + s.width]);
-            s.rows.iter().for_each(|&row| own.extend_from_slice(&x[symbolic.range(row)]));
-            if own.iter().all(|&value| value == 0.0) {
-                continue;
-            }
-            for (j, column) in panels.panel(index).chunks_exact(s.height()).enumerate().rev() {
-                own[j] = (own[j] - dot_in_lanes(&column[j + 1..], &own[j + 1..])) / column[j];
-            }
-            x[first..first + s.width].copy_from_slice(&own[..s.width]);
-        }
     }
 }

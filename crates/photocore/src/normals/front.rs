@@ -5,7 +5,7 @@ use std::ops::Range;
 use pulp::Simd;
 
 use super::panels::skip;
-use super::vectorised::{LANES, Rows, Side, add_difference, add_product, add_products, add_right, add_side};
+use super::vectorised::{Rows, add_difference, add_product, add_products, add_right};
 
 /// A front: the columns of a supernode, and what their elimination will leave for the parent. Rows and columns are those of the
 /// supernode's panel, its own blocks before the coupled ones. Lower triangles; what stands above carries no meaning.
@@ -22,17 +22,13 @@ pub(super) struct Front<'a> {
     pub right: Vec<f64>,
     /// Diagonal of the normal equations before any elimination.
     pub diagonal: Vec<f64>,
-    /// What the local blocks take off further right-hand sides: so many blocks of them for each row.
-    pub sides: Vec<Side>,
-    pub further: usize,
 }
 
 impl<'a> Front<'a> {
     /// A front of zeros, but for the panel; `update` must hold zeros on and below its diagonal.
-    pub fn new(width: usize, height: usize, panel: &'a mut [f64], update: Vec<f64>, further: usize) -> Self {
+    pub fn new(width: usize, height: usize, panel: &'a mut [f64], update: Vec<f64>) -> Self {
         let (right, diagonal) = (vec![0.0; height], vec![0.0; height]);
-        let sides = vec![[0.0; LANES]; height * further];
-        Self { width, height, panel, update, right, diagonal, sides, further }
+        Self { width, height, panel, update, right, diagonal }
     }
 
     /// Adds one equation: coefficients in some rows and columns of the front, ascending, and the right-hand side.
@@ -62,8 +58,6 @@ impl<'a> Front<'a> {
             update: &mut self.update,
             right: &mut self.right,
             diagonal: &mut self.diagonal,
-            sides: &mut self.sides,
-            further: self.further,
         }
     }
 
@@ -72,7 +66,6 @@ impl<'a> Front<'a> {
         let (width, height) = (self.width, self.height);
         let (mut panel, mut update) = (&mut *self.panel, &mut self.update[..]);
         let (mut right, mut diagonal) = (&mut self.right[..], &mut self.diagonal[..]);
-        let (mut sides, further) = (&mut self.sides[..], self.further);
         let mut first = 0;
         let ends = starts.iter().copied().filter(|&start| start > 0).chain([height]);
         let part = |end: usize| {
@@ -85,8 +78,6 @@ impl<'a> Front<'a> {
                 update: skip(&mut update, (end - first - own) * (height - width)),
                 right: skip(&mut right, end - first),
                 diagonal: skip(&mut diagonal, end - first),
-                sides: skip(&mut sides, (end - first) * further),
-                further,
             };
             first = end;
             columns
@@ -104,8 +95,6 @@ pub(super) struct Columns<'a> {
     update: &'a mut [f64],
     right: &'a mut [f64],
     diagonal: &'a mut [f64],
-    sides: &'a mut [Side],
-    further: usize,
 }
 
 /// A matrix whose columns belong to consecutive rows and columns of the front.
@@ -174,16 +163,5 @@ impl Columns<'_> {
     pub fn subtract_right<S: Simd>(&mut self, simd: S, a: Strip<'_>, b: &[f64]) {
         let own = a.at - self.columns.start..a.at - self.columns.start + a.rows.width;
         add_right(simd, &mut self.right[own], None, -1.0, a.rows, b);
-    }
-
-    /// Adds A^T B to what is taken off further right-hand sides, B being rows of each block of them in turn.
-    #[inline(always)]
-    pub fn add_sides<S: Simd>(&mut self, simd: S, a: Strip<'_>, b: &[Side]) {
-        for (block, b) in b.chunks_exact(a.rows.count.max(1)).enumerate() {
-            for i in 0..a.rows.width {
-                let own = &mut self.sides[(a.at + i - self.columns.start) * self.further + block];
-                add_side(simd, own, a.rows, i, b);
-            }
-        }
     }
 }

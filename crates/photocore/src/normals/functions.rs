@@ -10,19 +10,18 @@
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
-use pulp::Simd;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::eliminated::{Batch, Coupled, Reduced as OfLocal};
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::layout::Layout;
 use super::products::Products;
-use super::stack::Stack;
+use super::stack::{Gathered, Stack};
 use super::symbolic::Symbolic;
 use super::system::System;
-use super::triangle::Triangle;
-use super::vectorised::{Kernel, dot, run};
+use super::vectorised::dot;
 use super::watch::{Between, Control, Stopped, watched};
 use super::workspace::zeros;
 
@@ -66,6 +65,7 @@ impl System {
         columns: Option<&[Function]>,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Functions> {
+        let equations: &dyn Gathered = equations;
         watched(pool, between, |control| {
             let places = self.symbolic.places(&self.layout);
             let work = Reduction { system: self, equations, prior, places: &places, control };
@@ -203,9 +203,9 @@ impl Symbolic {
     }
 }
 
-struct Reduction<'a, E> {
+struct Reduction<'a> {
     system: &'a System,
-    equations: &'a E,
+    equations: &'a dyn Gathered,
     prior: &'a Prior,
     places: &'a [usize],
     control: &'a Control,
@@ -217,7 +217,7 @@ type Taken = Vec<(usize, [f64; 3])>;
 /// What a function becomes at a local block: its number, y, and what goes to e.
 type Found = (usize, [f64; 3], Vec<(usize, f64)>);
 
-impl<E: Equations> Reduction<'_, E> {
+impl Reduction<'_> {
     fn reduced(&self, functions: &[Function]) -> Vec<Reduced> {
         let layout = &self.system.layout;
         let (end, dim) = (layout.all_locals().end, layout.local_dim());
@@ -254,17 +254,22 @@ impl<E: Equations> Reduction<'_, E> {
 
     fn at_locals(&self, taken: &[(usize, Taken)]) -> Vec<(usize, Vec<Found>)> {
         let layout = &self.system.layout;
-        let mut stack = Stack::default();
-        let at_local = |(local, taken): &(usize, Taken)| {
-            let mut found = Vec::with_capacity(taken.len());
-            stack.gather(self.system, self.equations, &[*local as u32]);
+        let (mut stack, mut coupled) = (Stack::default(), Coupled::default());
+        let mut at_local = |(local, taken): &(usize, Taken)| {
+            self.equations.gather(&mut stack, self.system, &[*local as u32]);
             stack.eliminate(layout, self.prior, 0.0);
-            let symbolic = &*self.system.symbolic;
-            run(layout, stack.kept_dim(), AtLocal { stack: &stack, symbolic, taken, found: &mut found });
             self.control.count(1);
-            (*local, found)
+            let batch = Batch::new(self.system, &mut stack, &mut coupled);
+            let of_function = |&(index, mut y): &(usize, [f64; 3])| {
+                let (own, mut found) = (&mut y[..layout.local_dim()], OfLocal::<1>::default());
+                found.own.extend_from_slice(own.as_chunks().0);
+                batch.reduce(layout, 0, 0, &mut found);
+                own.copy_from_slice(found.own.as_flattened());
+                (index, y, found.entries())
+            };
+            (*local, taken.iter().map(of_function).collect())
         };
-        taken.iter().take_while(|_| !self.control.stopped()).map(at_local).collect()
+        taken.iter().take_while(|_| !self.control.stopped()).map(&mut at_local).collect()
     }
 }
 
@@ -278,33 +283,4 @@ fn unite(entries: &mut Vec<(usize, f64)>) {
         }
         same
     });
-}
-
-/// Computes y and -V^T y of functions of one local block.
-struct AtLocal<'a> {
-    stack: &'a Stack,
-    symbolic: &'a Symbolic,
-    taken: &'a Taken,
-    found: &'a mut Vec<Found>,
-}
-
-impl Kernel for AtLocal<'_> {
-    #[inline(always)]
-    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
-        for &(index, coefficients) in self.taken {
-            let mut y = coefficients;
-            let triangle: &Triangle = &self.stack.triangles[0];
-            triangle.forward::<L>(&mut y[..L], 1);
-            let mut entries = Vec::new();
-            for (range, v) in self.stack.couplings::<L, D>(self.symbolic) {
-                let width = range.len().max(1);
-                let mut sums = vec![0.0; range.len()];
-                for (row, factor) in v.values.chunks_exact(width).zip(&y[..L]) {
-                    sums.iter_mut().zip(row).for_each(|(sum, value)| *sum -= factor * value);
-                }
-                entries.extend(range.zip(sums));
-            }
-            self.found.push((index, y, entries));
-        }
-    }
 }

@@ -152,11 +152,6 @@ impl Incidence {
         self.group_with[common as usize] as usize
     }
 
-    /// All local blocks, by home.
-    pub fn locals(&self) -> &[u32] {
-        &self.by_home
-    }
-
     /// The local blocks whose home is a supernode; after the last supernode those without equations.
     pub fn locals_at(&self, supernode: usize) -> &[u32] {
         &self.by_home[self.home_ptr[supernode]..self.home_ptr[supernode + 1]]

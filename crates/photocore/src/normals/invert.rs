@@ -13,13 +13,13 @@ use super::contribution::unpack;
 use super::dense::invert_front;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
-use super::further::Known;
+use super::options::InvertOptions;
 use super::panels::{Handover, Panels, lock};
 use super::selected::SelectedInverse;
+use super::stack::Gathered;
 use super::symbolic::Symbolic;
 use super::system::System;
 use super::watch::{Between, Control, Stopped, watched};
-use super::workspace::zeros;
 
 /// Cofactors with the selected inverse that they come from.
 #[derive(Debug)]
@@ -28,8 +28,6 @@ pub struct Inversion {
     pub cofactors: Cofactors,
     /// Of every two kept blocks that share a local block.
     pub selected: SelectedInverse,
-    /// Solutions for the right-hand sides that the factor was formed with: a row for each unknown, one after the other.
-    pub further: Vec<f64>,
     /// Share of the time of all threads that went into the selected inverse; the rest went into the other cofactors.
     pub inversion_share: f64,
 }
@@ -41,101 +39,47 @@ impl System {
     pub fn invert<E: Equations>(
         &self,
         pool: &ThreadPool,
-        factor: Factor,
-        equations: &E,
-        prior: &Prior,
-        between: Between<'_>,
-    ) -> ControlFlow<Stopped, Inversion> {
-        self.inverted(pool, factor, equations, prior, Given::default(), between, false)
-    }
-
-    /// The same of a part of a larger system, with the inverse over the outer unknowns: a lower triangle, block by block, column by column.
-    pub fn invert_below<E: Equations>(
-        &self,
-        pool: &ThreadPool,
         mut factor: Factor,
         equations: &E,
         prior: &Prior,
-        outer: &[f64],
+        options: &InvertOptions<'_>,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Inversion> {
-        factor.reopen();
-        self.inverted(pool, factor, equations, prior, Given { outer, rights: &[] }, between, false)
-    }
-
-    /// The same with what the equations of each group have to do with each other ([`Cofactors::groups`]).
-    ///
-    /// [`Cofactors::groups`]: super::Cofactors::groups
-    pub fn invert_by_groups<E: Equations>(
-        &self,
-        pool: &ThreadPool,
-        factor: Factor,
-        equations: &E,
-        prior: &Prior,
-        between: Between<'_>,
-    ) -> ControlFlow<Stopped, Inversion> {
-        self.inverted(pool, factor, equations, prior, Given::default(), between, true)
-    }
-
-    /// The same as [`System::invert`] with solutions for the right-hand sides that the factor was formed with.
-    pub fn invert_with<E: Equations>(
-        &self,
-        pool: &ThreadPool,
-        factor: Factor,
-        equations: &E,
-        prior: &Prior,
-        rights: &[f64],
-        between: Between<'_>,
-    ) -> ControlFlow<Stopped, Inversion> {
-        self.inverted(pool, factor, equations, prior, Given { outer: &[], rights }, between, false)
-    }
-
-    fn inverted<E: Equations>(
-        &self,
-        pool: &ThreadPool,
-        factor: Factor,
-        equations: &E,
-        prior: &Prior,
-        Given { rights, outer }: Given<'_>,
-        between: Between<'_>,
-        by_group: bool,
-    ) -> ControlFlow<Stopped, Inversion> {
+        let equations: &dyn Gathered = equations;
+        factor.forget();
         watched(pool, between, |control| {
-            let mut factor = factor;
-            factor.forget_locals();
-            let mut others = std::mem::take(&mut factor.further);
-            factor.solve_columns(&mut others);
-            let known = Known::new(self, rights, &others);
-            let walk = Walk { system: self, equations, prior, known, outer, control, by_group };
-            let information = factor.information(&self.layout);
-            walk.invert(factor.panels, information)
+            let Factor { mut panels, diagonal, .. } = factor;
+            let information = self.information(&diagonal);
+            panels.reopen();
+            Walk { system: self, equations, prior, options, control }.invert(panels, information)
         })
     }
-}
 
-/// What an inversion is given besides the factor.
-#[derive(Default)]
-struct Given<'a> {
-    /// The inverse over the outer unknowns.
-    outer: &'a [f64],
-    /// Right-hand sides.
-    rights: &'a [f64],
+    /// The diagonal of the normal equations of the unknowns of kept blocks before any elimination, which is given in that order, in the order
+    /// of the layout.
+    fn information(&self, diagonal: &[f64]) -> Vec<f64> {
+        let kept = self.layout.all_kept();
+        let mut information = vec![0.0; kept.len()];
+        let positions = 0..self.symbolic.blocks();
+        let unknowns = positions.flat_map(|position| self.symbolic.unknowns_at(&self.layout, position));
+        let of_kept = unknowns.zip(diagonal).filter(|(unknown, _)| kept.contains(unknown));
+        of_kept.for_each(|(unknown, &n)| information[unknown - kept.start] = n);
+        information
+    }
 }
 
 /// The inverse over the rows of one front (own blocks, then coupled blocks), full square, column by column.
 type Front = Arc<Vec<f64>>;
 
-struct Walk<'a, E> {
+struct Walk<'a> {
     system: &'a System,
-    equations: &'a E,
+    equations: &'a dyn Gathered,
     prior: &'a Prior,
-    known: Known<'a>,
-    outer: &'a [f64],
+    options: &'a InvertOptions<'a>,
     control: &'a Control,
-    by_group: bool,
 }
 
-impl<E: Equations> Walk<'_, E> {
+impl Walk<'_> {
     /// None without memory.
     fn invert(&self, mut panels: Panels, information: Vec<f64>) -> Option<Inversion> {
         let symbolic = &*self.system.symbolic;
@@ -162,12 +106,11 @@ impl<E: Equations> Walk<'_, E> {
         found.push(self.at_home(count, &[], 0));
         let selected = SelectedInverse { panels };
         let mut cofactors = Cofactors::collect(self.system, self.control, &selected, &found, information)?;
-        if self.by_group {
+        if self.options.by_groups {
             cofactors.groups = Some(GroupCofactors::collect(self.system, self.control, &found)?);
         }
-        let further = self.further(&found)?;
         let inversion_share = if inversion > 0.0 { inversion / (inversion + rest) } else { 0.0 };
-        Some(Inversion { cofactors, selected, further, inversion_share })
+        Some(Inversion { cofactors, selected, inversion_share })
     }
 
     /// Inverts one panel, given the front of its parent, and hands its own front to its children. Returns the cofactors of the local
@@ -184,7 +127,7 @@ impl<E: Equations> Walk<'_, E> {
             Arc::into_inner(parent).into_iter().for_each(|last| workspace.put_back(last));
         }
         if symbolic.open() == Some(index) {
-            unpack(width, self.outer, panel);
+            unpack(width, self.options.outer, panel);
         } else {
             let z = MatRef::from_column_major_slice(&front, height, height);
             let below = z.submatrix(width, width, height - width, height - width);
@@ -204,30 +147,8 @@ impl<E: Equations> Walk<'_, E> {
     }
 
     fn at_home(&self, index: usize, front: &[f64], height: usize) -> AtHome {
-        let Self { system, equations, prior, ref known, control, by_group, .. } = *self;
-        AtHome::new(system, index, equations, prior, known, control, front, height, by_group)
-    }
-
-    /// The solutions for further right-hand sides, row by row; None without memory.
-    fn further(&self, found: &[AtHome]) -> Option<Vec<f64>> {
-        let (layout, symbolic, count) = (&self.system.layout, &*self.system.symbolic, self.known.count());
-        let mut rows = self.control.allocated(zeros(layout.unknowns() * count))?;
-        for (index, at_home) in found.iter().enumerate().filter(|_| count > 0) {
-            let stacks = self.system.incidence.stacks_at(index);
-            self.known.hand_out(layout, stacks, at_home.further.iter(), |local, first, own| {
-                for (row, own) in rows[local.start * count..].chunks_exact_mut(count).zip(own) {
-                    row[first..].iter_mut().zip(own).for_each(|(x, own)| *x = *own);
-                }
-            });
-        }
-        for column in 0..count {
-            let mut others = self.known.others(column);
-            for position in 0..symbolic.blocks() {
-                let range = symbolic.unknowns_at(layout, position);
-                range.zip(&mut others).for_each(|(unknown, x)| rows[unknown * count + column] = x);
-            }
-        }
-        Some(rows)
+        let Self { system, equations, prior, options, control } = *self;
+        AtHome::new(system, index, equations, prior, control, front, height, options.by_groups)
     }
 }
 

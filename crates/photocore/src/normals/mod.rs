@@ -8,19 +8,19 @@
 //! 2. [`System`]: the order of elimination and the pattern of the factor ([`Symbolic`]), once for all iterations;
 //! 3. [`System::factor`]: the normal equations formed, the local blocks reduced out and the rest factored (block Cholesky on dense
 //!    panels), front by front;
-//! 4. [`System::solve`], and [`System::solve_for`] for any other right-hand sides;
+//! 4. [`System::solve`], for the right-hand side of the equations or any others;
 //! 5. [`System::invert`]: the selected inverse, and cofactors of everything; [`System::reduce`] those of any linear functions.
 //!
 //! A system may be a part of a larger one ([`Layout::as_part`]): some kept blocks, the outer ones, stay when all others are eliminated. Their
 //! front, ordered last, is assembled and left open, and is what the part leaves for the system above ([`Factor::take_contribution`]), into
-//! whose fronts it goes like what a child leaves for its parent ([`Equations::contribution`]). [`System::solve_below`] and
-//! [`System::invert_below`] begin with the step and the inverse that the system above has found for these blocks. Cut near the top of its
-//! elimination tree, a system is solved in pieces so, to the same result (Helmert 1880; Wolf 1978).
+//! whose fronts it goes like what a child leaves for its parent ([`Equations::contribution`]). The step and the inverse that
+//! the system above has found for these blocks are options of the phases that go down. Cut near the top of its elimination tree, a system is
+//! solved in pieces so, to the same result (Helmert 1880; Wolf 1978).
 //!
 //! ```
 //! use std::ops::ControlFlow;
 //!
-//! use photocore::normals::{Equations, GroupRows, Layout, Ordering, Prior, System};
+//! use photocore::normals::{Equations, FactorOptions, GroupRows, Layout, Ordering, Prior, SolveOptions, System};
 //!
 //! /// x_local - y_kept = 1 for every pair.
 //! struct Differences;
@@ -37,8 +37,9 @@
 //! let prior = Prior { weight: vec![1.0, 0.0, 0.0, 0.0, 0.0], right: vec![0.0; 5], between: vec![] };
 //! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
 //! let mut go_on = |_| ControlFlow::Continue(());
-//! let factor = system.factor(&pool, &Differences, &prior, 0.0, &mut go_on).continue_value().expect("not stopped");
-//! let x = system.solve(&pool, &factor, &Differences, &prior, 0.0, &mut go_on).continue_value().expect("not stopped");
+//! let (factoring, solving) = (FactorOptions::default(), SolveOptions::default());
+//! let factor = system.factor(&pool, &Differences, &prior, &factoring, &mut go_on).continue_value().expect("not stopped");
+//! let x = system.solve(&pool, &factor, &Differences, &prior, &solving, &mut go_on).continue_value().expect("not stopped");
 //! assert!(x.iter().zip([0.0, 0.0, 0.0, -1.0, -1.0]).all(|(x, expected)| (x - expected).abs() < 1e-12));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -56,7 +57,6 @@ mod equations;
 mod factor;
 mod front;
 mod functions;
-mod further;
 mod graph;
 mod homes;
 mod incidence;
@@ -65,6 +65,7 @@ mod layout;
 mod memory;
 mod minimum_degree;
 mod open_front;
+mod options;
 mod ordering;
 mod panels;
 mod pattern;
@@ -72,8 +73,8 @@ mod products;
 mod room;
 mod selected;
 mod solve;
-mod solve_for;
 mod stack;
+mod substitution;
 mod symbolic;
 mod system;
 mod tie_equations;
@@ -93,6 +94,7 @@ pub use functions::{Function, Functions};
 pub use graph::Graph;
 pub use invert::Inversion;
 pub use layout::{Layout, LayoutError, Tie};
+pub use options::{FactorOptions, InvertOptions, SolveOptions};
 pub use ordering::Ordering;
 pub use selected::SelectedInverse;
 pub use symbolic::{Operations, Symbolic};

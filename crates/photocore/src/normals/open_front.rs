@@ -2,6 +2,7 @@
 
 use super::contribution::{Contribution, packed};
 use super::factor::Factor;
+use super::panels::Panels;
 
 impl Factor {
     /// Takes what is left for the outer unknowns, in the order of the layout, and the memory of its front; empty for a whole system,
@@ -25,9 +26,11 @@ impl Factor {
             diagonal: self.diagonal[first..].to_vec().into(),
         }
     }
+}
 
-    /// Makes room again for the front of the outer unknowns.
-    pub(super) fn reopen(&mut self) {
-        self.panels.values.resize(self.panels.symbolic.values(), 0.0);
+impl Panels {
+    /// Makes room again for the front of outer unknowns that was taken.
+    pub fn reopen(&mut self) {
+        self.values.resize(self.symbolic.values(), 0.0);
     }
 }

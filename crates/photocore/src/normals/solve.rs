@@ -5,174 +5,139 @@ use std::ops::ControlFlow;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::eliminated::{self, Coupled, OfHome};
+use super::eliminated::Elimination;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
-use super::further::of_others;
-use super::incidence::Stacks;
-use super::stack::Stack;
+use super::options::SolveOptions;
+use super::panels::skip_ref;
+use super::stack::Gathered;
 use super::system::System;
-use super::vectorised::dot;
+use super::vectorised::LANES;
 use super::watch::{Between, Control, Stopped, watched};
-use super::workspace::{Eliminated, zeros};
+use super::workspace::{reserved, zeros};
 
-/// Stacks that a thread takes at a time.
-const CHUNK: usize = 64;
+/// Right-hand sides that go through the factor together.
+const TOGETHER: usize = 16;
 
 impl System {
-    /// Solves the normal equations for all unknowns, in the order of the layout: the kept blocks and the border from the factor, the
-    /// local blocks one by one.
+    /// Solves the normal equations for all unknowns, in the order of the layout, for one right-hand side or several, the solutions one after
+    /// the other: the kept blocks and the border from the factor, the local blocks one by one. The same bits for any number of threads.
     ///
-    /// `equations`, `prior` and `damping` must be those that the factor comes from. The equations are written again where the factor has
-    /// not kept what the elimination of the local blocks has left.
+    /// `equations` and `prior` must be those that the factor comes from. The equations are written again where the factor has not cached
+    /// what the elimination of the local blocks has left; those of local blocks whose right-hand sides are all zero once only.
     pub fn solve<E: Equations>(
         &self,
         pool: &ThreadPool,
         factor: &Factor,
         equations: &E,
         prior: &Prior,
-        damping: f64,
+        options: &SolveOptions<'_>,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Vec<f64>> {
-        self.solve_below(pool, factor, equations, prior, damping, &[], between)
-    }
-
-    /// The same of a part of a larger system, with the outer unknowns, block by block, as they are given.
-    pub fn solve_below<E: Equations>(
-        &self,
-        pool: &ThreadPool,
-        factor: &Factor,
-        equations: &E,
-        prior: &Prior,
-        damping: f64,
-        outer: &[f64],
-        between: Between<'_>,
-    ) -> ControlFlow<Stopped, Vec<f64>> {
-        let symbolic = &*self.symbolic;
+        let equations: &dyn Gathered = equations;
         watched(pool, between, |control| {
-            let mut others = factor.right.clone();
-            let first = others.len() - symbolic.outer_unknowns();
-            others[first..].iter_mut().zip(outer).for_each(|(x, given)| *x = *given);
-            factor.solve_backward(&mut others);
-            let found = match factor.eliminated.is_empty() {
-                false => self.kept_locals(&factor.eliminated, None, &others, control),
-                true => self.written_locals(equations, prior, damping, &others, control),
-            };
-            self.in_order_of_layout(&found, &others, control)
-        })
-    }
-
-    /// Solves the normal equations for another right-hand side over all unknowns, with what the factor has kept of the local blocks; as
-    /// [`System::solve_for`] does where it has kept nothing.
-    ///
-    /// `equations`, `prior` and `damping` must be those that the factor comes from.
-    pub fn solve_again<E: Equations>(
-        &self,
-        pool: &ThreadPool,
-        factor: &Factor,
-        equations: &E,
-        prior: &Prior,
-        damping: f64,
-        right: &[f64],
-        between: Between<'_>,
-    ) -> ControlFlow<Stopped, Vec<f64>> {
-        if factor.eliminated.is_empty() {
-            return self.solve_for(pool, factor, equations, prior, damping, right, between);
-        }
-        watched(pool, between, |control| {
-            let others = control.allocated(of_others(self, right))?;
-            let reduced = |coupled: &mut Coupled, (index, kept): (usize, &Vec<f64>)| {
-                let mut kept = &kept[..];
-                let mut found = OfHome::default();
-                for run in self.incidence.stacks_at(index).iter().take_while(|_| !control.stopped()) {
-                    let ranges = run.iter().map(|&local| self.layout.local_range(local as usize));
-                    ranges.for_each(|range| found.own.extend_from_slice(&right[range]));
-                    eliminated::reduce(self, run, coupled, &mut kept, &mut found);
+            let elimination = self.elimination(factor, equations, prior, control);
+            match options.rights {
+                None => {
+                    let mut others = factor.right.clone();
+                    let first = others.len() - self.symbolic.outer_unknowns();
+                    others[first..].iter_mut().zip(options.outer).for_each(|(x, given)| *x = *given);
+                    factor.solve_backward(&mut others);
+                    elimination.complete::<1>(None, &others, 1)
                 }
-                found
-            };
-            let homes = factor.eliminated.par_iter().enumerate();
-            let found = homes.map_init(Coupled::default, reduced).collect();
-            self.solve_reduced(factor, found, others, control).map(|(solution, _)| solution)
+                Some(rights) if rights.len() <= self.layout.unknowns() => {
+                    elimination.solve_for::<1>(factor, rights)
+                }
+                Some(rights) => elimination.solve_for::<LANES>(factor, rights),
+            }
         })
     }
 
-    /// Solves N x = r for a right-hand side that the local blocks have reduced; `others` without what they leave, in the order of elimination.
-    /// The solution, and r^T x.
-    pub(super) fn solve_reduced(
-        &self,
-        factor: &Factor,
-        found: Vec<OfHome>,
-        mut others: Vec<f64>,
-        control: &Control,
-    ) -> Option<(Vec<f64>, f64)> {
-        // One after the other in a fixed order, whichever thread has found them.
-        found.iter().for_each(|found| found.add_to(&mut others));
-        let reduced = others.clone();
-        factor.solve_columns(&mut others);
-        let own: Vec<Vec<f64>> = found.into_iter().map(|found| found.own).collect();
-        // With N = L L^T, r^T x is the square of L^-1 r, of which the local blocks have their parts.
-        let product = dot(&reduced, &others) + own.iter().map(|own| dot(own, own)).sum::<f64>();
-        let found = self.kept_locals(&factor.eliminated, Some(&own), &others, control);
-        Some((self.in_order_of_layout(&found, &others, control)?, product))
+    /// The elimination of the local blocks that a factor comes from.
+    pub(super) fn elimination<'a>(
+        &'a self,
+        factor: &'a Factor,
+        equations: &'a dyn Gathered,
+        prior: &'a Prior,
+        control: &'a Control,
+    ) -> Elimination<'a> {
+        let Factor { eliminated: cached, damping, .. } = factor;
+        Elimination { system: self, cached, equations, prior, damping: *damping, control }
     }
 
-    /// The local blocks in the order of the incidence, from what was kept of them; `own`: with other right-hand sides.
-    fn kept_locals(
-        &self,
-        eliminated: &Eliminated,
-        own: Option<&[Vec<f64>]>,
-        others: &[f64],
-        control: &Control,
-    ) -> Vec<Vec<f64>> {
-        let solve = |coupled: &mut Coupled, (index, kept): (usize, &Vec<f64>)| {
-            let (stacks, mut kept) = (self.incidence.stacks_at(index), &kept[..]);
-            let mut own = own.map(|own| &own[index][..]);
-            let mut found = Vec::with_capacity(stacks.locals() * self.layout.local_dim());
-            for run in stacks.iter().take_while(|_| !control.stopped()) {
-                eliminated::solve(self, run, coupled, &mut kept, own.as_mut(), others, &mut found);
-            }
-            control.count(stacks.locals());
-            found
-        };
-        eliminated.par_iter().enumerate().map_init(Coupled::default, solve).collect()
-    }
-
-    /// The same from their equations.
-    fn written_locals<E: Equations>(
-        &self,
-        equations: &E,
-        prior: &Prior,
-        damping: f64,
-        others: &[f64],
-        control: &Control,
-    ) -> Vec<Vec<f64>> {
-        let solve = |stack: &mut Stack, stacks: Stacks<'_>| {
-            let mut found = Vec::with_capacity(stacks.locals() * self.layout.local_dim());
-            for run in stacks.iter().take_while(|_| !control.stopped()) {
-                stack.gather(self, equations, run);
-                stack.solve(self, prior, damping, others, &mut found);
-                control.count(run.len());
-            }
-            found
-        };
-        let parts = self.incidence.stacks().parts(CHUNK);
-        parts.into_par_iter().map_init(Stack::default, solve).collect()
-    }
-
-    /// Puts local blocks in the order of the incidence, and the others in that of elimination, in the order of the layout; None without
-    /// memory.
-    fn in_order_of_layout(&self, found: &[Vec<f64>], others: &[f64], control: &Control) -> Option<Vec<f64>> {
+    /// The parts of right-hand sides that belong to unknowns that are not local, in the order of elimination; the bytes that there are not.
+    pub(super) fn of_others(&self, rights: &[f64]) -> Result<Vec<f64>, usize> {
         let (layout, symbolic) = (&self.layout, &*self.symbolic);
-        let mut values = control.allocated(zeros(layout.unknowns()))?;
-        for position in 0..symbolic.blocks() {
-            let range = symbolic.unknowns_at(layout, position);
-            values[range].copy_from_slice(&others[symbolic.range(position)]);
+        let unknowns = layout.unknowns().max(1);
+        let mut others = reserved(symbolic.unknowns() * (rights.len() / unknowns))?;
+        for right in rights.chunks_exact(unknowns) {
+            for position in 0..symbolic.blocks() {
+                others.extend_from_slice(&right[symbolic.unknowns_at(layout, position)]);
+            }
         }
-        let found = found.iter().flat_map(|part| part.chunks_exact(layout.local_dim()));
-        for (&local, x) in self.incidence.locals().iter().zip(found) {
-            values[layout.local_range(local as usize)].copy_from_slice(x);
+        Ok(others)
+    }
+}
+
+impl Elimination<'_> {
+    /// Solves for right-hand sides over all unknowns, C at a time; None without memory.
+    fn solve_for<const C: usize>(&self, factor: &Factor, rights: &[f64]) -> Option<Vec<f64>> {
+        let (unknowns, count) = (self.system.layout.unknowns().max(1), self.system.symbolic.unknowns());
+        let mut others = self.control.allocated(self.system.of_others(rights))?;
+        let found = self.reduce::<C>(rights);
+        // One after the other in a fixed order, whichever thread has found them.
+        found.iter().for_each(|found| found.add_to(&mut others, count));
+        others.par_chunks_mut((TOGETHER * count).max(1)).for_each(|columns| {
+            if !self.control.stopped() {
+                factor.solve_columns(columns);
+            }
+        });
+        let own = found.into_iter().map(|found| found.own).collect();
+        self.complete(Some(own), &others, rights.len() / unknowns)
+    }
+
+    /// Solves for the local blocks, the others being solved for in the order of elimination, and puts all in the order of the layout; None
+    /// without memory. There are so many columns.
+    pub fn complete<const C: usize>(
+        &self,
+        own: Option<Vec<Vec<[f64; C]>>>,
+        others: &[f64],
+        columns: usize,
+    ) -> Option<Vec<f64>> {
+        let (layout, symbolic) = (&self.system.layout, &*self.system.symbolic);
+        let (unknowns, count) = (layout.unknowns(), symbolic.unknowns().max(1));
+        let rows = |first: usize| {
+            let mut rows = vec![[0.0; C]; count];
+            for (k, column) in others.chunks_exact(count).skip(first).take(C).enumerate() {
+                rows.iter_mut().zip(column).for_each(|(row, value)| row[k] = *value);
+            }
+            rows
+        };
+        let blocks: Vec<Vec<[f64; C]>> = (0..columns).step_by(C).map(rows).collect();
+        let found = self.solve(own, &blocks);
+        let mut solutions = self.control.allocated(zeros(columns * unknowns))?;
+        for (solution, others) in solutions.chunks_exact_mut(unknowns.max(1)).zip(others.chunks_exact(count))
+        {
+            for position in 0..symbolic.blocks() {
+                solution[symbolic.unknowns_at(layout, position)]
+                    .copy_from_slice(&others[symbolic.range(position)]);
+            }
         }
-        Some(values)
+        for ((_, stacks), found) in self.parts().into_iter().zip(&found) {
+            let mut found = &found[..];
+            for locals in stacks.iter().take_while(|_| !self.control.stopped()) {
+                for first in (0..columns).step_by(C) {
+                    for &local in locals {
+                        let own = skip_ref(&mut found, layout.local_dim());
+                        for k in 0..C.min(columns - first) {
+                            let solution = &mut solutions[(first + k) * unknowns..];
+                            let range = layout.local_range(local as usize);
+                            solution[range].iter_mut().zip(own).for_each(|(x, row)| *x = row[k]);
+                        }
+                    }
+                }
+            }
+        }
+        Some(solutions)
     }
 }

@@ -16,7 +16,13 @@ pub(super) struct TieEquations {
 
 impl TieEquations {
     /// Gathers the equations of a tie whose home is supernode `home`.
-    pub fn gather(&mut self, system: &System, equations: &impl Equations, home: usize, tie: usize) {
+    pub fn gather(
+        &mut self,
+        system: &System,
+        equations: &(impl Equations + ?Sized),
+        home: usize,
+        tie: usize,
+    ) {
         let layout = &system.layout;
         self.place(system, home, tie);
         let (rows, width) = (layout.ties()[tie].rows, self.columns.len());

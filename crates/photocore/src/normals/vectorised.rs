@@ -71,9 +71,6 @@ const TOGETHER: usize = 6;
 /// Rows of a product whose sums are kept in registers together; matrices are followed by so many readable elements.
 pub(super) const LANES: usize = 8;
 
-/// One row of so many right-hand sides: they go through the local blocks side by side.
-pub(super) type Side = [f64; LANES];
-
 /// A matrix row by row, in a buffer that goes on for [`LANES`] elements at least.
 #[derive(Clone, Copy)]
 pub(super) struct Rows<'a> {
@@ -174,38 +171,54 @@ pub(super) fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + last.iter().zip(end).map(|(a, b)| a * b).sum::<f64>()
 }
 
-/// The product of two short vectors, summed in four parts that do not wait for each other.
+/// The products of a vector with C others, whose rows are given.
 #[inline(always)]
-pub(super) fn dot_by_fours(a: &[f64], b: &[f64]) -> f64 {
-    let ((a, last), (b, end)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
-    let mut sums = [0.0; 4];
+pub(super) fn dot_columns<const C: usize>(a: &[f64], b: &[[f64; C]]) -> [f64; C] {
+    let mut sums = [0.0; C];
     for (a, b) in a.iter().zip(b) {
-        for k in 0..4 {
-            sums[k] += a[k] * b[k];
+        for c in 0..C {
+            sums[c] += a * b[c];
         }
     }
-    let rest: f64 = last.iter().zip(end).map(|(a, b)| a * b).sum();
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+    sums
 }
 
-/// target += the sum over rows of a[row][i] b[row].
+/// The same of short vectors, summed in four parts that do not wait for each other.
 #[inline(always)]
-pub(super) fn add_side<S: Simd>(
-    simd: S,
-    target: &mut [f64; LANES],
-    a: Rows<'_>,
-    i: usize,
-    b: &[[f64; LANES]],
-) {
-    let mut sums = [simd.splat_f64s(0.0); LANES];
-    for (row, b) in b.iter().enumerate() {
-        let factor = simd.splat_f64s(a.values[row * a.stride + i]);
-        let vectors = S::as_simd_f64s(b).0;
-        for k in 0..LANES / S::F64_LANES {
-            sums[k] = simd.mul_add_f64s(vectors[k], factor, sums[k]);
+pub(super) fn dot_by_fours<const C: usize>(a: &[f64], b: &[[f64; C]]) -> [f64; C] {
+    let ((a, last), (b, end)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [[0.0; C]; 4];
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..4 {
+            for c in 0..C {
+                sums[k][c] += a[k] * b[k][c];
+            }
         }
     }
-    add_sums::<S, 1>(simd, target, 0, 1.0, &[sums], LANES);
+    let rest = dot_columns(last, end);
+    let [first, second, third, fourth] = sums;
+    std::array::from_fn(|c| (first[c] + second[c]) + (third[c] + fourth[c]) + rest[c])
+}
+
+/// rights -= the sum over rows of a[row] b[row], of C right-hand sides.
+#[inline(always)]
+pub(super) fn subtract_rights<S: Simd, const C: usize>(
+    simd: S,
+    rights: &mut [[f64; C]],
+    a: Rows<'_>,
+    b: &[[f64; C]],
+) {
+    if C == 1 {
+        return add_right(simd, rights.as_flattened_mut(), None, -1.0, a, b.as_flattened());
+    }
+    for (i, right) in rights.iter_mut().enumerate() {
+        for (row, b) in b.iter().enumerate() {
+            let factor = a.values[row * a.stride + i];
+            for c in 0..C {
+                right[c] -= factor * b[c];
+            }
+        }
+    }
 }
 
 /// target += the sum over `parts` equal parts of a and v of a^T a - v^T v. Both are summed together, part by part: where the

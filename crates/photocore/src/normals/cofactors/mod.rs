@@ -7,13 +7,13 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use self::others::Others;
-use super::equations::{Equations, Prior};
-use super::further::Known;
+use super::equations::Prior;
 use super::incidence::Stacks;
 use super::selected::SelectedInverse;
+use super::stack::Gathered;
 use super::system::System;
 use super::tie_equations::TieEquations;
-use super::vectorised::{Side, dot};
+use super::vectorised::dot;
 use super::watch::Control;
 use super::workspace::zeros;
 
@@ -143,8 +143,6 @@ pub(super) struct AtHome {
     shares: Vec<f64>,
     by_local: Vec<f64>,
     alone: Vec<f64>,
-    /// Solutions for further right-hand sides, stack by stack.
-    pub further: Vec<Side>,
     /// Time that it took.
     pub seconds: f64,
 }
@@ -154,12 +152,11 @@ const MANY: usize = 256;
 
 impl AtHome {
     /// `front` is the inverse over the rows of the front of the supernode, full square, of the order `height`.
-    pub fn new<E: Equations>(
+    pub fn new(
         system: &System,
         index: usize,
-        equations: &E,
+        equations: &dyn Gathered,
         prior: &Prior,
-        known: &Known<'_>,
         control: &Control,
         front: &[f64],
         height: usize,
@@ -172,11 +169,10 @@ impl AtHome {
         let part = |others: &mut Others, stacks: Stacks<'_>| {
             let (mut stack, mut part) = (system.workspace.stack(), Self::default());
             for run in stacks.iter().take_while(|_| !control.stopped()) {
-                stack.gather(system, equations, run);
+                equations.gather(&mut stack, system, run);
                 stack.eliminate(layout, prior, 0.0);
                 others.gather(&stack, front, height);
                 others.cofactors(&stack, layout, &mut part);
-                known.solve(system, &stack, &mut part.further);
                 control.count(run.len());
             }
             system.workspace.put_back_stack(stack);
@@ -192,7 +188,6 @@ impl AtHome {
                 all.shares.extend(part.shares);
                 all.by_local.extend(part.by_local);
                 all.alone.extend(part.alone);
-                all.further.extend(part.further);
                 all
             })
         };
@@ -203,10 +198,10 @@ impl AtHome {
 }
 
 /// a Q a^T of the equations of the ties at home in a supernode, a square block for each.
-fn ties_at_home<E: Equations>(
+fn ties_at_home(
     system: &System,
     index: usize,
-    equations: &E,
+    equations: &dyn Gathered,
     front: &[f64],
     height: usize,
 ) -> Vec<f64> {

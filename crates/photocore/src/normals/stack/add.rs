@@ -30,7 +30,6 @@ impl Stack {
             columns.add_difference(simd, own, v, self.locals.len());
             columns.add_equations(simd, own, constants);
             columns.subtract_right(simd, v, &self.reduced);
-            columns.add_sides(simd, v, &self.sides);
             for other in &self.slots[index + 1..] {
                 columns.add_product(simd, -1.0, self.slot_coupling::<L, D>(other), v);
             }
@@ -122,7 +121,6 @@ impl Stack {
                 columns.add_products(simd, [taken]);
             }
             columns.subtract_right(simd, v, &self.reduced);
-            columns.add_sides(simd, v, &self.sides);
             for other in &self.segments[index + 1..] {
                 columns.add_product(simd, -1.0, self.segment_coupling::<L>(other), v);
             }

@@ -7,13 +7,20 @@ use crate::normals::equations::{Equations, GroupRows};
 use crate::normals::system::System;
 use crate::normals::vectorised::{Kernel, run_unsized};
 
-impl Stack {
+/// Equations of any kind, gathered by one call for a whole stack: nothing else is compiled for each kind.
+pub(in crate::normals) trait Gathered: Equations {
     /// Gathers the equations of local blocks of one pattern.
-    pub fn gather(&mut self, system: &System, equations: &impl Equations, locals: &[u32]) {
-        self.place(system, locals);
-        run_unsized(Gather { stack: self, system, equations });
-    }
+    fn gather(&self, stack: &mut Stack, system: &System, locals: &[u32]);
+}
 
+impl<E: Equations> Gathered for E {
+    fn gather(&self, stack: &mut Stack, system: &System, locals: &[u32]) {
+        stack.place(system, locals);
+        run_unsized(Gather { stack, system, equations: self });
+    }
+}
+
+impl Stack {
     #[inline(always)]
     fn write(&mut self, system: &System, equations: &impl Equations) {
         let (rows, l) = (system.layout.rows(), system.layout.local_dim());

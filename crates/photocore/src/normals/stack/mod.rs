@@ -5,7 +5,6 @@ mod chord;
 mod eliminate;
 mod gather;
 mod place;
-mod solve;
 
 use std::ops::Range;
 
@@ -14,8 +13,9 @@ use smallvec::SmallVec;
 use super::front::Strip;
 use super::symbolic::Symbolic;
 use super::triangle::Triangle;
-use super::vectorised::{Rows, Side, size};
+use super::vectorised::{Rows, size};
 
+pub(super) use gather::Gathered;
 pub(super) use place::{parts_of, united};
 
 /// A main kept block that the local blocks are tied to.
@@ -148,8 +148,6 @@ pub(super) struct Stack {
     pub start: usize,
     pub end: usize,
     pub reduced: Vec<f64>,
-    /// L^-1 r of further right-hand sides, so many at a time: row by row of all local blocks; empty where there are none.
-    pub sides: Vec<Side>,
 }
 
 impl Stack {
@@ -157,11 +155,6 @@ impl Stack {
     pub fn kept_dim(&self) -> Option<usize> {
         let dim = self.slots.first()?.dim;
         self.slots.iter().all(|slot| slot.dim == dim).then_some(dim)
-    }
-
-    /// The coupling to everything, main blocks before segments, each local block by local block.
-    pub fn coupling(&self) -> &[f64] {
-        &self.coupling[self.start..self.end]
     }
 
     /// The coupling to a main block, local block by local block.
@@ -184,18 +177,6 @@ impl Stack {
     pub fn ranges<'s>(&'s self, symbolic: &'s Symbolic) -> impl Iterator<Item = Range<usize>> + 's {
         let of_segments = self.segments.iter().map(|segment| segment.range(symbolic));
         self.slots.iter().map(|slot| symbolic.range(slot.position)).chain(of_segments)
-    }
-
-    /// Its coupling V, part by part: where the coupled unknowns stand in the order of elimination, and its rows, local block by local
-    /// block.
-    #[inline(always)]
-    pub fn couplings<'s, const L: usize, const D: usize>(
-        &'s self,
-        symbolic: &'s Symbolic,
-    ) -> impl Iterator<Item = (Range<usize>, Rows<'s>)> {
-        let of_slots = self.slots.iter().map(|slot| self.slot_coupling::<L, D>(slot).rows);
-        let of_segments = self.segments.iter().map(|segment| self.segment_coupling::<L>(segment).rows);
-        self.ranges(symbolic).zip(of_slots.chain(of_segments))
     }
 
     /// The coefficients of a main block in all its equations, local block by local block.
