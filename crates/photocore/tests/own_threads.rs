@@ -79,7 +79,7 @@ fn adjust_block(network: &Network, pool: &ThreadPool) {
     let covariances = network.covariances(&options, &solution.state, None, pool, &mut go).unwrap();
     covariances.cofactors(&[Of::Point(0), Of::Photo(0)], None, pool, &mut go).unwrap();
     network.adjust_again(&options, &solution.state, pool, &mut go).unwrap();
-    let mut trial = solution.settled.expect("it converges").trial(network);
+    let mut trial = solution.converged.expect("it converges").trial(network);
     trial.stand(pool, &mut go).unwrap();
     trial.tests(pool).unwrap();
     trial.effects(&[0, 5], pool).unwrap();

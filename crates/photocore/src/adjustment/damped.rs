@@ -29,7 +29,7 @@ const MOST_DAMPING: f64 = 1e9;
 /// so weakly determined that the others bend off the straight line on the way: it is followed along the curve (see
 /// [`Run::along_valley`]).
 const VALLEY: f64 = 30.0;
-/// Parts of such a step that are tried, each half of the one before,
+/// Parts of such a step that are taken in turn, each half of the one before,
 const PARTS: usize = 4;
 /// and how many steps are taken so in one adjustment at the most: a valley that goes on and on is for the names of its unknowns.
 const MOST_ALONG: usize = 8;

@@ -18,13 +18,10 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use super::equations::ObservationEquations;
-use super::linearized::{Inverted, Linearized};
 use super::loss::Loss;
 use super::problem::{Model, Motions, Problem};
 use super::result::AdjustError;
 use super::transformation::Transformation;
-use crate::normals::{Between, FactorOptions, InvertOptions};
 
 /// A datum of a network whose observations leave one open.
 #[derive(Debug, Clone, Default)]
@@ -79,51 +76,6 @@ pub struct Adjusted<'a> {
     pub held: &'a [usize],
     /// What has weighted the observations.
     pub loss: Option<Loss>,
-}
-
-impl Linearized {
-    /// Moves an adjusted network to another datum, and factors its normal equations there.
-    ///
-    /// # Errors
-    /// A network that is not free, carriers that do not carry all null vectors; what ends adjustments.
-    pub fn in_datum<M: Model>(
-        problem: &Problem<M>,
-        adjusted: Adjusted<'_>,
-        datum: &Datum,
-        reference: &[f64],
-        pool: &ThreadPool,
-        between: Between<'_>,
-    ) -> Result<Self, DatumError> {
-        let (unknowns, basis) = moved(problem, adjusted, datum, reference, pool)?;
-        let Adjusted { held, loss, .. } = adjusted;
-        let equations = ObservationEquations::new(problem, loss, &unknowns, held, pool);
-        let options = FactorOptions::default();
-        let formed = Self::of(&equations, unknowns, held.to_vec(), &options, pool, between)?;
-        let mut linearized = formed.determined()?;
-        linearized.basis = Some(basis);
-        linearized.take_to_datum(&equations, pool, between)?;
-        linearized.factor.forget();
-        Ok(linearized)
-    }
-}
-
-impl Inverted {
-    /// Moves an adjusted network to another datum, and computes all cofactors there.
-    ///
-    /// # Errors
-    /// Those of [`Linearized::in_datum`].
-    pub fn in_datum<M: Model>(
-        problem: &Problem<M>,
-        adjusted: Adjusted<'_>,
-        datum: &Datum,
-        reference: &[f64],
-        pool: &ThreadPool,
-        between: Between<'_>,
-    ) -> Result<Self, DatumError> {
-        let linearized = Linearized::in_datum(problem, adjusted, datum, reference, pool, between)?;
-        let equations = linearized.equations(problem, pool);
-        Ok(linearized.invert(&equations, &InvertOptions::default(), pool, between)?)
-    }
 }
 
 /// The datum that an adjustment is to end in, and the values from which its carriers move least.

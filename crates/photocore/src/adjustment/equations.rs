@@ -5,6 +5,7 @@ use rayon::ThreadPool;
 use super::group_step::GroupStep;
 use super::loss::{Loss, Reweighting};
 use super::problem::{Model, Problem};
+use super::walk::Buffers;
 use crate::normals::{Contribution, Equations, GroupRows, Prior, TieRows, dot};
 
 /// The equations of a problem at given values of the unknowns: weighted to unit weight, by a loss besides, without fixed unknowns.
@@ -16,8 +17,27 @@ pub(super) struct ObservationEquations<'a, M: Model> {
     /// Which unknowns are fixed or held; None where none is.
     fixed: Option<Vec<bool>>,
     reweighting: Option<Reweighting>,
-    /// What systems below have left (see [`super::Part`]).
+    /// What systems below have left (see [`super::Linearized::of_part`]).
     contributions: &'a [Contribution<'a>],
+}
+
+/// One equation of unit weight.
+pub(super) struct Row<'a> {
+    /// Its number, in the order of groups and rows, then of ties and rows.
+    pub number: usize,
+    /// Observed minus computed.
+    pub constant: f64,
+    columns: &'a [usize],
+    coefficients: [&'a [f64]; 3],
+}
+
+impl Row<'_> {
+    /// The unknowns that it takes, with their coefficients.
+    #[inline(always)]
+    pub fn taken(&self) -> impl Iterator<Item = (usize, f64)> {
+        let [first, second, third] = self.coefficients;
+        self.columns.iter().copied().zip(first.iter().chain(second).chain(third).copied())
+    }
 }
 
 impl<'a, M: Model> ObservationEquations<'a, M> {
@@ -90,6 +110,45 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
     /// The values that the equations are of, prepared.
     pub fn at(&self) -> &M::Prepared {
         &self.prepared
+    }
+
+    /// Hands out the rows of a local block.
+    #[inline(always)]
+    pub fn each_row(&self, buffers: &mut Buffers, local: usize, mut take: impl FnMut(&Row<'_>)) {
+        let layout = self.problem.layout();
+        let mut columns = std::mem::take(&mut buffers.columns);
+        for group in layout.groups_of(local) {
+            columns.clear();
+            columns.extend(layout.local_range(local));
+            columns.extend(layout.kept_range(layout.kept_of(group)));
+            columns.extend(layout.common_columns(group));
+            let mut rows = buffers.rows(layout, group);
+            self.write(local, group, &mut rows);
+            let GroupRows { constant, local: own, kept, common } = rows;
+            for (row, &constant) in constant.iter().enumerate() {
+                let coefficients = [&*own, &*kept, &*common].map(|part| {
+                    let width = part.len() / layout.rows();
+                    &part[row * width..][..width]
+                });
+                let number = group * layout.rows() + row;
+                take(&Row { number, constant, columns: &columns, coefficients });
+            }
+        }
+        buffers.columns = columns;
+    }
+
+    /// Hands out the rows of all ties, with the numbers of these.
+    pub fn each_row_of_ties(&self, mut take: impl FnMut(usize, &Row<'_>)) {
+        let layout = self.problem.layout();
+        let groups = layout.groups() * layout.rows();
+        self.problem.for_ties(|tie, rows| {
+            self.write_tie(tie, rows);
+            let columns: Vec<usize> = layout.tie_columns(tie).collect();
+            let each = rows.constant.iter().zip(rows.coefficients.chunks_exact(columns.len().max(1)));
+            for (number, (&constant, own)) in (groups + layout.tie_rows(tie).start..).zip(each) {
+                take(tie, &Row { number, constant, columns: &columns, coefficients: [own, &[], &[]] });
+            }
+        });
     }
 
     /// By how much a step lowers the weighted sum of squares of these equations and the priors: sum of Ax (2 l - Ax).

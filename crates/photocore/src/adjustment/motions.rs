@@ -8,10 +8,10 @@ use faer::{Mat, Side};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::equations::ObservationEquations;
+use super::equations::{ObservationEquations, Row};
 use super::problem::{Model, Motions, Problem};
 use super::walk::Buffers;
-use crate::normals::{Equations, Layout, TieRows};
+use crate::normals::{Equations, TieRows};
 
 /// The combinations of motions that are open at some values of the unknowns.
 pub(super) struct Open {
@@ -31,8 +31,8 @@ const HOLDS: [f64; 2] = [1e-2, 1e-6];
 /// Local blocks that are added up one after the other.
 const AT_ONCE: usize = 256;
 
-/// Local blocks that are tried at the least where all are known to leave all motions open.
-const TRIED: usize = 1024;
+/// Local blocks that are looked at at the least where all are known to leave all motions open.
+const SAMPLE: usize = 1024;
 
 /// Candidates are taken so many at once, in the registers of one instruction: there are seven, and one that moves nothing.
 const LANES: usize = 8;
@@ -161,31 +161,6 @@ impl<'a> Candidates<'a> {
         }
         add_square(&mut sums.together, 1.0, &sums.along);
     }
-
-    /// Adds the rows of a local block.
-    pub fn add_local<E: Equations>(
-        &self,
-        sums: &mut Sums,
-        buffers: &mut Buffers,
-        layout: &Layout,
-        equations: &E,
-        local: usize,
-    ) {
-        for group in layout.groups_of(local) {
-            let mut rows = buffers.rows(layout, group);
-            equations.write(local, group, &mut rows);
-            for row in 0..layout.rows() {
-                let of = |values: &[f64]| {
-                    let width = values.len() / layout.rows();
-                    row * width..(row + 1) * width
-                };
-                let own = layout.local_range(local).zip(&rows.local[of(rows.local)]);
-                let kept = layout.kept_range(layout.kept_of(group)).zip(&rows.kept[of(rows.kept)]);
-                let common = layout.common_columns(group).zip(&rows.common[of(rows.common)]);
-                self.add_row(sums, own.chain(kept).chain(common).map(|(unknown, &value)| (unknown, value)));
-            }
-        }
-    }
 }
 
 /// Adds w (b b^T).
@@ -257,17 +232,18 @@ impl<M: Model> Problem<M> {
         let candidates = Candidates::new(motions, &by_unknown, &fixed);
         let equations = ObservationEquations::of_all(self, values, pool);
         let known = self.model.groups_leave_open() && !candidates.move_fixed();
-        // One of so many local blocks is tried, and stands for them all.
-        let stride = if known { (layout.locals() / TRIED).max(1) } else { 1 };
-        let tried = layout.locals().div_ceil(stride);
+        // One of so many local blocks is taken for them all.
+        let stride = if known { (layout.locals() / SAMPLE).max(1) } else { 1 };
+        let sample = layout.locals().div_ceil(stride);
         let chunk = |chunk: usize| {
             let (mut sums, mut buffers) = (candidates.sums(), Buffers::default());
-            for local in chunk * AT_ONCE..((chunk + 1) * AT_ONCE).min(tried) {
-                candidates.add_local(&mut sums, &mut buffers, layout, &equations, local * stride);
+            for local in chunk * AT_ONCE..((chunk + 1) * AT_ONCE).min(sample) {
+                let add = |row: &Row<'_>| candidates.add_row(&mut sums, row.taken());
+                equations.each_row(&mut buffers, local * stride, add);
             }
             sums
         };
-        let chunks = (0..tried.div_ceil(AT_ONCE)).into_par_iter();
+        let chunks = (0..sample.div_ceil(AT_ONCE)).into_par_iter();
         let mut sums = candidates.sums();
         pool.install(|| chunks.map(chunk).collect::<Vec<Sums>>()).iter().for_each(|part| sums.add(part));
         sums.multiply(stride as f64);

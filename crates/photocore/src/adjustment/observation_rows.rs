@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 use super::equations::ObservationEquations;
 use super::problem::{Model, Problem, Weighted};
-use crate::normals::{Equations, GroupRows, TieRows};
 
 /// Equations a x = l of unit weight: first those of observations, in the order of groups and rows, then of ties and rows; then one for each
 /// unknown, that of it as an observation of itself, empty where it is none.
@@ -20,40 +19,15 @@ pub struct ObservationRows {
 impl ObservationRows {
     /// At the given values, without the columns of unknowns that are fixed or held.
     pub fn new<M: Model>(problem: &Problem<M>, values: &[f64], held: &[usize], pool: &ThreadPool) -> Self {
-        let layout = problem.layout();
         let equations = ObservationEquations::new(problem, None, values, held, pool);
         let of_locals = problem.for_locals(pool, |buffers, local| {
             let mut found = Self::empty();
-            for group in layout.groups_of(local) {
-                let mut rows = buffers.rows(layout, group);
-                equations.write(local, group, &mut rows);
-                let GroupRows { constant, local: own, kept, common } = rows;
-                let columns: Vec<usize> = layout
-                    .local_range(local)
-                    .chain(layout.kept_range(layout.kept_of(group)))
-                    .chain(layout.common_columns(group))
-                    .collect();
-                for (row, &constant) in constant.iter().enumerate() {
-                    let of = |part: &'_ [f64]| part.len() / layout.rows();
-                    let parts = [&*own, &*kept, &*common];
-                    let values = parts.iter().flat_map(|part| part[row * of(part)..][..of(part)].to_vec());
-                    found.push(columns.iter().copied().zip(values), constant);
-                }
-            }
-            found
-        });
-        let of_ties = problem.for_ties(|tie, rows| {
-            let mut found = Self::empty();
-            equations.write_tie(tie, rows);
-            let columns: Vec<usize> = layout.tie_columns(tie).collect();
-            let TieRows { constant, coefficients } = rows;
-            for (&constant, row) in constant.iter().zip(coefficients.chunks_exact(columns.len())) {
-                found.push(columns.iter().copied().zip(row.iter().copied()), constant);
-            }
+            equations.each_row(buffers, local, |row| found.push(row.taken(), row.constant));
             found
         });
         let mut all = Self::empty();
-        of_locals.into_iter().chain(of_ties).for_each(|part| all.append(part));
+        of_locals.into_iter().for_each(|part| all.append(part));
+        equations.each_row_of_ties(|_, row| all.push(row.taken(), row.constant));
         let weighted = problem.weighted(values);
         let fixed = |unknown: usize| problem.sd[unknown] == 0.0 || held.contains(&unknown);
         for unknown in 0..values.len() {

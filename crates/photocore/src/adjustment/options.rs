@@ -1,4 +1,4 @@
-//! How to adjust, and what is told while it goes on.
+//! How to adjust, and the events of it.
 
 use super::loss::Loss;
 use super::method::Method;
@@ -57,7 +57,7 @@ pub enum Phase {
     Invert,
 }
 
-/// What is told while the adjustment runs.
+/// An event of an adjustment that runs.
 #[derive(Debug, Clone, Copy)]
 pub enum Event {
     /// A phase has come so far: `done` of `total` local blocks.

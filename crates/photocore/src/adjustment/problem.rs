@@ -103,8 +103,8 @@ pub trait Model: Sync {
         None
     }
 
-    /// Whether what is observed of groups is known to leave all motions open, where none of the unknowns is fixed. They are then tried on some
-    /// groups only.
+    /// Whether what is observed of groups is known to leave all motions open, where none of the unknowns is fixed. Some groups are then
+    /// looked at for all.
     fn groups_leave_open(&self) -> bool {
         false
     }

@@ -10,7 +10,7 @@ use super::linearized::Linearized;
 use super::problem::{Model, Problem, Weighted};
 use super::result::AdjustError;
 use super::walk::Buffers;
-use crate::normals::{Between, Equations, TieRows};
+use crate::normals::{Between, SolveOptions};
 
 /// Parts that the walk over the local blocks is made of, whatever the number of threads: so sums have the same bits.
 const PARTS: usize = 16;
@@ -41,7 +41,8 @@ impl Linearized {
     ) -> Result<Vec<f64>, AdjustError> {
         let rows = Rows::new(self, problem, pool);
         let rights = pool.install(|| rows.transposed(&columns));
-        let solutions = self.solve_for(problem, &rights, pool, between)?;
+        let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
+        let solutions = self.solve(&rows.equations, &options, pool, between)?;
         drop(rights);
         pool.install(|| rows.subtract(&solutions, &mut columns));
         Ok(columns)
@@ -59,24 +60,20 @@ impl Linearized {
 struct Rows<'a, M: Model> {
     problem: &'a Problem<M>,
     equations: ObservationEquations<'a, M>,
+    values: &'a [f64],
     /// Which unknowns are fixed or held.
     fixed: Vec<bool>,
     /// Those that are weighted together with others.
     together: Vec<Weighted>,
-    /// Which are weighted by themselves.
-    alone: Vec<bool>,
 }
 
 impl<'a, M: Model> Rows<'a, M> {
-    fn new(linearized: &Linearized, problem: &'a Problem<M>, pool: &ThreadPool) -> Self {
+    fn new(linearized: &'a Linearized, problem: &'a Problem<M>, pool: &ThreadPool) -> Self {
         let Linearized { values, held, .. } = linearized;
         let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
         held.iter().for_each(|&unknown| fixed[unknown] = true);
-        let together = problem.weighted(values);
-        let mut alone: Vec<bool> = (0..fixed.len()).map(|i| problem.is_weighted(i) && !fixed[i]).collect();
-        together.iter().for_each(|own| alone[own.unknowns()].fill(false));
-        let equations = linearized.equations(problem, pool);
-        Self { problem, equations, fixed, together, alone }
+        let (together, equations) = (problem.weighted(values), linearized.equations(problem, pool));
+        Self { problem, equations, values, fixed, together }
     }
 
     /// The local blocks of a part.
@@ -151,56 +148,25 @@ impl<'a, M: Model> Rows<'a, M> {
         });
     }
 
-    /// Tells of the rows of some local blocks: their number, and what they take.
-    fn each_row_of(&self, locals: Range<usize>, mut tell: impl FnMut(usize, &Taken)) {
-        let layout = self.problem.layout();
+    /// Hands out the rows of some local blocks: their number, and what they take.
+    fn each_row_of(&self, locals: Range<usize>, mut take: impl FnMut(usize, &Taken)) {
         let (mut buffers, mut taken) = (Buffers::default(), Taken::new());
         for local in locals {
-            for group in layout.groups_of(local) {
-                let mut rows = buffers.rows(layout, group);
-                self.equations.write(local, group, &mut rows);
-                for row in 0..layout.rows() {
-                    let of = |values: &[f64]| {
-                        let width = values.len() / layout.rows();
-                        row * width..(row + 1) * width
-                    };
-                    taken.clear();
-                    taken.extend(layout.local_range(local).zip(rows.local[of(rows.local)].iter().copied()));
-                    let kept = layout.kept_range(layout.kept_of(group));
-                    taken.extend(kept.zip(rows.kept[of(rows.kept)].iter().copied()));
-                    let common = layout.common_columns(group);
-                    taken.extend(common.zip(rows.common[of(rows.common)].iter().copied()));
-                    tell(group * layout.rows() + row, &taken);
-                }
-            }
+            self.equations.each_row(&mut buffers, local, |row| {
+                taken.clear();
+                taken.extend(row.taken());
+                take(row.number, &taken);
+            });
         }
     }
 
     /// The same of ties and of weighted unknowns.
-    fn each_other_row(&self, mut tell: impl FnMut(usize, &Taken)) {
-        let layout = self.problem.layout();
-        let first = layout.groups() * layout.rows();
-        let (mut constant, mut coefficients) = (Vec::new(), Vec::new());
-        for tie in 0..layout.ties().len() {
-            let (rows, columns) = (layout.tie_rows(tie), layout.tie_columns(tie).collect::<Vec<usize>>());
-            constant.resize(rows.len(), 0.0);
-            coefficients.resize(rows.len() * columns.len(), 0.0);
-            self.equations
-                .write_tie(tie, &mut TieRows { constant: &mut constant, coefficients: &mut coefficients });
-            for (row, values) in rows.zip(coefficients.chunks_exact(columns.len().max(1))) {
-                tell(first + row, &columns.iter().copied().zip(values.iter().copied()).collect());
-            }
-        }
-        let first = self.problem.observation_sd.len();
-        for (unknown, _) in self.alone.iter().enumerate().filter(|(_, alone)| **alone) {
-            tell(first + unknown, &vec![(unknown, self.problem.sd[unknown].recip())]);
-        }
-        for own in &self.together {
-            for (row, unknown) in own.rows().zip(own.unknowns()).filter(|&(_, i)| self.problem.is_weighted(i))
-            {
-                let taken = own.unknowns().zip(row.iter().copied()).filter(|&(other, _)| !self.fixed[other]);
-                tell(first + unknown, &taken.collect());
-            }
+    fn each_other_row(&self, mut take: impl FnMut(usize, &Taken)) {
+        self.equations.each_row_of_ties(|_, row| take(row.number, &row.taken().collect()));
+        let (problem, first) = (self.problem, self.problem.observation_sd.len());
+        for unknown in problem.weighted_among(0..problem.sd.len()) {
+            let (row, _) = problem.prior_row(&problem.sd, self.values, &self.together, unknown);
+            take(first + unknown, &row.into_iter().filter(|&(other, _)| !self.fixed[other]).collect());
         }
     }
 }

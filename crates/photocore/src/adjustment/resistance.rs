@@ -33,7 +33,7 @@ impl<M: Model> Problem<M> {
         let mut buffers = Buffers::default();
         if let Some(groups) = sums.first_mut() {
             for local in 0..layout.locals() {
-                candidates.add_local(groups, &mut buffers, layout, &equations, local);
+                equations.each_row(&mut buffers, local, |row| candidates.add_row(groups, row.taken()));
             }
         }
         self.for_ties(|tie, rows| {

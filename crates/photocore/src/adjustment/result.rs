@@ -2,17 +2,12 @@
 
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
 use thiserror::Error;
 
-use super::datum::{Adjusted, Datum, DatumError, moved};
-use super::linearized::Inverted;
-use super::loss::Loss;
 use super::method::NEGLIGIBLE;
-use super::options::{Iteration, Options, Status};
-use super::problem::{Model, Problem};
+use super::options::{Iteration, Status};
 use super::statistics::{Counts, Observed, standardized};
-use crate::normals::{Between, Cofactors, Operations, Ordering, SelectedInverse, Stopped};
+use crate::normals::{Cofactors, Operations, Ordering, SelectedInverse, Stopped};
 
 /// Time spent in each phase, in seconds, over all iterations.
 #[derive(Debug, Clone, Copy, Default)]
@@ -92,133 +87,13 @@ pub struct Adjustment {
     pub seconds: Seconds,
     /// The ordering in force.
     pub ordering: Ordering,
-    /// The orderings that were tried, each with the predicted multiply-adds of a factorisation.
+    /// The orderings that were compared, each with the predicted multiply-adds of a factorisation.
     pub predictions: Vec<(Ordering, f64)>,
     /// Kept blocks (the border is the block after the last) in the order of their elimination.
     pub order: Vec<usize>,
 }
 
 impl Adjustment {
-    /// At the values that were reached, without iterations and cofactors.
-    pub(super) fn at<M: Model>(
-        problem: &Problem<M>,
-        loss: Option<Loss>,
-        unknowns: Vec<f64>,
-        pool: &ThreadPool,
-    ) -> Self {
-        let locals = problem.layout().all_locals();
-        let symbolic = problem.system.symbolic();
-        let residuals = problem.residuals(pool, &unknowns);
-        let weights =
-            |loss: Loss| problem.group_squares(&residuals).map(|square| loss.weight(square)).collect();
-        Self {
-            status: Status::Converged,
-            initial_sum_of_squares: f64::NAN,
-            iterations: vec![],
-            history: vec![unknowns[locals.end..].to_vec()],
-            last_local_corrections: vec![0.0; locals.len()],
-            weights: loss.map(weights),
-            residuals,
-            redundancy: None,
-            prior_redundancy: None,
-            redundancy_excess: None,
-            unknowns,
-            cofactors: None,
-            lost: None,
-            selected: None,
-            undetermined: None,
-            counts: problem.counts(0),
-            datum: vec![],
-            weak: vec![],
-            collapsed: vec![],
-            operations: symbolic.operations(problem.layout()),
-            formations: 0,
-            seconds: Seconds::default(),
-            ordering: symbolic.ordering(),
-            predictions: symbolic.predictions().to_vec(),
-            order: symbolic.order().to_vec(),
-        }
-    }
-
-    /// After the last step, without cofactors.
-    pub fn between<M: Model>(
-        problem: &Problem<M>,
-        before: &[f64],
-        reached: Vec<f64>,
-        pool: &ThreadPool,
-    ) -> Self {
-        let locals = problem.layout().all_locals();
-        let corrections = before[locals.clone()].iter().zip(&reached).map(|(from, to)| to - from).collect();
-        let after = Self::at(problem, None, reached, pool);
-        let history = [vec![before[locals.end..].to_vec()], after.history].concat();
-        Self { history, last_local_corrections: corrections, ..after }
-    }
-
-    /// Where the normal equations were inverted, without iterations.
-    ///
-    /// * `loss`: what has weighted the observations.
-    pub fn inverted<M: Model>(
-        problem: &Problem<M>,
-        loss: Option<Loss>,
-        mut inverted: Inverted,
-        pool: &ThreadPool,
-    ) -> Self {
-        let mut adjustment = Self::at(problem, loss, std::mem::take(&mut inverted.values), pool);
-        adjustment.put(problem, inverted);
-        adjustment
-    }
-
-    /// Puts in cofactors and redundancy numbers, with one more formation that they come from.
-    pub(super) fn put<M>(&mut self, problem: &Problem<M>, inverted: Inverted) {
-        self.redundancy = Some(inverted.cofactors.equations.iter().map(|share| 1.0 - share).collect());
-        self.counts = problem.counts(inverted.held.len());
-        self.datum = inverted.held;
-        self.selected = inverted.cofactors.groups.is_some().then_some(inverted.selected);
-        self.cofactors = Some(inverted.cofactors);
-        self.prior_redundancy = Some(inverted.prior_redundancy);
-        self.lost = inverted.lost;
-        self.formations += 1;
-        self.seconds.add(&inverted.seconds);
-    }
-
-    /// Sum of all redundancy numbers minus the degrees of freedom.
-    pub(super) fn excess(&self) -> f64 {
-        let all = self.redundancy.iter().chain(&self.prior_redundancy).flatten();
-        all.sum::<f64>() - self.counts.degrees_of_freedom() as f64
-    }
-
-    /// Takes an adjusted network to another datum: unknowns and, where so asked, all cofactors and redundancy numbers. It need not have any
-    /// before. Returns about how large a part of its variances may be rounding.
-    ///
-    /// * `options`: those of the adjustment;
-    /// * `reference`: the values x_0 from which the carriers move least, usually the initial ones.
-    ///
-    /// # Errors
-    /// A network that is not free, carriers that do not carry all null vectors, unknowns that are not determined; an interruption.
-    pub fn take_to<M: Model>(
-        &mut self,
-        problem: &Problem<M>,
-        options: &Options,
-        datum: &Datum,
-        reference: &[f64],
-        pool: &ThreadPool,
-        between: Between<'_>,
-    ) -> Result<f64, DatumError> {
-        if self.undetermined.is_some() {
-            return Err(DatumError::NoCofactors);
-        }
-        let adjusted = Adjusted { unknowns: &self.unknowns, held: &self.datum, loss: options.loss };
-        if !options.covariance {
-            (self.unknowns, _) = moved(problem, adjusted, datum, reference, pool)?;
-            return Ok(0.0);
-        }
-        let mut inverted = Inverted::in_datum(problem, adjusted, datum, reference, pool, between)?;
-        self.unknowns = std::mem::take(&mut inverted.values);
-        self.put(problem, inverted);
-        self.redundancy_excess = options.loss.is_none().then(|| self.excess());
-        Ok(self.lost.unwrap_or(0.0))
-    }
-
     /// Whether cofactors, which were formed before the last step, hold after it: the step was the last one, and short.
     pub fn holds_after_last_step(&self) -> bool {
         let last = self.iterations.last().map_or(0.0, |iteration| iteration.largest_change);

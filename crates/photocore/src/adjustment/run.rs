@@ -15,7 +15,7 @@ use super::problem::{Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
 use crate::normals::{FactorOptions, InvertOptions, SolveOptions};
 
-/// Whoever is told on the calling thread what is going on; breaking stops the work.
+/// Called with what is going on, on the calling thread; breaking stops the work.
 pub type Watch<'a> = &'a mut dyn FnMut(Event) -> ControlFlow<()>;
 
 /// Bytes that the stack of a thread takes: none is started where there is no memory for it.
@@ -231,7 +231,7 @@ pub(super) struct Run<'a, 'w, M: Model> {
 
 impl<'a, M: Model> Run<'a, '_, M> {
     /// Ends at the values reached, without a further step. Cofactors are those of the reweighted equations, whose weights can be
-    /// told, without second-order term.
+    /// reported, without second-order term.
     pub(super) fn stay(&mut self, state: State<'a, M>, status: Status) -> Result<End<'a, M>, AdjustError> {
         let plain = state.linearized.damping() == 0.0 && !state.linearized.is_curved();
         self.curved = false;

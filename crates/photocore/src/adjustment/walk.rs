@@ -15,6 +15,8 @@ pub(super) struct Buffers {
     local: Vec<f64>,
     kept: Vec<f64>,
     common: Vec<f64>,
+    /// Room for the unknowns of these rows.
+    pub columns: Vec<usize>,
 }
 
 impl Buffers {
@@ -61,7 +63,7 @@ impl<M: Sync> Problem<M> {
         pool.install(|| stretches.map_init(Buffers::default, each).collect())
     }
 
-    /// What `each` makes of every tie, in their order: few beside the local blocks.
+    /// What `each` makes of every tie, in their order: there are few.
     pub(super) fn for_ties<T>(&self, mut each: impl FnMut(usize, &mut TieRows<'_>) -> T) -> Vec<T> {
         let layout = self.layout();
         let (mut constant, mut coefficients) = (Vec::new(), Vec::new());

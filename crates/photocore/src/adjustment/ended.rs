@@ -1,0 +1,99 @@
+//! Adjustments put together where they have ended.
+
+use rayon::ThreadPool;
+
+use super::linearized::Inverted;
+use super::loss::Loss;
+use super::options::Status;
+use super::problem::{Model, Problem};
+use super::result::{Adjustment, Seconds};
+
+impl Adjustment {
+    /// At the values that were reached, without iterations and cofactors.
+    pub(super) fn at<M: Model>(
+        problem: &Problem<M>,
+        loss: Option<Loss>,
+        unknowns: Vec<f64>,
+        pool: &ThreadPool,
+    ) -> Self {
+        let locals = problem.layout().all_locals();
+        let symbolic = problem.system.symbolic();
+        let residuals = problem.residuals(pool, &unknowns);
+        let weights =
+            |loss: Loss| problem.group_squares(&residuals).map(|square| loss.weight(square)).collect();
+        Self {
+            status: Status::Converged,
+            initial_sum_of_squares: f64::NAN,
+            iterations: vec![],
+            history: vec![unknowns[locals.end..].to_vec()],
+            last_local_corrections: vec![0.0; locals.len()],
+            weights: loss.map(weights),
+            residuals,
+            redundancy: None,
+            prior_redundancy: None,
+            redundancy_excess: None,
+            unknowns,
+            cofactors: None,
+            lost: None,
+            selected: None,
+            undetermined: None,
+            counts: problem.counts(0),
+            datum: vec![],
+            weak: vec![],
+            collapsed: vec![],
+            operations: symbolic.operations(problem.layout()),
+            formations: 0,
+            seconds: Seconds::default(),
+            ordering: symbolic.ordering(),
+            predictions: symbolic.predictions().to_vec(),
+            order: symbolic.order().to_vec(),
+        }
+    }
+
+    /// After the last step, without cofactors.
+    pub fn between<M: Model>(
+        problem: &Problem<M>,
+        before: &[f64],
+        reached: Vec<f64>,
+        pool: &ThreadPool,
+    ) -> Self {
+        let locals = problem.layout().all_locals();
+        let corrections = before[locals.clone()].iter().zip(&reached).map(|(from, to)| to - from).collect();
+        let after = Self::at(problem, None, reached, pool);
+        let history = [vec![before[locals.end..].to_vec()], after.history].concat();
+        Self { history, last_local_corrections: corrections, ..after }
+    }
+
+    /// Where the normal equations were inverted, without iterations.
+    ///
+    /// * `loss`: what has weighted the observations.
+    pub fn inverted<M: Model>(
+        problem: &Problem<M>,
+        loss: Option<Loss>,
+        mut inverted: Inverted,
+        pool: &ThreadPool,
+    ) -> Self {
+        let mut adjustment = Self::at(problem, loss, std::mem::take(&mut inverted.values), pool);
+        adjustment.put(problem, inverted);
+        adjustment
+    }
+
+    /// Puts in cofactors and redundancy numbers, with one more formation that they come from.
+    pub(super) fn put<M>(&mut self, problem: &Problem<M>, inverted: Inverted) {
+        self.redundancy = Some(inverted.cofactors.equations.iter().map(|share| 1.0 - share).collect());
+        self.counts = problem.counts(inverted.held.len());
+        self.datum = inverted.held;
+        self.selected = inverted.cofactors.groups.is_some().then_some(inverted.selected);
+        self.cofactors = Some(inverted.cofactors);
+        self.prior_redundancy = Some(inverted.prior_redundancy);
+        self.lost = inverted.lost;
+        self.formations += 1;
+        self.seconds.add(&inverted.seconds);
+    }
+
+    /// Sum of all redundancy numbers minus the degrees of freedom.
+    pub(super) fn excess(&self) -> f64 {
+        let all = self.redundancy.iter().chain(&self.prior_redundancy).flatten();
+        all.sum::<f64>() - self.counts.degrees_of_freedom() as f64
+    }
+}

@@ -1,0 +1,90 @@
+//! Adjusted networks in another datum, without adjusting again.
+
+use rayon::ThreadPool;
+
+use super::datum::{Adjusted, Datum, DatumError, moved};
+use super::equations::ObservationEquations;
+use super::linearized::{Inverted, Linearized};
+use super::options::Options;
+use super::problem::{Model, Problem};
+use super::result::Adjustment;
+use crate::normals::{Between, FactorOptions, InvertOptions};
+
+impl Linearized {
+    /// Moves an adjusted network to another datum, and factors its normal equations there.
+    ///
+    /// # Errors
+    /// A network that is not free, carriers that do not carry all null vectors; what ends adjustments.
+    pub fn in_datum<M: Model>(
+        problem: &Problem<M>,
+        adjusted: Adjusted<'_>,
+        datum: &Datum,
+        reference: &[f64],
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<Self, DatumError> {
+        let (unknowns, basis) = moved(problem, adjusted, datum, reference, pool)?;
+        let Adjusted { held, loss, .. } = adjusted;
+        let equations = ObservationEquations::new(problem, loss, &unknowns, held, pool);
+        let options = FactorOptions::default();
+        let formed = Self::of(&equations, unknowns, held.to_vec(), &options, pool, between)?;
+        let mut linearized = formed.determined()?;
+        linearized.basis = Some(basis);
+        linearized.take_to_datum(&equations, pool, between)?;
+        linearized.factor.forget();
+        Ok(linearized)
+    }
+}
+
+impl Inverted {
+    /// Moves an adjusted network to another datum, and computes all cofactors there.
+    ///
+    /// # Errors
+    /// Those of [`Linearized::in_datum`].
+    pub fn in_datum<M: Model>(
+        problem: &Problem<M>,
+        adjusted: Adjusted<'_>,
+        datum: &Datum,
+        reference: &[f64],
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<Self, DatumError> {
+        let linearized = Linearized::in_datum(problem, adjusted, datum, reference, pool, between)?;
+        let equations = linearized.equations(problem, pool);
+        Ok(linearized.invert(&equations, &InvertOptions::default(), pool, between)?)
+    }
+}
+
+impl Adjustment {
+    /// Takes an adjusted network to another datum: unknowns and, where so asked, all cofactors and redundancy numbers. It need not have any
+    /// before. Returns about how large a part of its variances may be rounding.
+    ///
+    /// * `options`: those of the adjustment;
+    /// * `reference`: the values x_0 from which the carriers move least, usually the initial ones.
+    ///
+    /// # Errors
+    /// A network that is not free, carriers that do not carry all null vectors, unknowns that are not determined; an interruption.
+    pub fn take_to<M: Model>(
+        &mut self,
+        problem: &Problem<M>,
+        options: &Options,
+        datum: &Datum,
+        reference: &[f64],
+        pool: &ThreadPool,
+        between: Between<'_>,
+    ) -> Result<f64, DatumError> {
+        if self.undetermined.is_some() {
+            return Err(DatumError::NoCofactors);
+        }
+        let adjusted = Adjusted { unknowns: &self.unknowns, held: &self.datum, loss: options.loss };
+        if !options.covariance {
+            (self.unknowns, _) = moved(problem, adjusted, datum, reference, pool)?;
+            return Ok(0.0);
+        }
+        let mut inverted = Inverted::in_datum(problem, adjusted, datum, reference, pool, between)?;
+        self.unknowns = std::mem::take(&mut inverted.values);
+        self.put(problem, inverted);
+        self.redundancy_excess = options.loss.is_none().then(|| self.excess());
+        Ok(self.lost.unwrap_or(0.0))
+    }
+}
