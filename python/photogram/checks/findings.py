@@ -37,7 +37,7 @@ _CORRECT = (
     "Correct what the first finding names, and check again: one mistake may hide another, and explain it.",
 )
 _LOOK = ("Look at what was found first.",)
-_ADJUST = ("Adjust: `photogram adjust`, or `photogram giant` for a GIANT project.",)
+_ADJUST = ("Adjust: `photogram adjust`, `giant` for a GIANT project, `collection` for a collection.",)
 SHOWN = 40
 """Findings of one level that a section of the text shows at most; the JSON document has all."""
 
