@@ -21,6 +21,19 @@ def test_a_network_agrees_with_the_dense_step(number):
     assert found.ending in ("agree", "too weak to compare"), found
 
 
+def test_a_datum_is_reached_that_its_carriers_contradict():
+    """Offsets of millimetres from a plane give the only scale, of the wrong sign.
+
+    The carriers come nowhere near to their places, and each move takes them a few per cent of the way only.
+    """
+    network = random_network(7, 40)
+    found = compare(network)
+    assert found.ending == "agree", found
+    result = adjust(network.block, datum=network.datum)
+    assert result.verdict.code == "undetermined"
+    assert any("behind the camera" in str(each) for each in result.messages)
+
+
 def test_these_networks_have_every_camera_kind_and_datum():
     networks = [random_network(SEED, number) for number in NUMBERS]
     assert {model for each in networks for model in each.models} == set(MODELS)

@@ -62,10 +62,11 @@ pub enum DatumError {
 
 /// Null vectors that the carriers tell apart by less than this share are not carried.
 const SEPARABLE: f64 = 1e-10;
-/// The network is moved until so many moves have not halved what the carriers are still to go: rounding then.
+/// The network is moved until so many moves have left the carriers no nearer than any before: rounding then.
 const STALLS: usize = 3;
-/// Moves converge quadratically, near the end.
-const MOST_MOVES: usize = 100;
+/// Moves converge quadratically where carriers come near to their places; where these contradict what they are to each other, by a few
+/// per cent each.
+const MOST_MOVES: usize = 1000;
 
 /// Where an adjustment has ended.
 #[derive(Debug, Clone, Copy)]
@@ -148,7 +149,7 @@ pub(super) fn moved<M: Model>(
     pool: &ThreadPool,
 ) -> Result<(Vec<f64>, Basis), DatumError> {
     let mut unknowns = adjusted.unknowns.to_vec();
-    let (mut before, mut stalls) = (f64::INFINITY, 0);
+    let (mut least, mut stalls) = (f64::INFINITY, 0);
     let square = |&(carrier, factor): &(usize, f64)| (factor * reference[carrier]).powi(2);
     let rounding = f64::EPSILON * datum.carriers.iter().map(square).sum::<f64>().sqrt();
     // What was found to leave all motions open leaves them open wherever it is moved to.
@@ -166,12 +167,12 @@ pub(super) fn moved<M: Model>(
         };
         let apart = problem.model.step_between(&unknowns, reference);
         let carried = Carried::new(&motions, combinations, datum, &apart).ok_or(DatumError::NotCarried)?;
-        stalls += usize::from(carried.length >= 0.5 * before);
+        stalls += usize::from(carried.length >= least);
         if carried.length <= rounding || stalls == STALLS {
             let basis = carried.basis(&motions, datum).ok_or(DatumError::NotCarried)?;
             return Ok((unknowns, basis));
         }
-        before = carried.length;
+        least = least.min(carried.length);
         let mut along = vec![0.0; kept.1];
         for (&motion, amount) in kept.0.iter().zip(carried.along()) {
             along[motion] = amount;
