@@ -96,7 +96,7 @@ def features(
     """Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.
 
     PATH is a result that `photogram adjust --parquet` has written, or a project, which is adjusted first.
-    Those of its [features] are fitted where no option names others.
+    Those that the project declares are fitted where no option names others.
     """
     path = project_path(job, path)
     with job:
