@@ -3,7 +3,8 @@
     python docs/pictures_figures.py
 
 The network is the packaged example of GIANT, the camera that of examples/self_calibration.py; the field of
-residuals is a simulated block whose camera bends a little more than the adjustment knows.
+residuals is a simulated block whose camera bends a little more than the adjustment knows, the features are
+those of the example of metrology.
 """
 
 from __future__ import annotations
@@ -15,9 +16,19 @@ from pathlib import Path
 import numpy as np
 from walk import rounded
 
-from photogram import Block, Result, adjust, simulate
+from photogram import (
+    Block,
+    InnerConstraints,
+    Result,
+    adjust,
+    adjust_started,
+    first_values,
+    formats,
+    simulate,
+)
 from photogram.giant import read_project
 from photogram.plots import figures
+from photogram.results.fitting import with_features
 from photogram.show.pictures import drawn
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
@@ -35,6 +46,13 @@ def bent() -> Block:
     return block.replace(image_xy=block.image_xy * (1.0 + 0.02 * radius**2 / 160.0**3))
 
 
+def part() -> Result:
+    """Return the packaged example of metrology, adjusted, with the circle through its holes."""
+    project = formats.read(str(files("photogram") / "examples" / "flange"))
+    result = adjust_started(first_values(project.block), datum=InnerConstraints())
+    return with_features(result, project.features)
+
+
 def results() -> dict[str, tuple[Result, tuple[str, ...]]]:
     """Return adjustments, and which pictures are taken of each."""
     galveston = adjust(read_project(files("photogram") / "examples" / "galveston").to_block())
@@ -42,6 +60,7 @@ def results() -> dict[str, tuple[Result, tuple[str, ...]]]:
         "giant": (galveston, ("network", "redundancy", "tests")),
         "lens": (adjust(measured()), ("correlations", "distortion")),
         "bent": (adjust(bent()), ("residuals",)),
+        "part": (part(), ("features",)),
     }
 
 

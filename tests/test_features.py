@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from photogram import InnerConstraints, InputError, Spheroid, adjust, features, formats, read_result, simulate
 from photogram.results.features import named_points
@@ -155,6 +156,16 @@ def test_reports_tables_and_saved_results_have_them(result, names, tmp_path):
     assert table.loc[table["quantity"] == "flatness", "expanded"].tolist() == [flatness.expanded]
     # In another datum they would be others.
     assert told.relative_to(points=names[:3]).features is None
+
+
+def test_deviations_are_drawn(result, names):
+    told = with_features(result, {"ground": ("plane", names), "d": ("distance", names[:2])})
+    axes = told.plot.features(Figure())
+    assert axes.get_title(loc="left") == "ground: plane through 8 points"
+    drawn = np.concatenate([line.get_ydata() for line in axes.lines if len(line.get_ydata()) == 8])
+    np.testing.assert_allclose(drawn, told.features["ground"].deviations[:, 0])
+    with pytest.raises(InputError, match="no deviations to draw"):
+        result.plot.features()
 
 
 def test_patterns_name_points_in_the_order_in_which_they_are_asked_for():

@@ -6,6 +6,7 @@
 from photogram.plots.accessor import PICTURES, Plots, figures, picture_files
 from photogram.plots.correlations import correlations
 from photogram.plots.distortion import distortion
+from photogram.plots.features import features
 from photogram.plots.network import network
 from photogram.plots.redundancy import redundancy
 from photogram.plots.residuals import residuals
@@ -16,6 +17,7 @@ __all__ = [
     "Plots",
     "correlations",
     "distortion",
+    "features",
     "figures",
     "network",
     "picture_files",

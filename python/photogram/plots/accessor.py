@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from photogram.errors import InputError
 from photogram.plots.correlations import correlations
 from photogram.plots.distortion import distortion
+from photogram.plots.features import features
 from photogram.plots.network import network
 from photogram.plots.panels import Where, figure_of
 from photogram.plots.redundancy import redundancy
@@ -29,6 +30,7 @@ PICTURES: dict[str, Callable[..., Any]] = {
     "tests": tests,
     "correlations": correlations,
     "distortion": distortion,
+    "features": features,
 }
 """The pictures by name, in the order in which a reader looks at them."""
 
@@ -72,6 +74,10 @@ class Plots:
         """Draw curves of radial distortion; see :func:`photogram.plots.distortion`."""
         return distortion(self._result, ax)
 
+    def features(self, ax: Where = None) -> Any:
+        """Draw deviations of points from their features; see :func:`photogram.plots.features`."""
+        return features(self._result, ax)
+
     def save(self, folder: Path | str, ending: str = "png") -> list[Path]:
         """Write all pictures that there are, `network.png` ..., and return their places.
 
@@ -100,14 +106,15 @@ def figures(result: object, names: Sequence[str] = tuple(PICTURES)) -> dict[str,
     """Return pictures of a result by name, each a figure that belongs to no window.
 
     Those that there is nothing of are left out: correlations and distortion of known cameras, redundancy and
-    tests without covariances.
+    tests without covariances, features where none are fitted.
 
     Parameters
     ----------
     result
         An adjusted block or collection.
     names
-        Which, of `network`, `residuals`, `redundancy`, `tests`, `correlations`, `distortion`.
+        Which, of `network`, `residuals`, `redundancy`, `tests`, `correlations`, `distortion`,
+        `features`.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats, Indices
 from photogram.statistics.outliers import Observations
 
-__all__ = ["Correlated", "Curve", "Curves", "Images", "Pictured", "Plan", "pictured"]
+__all__ = ["Correlated", "Curve", "Curves", "Deviations", "Images", "Pictured", "Plan", "pictured"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +162,39 @@ class Curves:
         return (1000.0, "µm") if self.unit == "mm" else (1.0, self.unit)
 
 
+@dataclass(frozen=True, eq=False)
+class Deviations:
+    """Distances of n points from a feature that is fitted to them.
+
+    Attributes
+    ----------
+    title
+        What the feature is.
+    unit
+        Of lengths.
+    points
+        The names of the points.
+    directions
+        What d deviations of each point are.
+    values, expanded
+        (n, d) deviations, and k times their standard deviations.
+    """
+
+    title: str
+    unit: str
+    points: Sequence[str]
+    directions: Sequence[str]
+    values: Floats
+    expanded: Floats
+
+    @property
+    def shown_as(self) -> tuple[float, str]:
+        """What deviations are multiplied by, and the unit that they then have."""
+        largest = float(np.abs(self.values).max(initial=0.0))
+        small = {"m": (1e6, "µm") if largest < 1e-3 else (1e3, "mm"), "mm": (1e3, "µm")}
+        return small[self.unit] if self.unit in small and largest < 1.0 else (1.0, self.unit)
+
+
 class Pictured(ABC):
     """What is drawn of an adjusted network. Each part is computed when it is asked for."""
 
@@ -211,6 +244,11 @@ class Pictured(ABC):
     @abstractmethod
     def distortion(self) -> list[Curves]:
         """Cameras with radial distortion."""
+
+    @property
+    def deviations(self) -> list[Deviations]:
+        """Features with deviations of points."""
+        return []
 
 
 @singledispatch

@@ -26,7 +26,8 @@ def features_sections(features: Features | None) -> list[Section]:
     for each in features:
         lines += [f"{each.name}: {through(each)}", *(_line(each, own) for own in each.quantities)]
         if each.form:
-            figures = f"T = {each.statistic:.4g} of {each.freedom}, p = {each.probability:.2g}"
+            p = f"p = {each.probability:.2g}" if (each.probability or 0.0) > 1e-99 else "p < 1e-99"
+            figures = f"T = {each.statistic:.4g} of {each.freedom}, {p}"
             lines += [f"  form: {each.form} ({figures})"]
     return [("Features", [*lines, *(f"{each[:1].upper()}{each[1:]}." for each in features.remarks)])]
 

@@ -9,10 +9,11 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.network import geometry
 from photogram.network.rays import LocalAxes, local_axes
-from photogram.plots.pictured import Correlated, Curve, Curves, Images, Pictured, Plan, pictured
+from photogram.plots.pictured import Correlated, Curve, Curves, Deviations, Images, Pictured, Plan, pictured
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.ellipses import metric_covariances
+from photogram.results.features import Features, directions
 from photogram.results.findings import tested_observations
 from photogram.results.footprints import footprints
 from photogram.results.result import Result
@@ -122,6 +123,23 @@ class PicturedBlock(Pictured):
         """Cameras with radial distortion."""
         curves = [(each, distortion_curve(self.result, each)) for each in self.result.cameras]
         return [curves_of(each, curve) for each, curve in curves if curve is not None]
+
+    @property
+    def deviations(self) -> list[Deviations]:
+        """Features with deviations of points."""
+        found = self.result.features or Features(())
+        return [
+            Deviations(
+                f"{each.name}: {each.kind} through {len(each.points)} points",
+                self.result.block.linear_unit,
+                each.points,
+                directions(each.kind),
+                each.deviations,
+                found.k * each.deviation_sd,
+            )
+            for each in found
+            if each.deviations.size
+        ]
 
 
 def _bands(**sds: Floats) -> dict[str, Floats]:

@@ -53,7 +53,7 @@ def block_page(result: Result) -> Page:
     photos, points = block.image_photos[worst].tolist(), block.image_points[worst].tolist()
     sections = [
         _network_section(result, pictures),
-        features_section(result.features),
+        features_section(result.features, pictures["features"]),
         _size_section(result),
         _residuals_section(pictures),
         _redundancy_section(result, pictures),

@@ -43,6 +43,10 @@ CAPTIONS = {
         "Radial distortion with its standard deviations",
         "The curve, dashed where no image lies; where it is estimated, with one standard deviation beside.",
     ),
+    "features": (
+        "Deviations of points from their features",
+        "Outside positive, of a plane on the side of its normal; bars are U to either side.",
+    ),
 }
 """Title and caption by name."""
 
