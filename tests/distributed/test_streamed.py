@@ -1,5 +1,7 @@
 """Parts of a project on disk, read batch by batch: those of the same project read whole."""
 
+import shutil
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -111,6 +113,15 @@ def test_a_photo_that_is_not_there_is_named(project, tmp_path):
     table.to_parquet(folder / "images.parquet")
     with pytest.raises(InputError, match=r"images\.parquet: there is no photo 'nowhere'"):
         Streamed(folder, Wishes(), tmp_path / "parts").counted(2)
+
+
+def test_features_are_refused(project, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(project, folder)
+    with (folder / "project.toml").open("a") as file:
+        file.write('[features]\nd = { distance = ["a", "b"] }\n')
+    with pytest.raises(InputError, match=r"\[features\] take joint covariances"):
+        Streamed(folder, Wishes(), tmp_path / "parts")
 
 
 def test_what_has_to_be_read_whole_is_not_streamed(project, tmp_path):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from photogram.cli.job import Job, Reads
-from photogram.messages import counted
+from photogram.messages import counted, listed
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Indices
@@ -275,6 +275,8 @@ def described(project: Project) -> list[Section]:
     for each in block.observations:
         kinds[each.label] = kinds.get(each.label, 0) + 1
     size += [f"{counted(count, 'observation')} of the kind {kind}" for kind, count in kinds.items()]
+    if project.features:
+        size.append(f"{counted(len(project.features), 'feature')}: {listed(list(project.features))}")
     if block.mounts:
         size.append(f"{len(block.mounts)} photos on frames with others")
     cameras = []

@@ -70,17 +70,18 @@ def with_features(result: Result, definitions: Mapping[str, Definition]) -> Resu
     """Return a result with features; what keeps one from being fitted is told in its messages."""
     if not definitions:
         return result
-    found, messages = [], []
     try:
         fitted, empty = _fitting(result, 2.0, None)
     except (InputError, AdjustmentError) as error:
-        messages = [Message(f"no features: {error}")]
-        return replace(result, messages=[*result.messages, *messages])
+        return replace(result, messages=[*result.messages, Message(f"no features: {error}")])
+    found, messages = [], []
     for name, each in definitions.items():
         try:
             found.append(fitted(name, each))
         except InputError as error:
             messages.append(Message(error.message))
+        except AdjustmentError as error:
+            messages.append(Message(f"feature {name}: {error}"))
     told = [*result.messages, *messages, *(Message(each) for each in empty.remarks)]
     return replace(result, messages=told, features=replace(empty, features=tuple(found)))
 

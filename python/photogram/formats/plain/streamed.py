@@ -96,6 +96,12 @@ class Streamed:
     def __init__(self, path: Path, wishes: Wishes, folder: Path) -> None:
         settings = read_settings(path / SETTINGS if path.is_dir() else path)
         settings = replace(settings, sd={**settings.sd, **wishes.sd})
+        if settings.features:
+            raise InputError(
+                "[features] take joint covariances of points, which a block in parts does not keep: leave"
+                " them out, or adjust in one process",
+                file=settings.path,
+            )
         self._folder = folder / "buckets"
         shutil.rmtree(self._folder, ignore_errors=True)
         self._folder.mkdir(parents=True)
