@@ -254,3 +254,43 @@ def test_no_threads_are_started_beside_those_of_the_adjustment():
         [sys.executable, "-c", code], env=own, capture_output=True, text=True, check=False, timeout=120
     )
     assert (done.stdout, done.stderr) == ("1\n", "")
+
+
+ANOTHER_BEGINS = """
+import resource, threading
+from pathlib import Path
+import numpy as np
+from photogram import OutOfMemoryError, adjust, simulate
+from photogram._photocore import normal
+
+block = simulate(strips=2, photos_per_strip=6, seed=2).block
+numbers = np.zeros(1_900_000)
+unlimited = resource.getrlimit(resource.RLIMIT_AS)
+done = []
+
+def fails(progress):
+    if done or progress.iteration is None:
+        return
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + (2 << 20), unlimited[1]))
+    # It takes the reserve.
+    normal(numbers)
+    resource.setrlimit(resource.RLIMIT_AS, unlimited)
+    other = threading.Thread(target=lambda: done.append(adjust(block).status))
+    other.start()
+    other.join()
+
+try:
+    done.append(adjust(block, progress=fails, tolerance=1e-12).status)
+except OutOfMemoryError:
+    done.append("refused")
+print(*done)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="this system has no such limits")
+def test_a_job_that_begins_does_not_make_another_forget_that_memory_is_short():
+    done = subprocess.run(
+        [sys.executable, "-c", ANOTHER_BEGINS], capture_output=True, text=True, check=False, timeout=120
+    )
+    assert (done.stdout, done.stderr) == ("converged refused\n", "")

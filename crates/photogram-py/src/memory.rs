@@ -33,8 +33,10 @@ const LARGE: usize = 16 << 20;
 const PATIENCE: usize = 1 << 16;
 
 static KEPT: AtomicPtr<u8> = AtomicPtr::new(ptr::null_mut());
-/// Bytes of the last allocation that failed since the work began; 0 where none did.
-static FAILED: AtomicUsize = AtomicUsize::new(0);
+/// How many allocations have failed so far. It only ever rises: each job compares it with what it was when the job began.
+static FAILURES: AtomicUsize = AtomicUsize::new(0);
+/// Bytes of the last of them.
+static LAST: AtomicUsize = AtomicUsize::new(0);
 
 /// The allocator of the system, with a reserve.
 pub struct Reserved;
@@ -78,7 +80,8 @@ fn again(size: usize, allocate: impl Fn() -> *mut u8) -> *mut u8 {
             return pointer;
         }
     }
-    FAILED.store(size.max(1), SeqCst);
+    LAST.store(size, SeqCst);
+    FAILURES.fetch_add(1, SeqCst);
     if size > LARGE {
         return ptr::null_mut();
     }
@@ -105,12 +108,23 @@ const fn reserve() -> Layout {
     }
 }
 
+/// How many allocations had failed when a job began.
+#[derive(Clone, Copy)]
+pub struct Failures(usize);
+
+impl Failures {
+    /// Whether an allocation, of whichever job, has failed since.
+    pub fn more(self) -> bool {
+        FAILURES.load(SeqCst) != self.0
+    }
+}
+
 /// Puts the reserve in its place before work begins.
 ///
 /// # Errors
 /// There is no memory for it, nor for the stacks of threads beside it.
-pub fn arm() -> PyResult<()> {
-    FAILED.store(0, SeqCst);
+pub fn arm() -> PyResult<Failures> {
+    let before = Failures(FAILURES.load(SeqCst));
     // SAFETY: the layout is not empty.
     let fresh = || unsafe { System.alloc(reserve()) };
     if KEPT.load(SeqCst).is_null() {
@@ -127,7 +141,7 @@ pub fn arm() -> PyResult<()> {
     }
     // Or the compiler would see that nobody needs it.
     black_box(margin.as_mut_ptr());
-    Ok(())
+    Ok(before)
 }
 
 /// Addresses that a thread holds until its buffers, which need them, are taken.
@@ -198,14 +212,9 @@ pub fn no_buffers() -> PyErr {
     ))
 }
 
-/// Whether an allocation has failed since the work began.
-pub fn failed() -> bool {
-    FAILED.load(SeqCst) > 0
-}
-
 /// What Python hears when one has failed.
 pub fn failure() -> PyErr {
-    exhausted(&format!("an allocation of {} bytes failed: there is not enough memory", FAILED.load(SeqCst)))
+    exhausted(&format!("an allocation of {} bytes failed: there is not enough memory", LAST.load(SeqCst)))
 }
 
 /// An error of memory.

@@ -55,11 +55,11 @@ pub fn watched<T: Send, E: Send>(
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(&ThreadPool, Watch<'_>) -> Result<T, E> + Send,
 ) -> PyResult<Result<T, E>> {
-    memory::arm()?;
+    let failures = memory::arm()?;
     let mut raised = None;
     let mut last = Instant::now();
     let mut watch = |event: Event| {
-        if memory::failed() {
+        if failures.more() {
             return ControlFlow::Break(());
         }
         let due = matches!(event, Event::Iteration(_)) || last.elapsed() > PATIENCE;
@@ -96,7 +96,7 @@ pub fn watched<T: Send, E: Send>(
     let done = done.ok_or_else(memory::no_buffers)?;
     match raised {
         Some(error) => Err(error),
-        None if done.is_err() && memory::failed() => Err(memory::failure()),
+        None if done.is_err() && failures.more() => Err(memory::failure()),
         None => {
             // What is made of the result needs a reserve again.
             memory::arm()?;
