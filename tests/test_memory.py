@@ -294,3 +294,38 @@ def test_a_job_that_begins_does_not_make_another_forget_that_memory_is_short():
         [sys.executable, "-c", ANOTHER_BEGINS], capture_output=True, text=True, check=False, timeout=120
     )
     assert (done.stdout, done.stderr) == ("converged refused\n", "")
+
+
+SHORT_THREADS = """
+import threading
+import numpy as np
+from photogram import adjust, memory, resect, simulate
+
+block = simulate(strips=2, photos_per_strip=3, points_per_photo=8, seed=1).block
+ground = np.array([[0.0, 0, 10], [800, 50, 20], [750, 900, 0], [30, 820, 40], [400, 420, 5]])
+xy = np.array([[-40.0, -44], [42, -39], [37, 48], [-37, 41], [1, -1]])
+
+def after(times, work):
+    for _ in range(times):
+        each = threading.Thread(target=work)
+        each.start()
+        each.join()
+    return memory.resident_memory()
+
+def resected():
+    resect(ground, xy, -152.0, image_sd=0.5)
+
+after(20, lambda: adjust(block))
+first = after(100, resected)
+print(after(400, resected) - first)
+"""
+
+
+@pytest.mark.skipif(memory.resident_memory() is None, reason="this system does not tell what a process holds")
+def test_threads_of_python_leave_nothing_behind():
+    """One that became a pool of its own would leave 13 KiB: it is one for as long as the process lives."""
+    done = subprocess.run(
+        [sys.executable, "-c", SHORT_THREADS], capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.stderr == ""
+    assert int(done.stdout) < 400 * (4 << 10), f"{int(done.stdout) / 400 / 1024:.1f} KiB each"

@@ -24,7 +24,7 @@ const SMALL: usize = 5000;
 /// Who does work.
 pub struct Workers {
     /// So many threads, 0 for all processors, which the calling thread watches; None for the calling thread itself, which looks after
-    /// signals and progress between the phases of the work.
+    /// signals and progress between the phases of the work, or one other where it is not the main thread.
     threads: Option<usize>,
     /// Whether they multiply matrices, for which each needs buffers.
     multiply: bool,
@@ -75,9 +75,14 @@ pub fn watched<T: Send, E: Send>(
             }
         }
     };
-    let done = match workers.threads {
+    // A thread that has become a pool stays one as long as the process lives: the main thread alone does. Others come and go.
+    let threads = match workers.threads {
+        None if !is_main_thread(py)? => Some(1),
+        asked => asked,
+    };
+    let done = match threads {
         None => {
-            let pool = calling_thread()?;
+            let pool = pool_of_main_thread()?;
             py.detach(|| (!workers.multiply || memory::take_buffers()).then(|| work(pool, &mut watch)))
         }
         Some(threads) => {
@@ -105,8 +110,16 @@ pub fn watched<T: Send, E: Send>(
     }
 }
 
-/// The calling thread as a pool of one. A thread can be in one pool only and stays in it: it is made once for each.
-fn calling_thread() -> PyResult<&'static ThreadPool> {
+/// Whether the calling thread is the one that Python started in.
+fn is_main_thread(py: Python<'_>) -> PyResult<bool> {
+    let threading = py.import("threading")?;
+    let main = threading.call_method0("main_thread")?.getattr("ident")?;
+    main.eq(threading.call_method0("get_ident")?)
+}
+
+/// The main thread, which calls, as a pool of one. A thread can be in one pool only and stays in it: it is made once, and once more by
+/// the thread that is the main one of a process forked from this.
+fn pool_of_main_thread() -> PyResult<&'static ThreadPool> {
     thread_local! {
         static POOL: Cell<Option<&'static ThreadPool>> = const { Cell::new(None) };
     }
