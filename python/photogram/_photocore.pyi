@@ -731,6 +731,17 @@ class BlockNetwork:
         With each the greatest share of what a motion changes in them that remains when all unknowns move.
         """
 
+    def held_for_datum(self, *, threads: int) -> list[tuple[int, int]]:
+        """Return what an adjustment holds where nothing gives a datum; nothing where there is one.
+
+        Photos, each with the number (0 to 5) of one of its unknowns.
+
+        Raises
+        ------
+        BlockError
+            As :meth:`adjust`, before its first iteration.
+        """
+
     def node(
         self,
         outer: list[tuple[str, int]],
@@ -738,6 +749,7 @@ class BlockNetwork:
         *,
         middle: tuple[float, float, float] | None,
         threads: int,
+        held: list[tuple[int, int]] = ...,
     ) -> Node:
         """Take the block as a node of the elimination tree of a larger one (Helmert blocking).
 
@@ -764,6 +776,9 @@ class BlockNetwork:
             space. Every node must be given the same. None: of the photos of this block.
         threads
             As in :meth:`adjust`.
+        held
+            What :meth:`held_for_datum` of the larger block gives, of the photos of this one, which are
+            outer ones or not.
 
         Raises
         ------

@@ -16,7 +16,7 @@ from photogram.distributed.core import CoreEngine
 from photogram.distributed.entrance import plan_in_parts
 from photogram.distributed.run import read_manifest
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
-from photogram.network.observations import Relative
+from photogram.network.observations import Distance, Relative
 from photogram.network.simulated_observations import with_gnss, with_rig
 from photogram.network.unknowns import Drift
 
@@ -101,6 +101,44 @@ def test_cameras_ties_and_common_unknowns_cross_cuts():
             np.testing.assert_allclose(
                 getattr(found.kinds[kind], name), getattr(other, name), rtol=1e-6, atol=1e-8
             )
+
+
+def freed(block):
+    """Return a block without control."""
+    return block.replace(point_sd=np.full_like(block.point_sd, np.inf))
+
+
+@pytest.mark.parametrize("parts", [2, 6])
+def test_a_free_block_is_held_as_in_one_process(block, parts):
+    """Its datum is that of the same photos, in whichever nodes they are."""
+    found, whole = adjust(freed(block), parts=parts), adjust(freed(block))
+    assert len(whole.datum.held) == 7
+    assert found.datum == whole.datum
+    assert found.messages == whole.messages
+    agrees(found, whole, 1e-6)
+
+
+def test_what_observations_leave_open_of_a_free_block_is_held():
+    """With a distance scale is given, and six unknowns are held."""
+    made = photogram.simulate(strips=4, photos_per_strip=12, points_per_photo=40, seed=3)
+    block, ends = freed(made.block), made.truth.point_positions[[0, -1]]
+    distance = Distance(
+        block.point_ids[0], block.point_ids[-1], float(np.linalg.norm(ends[1] - ends[0])), sd=0.01
+    )
+    block = block.replace(observations=[distance])
+    found, whole = adjust(block, parts=3), adjust(block)
+    assert len(whole.datum.held) == 6
+    assert found.datum == whole.datum
+    agrees(found, whole, 1e-6, tied=True)
+
+
+def test_a_held_photo_is_held_in_the_results_of_its_nodes(block, tmp_path):
+    found = adjust(freed(block), parts=4, folder=tmp_path / "run")
+    names = {photo for photo, _ in found.datum.held}
+    for node in range(len(read_manifest(tmp_path / "run").tree)):
+        of_node = photogram.read_result(tmp_path / "run" / "results" / f"{node:05d}")
+        held = {photo for photo, _ in of_node.datum.held}
+        assert held == names & set(of_node.block.photo_ids)
 
 
 @pytest.mark.parametrize("unit_variance", ["free", "unity"])
@@ -191,9 +229,12 @@ def test_a_run_is_taken_up_in_its_folder_alone(block, whole, tmp_path):
 
 
 def test_what_is_not_determined_is_named(block):
-    free = block.replace(point_sd=np.full((len(block.point_ids), 3), np.inf))
+    """One control point gives a place, and is the user's datum: what it leaves open is not held."""
+    sd = np.full_like(block.point_sd, np.inf)
+    control = np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))[0]
+    sd[control] = block.point_sd[control]
     with pytest.raises(RankError):
-        adjust(free, parts=2)
+        adjust(block.replace(point_sd=sd), parts=2)
 
 
 def test_what_parts_cannot_do_is_refused(block):

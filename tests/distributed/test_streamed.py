@@ -56,7 +56,7 @@ def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatc
     assert not (tmp_path / "parts" / "buckets").exists()
     assert found.tree == expected.tree
     assert found.outer == expected.outer
-    for name in ("middle", "weighted", "photos", "points", "images"):
+    for name in ("middle", "weighted", "photos", "points", "images", "held"):
         assert getattr(found, name) == getattr(expected, name)
     for node in range(len(tree)):
         one, other = (
@@ -122,6 +122,17 @@ def test_features_are_refused(project, tmp_path):
         file.write('[features]\nd = { distance = ["a", "b"] }\n')
     with pytest.raises(InputError, match=r"\[features\] take joint covariances"):
         Streamed(folder, Wishes(), tmp_path / "parts")
+
+
+def test_a_free_project_is_refused_before_its_images_are_read(tmp_path):
+    block = tied_block()
+    free = np.full_like(block.point_sd, np.inf)
+    project = project_of(
+        block.replace(observations=[], point_sd=free, photo_position_sd=np.inf),
+        tmp_path / "free",
+    )
+    with pytest.raises(InputError, match=r"nothing gives the block a datum .* photogram\.adjust\("):
+        Streamed(project, Wishes(), tmp_path / "parts")
 
 
 def test_what_has_to_be_read_whole_is_not_streamed(project, tmp_path):

@@ -53,9 +53,13 @@ class CoreEngine:
             kinds = zip(("photo", "camera", "unknown"), rows, names.rows, strict=True)
             return [(kind, places[row]) for kind, places, each in kinds for row in each]
 
+        places = rows[0]
+        held = [(places[photo], number) for photo, number in manifest.held if photo in places]
         children = [local(manifest.outer[child]) for child in manifest.tree.children[number]]
         try:
-            return network.node(local(manifest.outer[number]), children, middle=manifest.middle, threads=0)
+            return network.node(
+                local(manifest.outer[number]), children, middle=manifest.middle, threads=0, held=held
+            )
         except _photocore.BlockError as error:
             raise named(part.block, *error.args, unknowns=part.common) from None
 

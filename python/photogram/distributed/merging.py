@@ -117,7 +117,7 @@ def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InP
         owners[part.photos[own]] = node
         at_home = set(own.tolist())
         orders += [int(part.photos[row]) for row in result.photo_order.tolist() if row in at_home]
-    rest = _rest(owners, block, outcome, orders, details)
+    rest = _rest(owners, block, outcome, orders, details) | {"datum": manifest.held}
     solution = cast("BlockSolution", SimpleNamespace(**found, **rest))
     datum = datum_of(block, solution)
     messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
@@ -162,7 +162,6 @@ def _rest(
         "weak": [],
         "weak_cameras": [],
         "weak_unknowns": [],
-        "datum": [],
         "relative_error": 0.0,
         "minimal_control": False,
         "adjusted_unknowns": _unknowns(block, details),

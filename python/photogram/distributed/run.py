@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram import _photocore
+from photogram.adjustment.adjustment import named
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.cut import Tree, cut, tree_of
 from photogram.distributed.files import read_json, write_json
@@ -26,7 +27,7 @@ from photogram.distributed.parts import (
 )
 from photogram.errors import InputError
 from photogram.network.block import Block
-from photogram.network.core import CoreOptions
+from photogram.network.core import CoreOptions, block_network
 from photogram.network.observations.position import with_epochs
 from photogram.network.unknowns import Unknown
 
@@ -68,6 +69,8 @@ class Manifest:
         How many each node has at home.
     seals
         Of the parts of the nodes.
+    held
+        What is held where nothing gives a datum: photos, each with the number of one of its six unknowns.
     """
 
     version: str
@@ -81,6 +84,7 @@ class Manifest:
     points: list[int]
     images: list[int]
     seals: list[str]
+    held: list[tuple[int, int]]
 
 
 def part_folder(run: Path, number: int) -> Path:
@@ -128,8 +132,30 @@ def partition(block: Block, run: Path, parts: int, options: CoreOptions, source:
     found = cut(places_of(block), images.astype(float), lambda: [incidence], parts)
     homes = homes_of(block, found.owners, found.tree.root)
     return divided(
-        block, run, found.tree, lambda node, below: part_of(block, homes, node, below), options, source
+        block,
+        run,
+        found.tree,
+        lambda node, below: part_of(block, homes, node, below),
+        options,
+        source,
+        held_for_datum(block, options),
     )
+
+
+def held_for_datum(block: Block, options: CoreOptions) -> list[tuple[int, int]]:
+    """Return what an adjustment of a whole block would hold, nothing else giving a datum.
+
+    Raises
+    ------
+    RankError, AdjustmentError
+        As of :func:`photogram.adjust`, before its first iteration.
+    """
+    if np.isfinite(block.point_sd[np.unique(block.image_points)]).any():
+        return []
+    try:
+        return block_network(block, options).held_for_datum(threads=0)
+    except _photocore.BlockError as error:
+        raise named(block, *error.args) from None
 
 
 def divided(
@@ -139,6 +165,7 @@ def divided(
     part_at: Callable[[int, Names], Part],
     options: CoreOptions,
     source: str,
+    held: list[tuple[int, int]],
 ) -> Manifest:
     """Write the parts of a block, one after the other.
 
@@ -148,6 +175,8 @@ def divided(
         The block, or all of it but points and images.
     run, options, source
         As of :func:`partition`.
+    held
+        As in :class:`Manifest`.
     tree
         The tree.
     part_at
@@ -189,6 +218,7 @@ def divided(
         points,
         images,
         seals,
+        held,
     )
     write_manifest(run, manifest)
     return manifest
@@ -218,7 +248,7 @@ def write_manifest(run: Path, manifest: Manifest) -> None:
     write_json(run / MANIFEST, document)
 
 
-_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals")
+_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals", "held")
 
 
 def read_manifest(run: Path) -> Manifest:
@@ -240,6 +270,7 @@ def read_manifest(run: Path) -> Manifest:
         options[name] = None if options[name] is None else tuple(options[name])
     plain = {name: document[name] for name in _PLAIN}
     plain["middle"] = tuple(plain["middle"])
+    plain["held"] = [(photo, number) for photo, number in plain["held"]]
     return Manifest(
         tree=tree_of(document["parts"]),
         outer=[Names(*rows) for rows in document["outer"]],

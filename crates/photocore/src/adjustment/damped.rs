@@ -262,7 +262,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     /// Whether the sum of squares has fallen by next to nothing since a full step failed.
     fn is_still(&self, refused: &Option<(f64, Vec<usize>)>, sum: f64) -> bool {
-        let freedom = self.problem.counts(0).degrees_of_freedom().max(1) as f64;
+        let freedom = self.problem.counts(&[]).degrees_of_freedom().max(1) as f64;
         let least = STILL * (sum / freedom).max(1.0);
         refused.as_ref().is_some_and(|(before, _)| before - sum <= least)
     }

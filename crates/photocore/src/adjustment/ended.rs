@@ -37,7 +37,7 @@ impl Adjustment {
             lost: None,
             selected: None,
             undetermined: None,
-            counts: problem.counts(0),
+            counts: problem.counts(&[]),
             datum: vec![],
             weak: vec![],
             collapsed: vec![],
@@ -53,6 +53,7 @@ impl Adjustment {
     /// After the last step, without cofactors.
     pub fn between<M: Model>(
         problem: &Problem<M>,
+        held: &[usize],
         before: &[f64],
         reached: Vec<f64>,
         pool: &ThreadPool,
@@ -61,7 +62,8 @@ impl Adjustment {
         let corrections = before[locals.clone()].iter().zip(&reached).map(|(from, to)| to - from).collect();
         let after = Self::at(problem, None, reached, pool);
         let history = [vec![before[locals.end..].to_vec()], after.history].concat();
-        Self { history, last_local_corrections: corrections, ..after }
+        let (counts, datum) = (problem.counts(held), held.to_vec());
+        Self { history, last_local_corrections: corrections, counts, datum, ..after }
     }
 
     /// Where the normal equations were inverted, without iterations.
@@ -81,7 +83,7 @@ impl Adjustment {
     /// Puts in cofactors and redundancy numbers, with one more formation that they come from.
     pub(super) fn put<M>(&mut self, problem: &Problem<M>, inverted: Inverted) {
         self.redundancy = Some(inverted.cofactors.equations.iter().map(|share| 1.0 - share).collect());
-        self.counts = problem.counts(inverted.held.len());
+        self.counts = problem.counts(&inverted.held);
         self.datum = inverted.held;
         self.selected = inverted.cofactors.groups.is_some().then_some(inverted.selected);
         self.cofactors = Some(inverted.cofactors);

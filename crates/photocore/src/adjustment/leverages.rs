@@ -80,7 +80,7 @@ impl Leverages {
     /// Observations that take part, those of unknowns themselves among them, minus unknowns.
     pub fn degrees_of_freedom<M>(&self, problem: &Problem<M>) -> i64 {
         let out = problem.observation_sd.iter().filter(|sd| sd.is_infinite()).count();
-        problem.counts(self.held.len()).degrees_of_freedom() - out as i64
+        problem.counts(&self.held).degrees_of_freedom() - out as i64
     }
 
     /// Cofactors of all equations of some local blocks, with the given standard deviations; with those of their weighted unknowns, where

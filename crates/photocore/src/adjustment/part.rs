@@ -30,6 +30,7 @@ pub enum PartError {
 impl Linearized {
     /// Forms the normal equations of a part at given values and eliminates what is at home here.
     ///
+    /// * `held`: unknowns held for the datum of the whole, outer ones among them;
     /// * `contributions`: what the parts below leave, in the order of the layout: they are added in this order;
     /// * `damping`: a fraction of the diagonal of the normal equations that is added to it.
     ///
@@ -38,6 +39,7 @@ impl Linearized {
     pub fn of_part<M: Model>(
         problem: &Problem<M>,
         values: Vec<f64>,
+        held: Vec<usize>,
         contributions: &[Contribution<'_>],
         damping: f64,
         pool: &ThreadPool,
@@ -52,10 +54,10 @@ impl Linearized {
             return Err(PartError::Foreign);
         }
         let equations =
-            ObservationEquations::new(problem, None, &values, &[], pool).with_contributions(contributions);
+            ObservationEquations::new(problem, None, &values, &held, pool).with_contributions(contributions);
         let options = FactorOptions { damping, ..FactorOptions::default() };
         let mut between = between(watch, Phase::Form, layout.locals());
-        let formed = Self::of(&equations, values, vec![], &options, pool, &mut between)?;
+        let formed = Self::of(&equations, values, held, &options, pool, &mut between)?;
         // The factor waits for the way down, perhaps with those of many others.
         problem.system.release();
         Ok(formed)
@@ -113,7 +115,7 @@ impl Linearized {
         problem.system.release();
         let below = layout.contributions().iter().map(|blocks| inverted.selected.triangle(layout, blocks));
         let below = below.collect();
-        let mut adjustment = Adjustment::between(problem, &inverted.values, reached, pool);
+        let mut adjustment = Adjustment::between(problem, &inverted.held, &inverted.values, reached, pool);
         adjustment.put(problem, inverted);
         Ok((adjustment, below))
     }

@@ -384,7 +384,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             history: self.history,
             last_local_corrections: self.last_local_corrections,
             undetermined: end.undetermined,
-            counts: problem.counts(self.datum.len()),
+            counts: problem.counts(&self.datum),
             datum: self.datum,
             weak: self.weak,
             collapsed: self.collapsed,

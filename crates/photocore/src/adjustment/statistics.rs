@@ -1,5 +1,6 @@
 //! Counts, residuals and redundancy numbers.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use rayon::ThreadPool;
@@ -50,15 +51,16 @@ pub fn leading_matrix<const N: usize>(cofactors: Option<&[f64]>) -> [[f64; N]; N
 }
 
 impl<M> Problem<M> {
-    /// Counts observations and unknowns; a datum of `held` unknowns takes as many degrees of freedom. Outer unknowns do not count: they
-    /// are free or fixed here.
-    pub fn counts(&self, held: usize) -> Counts {
+    /// Counts observations and unknowns; a datum of `held` unknowns takes as many degrees of freedom. Outer unknowns, held or not, do not
+    /// count: they are free or fixed here.
+    pub fn counts(&self, held: &[usize]) -> Counts {
         let layout = self.layout();
-        let outer = layout.unknowns_of(layout.outer()).filter(|&unknown| self.sd[unknown] != 0.0).count();
+        let outer = layout.unknowns_of(layout.outer()).filter(|&unknown| self.sd[unknown] != 0.0);
+        let elsewhere = outer.chain(held.iter().copied()).collect::<BTreeSet<usize>>().len();
         Counts {
             observations: self.observation_sd.len(),
             weighted: self.weighted_among(0..self.sd.len()).count(),
-            unknowns: self.sd.iter().filter(|&&sd| sd != 0.0).count() - held - outer,
+            unknowns: self.sd.iter().filter(|&&sd| sd != 0.0).count() - elsewhere,
         }
     }
 

@@ -191,7 +191,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// Whether the sum of squares, or of losses, creeps: by less and less and never to an end.
     fn creeps(&self, falls: &[f64], lowest: f64, stop: Stop) -> bool {
         let least = stop.least_decrease(lowest).unwrap_or(0.0);
-        let freedom = self.problem.counts(0).degrees_of_freedom().max(1) as f64;
+        let freedom = self.problem.counts(&[]).degrees_of_freedom().max(1) as f64;
         let (steps, little) = match self.is_network() {
             true => (CREEPING_IN_NETWORKS, least.max(LITTLE * (lowest / freedom).max(1.0))),
             false => (CREEPING, least),

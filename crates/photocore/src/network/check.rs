@@ -69,7 +69,12 @@ impl Network {
             BlockOf::Common(common) => common < self.commons.len(),
             BlockOf::Point(point) => point < self.points.len(),
         };
-        let missing = surroundings.all().find(|&block| !there(block));
+        let held = surroundings.held.iter();
+        if held.clone().any(|&(_, number)| number >= 6) {
+            return Err(NetworkError::Node("a photo has six unknowns that may be held"));
+        }
+        let mut all = surroundings.all().chain(held.map(|&(photo, _)| BlockOf::Photo(photo)));
+        let missing = all.find(|&block| !there(block));
         missing.map_or(Ok(()), |block| Err(NetworkError::NoBlock(block)))
     }
 }

@@ -7,7 +7,7 @@
 use rayon::ThreadPool;
 
 use super::problem::Assembled;
-use super::solution::{observations, sums_of_squares};
+use super::solution::{observations, of_photo, sums_of_squares};
 use super::surroundings::{BlockOf, Surroundings};
 use super::{Dropped, Image, Network, NetworkError, Options, Point, Solution, SumsOfSquares};
 use crate::adjustment::{Adjustment, Counts, Linearized, Model, PartError, Watch};
@@ -21,6 +21,8 @@ pub struct Node {
     assembled: Assembled,
     outer: Vec<usize>,
     below: Vec<Vec<usize>>,
+    /// Unknowns held for the datum of the larger network, outer ones among them.
+    held: Vec<usize>,
 }
 
 /// A node at given values, what is at home in it eliminated.
@@ -57,6 +59,28 @@ pub struct NodePrediction {
 const FOUND: usize = 7;
 
 impl Network {
+    /// The unknowns that an adjustment of the whole network holds because nothing gives it a datum: photos, each with the number of one of
+    /// its pose unknowns (see [`Surroundings::held`]); none where there is a datum.
+    ///
+    /// # Errors
+    /// Those of [`Network::adjust`] before its first iteration.
+    pub fn held_for_datum(
+        &self,
+        options: &Options,
+        pool: &ThreadPool,
+    ) -> Result<Vec<(usize, usize)>, NetworkError> {
+        self.check()?;
+        let left_out = self.left_out(self.untouched_photos(), None)?;
+        let selected = pool.install(|| self.select(&left_out, Surroundings::default()));
+        if self.is_placed(&selected) {
+            return Ok(vec![]);
+        }
+        let assembled = pool.install(|| self.assemble(options, selected, None))?;
+        let problem = &assembled.problem;
+        let held = problem.to_hold(&problem.initial, pool);
+        Ok(held.iter().filter_map(|&unknown| of_photo(problem, unknown)).collect())
+    }
+
     /// Takes the network as a node of a larger one.
     ///
     /// # Errors
@@ -74,6 +98,7 @@ impl Network {
         }
         let mut network = self.clone();
         network.release(&surroundings.outer);
+        let in_photos = surroundings.held.clone();
         let none = self.left_out(vec![false; self.photos.len()], None)?;
         let selected = pool.install(|| network.select(&none, surroundings));
         let assembled = pool.install(|| network.assemble(options, selected, None))?;
@@ -82,7 +107,9 @@ impl Network {
         let outer = layout.unknowns_of(layout.outer()).collect();
         let below =
             layout.contributions().iter().map(|blocks| layout.unknowns_of(blocks).collect()).collect();
-        Ok(Node { network, options: *options, assembled, outer, below })
+        let model = &assembled.problem.model;
+        let held = in_photos.iter().map(|&(photo, number)| model.of_block(photo).start + number).collect();
+        Ok(Node { network, options: *options, assembled, outer, below, held })
     }
 
     /// Takes the weights of outer blocks away: they count where these are eliminated. What is fixed stays so.
@@ -138,7 +165,7 @@ impl Node {
 
     /// Observations and unknowns at home here.
     pub fn counts(&self) -> Counts {
-        self.assembled.problem.counts(0)
+        self.assembled.problem.counts(&self.held)
     }
 
     /// Points that do not take part.
@@ -217,7 +244,7 @@ impl Node {
     pub fn objective(&self, state: &[f64], pool: &ThreadPool) -> Result<SumsOfSquares, NetworkError> {
         self.check(&[state])?;
         let problem = &self.assembled.problem;
-        let reached = Adjustment::between(problem, state, state.to_vec(), pool);
+        let reached = Adjustment::between(problem, &self.held, state, state.to_vec(), pool);
         let observed = observations(&self.network, problem, &reached);
         Ok(sums_of_squares(problem, &reached, state, &observed))
     }
@@ -236,7 +263,8 @@ impl Node {
     ) -> Result<FormedNode, NetworkError> {
         self.check(&[state])?;
         let problem = &self.assembled.problem;
-        let part = Linearized::of_part(problem, state.to_vec(), contributions, damping, pool, watch);
+        let (state, held) = (state.to_vec(), self.held.clone());
+        let part = Linearized::of_part(problem, state, held, contributions, damping, pool, watch);
         Ok(FormedNode { part: part.map_err(|error| self.named(error))? })
     }
 
@@ -292,7 +320,8 @@ impl Node {
         pool: &ThreadPool,
     ) -> Result<Solution, NetworkError> {
         self.check(&[state, before])?;
-        let adjustment = Adjustment::between(&self.assembled.problem, before, state.to_vec(), pool);
+        let problem = &self.assembled.problem;
+        let adjustment = Adjustment::between(problem, &self.held, before, state.to_vec(), pool);
         Ok(self.told(adjustment, pool))
     }
 

@@ -355,7 +355,12 @@ impl Network {
         }
     }
 
-    /// Whether the datum is the user's; and the photo to hold where it is not, but the position of a single one is fixed.
+    /// Whether the datum is the user's.
+    pub(super) fn is_placed(&self, selected: &Selected) -> bool {
+        self.placed(selected, &self.mounts_by_photo()).0
+    }
+
+    /// The same, and the photo to hold where it is not, but the position of a single one is fixed.
     fn placed(&self, selected: &Selected, mounts: &[Option<Mount>]) -> (bool, Option<usize>) {
         // Angles alone leave position and scale open.
         let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };

@@ -212,7 +212,7 @@ impl Solution {
 }
 
 /// The photo and the number of one of its unknowns; None for unknowns of anything else.
-fn of_photo(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
+pub(super) fn of_photo(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
     match of_block(problem, unknown)? {
         (Owner::Photo(photo), number) => Some((photo, number)),
         _ => None,

@@ -107,7 +107,14 @@ impl BlockNetwork {
         found.map_err(|error| refused(&error))
     }
 
-    #[pyo3(signature = (outer, children, *, middle, threads))]
+    #[pyo3(signature = (*, threads))]
+    fn held_for_datum(&self, py: Python<'_>, threads: usize) -> PyResult<Vec<(usize, usize)>> {
+        let workers = Workers::of(threads, self.network.images.len());
+        let held = watched(py, workers, None, |pool, _| self.network.held_for_datum(&self.options, pool))?;
+        held.map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (outer, children, *, middle, threads, held = vec![]))]
     fn node(
         &self,
         py: Python<'_>,
@@ -115,8 +122,9 @@ impl BlockNetwork {
         children: Vec<Vec<BlockRow>>,
         middle: Option<[f64; 3]>,
         threads: usize,
+        held: Vec<(usize, usize)>,
     ) -> PyResult<Node> {
-        Node::new(py, (&self.network, &self.options), outer, children, middle, threads)
+        Node::new(py, (&self.network, &self.options), (outer, children), middle, held, threads)
     }
 }
 

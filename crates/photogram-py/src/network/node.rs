@@ -226,14 +226,14 @@ impl Node {
     pub fn new(
         py: Python<'_>,
         (network, options): (&Network, &Options),
-        outer: Vec<BlockRow>,
-        children: Vec<Vec<BlockRow>>,
+        (outer, children): (Vec<BlockRow>, Vec<Vec<BlockRow>>),
         middle: Option<[f64; 3]>,
+        held: Vec<(usize, usize)>,
         threads: usize,
     ) -> PyResult<Self> {
         let blocks = |rows: Vec<BlockRow>| rows.into_iter().map(block_of).collect::<PyResult<Vec<BlockOf>>>();
         let below = children.into_iter().map(blocks).collect::<PyResult<_>>()?;
-        let surroundings = Surroundings { outer: blocks(outer)?, below, middle };
+        let surroundings = Surroundings { outer: blocks(outer)?, below, middle, held };
         let workers = Workers::of(threads, network.images.len());
         let node = watched(py, workers, None, |pool, _| network.node(options, surroundings, pool))?;
         node.map(|node| Self { node: Arc::new(node) }).map_err(|error| failed(&error))

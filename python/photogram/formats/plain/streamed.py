@@ -120,6 +120,14 @@ class Streamed:
             raise InputError(
                 "cameras for each photo or group are read whole: without parts", file=settings.path
             )
+        known = (self.block.point_sd, self.block.photo_position_sd)
+        if not (self.block.observations or any(np.isfinite(each).any() for each in known)):
+            raise InputError(
+                "nothing gives the block a datum (no control, no weighted position, no observation), and what"
+                " to hold is found of blocks that are read whole:"
+                " photogram.adjust(photogram.formats.read(path).block, parts=...)",
+                file=settings.path,
+            )
         named = {name for each in self.block.observations for name in each.points}
         self._tied = {name: row for row, name in enumerate(sorted(named))}
 
@@ -168,7 +176,7 @@ class Streamed:
             at_home = self._at_home(node, unseen if node == root else [], own)
             return assembled_part(self.block, found.owners, node, at_home, below)
 
-        manifest = divided(self.block, run, found.tree, part_at, options, source)
+        manifest = divided(self.block, run, found.tree, part_at, options, source, [])
         self.close()
         return manifest
 
