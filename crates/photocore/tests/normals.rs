@@ -135,13 +135,13 @@ const ALL: [Ordering; 6] = [
     Ordering::DissectionByGraph,
 ];
 
-/// Random systems: local blocks of 1 to 3 unknowns, kept blocks of 1 to 7, with and without border, several groups of
-/// a local block on the same kept block, up to two further blocks of a group, ties among up to three kept blocks and the border.
+/// Random systems: local blocks of 1 to 3 unknowns, kept blocks of 1 to 7, with and without one that most groups share, several groups of
+/// a local block on the same kept block, up to two further blocks of a group besides, ties among up to three kept blocks and the shared one.
 fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
     let blocks = (prop::collection::vec(1..8usize, 1..12), 0..4usize);
     let shape = (1..4usize, 1..3usize, blocks, 0..5usize);
     shape
-        .prop_flat_map(|(l, rows, (kept, common), border)| {
+        .prop_flat_map(|(l, rows, (kept, common), shared)| {
             // Main blocks stand before the common ones, or after them.
             let common = common.min(kept.len() - 1) as u32;
             let main = if l == 2 { 0..kept.len() as u32 - common } else { common..kept.len() as u32 };
@@ -150,40 +150,36 @@ fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
             let further = further.prop_map(move |further| if common > 0 { further } else { BTreeSet::new() });
             let groups = prop::collection::vec(prop::collection::vec((main, further), 0..5), 1..25);
             let tied = prop::collection::btree_set(0..kept.len() as u32, 0..4);
-            let ties = prop::collection::vec((1..4usize, tied, 0..=border as u32), 0..6);
-            (Just((l, rows, kept, border)), groups, ties, any::<u64>(), prop::sample::select(ALL.to_vec()))
+            let ties = prop::collection::vec((1..4usize, tied, any::<bool>()), 0..6);
+            (Just((l, rows, kept, shared)), groups, ties, any::<u64>(), prop::sample::select(ALL.to_vec()))
         })
-        .prop_map(|((l, rows, kept, border), locals, ties, seed, ordering)| {
-            let ties = ties.into_iter().filter(|(_, kept, end)| !kept.is_empty() || *end > 0);
-            // Not in the order of the blocks: a tie has an order of its own.
-            let tie = |(rows, kept, end): (usize, BTreeSet<u32>, u32)| Tie {
-                rows,
-                kept: kept.into_iter().rev().collect(),
-                border: end / 2..end,
+        .prop_map(|((l, rows, mut kept, shared), locals, ties, seed, ordering)| {
+            let last = kept.len() as u32;
+            kept.extend((shared > 0).then_some(shared));
+            // Not in the order of the blocks: ties and groups have an order of their own.
+            let blocks = |own: BTreeSet<u32>, too: bool| -> Vec<u32> {
+                own.into_iter().rev().chain((shared > 0 && too).then_some(last)).collect()
             };
-            let ties = ties.map(tie).filter(|tie| !tie.kept.is_empty() || !tie.border.is_empty()).collect();
+            let tie = |(rows, own, too): (usize, BTreeSet<u32>, bool)| Tie { rows, kept: blocks(own, too) };
+            let ties = ties.into_iter().map(tie).filter(|tie| !tie.kept.is_empty()).collect();
             let mut ptr = vec![0];
             for groups in &locals {
                 ptr.push(ptr[ptr.len() - 1] + groups.len());
             }
             let (group_kept, further): (Vec<u32>, Vec<BTreeSet<u32>>) = locals.into_iter().flatten().unzip();
-            let mut further_ptr = vec![0];
-            further
-                .iter()
-                .for_each(|further| further_ptr.push(further_ptr[further_ptr.len() - 1] + further.len()));
-            // Not in the order of the blocks either.
-            let further = further.into_iter().flat_map(|further| further.into_iter().rev()).collect();
-            let ranges =
-                (0..group_kept.len() as u32).map(|g| g % (border as u32 + 1)..border as u32).collect();
+            let (mut further_ptr, mut all) = (vec![0], vec![]);
+            for (g, own) in further.into_iter().enumerate() {
+                all.extend(blocks(own, g % 4 > 0));
+                further_ptr.push(all.len());
+            }
             let layout = Layout::new(rows, l, &kept, ptr, group_kept).unwrap();
-            let layout =
-                layout.with_further(further_ptr, further).unwrap().with_border(border, ranges).unwrap();
+            let layout = layout.with_further(further_ptr, all).unwrap();
             (Dense::new(layout.with_ties(ties).unwrap(), seed), ordering)
         })
 }
 
-/// A strip or a block, large enough for several supernodes, subtrees and tiles.
-fn block(strips: usize, length: usize, border: usize) -> Dense {
+/// A strip or a block, large enough for several supernodes, subtrees and tiles; every group shares a last block of so many unknowns.
+fn block(strips: usize, length: usize, shared: usize) -> Dense {
     let (mut ptr, mut kept) = (vec![0], Vec::new());
     for strip in 0..strips {
         for photo in 0..length {
@@ -195,11 +191,17 @@ fn block(strips: usize, length: usize, border: usize) -> Dense {
             }
         }
     }
-    let ranges = vec![0..border as u32; kept.len()];
-    let layout =
-        Layout::new(2, 3, &vec![6; strips * length], ptr, kept).unwrap().with_border(border, ranges).unwrap();
-    let places =
-        (0..strips * length).map(|k| [(k % length) as f64, (k / length) as f64 * 1.7, 0.0]).collect();
+    let photos = strips * length;
+    let mut places: Vec<[f64; 3]> =
+        (0..photos).map(|k| [(k % length) as f64, (k / length) as f64 * 1.7, 0.0]).collect();
+    if shared == 0 {
+        let layout = Layout::new(2, 3, &vec![6; photos], ptr, kept).unwrap();
+        return Dense::new(layout.with_places(places).unwrap(), 7);
+    }
+    let further = vec![photos as u32; kept.len()];
+    let layout = Layout::new(2, 3, &[vec![6; photos], vec![shared]].concat(), ptr, kept).unwrap();
+    let layout = layout.with_further((0..=further.len()).collect(), further).unwrap();
+    places.push([0.0; 3]);
     Dense::new(layout.with_places(places).unwrap(), 7)
 }
 
@@ -236,7 +238,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     for (value, other) in again.iter().zip(&solution) {
         assert_close(*value, *other, 1e-11 * expected.norm_max(), "solution for its right-hand side");
     }
-    if factor.has_kept() {
+    if factor.has_cached() {
         let (chord, decrease) = done(system.chord(&pool, &factor, dense, &dense.prior, &mut go));
         assert_close(decrease, factor.decrease, 1e-11 * factor.decrease, "decrease");
         for (value, other) in chord.iter().zip(&solution) {
@@ -390,9 +392,7 @@ fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &
 }
 
 fn compare_blocks(layout: &Layout, selected: &SelectedInverse, inverse: &Mat<f64>) {
-    let blocks = layout.kept() + usize::from(layout.border_dim() > 0);
-    let range =
-        |block: usize| if block < layout.kept() { layout.kept_range(block) } else { layout.border_range() };
+    let (blocks, range) = (layout.kept(), |block: usize| layout.kept_range(block));
     for row in 0..blocks {
         assert!(selected.block(row, row).is_some());
         for column in 0..blocks {
@@ -432,11 +432,14 @@ fn strip_and_block_agree_with_dense_algebra() {
 
 /// Thirty cameras of ten unknowns in turn: every group touches those of one.
 #[test]
-fn a_border_of_hundreds_agrees_with_dense_algebra() {
+fn cameras_in_turn_agree_with_dense_algebra() {
     let plain = block(5, 10, 0).layout;
-    let camera = |group: usize| plain.kept_of(group) as u32 % 30;
-    let ranges = (0..plain.groups()).map(|group| 10 * camera(group)..10 * camera(group) + 10).collect();
-    let layout = plain.clone().with_border(300, ranges).unwrap();
+    let mut ptr = vec![0];
+    ptr.extend((0..plain.locals()).map(|local| plain.groups_of(local).end));
+    let kept: Vec<u32> = (0..plain.groups()).map(|group| plain.kept_of(group) as u32).collect();
+    let cameras = kept.iter().map(|photo| 50 + photo % 30).collect();
+    let layout = Layout::new(2, 3, &[[6; 50].as_slice(), &[10; 30]].concat(), ptr, kept).unwrap();
+    let layout = layout.with_further((0..=plain.groups()).collect(), cameras).unwrap();
     for ordering in [Ordering::ReverseCuthillMckee, Ordering::DissectionByPlace] {
         compare_with_dense(&Dense::new(layout.clone(), 11), ordering);
     }
@@ -444,8 +447,8 @@ fn a_border_of_hundreds_agrees_with_dense_algebra() {
 
 /// A block whose photographs have a camera of three unknowns for each strip and share one of ten; `first` of the cameras stand before
 /// the photographs.
-fn with_cameras(strips: usize, length: usize, border: usize, first: bool) -> Layout {
-    let (plain, photos) = (block(strips, length, border).layout, strips * length);
+fn with_cameras(strips: usize, length: usize, first: bool) -> Layout {
+    let (plain, photos) = (block(strips, length, 0).layout, strips * length);
     let shift = if first { strips + 1 } else { 0 };
     let camera = |index: usize| (if first { index } else { photos + index }) as u32;
     let group = |group: usize| plain.kept_of(group);
@@ -460,8 +463,6 @@ fn with_cameras(strips: usize, length: usize, border: usize, first: bool) -> Lay
     let further = (0..plain.groups()).flat_map(|g| [camera(strips), camera(group(g) / length)]).collect();
     let layout = Layout::new(2, 3, &dims, ptr, kept).unwrap();
     let layout = layout.with_further((0..=plain.groups()).map(|g| 2 * g).collect(), further).unwrap();
-    let ranges = (0..plain.groups()).map(|g| plain.border_of(g)).map(|r| r.start as u32..r.end as u32);
-    let layout = layout.with_border(border, ranges.collect()).unwrap();
     let of_photos = plain.places().unwrap();
     let of_cameras: Vec<[f64; 3]> =
         (0..=strips).map(|strip| of_photos[strip.min(strips - 1) * length + length / 2]).collect();
@@ -472,9 +473,9 @@ fn with_cameras(strips: usize, length: usize, border: usize, first: bool) -> Lay
 #[test]
 fn shared_cameras_agree_with_dense_algebra() {
     for ordering in ALL {
-        compare_with_dense(&Dense::new(with_cameras(1, 60, 0, true), 13), ordering);
-        compare_with_dense(&Dense::new(with_cameras(7, 12, 0, false), 14), ordering);
-        compare_with_dense(&Dense::new(with_cameras(5, 12, 9, true), 15), ordering);
+        compare_with_dense(&Dense::new(with_cameras(1, 60, true), 13), ordering);
+        compare_with_dense(&Dense::new(with_cameras(7, 12, false), 14), ordering);
+        compare_with_dense(&Dense::new(with_cameras(5, 12, true), 15), ordering);
     }
 }
 
@@ -482,7 +483,7 @@ fn shared_cameras_agree_with_dense_algebra() {
 #[test]
 fn what_is_joined_to_everything_is_eliminated_last() {
     for (strips, length) in [(1, 200), (12, 40)] {
-        let layout = with_cameras(strips, length, 0, true);
+        let layout = with_cameras(strips, length, true);
         let plain = block(strips, length, 0).layout;
         for ordering in &ALL[2..] {
             let system = System::new(layout.clone(), *ordering).unwrap();
@@ -499,7 +500,7 @@ fn what_is_joined_to_everything_is_eliminated_last() {
 
 #[test]
 fn what_a_shared_camera_and_photos_leave_open_is_named() {
-    let mut dense = Dense::new(with_cameras(3, 8, 0, false), 17);
+    let mut dense = Dense::new(with_cameras(3, 8, false), 17);
     let layout = dense.layout.clone();
     let camera = 24 + 3;
     dense.prior.weight[layout.kept_range(camera)].fill(0.0);
@@ -519,11 +520,11 @@ fn what_a_shared_camera_and_photos_leave_open_is_named() {
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
     same_bits(block(8, 40, 5).layout);
-    same_bits(with_cameras(8, 40, 5, true));
+    same_bits(with_cameras(8, 40, true));
 }
 
 fn same_bits(plain: Layout) {
-    let tie = |k: u32| Tie { rows: 2, kept: vec![k, k + 40, 7], border: 0..3 };
+    let tie = |k: u32| Tie { rows: 2, kept: vec![k, k + 40, 7] };
     let dense = Dense::new(plain.with_ties((10..30).map(tie).collect()).unwrap(), 3);
     let rights: Vec<f64> = (0..20 * dense.layout.unknowns()).map(|k| (k % 17) as f64 - 8.0).collect();
     let run = |threads: usize| {
@@ -542,16 +543,8 @@ fn same_bits(plain: Layout) {
         let cofactors =
             done(system.invert(&pool, factor, &dense, &dense.prior, &InvertOptions::default(), &mut go))
                 .cofactors;
-        let numbers = [
-            solution,
-            more,
-            written,
-            of_functions,
-            cofactors.local,
-            cofactors.kept,
-            cofactors.border,
-            cofactors.equations,
-        ];
+        let numbers =
+            [solution, more, written, of_functions, cofactors.local, cofactors.kept, cofactors.equations];
         numbers.concat().into_iter().map(f64::to_bits).collect::<Vec<u64>>()
     };
     let one = run(1);
@@ -608,8 +601,6 @@ fn layouts_that_contradict_themselves_are_refused() {
     assert!(Layout::new(2, 3, &[6], vec![1, 1], vec![0]).is_err());
     assert!(Layout::new(2, 3, &[6], vec![0, 1], vec![1]).is_err());
     let layout = Layout::new(2, 3, &[6], vec![0, 1], vec![0]).unwrap();
-    assert!(layout.clone().with_border(3, std::iter::once(1..4).collect()).is_err());
-    assert!(layout.clone().with_border(3, vec![]).is_err());
     assert!(layout.clone().with_places(vec![]).is_err());
     let two = Layout::new(2, 3, &[6, 6, 3], vec![0, 2], vec![0, 0]).unwrap();
     assert!(two.clone().with_further(vec![0, 1, 3], vec![2, 1, 2]).is_ok());
@@ -623,22 +614,20 @@ fn layouts_that_contradict_themselves_are_refused() {
     ] {
         assert!(two.clone().with_further(ptr, blocks).is_err());
     }
-    let refused = |rows, kept: &[u32], border| {
-        layout.clone().with_ties(vec![Tie { rows, kept: kept.to_vec(), border }]).is_err()
-    };
-    assert!(refused(1, &[1], 0..0));
-    assert!(refused(1, &[0, 0], 0..0));
-    assert!(refused(1, &[0], 0..1));
-    assert!(refused(1, &[], 0..0));
-    assert!(refused(0, &[0], 0..0));
-    assert!(!refused(1, &[0], 0..0));
+    let refused =
+        |rows, kept: &[u32]| layout.clone().with_ties(vec![Tie { rows, kept: kept.to_vec() }]).is_err();
+    assert!(refused(1, &[1]));
+    assert!(refused(1, &[0, 0]));
+    assert!(refused(1, &[]));
+    assert!(refused(0, &[0]));
+    assert!(!refused(1, &[0]));
 }
 
 /// Two points at one height, and nothing else that joins two photos: a tie alone holds a network together.
 #[test]
 fn ties_alone_are_a_system() {
     let layout = Layout::new(1, 1, &[1; 6], vec![0], vec![]).unwrap();
-    let tie = |k: u32| Tie { rows: 1, kept: vec![k, (k + 1) % 6], border: 0..0 };
+    let tie = |k: u32| Tie { rows: 1, kept: vec![k, (k + 1) % 6] };
     let dense = Dense::new(layout.with_ties((0..6).map(tie).collect()).unwrap(), 9);
     for ordering in ALL {
         compare_with_dense(&dense, ordering);

@@ -33,7 +33,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     ) -> Result<Vec<f64>, AdjustError> {
         self.chord = None;
         let (values, factor) = (self.problem.advanced(state.values(), step), &state.linearized.factor);
-        if !(factor.has_kept() && self.is_for_chord(iteration)) {
+        if !(factor.has_cached() && self.is_for_chord(iteration)) {
             return Ok(values);
         }
         let (problem, start) = (self.problem, Instant::now());

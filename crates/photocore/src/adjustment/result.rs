@@ -89,7 +89,7 @@ pub struct Adjustment {
     pub ordering: Ordering,
     /// The orderings that were compared, each with the predicted multiply-adds of a factorisation.
     pub predictions: Vec<(Ordering, f64)>,
-    /// Kept blocks (the border is the block after the last) in the order of their elimination.
+    /// Kept blocks in the order of their elimination.
     pub order: Vec<usize>,
 }
 
@@ -161,8 +161,7 @@ pub enum AdjustError {
     /// Local blocks that their observations do not determine.
     #[error("{} local blocks are not determined by their observations", .0.len())]
     UndeterminedLocals(Vec<usize>),
-    /// Combinations of kept unknowns that the observations do not determine: for each the kept blocks it moves (the
-    /// border is the block after the last).
+    /// Combinations of kept unknowns that the observations do not determine: for each the kept blocks it moves.
     #[error("{} combinations of unknowns are not determined by the observations", .0.len())]
     Undetermined(Vec<Vec<usize>>),
     /// The initial values give observations that are not finite.

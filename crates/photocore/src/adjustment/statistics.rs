@@ -123,7 +123,6 @@ impl<M> Problem<M> {
             diagonal(&mut cofactors.kept[start..], layout.kept_range(kept));
             start += layout.kept_dim(kept).pow(2);
         }
-        diagonal(&mut cofactors.border, layout.border_range());
     }
 }
 

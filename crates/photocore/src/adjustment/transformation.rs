@@ -62,21 +62,12 @@ impl Transformation {
                 cancelled = cancelled.max(self.blocks(std::iter::once(Block { rows, columns, values })));
             }
         }
-        let border = layout.border_range();
-        let (mut own, mut tied) = (&mut cofactors.kept[..], &mut cofactors.kept_border[..]);
+        let mut own = &mut cofactors.kept[..];
         for kept in 0..layout.kept() {
             let rows = layout.kept_range(kept);
             let (values, rest) = std::mem::take(&mut own).split_at_mut(rows.len().pow(2));
             own = rest;
-            if !border.is_empty() {
-                let (values, rest) = std::mem::take(&mut tied).split_at_mut(rows.len() * border.len());
-                others.push(Block { rows: rows.clone(), columns: border.clone(), values });
-                tied = rest;
-            }
             others.push(Block { rows: rows.clone(), columns: rows, values });
-        }
-        if !border.is_empty() {
-            others.push(Block { rows: border.clone(), columns: border, values: &mut cofactors.border });
         }
         let of_others = others.par_chunks_mut(AT_ONCE).map(|blocks| {
             self.blocks(blocks.iter_mut().map(|Block { rows, columns, values }| Block {

@@ -137,12 +137,11 @@ impl Bundle {
             let point = self.point_of(self.start[self.locals] + tie);
             let others = self.blocks_of_pose(image.photo).chain(self.camera_block[image.photo]);
             let blocks = std::iter::once(self.block_of_point(point)).chain(others);
-            Tie { rows: 2, kept: blocks.map(|block| block as u32).collect(), border: 0..0 }
+            Tie { rows: 2, kept: blocks.map(|block| block as u32).collect() }
         });
         let observations = self.observations.iter().map(|tied| Tie {
             rows: tied.root.nrows(),
             kept: tied.blocks.iter().map(|&block| block as u32).collect(),
-            border: 0..0,
         });
         images.chain(observations).collect()
     }

@@ -19,8 +19,8 @@ pub(super) struct Formation<'a> {
     pub equations: &'a dyn Gathered,
     pub prior: &'a Prior,
     pub damping: f64,
-    /// Whether to keep what [`System::solve`] needs of the local blocks.
-    pub keeps: bool,
+    /// Whether to cache what [`System::solve`] needs of the local blocks.
+    pub caches: bool,
     pub control: &'a Control,
 }
 
@@ -30,8 +30,8 @@ pub(super) struct Sums {
     pub sum_of_squares: f64,
     pub decrease: f64,
     pub deficient: Vec<usize>,
-    /// What is kept of the local blocks.
-    pub kept: Vec<f64>,
+    /// What is cached of the local blocks.
+    pub cached: Vec<f64>,
 }
 
 /// Local blocks at one supernode from which on several threads work at them.
@@ -45,24 +45,24 @@ impl Formation<'_> {
         &self,
         front: &mut Front<'_>,
         index: usize,
-        kept: &Handover<Vec<f64>>,
+        cached: &Handover<Vec<f64>>,
     ) -> Option<Sums> {
         let Self { system, control, .. } = self;
         let layout = &system.layout;
         let stacks = system.incidence.stacks_at(index);
         let mut sums = Sums::default();
-        if self.keeps {
-            sums.kept = kept.take(index).unwrap_or_default();
-            let numbers = system.kept[index] + LANES;
-            if sums.kept.capacity() < numbers {
-                sums.kept = control.allocated(reserved(numbers))?;
+        if self.caches {
+            sums.cached = cached.take(index).unwrap_or_default();
+            let numbers = system.cached[index] + LANES;
+            if sums.cached.capacity() < numbers {
+                sums.cached = control.allocated(reserved(numbers))?;
             }
         }
         if stacks.locals() < MANY || rayon::current_num_threads() == 1 {
             self.assemble_in_turn(front, stacks, &mut sums);
             return Some(sums);
         }
-        sums.kept.clear();
+        sums.cached.clear();
         let mut filled: Vec<Stack> = (0..WAVE).map(|_| system.workspace.stack()).collect();
         let starts = self.shares(index);
         for wave in stacks.parts(WAVE).into_iter().take_while(|_| !control.stopped()) {
@@ -76,34 +76,34 @@ impl Formation<'_> {
             });
             for stack in filled {
                 sums.add(stack);
-                if self.keeps {
-                    stack.keep(layout, &mut sums.kept);
+                if self.caches {
+                    stack.cache(layout, &mut sums.cached);
                 }
             }
         }
         filled.into_iter().for_each(|stack| system.workspace.put_back_stack(stack));
         // Products read beyond the end.
-        sums.kept.resize(sums.kept.len() + LANES, 0.0);
+        sums.cached.resize(sums.cached.len() + LANES, 0.0);
         Some(sums)
     }
 
-    /// The same stack by stack: what is kept of them is written where it stays.
+    /// The same stack by stack: what is cached of them is written where it stays.
     fn assemble_in_turn(&self, front: &mut Front<'_>, stacks: Stacks<'_>, sums: &mut Sums) {
         let layout = &self.system.layout;
         let mut stack = self.system.workspace.stack();
-        if self.keeps {
-            std::mem::swap(&mut stack.coupling, &mut sums.kept);
+        if self.caches {
+            std::mem::swap(&mut stack.coupling, &mut sums.cached);
         }
         for run in stacks.iter().take_while(|_| !self.control.stopped()) {
             self.fill(&mut stack, run);
             stack.add_to(&mut front.columns(), layout);
             sums.add(&mut stack);
-            if self.keeps {
-                stack.keep_in_place(layout);
+            if self.caches {
+                stack.cache_in_place(layout);
             }
         }
-        if self.keeps {
-            std::mem::swap(&mut stack.coupling, &mut sums.kept);
+        if self.caches {
+            std::mem::swap(&mut stack.coupling, &mut sums.cached);
             stack.start = 0;
         }
         self.system.workspace.put_back_stack(stack);

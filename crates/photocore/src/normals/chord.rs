@@ -17,9 +17,9 @@ impl System {
     /// About N^-1 A^T l over all unknowns, in the order of the layout, A and l of equations and priors at other values of the unknowns than those
     /// that the factor comes from: a chord step; and by how much it lowers the sum of squares of the equations there. The local blocks are
     /// eliminated from the right-hand sides by the equations given; the others are solved, and the local blocks from them, with the factor and
-    /// what it has kept. The same bits for any number of threads.
+    /// what it has cached. The same bits for any number of threads.
     ///
-    /// For a factor that has kept what the elimination of the local blocks has left ([`Factor::has_kept`]). What systems below a part of
+    /// For a factor that has cached what the elimination of the local blocks has left ([`Factor::has_cached`]). What systems below a part of
     /// a larger one have left is not in it.
     pub fn chord<E: Equations>(
         &self,
@@ -50,7 +50,7 @@ impl System {
     }
 
     /// What the local blocks at home in a supernode have as right-hand sides, and what they leave to others. Their normal matrices are those of the
-    /// equations: to form them takes less time than to read what the factor has kept.
+    /// equations: to form them takes less time than to read what the factor has cached.
     fn rights_at_home(
         &self,
         equations: &dyn Gathered,
@@ -78,10 +78,7 @@ impl System {
         let (mut constant, mut coefficients) = (Vec::new(), Vec::new());
         for (index, tie) in layout.ties().iter().enumerate() {
             let of_block = |&block: &u32| symbolic.range(symbolic.position(block as usize));
-            // The border is the last block.
-            let last = symbolic.blocks().saturating_sub(1);
-            let border = tie.border.clone().map(|k| symbolic.range(last).start + k as usize);
-            let columns: Vec<usize> = tie.kept.iter().flat_map(of_block).chain(border).collect();
+            let columns: Vec<usize> = tie.kept.iter().flat_map(of_block).collect();
             constant.resize(tie.rows, 0.0);
             coefficients.resize(tie.rows * columns.len(), 0.0);
             equations

@@ -23,13 +23,13 @@ const CHUNK: usize = 64;
 
 impl Stack {
     /// Appends what the elimination has left: V, v and L.
-    pub fn keep(&mut self, layout: &Layout, cached: &mut Vec<f64>) {
+    pub fn cache(&mut self, layout: &Layout, cached: &mut Vec<f64>) {
         let end = self.end + self.numbers_beside(layout) - self.start;
         cached.extend_from_slice(&self.eliminated(layout)[..end]);
     }
 
     /// Leaves it in its buffer; the V of the next stack goes behind it.
-    pub fn keep_in_place(&mut self, layout: &Layout) {
+    pub fn cache_in_place(&mut self, layout: &Layout) {
         self.eliminated(layout);
         self.start = self.end + self.numbers_beside(layout);
     }

@@ -13,7 +13,7 @@ use super::system::System;
 struct Own {
     local: Mat<f64>,
     others: Mat<f64>,
-    /// Each other block, the border counted after the last kept one, with its first column of B.
+    /// Each other block with its first column of B.
     blocks: BTreeMap<usize, usize>,
 }
 
@@ -26,7 +26,7 @@ pub struct LocalCofactors {
     pub by_local: Vec<f64>,
     /// Q a^T of the unknowns of the local block, those of each equation together.
     pub local: Vec<f64>,
-    /// The same of each kept block that the groups of the local block touch; the border is counted after the last.
+    /// The same of each kept block that the groups of the local block touch.
     pub others: Vec<(usize, Vec<f64>)>,
 }
 
@@ -54,12 +54,12 @@ impl System {
     /// * `equations`, `prior`: those that the inverse comes from;
     /// * `asked`: the equations whose cofactors are asked for, which may have another weight;
     /// * `further`: coefficients of the unknowns of the local block, one equation after the other.
-    pub fn local_cofactors<E: Equations, F: Equations>(
+    pub fn local_cofactors(
         &self,
         selected: &SelectedInverse,
-        equations: &E,
+        equations: &dyn Equations,
         prior: &Prior,
-        asked: &F,
+        asked: &dyn Equations,
         local: usize,
         further: &[f64],
     ) -> LocalCofactors {
@@ -78,7 +78,7 @@ impl System {
         for (&row, &first) in &blocks {
             for (&column, &left) in &blocks {
                 let values = selected.block(row, column).unwrap_or_default();
-                let width = self.block_dim(column);
+                let width = self.layout.kept_dim(column);
                 values.iter().enumerate().for_each(|(k, &v)| q[(first + k / width, left + k % width)] = v);
             }
         }
@@ -87,7 +87,7 @@ impl System {
         let found = &c * &others + &alone;
         let own = by_local - coupling * &others;
         let of_block = |(&block, &first): (&usize, &usize)| {
-            let width = self.block_dim(block);
+            let width = self.layout.kept_dim(block);
             (block, (0..rows * width).map(|k| others[(first + k % width, k / width)]).collect())
         };
         LocalCofactors {
@@ -98,24 +98,16 @@ impl System {
         }
     }
 
-    /// Unknowns of a kept block, or of the border, which is counted after the last.
-    fn block_dim(&self, block: usize) -> usize {
-        if block < self.layout.kept() { self.layout.kept_dim(block) } else { self.layout.border_dim() }
-    }
-
-    fn own_equations<E: Equations>(&self, equations: &E, local: usize, further: &[f64]) -> Own {
+    fn own_equations(&self, equations: &dyn Equations, local: usize, further: &[f64]) -> Own {
         let layout = &self.layout;
         let (rows, l, groups) = (layout.rows(), layout.local_dim(), layout.groups_of(local));
         let touched = groups.clone().flat_map(|group| layout.blocks_of(group));
-        let border = (layout.border_dim() > 0).then_some(layout.kept());
-        let mut blocks: BTreeMap<usize, usize> = touched.chain(border).map(|block| (block, 0)).collect();
+        let mut blocks: BTreeMap<usize, usize> = touched.map(|block| (block, 0)).collect();
         let (mut width, mut columns) = (0, BTreeMap::new());
         for (&block, first) in &mut blocks {
             *first = width;
-            let unknowns =
-                if Some(block) == border { layout.border_range() } else { layout.kept_range(block) };
-            columns.extend(unknowns.zip(width..));
-            width += self.block_dim(block);
+            columns.extend(layout.kept_range(block).zip(width..));
+            width += self.layout.kept_dim(block);
         }
         let count = groups.len() * rows + further.len() / l;
         let mut own = Own { local: Mat::zeros(count, l), others: Mat::zeros(count, width), blocks };

@@ -36,7 +36,7 @@ pub trait Equations: Sync {
 pub struct TieRows<'a> {
     /// Right-hand sides l (rows).
     pub constant: &'a mut [f64],
-    /// Coefficients, row by row: those of its kept blocks in their order, then those of its range of the border.
+    /// Coefficients, row by row: those of its kept blocks in their order.
     pub coefficients: &'a mut [f64],
 }
 
@@ -50,7 +50,7 @@ pub struct GroupRows<'a> {
     /// Coefficients of the main kept block (rows x its unknowns).
     pub kept: &'a mut [f64],
     /// Coefficients of what the group has in common with others (rows x [`Layout::common_width`]): those of its further kept blocks in
-    /// their order, then those of its range of the border.
+    /// their order.
     pub common: &'a mut [f64],
 }
 

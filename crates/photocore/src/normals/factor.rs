@@ -96,8 +96,8 @@ impl System {
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Factor> {
         watched(pool, between, |control| {
-            let keeps = cached && self.keeps;
-            let formation = Formation { system: self, equations, prior, damping, keeps, control };
+            let caches = cached && self.caches;
+            let formation = Formation { system: self, equations, prior, damping, caches, control };
             let mut given_up = Vec::new();
             loop {
                 let factor = formation.factor(&given_up)?;
@@ -126,10 +126,11 @@ impl Formation<'_> {
         let updates = Handover::new(symbolic.supernode_count());
         let visited = Handover::new(symbolic.supernode_count());
         let divided = panels.divide();
-        let kept = self.room();
+        let cached = self.room();
         self.system.tree.upward(|index| {
             if !self.control.stopped()
-                && let Some(found) = self.visit(index, &mut lock(&divided[index]), &kept, &updates, given_up)
+                && let Some(found) =
+                    self.visit(index, &mut lock(&divided[index]), &cached, &updates, given_up)
             {
                 visited.put(index, found);
             }
@@ -150,9 +151,9 @@ impl Formation<'_> {
         };
         let (mut formation, mut factorisation) = (0.0, 0.0);
         let none = Front::new(0, 0, &mut [], Vec::new());
-        let homeless = self.assemble(&mut { none }, symbolic.supernode_count(), &kept)?;
+        let homeless = self.assemble(&mut { none }, symbolic.supernode_count(), &cached)?;
         for (index, visited) in visited.into_values().flatten().enumerate() {
-            factor.add(visited.sums, self.keeps);
+            factor.add(visited.sums, self.caches);
             if symbolic.open() != Some(index) {
                 factor.decrease += visited.right.iter().map(|v| v * v).sum::<f64>();
             }
@@ -163,7 +164,7 @@ impl Formation<'_> {
             formation += visited.formation;
             factorisation += visited.factorisation;
         }
-        factor.add(homeless, self.keeps);
+        factor.add(homeless, self.caches);
         if formation + factorisation > 0.0 {
             factor.formation_share = formation / (formation + factorisation);
         }
@@ -176,7 +177,7 @@ impl Formation<'_> {
         &self,
         index: usize,
         panel: &mut [f64],
-        kept: &Handover<Vec<f64>>,
+        cached: &Handover<Vec<f64>>,
         updates: &Handover<Update>,
         given_up: &[usize],
     ) -> Option<Visited> {
@@ -191,7 +192,7 @@ impl Formation<'_> {
                 self.system.workspace.put_back(update.matrix);
             }
         }
-        let mut sums = self.assemble(&mut front, index, kept)?;
+        let mut sums = self.assemble(&mut front, index, cached)?;
         sums.sum_of_squares += self.add_ties(&mut front, index);
         self.add_contributions(&mut front, index);
         let open = symbolic.open() == Some(index);
@@ -221,14 +222,14 @@ impl Formation<'_> {
         })
     }
 
-    /// Room for what is kept at each supernode: that of the formation before, where there was one.
+    /// Room for what is cached at each supernode: that of the formation before, where there was one.
     fn room(&self) -> Handover<Vec<f64>> {
-        let kept = Handover::new(self.system.symbolic.supernode_count() + 1);
-        if self.keeps {
+        let cached = Handover::new(self.system.symbolic.supernode_count() + 1);
+        if self.caches {
             let spare = self.system.workspace.take_eliminated().into_iter().enumerate();
-            spare.for_each(|(index, room)| kept.put(index, room));
+            spare.for_each(|(index, room)| cached.put(index, room));
         }
-        kept
+        cached
     }
 }
 
@@ -275,17 +276,17 @@ impl Front<'_> {
 }
 
 impl Factor {
-    fn add(&mut self, sums: Sums, keeps: bool) {
+    fn add(&mut self, sums: Sums, caches: bool) {
         self.sum_of_squares += sums.sum_of_squares;
         self.decrease += sums.decrease;
         self.deficient_locals.extend(sums.deficient);
-        if keeps {
-            self.eliminated.push(sums.kept);
+        if caches {
+            self.eliminated.push(sums.cached);
         }
     }
 
     /// Whether it has cached what the elimination of the local blocks has left.
-    pub fn has_kept(&self) -> bool {
+    pub fn has_cached(&self) -> bool {
         !self.eliminated.is_empty()
     }
 

@@ -15,9 +15,7 @@ impl Homes {
     pub fn new<'a>(lists: impl Iterator<Item = &'a Vec<u32>>, symbolic: &Symbolic) -> Self {
         let home = |blocks: &Vec<u32>| {
             let positions = blocks.iter().map(|&block| symbolic.position(block as usize));
-            // A tie that touches no kept block touches the border, the last position.
-            let first = positions.min().or_else(|| symbolic.blocks().checked_sub(1));
-            first.map_or(symbolic.supernode_count(), |first| symbolic.supernode_of(first))
+            positions.min().map_or(symbolic.supernode_count(), |first| symbolic.supernode_of(first))
         };
         let home: Vec<usize> = lists.map(home).collect();
         let mut by_home: Vec<u32> = (0..home.len() as u32).collect();

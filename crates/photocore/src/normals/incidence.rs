@@ -173,20 +173,20 @@ impl Incidence {
 /// Numbers what groups have in common with others: that of each group, none where no group has anything, and a group that has it of each
 /// number. The images of one photo nearly always have the same.
 fn commons(layout: &Layout) -> (Vec<u32>, Vec<u32>) {
-    if !layout.has_common() {
+    if !layout.has_further() {
         return (Vec::new(), Vec::new());
     }
     let mut group_with: Vec<u32> = Vec::new();
-    let mut known: HashMap<(&[u32], Range<usize>), u32> = HashMap::new();
+    let mut known: HashMap<&[u32], u32> = HashMap::new();
     let mut last: Vec<Option<u32>> = vec![None; layout.kept()];
     let number = |group: usize| {
         let own = &mut last[layout.kept_of(group)];
-        if let Some(common) =
-            own.filter(|&common| layout.share_alike(group_with[common as usize] as usize, group))
-        {
+        let is_same =
+            |common: u32| layout.further_of(group_with[common as usize] as usize) == layout.further_of(group);
+        if let Some(common) = own.filter(|&common| is_same(common)) {
             return common;
         }
-        let common = *known.entry((layout.further_of(group), layout.border_of(group))).or_insert_with(|| {
+        let common = *known.entry(layout.further_of(group)).or_insert_with(|| {
             group_with.push(group as u32);
             group_with.len() as u32 - 1
         });

@@ -47,8 +47,8 @@ impl System {
     ) -> ControlFlow<Stopped, Inversion> {
         let equations: &dyn Gathered = equations;
         factor.forget();
+        let Factor { mut panels, diagonal, .. } = factor;
         watched(pool, between, |control| {
-            let Factor { mut panels, diagonal, .. } = factor;
             let information = self.information(&diagonal);
             panels.reopen();
             Walk { system: self, equations, prior, options, control }.invert(panels, information)

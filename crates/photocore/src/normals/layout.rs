@@ -7,10 +7,9 @@ use thiserror::Error;
 
 /// The unknowns and the equations of a system.
 ///
-/// The vector of unknowns is `[local blocks | kept blocks | border]`. A group of `rows` equations touches one local
-/// block, its main kept block and what it has in common with others: *further* kept blocks (the camera of several photographs)
-/// and a range of the border, both possibly none. The groups of a local block are consecutive.
-/// A [`Tie`] touches any kept blocks and a range of the border, but no local block.
+/// The vector of unknowns is `[local blocks | kept blocks]`. A group of `rows` equations touches one local block, its main kept block and
+/// what it has in common with others: *further* kept blocks (the camera of several photographs, the comparator of all), possibly none.
+/// The groups of a local block are consecutive. A [`Tie`] touches any kept blocks, but no local block.
 ///
 /// Kernels are made for the main blocks, so what nearly every group touches belongs among the further ones: a block that is further
 /// in any group is the main one of none.
@@ -22,13 +21,11 @@ pub struct Layout {
     local_dim: usize,
     locals: usize,
     kept_offset: Vec<usize>,
-    border_dim: usize,
     group_ptr: Vec<usize>,
     group_kept: Vec<u32>,
     /// The further blocks of group `g` are `further[further_ptr[g]..further_ptr[g + 1]]`; both are empty where no group has any.
     further_ptr: Vec<usize>,
     further: Vec<u32>,
-    group_border: Vec<Range<u32>>,
     ties: Vec<Tie>,
     /// Where the equations of each tie start among those of all ties; one more at the end.
     tie_ptr: Vec<usize>,
@@ -45,16 +42,14 @@ pub struct Layout {
     contributions: Vec<Vec<u32>>,
 }
 
-/// Equations among kept blocks and common unknowns: a distance between two points that are kept, a relative pose of two
-/// photographs, an observation of common unknowns alone.
+/// Equations among kept blocks: a distance between two points that are kept, a relative pose of two photographs, an observation of
+/// unknowns of one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tie {
     /// How many equations.
     pub rows: usize,
     /// The kept blocks that they touch, each once, in any order.
     pub kept: Vec<u32>,
-    /// The part of the border that they touch, counted from its start; may be empty.
-    pub border: Range<u32>,
 }
 
 /// A layout that contradicts itself.
@@ -102,21 +97,11 @@ pub enum LayoutError {
         /// The block it names.
         kept: usize,
     },
-    /// A group touches unknowns beyond the end of the border.
-    #[error("group {group} touches the border up to {end} of {border}")]
-    Border {
-        /// The group.
-        group: usize,
-        /// End of its range.
-        end: usize,
-        /// Size of the border.
-        border: usize,
-    },
     /// A pair names a kept block that does not exist.
     #[error("a pair of kept blocks names one that does not exist: {0:?}")]
     Pair([usize; 2]),
-    /// Outer blocks beside a border, or a list of outer or contributed blocks with one that does not exist or is there twice.
-    #[error("outer or contributed blocks do not exist, are named twice or stand beside a border")]
+    /// A list of outer or contributed blocks with one that does not exist or is there twice.
+    #[error("outer or contributed blocks do not exist or are named twice")]
     Outer,
     /// The pattern of the factor lacks a block that equations touch: the order of elimination contradicts the layout.
     #[error("the pattern of the factor lacks blocks that go to its front {front}")]
@@ -133,7 +118,7 @@ pub enum LayoutError {
 }
 
 impl Layout {
-    /// Describes a system without border.
+    /// Describes a system of main blocks alone.
     ///
     /// * `rows`: equations in each group (2 for an image point);
     /// * `local_dim`: unknowns of a local block, 1 to 3;
@@ -169,18 +154,15 @@ impl Layout {
         }
         kept_offset.push(offset);
         let locals = group_ptr.len() - 1;
-        let group_border = Vec::new();
         Ok(Self {
             rows,
             local_dim,
             locals,
             kept_offset,
-            border_dim: 0,
             group_ptr,
             group_kept,
             further_ptr: Vec::new(),
             further: Vec::new(),
-            group_border,
             ties: Vec::new(),
             tie_ptr: vec![0],
             block_ptr: vec![0],
@@ -225,32 +207,15 @@ impl Layout {
         Ok(self)
     }
 
-    /// Adds a border of `dim` common unknowns; `ranges` says which of them each group touches.
-    pub fn with_border(mut self, dim: usize, ranges: Vec<Range<u32>>) -> Result<Self, LayoutError> {
-        if ranges.len() != self.groups() {
-            return Err(LayoutError::GroupPointers(self.groups()));
-        }
-        numbered(self.all_kept().end.saturating_add(dim))?;
-        if let Some(group) =
-            ranges.iter().position(|range| range.end as usize > dim || range.start > range.end)
-        {
-            return Err(LayoutError::Border { group, end: ranges[group].end as usize, border: dim });
-        }
-        self.border_dim = dim;
-        self.group_border = ranges;
-        Ok(self)
-    }
-
-    /// Adds ties; after the border, which they may touch.
+    /// Adds ties.
     pub fn with_ties(mut self, ties: Vec<Tie>) -> Result<Self, LayoutError> {
         numbered(ties.len())?;
         let sound = |tie: &Tie| {
             let mut kept = tie.kept.clone();
             kept.sort_unstable();
-            let border = tie.border.start <= tie.border.end && tie.border.end as usize <= self.border_dim;
-            let exist = kept.last().is_none_or(|&last| (last as usize) < self.kept());
+            let exist = kept.last().is_some_and(|&last| (last as usize) < self.kept());
             let once = kept.windows(2).all(|pair| pair[0] < pair[1]);
-            tie.rows > 0 && border && exist && once && !(kept.is_empty() && tie.border.is_empty())
+            tie.rows > 0 && exist && once
         };
         if let Some(tie) = ties.iter().position(|tie| !sound(tie)) {
             return Err(LayoutError::Tie { tie });
@@ -325,7 +290,7 @@ impl Layout {
             blocks.iter().all(fresh)
         };
         let all_sound = std::iter::once(&outer).chain(&contributions).all(|blocks| sound(blocks));
-        if !all_sound || self.border_dim > 0 && !outer.is_empty() {
+        if !all_sound {
             return Err(LayoutError::Outer);
         }
         (self.outer, self.contributions) = (outer, contributions);
@@ -377,11 +342,6 @@ impl Layout {
         self.kept_offset[j + 1] - self.kept_offset[j]
     }
 
-    /// Size of the border.
-    pub fn border_dim(&self) -> usize {
-        self.border_dim
-    }
-
     /// Number of groups of equations.
     pub fn groups(&self) -> usize {
         self.group_kept.len()
@@ -412,17 +372,14 @@ impl Layout {
         self.groups() * self.rows + self.tie_ptr[self.ties.len()]
     }
 
-    /// The unknowns that a tie touches, block by block in its order, the border last: the columns of its coefficients.
+    /// The unknowns that a tie touches, block by block in its order: the columns of its coefficients.
     pub fn tie_columns(&self, tie: usize) -> impl Iterator<Item = usize> + '_ {
-        let Tie { kept, border, .. } = &self.ties[tie];
-        let start = self.border_range().start;
-        let common = start + border.start as usize..start + border.end as usize;
-        kept.iter().flat_map(|&block| self.kept_range(block as usize)).chain(common)
+        self.unknowns_of(&self.ties[tie].kept)
     }
 
     /// Number of unknowns.
     pub fn unknowns(&self) -> usize {
-        self.kept_offset[self.kept()] + self.border_dim
+        self.kept_offset[self.kept()]
     }
 
     /// The groups of local block `i`.
@@ -453,11 +410,6 @@ impl Layout {
         !self.further.is_empty()
     }
 
-    /// Whether any group may touch more than its main kept block.
-    pub(super) fn has_common(&self) -> bool {
-        self.has_further() || self.border_dim > 0
-    }
-
     /// The further kept blocks that a group touches, in its order.
     pub fn further_of(&self, group: usize) -> &[u32] {
         match self.further_ptr.get(group..group + 2) {
@@ -466,28 +418,20 @@ impl Layout {
         }
     }
 
-    /// Whether two groups have the same in common with others.
-    pub(super) fn share_alike(&self, a: usize, b: usize) -> bool {
-        self.further_of(a).iter().eq(self.further_of(b)) && self.border_of(a) == self.border_of(b)
-    }
-
     /// All kept blocks that a group touches, the main one first.
     pub fn blocks_of(&self, group: usize) -> impl Iterator<Item = usize> + '_ {
         std::iter::once(self.kept_of(group)).chain(self.further_of(group).iter().map(|&block| block as usize))
     }
 
-    /// The unknowns that a group touches in its further kept blocks, block by block in its order, then in the border: the columns of
-    /// what its equations have in common with others.
+    /// The unknowns that a group touches in its further kept blocks, block by block in its order: the columns of what its equations have in
+    /// common with others.
     pub fn common_columns(&self, group: usize) -> impl Iterator<Item = usize> + '_ {
-        let (start, border) = (self.border_range().start, self.border_of(group));
-        let further = self.further_of(group).iter().flat_map(|&block| self.kept_range(block as usize));
-        further.chain(start + border.start..start + border.end)
+        self.unknowns_of(self.further_of(group))
     }
 
     /// How many they are.
     pub fn common_width(&self, group: usize) -> usize {
-        let further = self.further_of(group).iter().map(|&block| self.kept_dim(block as usize));
-        further.sum::<usize>() + self.border_of(group).len()
+        self.further_of(group).iter().map(|&block| self.kept_dim(block as usize)).sum()
     }
 
     /// The unknowns of kept blocks, a main one counted for each of its groups, that lose products when local block `i` is reduced out.
@@ -501,14 +445,6 @@ impl Layout {
         further.sort_unstable();
         further.dedup();
         main + further.into_iter().map(|block| self.kept_dim(block as usize)).sum::<usize>()
-    }
-
-    /// The part of the border that a group touches, counted from the start of the border.
-    pub fn border_of(&self, group: usize) -> Range<usize> {
-        match self.group_border.get(group) {
-            Some(range) => range.start as usize..range.end as usize,
-            None => 0..0,
-        }
     }
 
     /// Where local block `i` stands in the vector of unknowns.
@@ -529,11 +465,6 @@ impl Layout {
     /// Where all kept blocks stand in the vector of unknowns.
     pub fn all_kept(&self) -> Range<usize> {
         self.kept_offset[0]..self.kept_offset[self.kept()]
-    }
-
-    /// Where the border stands in the vector of unknowns.
-    pub fn border_range(&self) -> Range<usize> {
-        self.kept_offset[self.kept()]..self.unknowns()
     }
 }
 

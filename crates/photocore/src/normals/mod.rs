@@ -1,8 +1,8 @@
 //! Block normal equations: formed, reduced, ordered, factored, solved and selectively inverted.
 //!
-//! The unknowns stand in one vector: *local* blocks of equal size (object points, stars), then *kept* blocks of any size
-//! (photographs, cameras), then a *border* of common unknowns. Each group of equations touches one local block, one main kept
-//! block, any further ones and a range of the border; ties are equations among any kept blocks and the border. One pass over a system is
+//! The unknowns stand in one vector: *local* blocks of equal size (object points, stars), then *kept* blocks of any size (photographs,
+//! cameras, a comparator). Each group of equations touches one local block, one main kept block and any further ones; ties are equations
+//! among any kept blocks. One pass over a system is
 //!
 //! 1. [`Layout`]: which unknowns there are and which group touches which of them;
 //! 2. [`System`]: the order of elimination and the pattern of the factor ([`Symbolic`]), once for all iterations;

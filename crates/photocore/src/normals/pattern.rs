@@ -24,8 +24,7 @@ impl System {
                 incidence.positions_of(layout, local).iter().all(|&position| has(position as usize))
                     && incidence.members(incidence.set_of(local)).iter().all(further)
             });
-            let border = layout.border_dim() == 0 || has(symbolic.blocks() - 1);
-            if !(children && ties && below && locals && border) {
+            if !(children && ties && below && locals) {
                 return Err(LayoutError::Pattern { front });
             }
         }
@@ -45,7 +44,7 @@ mod tests {
 
     #[test]
     fn a_pattern_that_lacks_what_goes_to_a_front_is_refused() {
-        let tie = Tie { rows: 1, kept: vec![0, 2], border: 0..0 };
+        let tie = Tie { rows: 1, kept: vec![0, 2] };
         let together = [
             Layout::new(1, 1, &[1, 1, 1, 1], vec![0, 2, 3], vec![0, 1, 2]).unwrap(),
             apart().with_further(vec![0, 0, 0, 1], vec![3]).unwrap(),

@@ -9,7 +9,7 @@ const PER_UNKNOWN: usize = 38;
 /// Numbers for each equation beside its coefficients: observed value, standard deviation, residual, redundancy number and test value,
 /// as given, as ordered for the adjustment and as handed back.
 const PER_EQUATION: usize = 18;
-/// Of these, the part that is made of the results after the last solution: what is kept from the formation to the solution may take it.
+/// Of these, the part that is made of the results after the last solution: what is cached from the formation to the solution may take it.
 const LATER: f64 = 0.65;
 
 /// Numbers in vectors, the problem itself and its results counted.
@@ -22,11 +22,10 @@ pub(super) fn made_of_results(layout: &Layout) -> usize {
     (LATER * vectors(layout) as f64) as usize
 }
 
-/// Numbers that are kept of so many local blocks of one pattern, at the most.
+/// Numbers that are cached of so many local blocks of one pattern, at the most.
 fn numbers_of(layout: &Layout, first: usize, count: usize) -> usize {
     let l = layout.local_dim();
-    let border = if layout.has_common() { layout.border_dim() } else { 0 };
-    count * (l * (layout.reduced_width(first) + border + 1) + Triangle::numbers(l))
+    count * (l * (layout.reduced_width(first) + 1) + Triangle::numbers(l))
 }
 
 /// The same of all local blocks at home in a supernode.

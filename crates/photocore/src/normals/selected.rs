@@ -10,8 +10,7 @@ pub struct SelectedInverse {
 }
 
 impl SelectedInverse {
-    /// Block (row, column) of the inverse, row by row; None outside the pattern. Kept blocks are counted as in the layout, the
-    /// border is the block after the last.
+    /// Block (row, column) of the inverse, row by row; None outside the pattern. Kept blocks are counted as in the layout.
     pub fn block(&self, row: usize, column: usize) -> Option<Vec<f64>> {
         let symbolic = &*self.panels.symbolic;
         let (p, q) = (symbolic.position(row), symbolic.position(column));

@@ -21,7 +21,7 @@ const TOGETHER: usize = 16;
 
 impl System {
     /// Solves the normal equations for all unknowns, in the order of the layout, for one right-hand side or several, the solutions one after
-    /// the other: the kept blocks and the border from the factor, the local blocks one by one. The same bits for any number of threads.
+    /// the other: the kept blocks from the factor, the local blocks one by one. The same bits for any number of threads.
     ///
     /// `equations` and `prior` must be those that the factor comes from. The equations are written again where the factor has not cached
     /// what the elimination of the local blocks has left; those of local blocks whose right-hand sides are all zero once only.

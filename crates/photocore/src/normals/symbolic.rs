@@ -10,8 +10,7 @@ use super::ordering::Ordering;
 
 /// The order of elimination and the pattern of the factor of the reduced normal equations.
 ///
-/// Blocks are counted by *position*, their place in the order of elimination. The border, when there is one, is a block
-/// like the others that is eliminated last and coupled to all. Blocks of nearly the same pattern are eliminated together,
+/// Blocks are counted by *position*, their place in the order of elimination. Blocks of nearly the same pattern are eliminated together,
 /// as one supernode whose columns form one dense panel. Outer blocks are the last supernode, which stays *open*: its front is
 /// assembled and not factored.
 #[derive(Debug, Clone)]
@@ -98,20 +97,13 @@ impl Symbolic {
 
     fn with_order(layout: &Layout, graph: &Graph, ordering: Ordering, order: &[usize]) -> Self {
         let inner = order.len() - layout.outer().len();
-        let order = postorder(graph, order, inner);
-        let border = layout.border_dim() > 0;
-        let mut block_at = order;
-        let mut dims: Vec<usize> = block_at.iter().map(|&block| layout.kept_dim(block)).collect();
-        if border {
-            block_at.push(layout.kept());
-            dims.push(layout.border_dim());
-        }
+        let block_at = postorder(graph, order, inner);
         let position_of = places(&block_at);
         let mut offset = vec![0];
-        for dim in &dims {
-            offset.push(offset[offset.len() - 1] + dim);
+        for &block in &block_at {
+            offset.push(offset[offset.len() - 1] + layout.kept_dim(block));
         }
-        let columns = column_patterns(graph, &block_at, &position_of, border);
+        let columns = column_patterns(graph, &block_at, &position_of);
         let mut symbolic = Self {
             ordering,
             predictions: Vec::new(),
@@ -123,19 +115,19 @@ impl Symbolic {
             values: 0,
             open: None,
         };
-        symbolic.gather_supernodes(columns, inner, border);
+        symbolic.gather_supernodes(columns, inner);
         symbolic
     }
 
-    /// Turns column patterns into supernodes with their panels. Blocks from position `inner` on are outer ones, or the border.
-    fn gather_supernodes(&mut self, mut columns: Vec<Vec<usize>>, inner: usize, border: bool) {
+    /// Turns column patterns into supernodes with their panels. Blocks from position `inner` on are outer ones.
+    fn gather_supernodes(&mut self, mut columns: Vec<Vec<usize>>, inner: usize) {
         let count = columns.len();
         self.supernode_of = vec![0; count];
-        let outer = (inner < count && !border).then_some((inner..count, Vec::new()));
+        let outer = (inner < count).then_some((inner..count, Vec::new()));
         if outer.is_some() {
             columns.truncate(inner);
         }
-        let merged = merge_columns(columns, &self.offset, border);
+        let merged = merge_columns(columns, &self.offset);
         self.open = outer.is_some().then_some(merged.len());
         for (blocks, rows) in merged.into_iter().chain(outer) {
             let width = self.offset[blocks.end] - self.offset[blocks.start];
@@ -176,7 +168,7 @@ impl Symbolic {
         &self.predictions
     }
 
-    /// Number of blocks in the order of elimination, the border counted.
+    /// Number of blocks.
     pub fn blocks(&self) -> usize {
         self.block_at.len()
     }
@@ -234,7 +226,7 @@ impl Symbolic {
         &self.supernodes
     }
 
-    /// Place of a kept block (the border is the block after the last) in the order of elimination.
+    /// Place of a kept block in the order of elimination.
     pub(crate) fn position(&self, block: usize) -> usize {
         self.position_of[block]
     }
@@ -244,7 +236,7 @@ impl Symbolic {
         self.block_at[position]
     }
 
-    /// All blocks (the border is the block after the last) in the order of their elimination.
+    /// All blocks in the order of their elimination.
     pub fn order(&self) -> &[usize] {
         &self.block_at
     }
@@ -260,8 +252,7 @@ impl Symbolic {
 
     /// Where the unknowns of a position stand in the vector of unknowns.
     pub(crate) fn unknowns_at(&self, layout: &Layout, position: usize) -> Range<usize> {
-        let block = self.block_at[position];
-        if block < layout.kept() { layout.kept_range(block) } else { layout.border_range() }
+        layout.kept_range(self.block_at[position])
     }
 
     pub(crate) fn supernode_of(&self, position: usize) -> usize {
@@ -333,7 +324,7 @@ fn elimination_tree(graph: &Graph, order: &[usize], place: &[usize]) -> Vec<Opti
 fn predicted_operations(layout: &Layout, graph: &Graph, order: &[usize]) -> f64 {
     let place = places(order);
     let parent = elimination_tree(graph, order, &place);
-    let mut below = vec![layout.border_dim(); order.len()];
+    let mut below = vec![0; order.len()];
     let mut seen_by = vec![usize::MAX; order.len()];
     for (k, &block) in order.iter().enumerate() {
         seen_by[k] = k;
@@ -348,8 +339,7 @@ fn predicted_operations(layout: &Layout, graph: &Graph, order: &[usize]) -> f64 
         }
     }
     let inner = &order[..order.len() - layout.outer().len()];
-    let columns = inner.iter().zip(below).map(|(&block, below)| multiply_adds(layout.kept_dim(block), below));
-    columns.sum::<f64>() + multiply_adds(layout.border_dim(), 0)
+    inner.iter().zip(below).map(|(&block, below)| multiply_adds(layout.kept_dim(block), below)).sum()
 }
 
 /// Multiply-adds of eliminating `width` unknowns that are coupled to `below` others.
@@ -397,12 +387,7 @@ fn postorder(graph: &Graph, order: &[usize], inner: usize) -> Vec<usize> {
 }
 
 /// The positions below the diagonal in each block column of the factor: its own neighbours and what its children leave.
-fn column_patterns(
-    graph: &Graph,
-    block_at: &[usize],
-    position_of: &[usize],
-    border: bool,
-) -> Vec<Vec<usize>> {
+fn column_patterns(graph: &Graph, block_at: &[usize], position_of: &[usize]) -> Vec<Vec<usize>> {
     let count = block_at.len();
     let mut columns: Vec<Vec<usize>> = Vec::with_capacity(count);
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); count];
@@ -415,12 +400,7 @@ fn column_patterns(
                 pattern.push(row);
             }
         };
-        if border {
-            add(count - 1);
-        }
-        if !border || position < count - 1 {
-            graph.neighbours(block_at[position]).for_each(|block| add(position_of[block]));
-        }
+        graph.neighbours(block_at[position]).for_each(|block| add(position_of[block]));
         for &child in &children[position] {
             columns[child].iter().for_each(|&row| add(row));
         }
@@ -439,14 +419,9 @@ const WIDEST_PANEL: usize = 768;
 
 /// Joins each column with the next one when that is its parent and few explicit zeros come in (relaxed supernodes,
 /// Ashcraft and Grimes 1989). Returns the blocks and the coupled rows of each supernode.
-fn merge_columns(
-    columns: Vec<Vec<usize>>,
-    offset: &[usize],
-    border: bool,
-) -> Vec<(Range<usize>, Vec<usize>)> {
+fn merge_columns(columns: Vec<Vec<usize>>, offset: &[usize]) -> Vec<(Range<usize>, Vec<usize>)> {
     let dim = |position: usize| offset[position + 1] - offset[position];
     let size = |rows: &[usize]| rows.iter().map(|&row| dim(row)).sum::<usize>();
-    let last = columns.len().wrapping_sub(usize::from(border));
     let mut merged: Vec<(Range<usize>, Vec<usize>)> = Vec::new();
     let mut filled = 0.0;
     for (position, rows) in columns.into_iter().enumerate() {
@@ -457,7 +432,7 @@ fn merge_columns(
             // All rows of the child but its parent stand in the parent's pattern, so the merged rows are the parent's.
             let zeros = 1.0 - (filled + own) / entries(width, size(&rows));
             let few = zeros < 0.05 || (width <= 48 && zeros < 0.2) || (width <= 24 && zeros < 0.4);
-            if position != last && above.first() == Some(&position) && width <= WIDEST_PANEL && few {
+            if above.first() == Some(&position) && width <= WIDEST_PANEL && few {
                 blocks.end = position + 1;
                 *above = rows;
                 filled += own;

@@ -21,10 +21,10 @@ pub struct System {
     pub(super) contributions: Homes,
     pub(super) tree: Tree,
     pub(super) workspace: Workspace,
-    /// Whether what the elimination of local blocks leaves is kept for the solution.
-    pub(super) keeps: bool,
-    /// Numbers in what is kept of it at each supernode, and last of the local blocks without equations, at the most; none where it is not.
-    pub(super) kept: Vec<usize>,
+    /// Whether what the elimination of local blocks leaves is cached for the solution.
+    pub(super) caches: bool,
+    /// Numbers in what is cached of it at each supernode, and last of the local blocks without equations, at the most; none where it is not.
+    pub(super) cached: Vec<usize>,
 }
 
 impl System {
@@ -47,11 +47,11 @@ impl System {
             factored + formation_work(&incidence, &layout, index)
         };
         let tree = Tree::new(&symbolic, symbolic.supernodes().iter().enumerate().map(work).collect());
-        let kept: Vec<usize> =
+        let cached: Vec<usize> =
             (0..=symbolic.supernode_count()).map(|index| numbers_at(&incidence, &layout, index)).collect();
         let is_part = symbolic.open().is_some() || !layout.contributions().is_empty();
         let workspace = if is_part { Workspace::frugal() } else { Workspace::default() };
-        let keeps = kept.iter().sum::<usize>() <= made_of_results(&layout);
+        let caches = cached.iter().sum::<usize>() <= made_of_results(&layout);
         let system = Self {
             layout,
             symbolic,
@@ -60,8 +60,8 @@ impl System {
             contributions,
             tree,
             workspace,
-            keeps,
-            kept: if keeps { kept } else { Vec::new() },
+            caches,
+            cached: if caches { cached } else { Vec::new() },
         };
         system.check_pattern()?;
         Ok(system)
@@ -79,12 +79,7 @@ impl System {
 
     /// Numbers that a factor holds at the most: the panels, and what the elimination of local blocks has left for the solution.
     pub fn numbers_in_factor(&self) -> usize {
-        self.symbolic.values() + self.kept.iter().sum::<usize>()
-    }
-
-    /// First row of the border in the front of a supernode.
-    pub(super) fn border_row(&self, supernode: usize) -> usize {
-        self.symbolic.supernodes().get(supernode).map_or(0, |s| s.height() - self.layout.border_dim())
+        self.symbolic.values() + self.cached.iter().sum::<usize>()
     }
 }
 

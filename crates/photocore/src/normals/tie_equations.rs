@@ -16,13 +16,7 @@ pub(super) struct TieEquations {
 
 impl TieEquations {
     /// Gathers the equations of a tie whose home is supernode `home`.
-    pub fn gather(
-        &mut self,
-        system: &System,
-        equations: &(impl Equations + ?Sized),
-        home: usize,
-        tie: usize,
-    ) {
+    pub fn gather(&mut self, system: &System, equations: &dyn Equations, home: usize, tie: usize) {
         let layout = &system.layout;
         self.place(system, home, tie);
         let (rows, width) = (layout.ties()[tie].rows, self.columns.len());
@@ -47,8 +41,6 @@ impl TieEquations {
             let row = symbolic.row_of(home, position);
             columns.extend(row..row + symbolic.dim(position));
         }
-        let border = system.border_row(home);
-        columns.extend((each.border.start as usize..each.border.end as usize).map(|k| border + k));
         self.columns.clone_from(&columns);
         self.columns.sort_unstable();
         self.order.clear();

@@ -7,7 +7,7 @@ use super::panels::lock;
 use super::stack::Stack;
 
 /// For each supernode, and last for the local blocks without equations: V, v and L of every stack at home there, one after
-/// the other; nothing where it is not kept.
+/// the other; nothing where it is not cached.
 pub(super) type Eliminated = Vec<Vec<f64>>;
 
 /// Spare buffers, by their capacity (see [`capacity`]). Fronts come and go by the thousand; fresh pages for each of them, and
@@ -92,7 +92,7 @@ impl Workspace {
         lock(&self.stacks).push(stack);
     }
 
-    /// Room for what is kept of local blocks, as it was given back; nothing where it was not.
+    /// Room for what is cached of local blocks, as it was given back; nothing where it was not.
     pub fn take_eliminated(&self) -> Eliminated {
         std::mem::take(&mut *lock(&self.eliminated))
     }

@@ -343,7 +343,7 @@ solution_class! {
         #[getter]
         fn photo_order<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
             let order = &self.solution.adjustment.order;
-            // A border of common unknowns is no photo.
+            // A camera, a point that stays or a mount is no photo.
             let photos = order.iter().filter(|&&block| block < self.solution.photos.len());
             PyArray1::from_vec(py, photos.map(|&photo| photo as i64).collect())
         }

@@ -24,10 +24,6 @@ pub struct Cofactors {
     pub local: Vec<f64>,
     /// Of each kept block, one after the other.
     pub kept: Vec<f64>,
-    /// Of the border.
-    pub border: Vec<f64>,
-    /// Of each kept block with the border (its unknowns x those of the border, row by row), one after the other.
-    pub kept_border: Vec<f64>,
     /// a Q a^T of each equation a x = l, in the order of groups and rows, then of ties and rows: the share of the equation that its own
     /// unknowns take up. One minus it is the redundancy number of an observation.
     pub equations: Vec<f64>,
@@ -90,20 +86,14 @@ impl Cofactors {
                 values = rest;
             }
         }
-        let blocks = 0..layout.kept();
-        let kept = blocks.clone().filter_map(|block| inverse.block(block, block)).flatten().collect();
+        let kept = (0..layout.kept()).filter_map(|block| inverse.block(block, block)).flatten().collect();
         let pair = |pair: &[u32; 2]| {
             let [row, column] = pair.map(|block| block as usize);
             let size = layout.kept_dim(row) * layout.kept_dim(column);
             inverse.block(row, column).unwrap_or_else(|| vec![f64::NAN; size])
         };
         let pairs = layout.pairs().iter().flat_map(pair).collect();
-        let (mut border, mut kept_border) = (Vec::new(), Vec::new());
-        if layout.border_dim() > 0 {
-            border = inverse.block(layout.kept(), layout.kept()).unwrap_or_default();
-            kept_border = blocks.filter_map(|block| inverse.block(block, layout.kept())).flatten().collect();
-        }
-        Some(Self { local, kept, border, kept_border, equations, ties, pairs, groups: None, information })
+        Some(Self { local, kept, equations, ties, pairs, groups: None, information })
     }
 }
 

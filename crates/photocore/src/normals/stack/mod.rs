@@ -34,7 +34,7 @@ pub(super) struct Slot {
     coupling: usize,
 }
 
-/// Consecutive unknowns of a further kept block or of the border that the local blocks are tied to. They stand in the order of their
+/// Consecutive unknowns of a further kept block that the local blocks are tied to. They stand in the order of their
 /// positions, and so of their rows in the front.
 #[derive(Debug, Clone)]
 pub(super) struct Segment {
@@ -97,7 +97,7 @@ struct Common {
     first: usize,
 }
 
-/// A part of what a group has in common with others: a further kept block, or a range of the border.
+/// A part of what a group has in common with others: unknowns of a further kept block that are not held.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     position: usize,

@@ -190,17 +190,10 @@ pub(in crate::normals) fn parts_of<'a>(
         let first = std::mem::replace(width, *width + layout.kept_dim(block));
         Some((block, first))
     });
-    let further = blocks.flat_map(move |(block, first)| {
+    blocks.flat_map(move |(block, first)| {
         let position = symbolic.position(block);
         layout.free_of(block).map(move |free| (position, free.clone(), first + free.start))
-    });
-    // The border is the last block.
-    let border = layout.border_of(group);
-    let own = (!border.is_empty()).then(|| {
-        let column = layout.common_width(group) - border.len();
-        (symbolic.blocks() - 1, border, column)
-    });
-    further.chain(own)
+    })
 }
 
 /// Unites ranges of the unknowns of blocks that overlap or meet, in the order of their positions.

@@ -180,9 +180,9 @@ impl Calibration {
                 combinations
                     .into_iter()
                     .map(|blocks| {
-                        let (kept, border): (Vec<_>, Vec<_>) =
+                        let (cases, comparator): (Vec<_>, Vec<_>) =
                             blocks.into_iter().partition(|&block| block < cases);
-                        (kept, !border.is_empty())
+                        (cases, !comparator.is_empty())
                     })
                     .collect(),
             ),
@@ -206,24 +206,25 @@ impl Calibration {
         }
     }
 
-    /// The least-squares problem: grid points are local blocks of two, cases kept blocks of three, the comparator is the border.
+    /// The least-squares problem: grid points are local blocks of two, cases kept blocks of three, the comparator one that all share.
     fn problem(&self) -> Result<Problem<Comparison>, CalibrationError> {
         let mut order: Vec<usize> = (0..self.measurements.len()).collect();
         order.sort_by_key(|&i| self.measurements[i].point);
         let measurements: Vec<Measurement> = order.iter().map(|&i| self.measurements[i]).collect();
         let start =
             (0..=self.points.len()).map(|point| measurements.partition_point(|m| m.point < point)).collect();
-        let border = self.comparator.unknowns();
-        let all = 0..border.len() as u32;
+        let comparator = self.comparator.unknowns();
+        let dims: Vec<usize> = self.cases.iter().map(|_| 3).chain([comparator.len()]).collect();
         let case_of = measurements.iter().map(|m| m.case as u32).collect();
-        let layout = Layout::new(2, 2, &vec![3; self.cases.len()], start, case_of)?
-            .with_border(border.len(), vec![all; measurements.len()])?;
+        let shared = vec![self.cases.len() as u32; measurements.len()];
+        let layout = Layout::new(2, 2, &dims, start, case_of)?
+            .with_further((0..=measurements.len()).collect(), shared)?;
         let points = self.points.iter().flat_map(|point| point.xy);
         let cases = self.cases.iter().flat_map(|case| {
             let Placement { rotation, translation: [x, y] } = case.placement;
             [rotation, x, y]
         });
-        let initial: Vec<f64> = points.chain(cases).chain(border).collect();
+        let initial: Vec<f64> = points.chain(cases).chain(comparator).collect();
         let free = vec![f64::INFINITY; 3 * self.cases.len() + 3];
         let sd = self.points.iter().flat_map(|point| point.sd).chain(free);
         Ok(Problem {
@@ -252,13 +253,19 @@ impl Solution {
         let redundancy = adjustment.redundancy.take();
         let sum_of_squares =
             problem.sum_of_squares(&residuals) + problem.prior_sum_of_squares(&unknowns, 0..unknowns.len());
-        let border = layout.border_range();
-        let missing = || vec![f64::NAN; border.len() * border.len()];
+        let cases = problem.model.left_handed.len();
+        let (placements, comparator) =
+            (layout.all_kept().start..layout.kept_range(cases).start, layout.kept_range(cases));
+        let missing = || vec![f64::NAN; comparator.len().pow(2)];
+        let (case_cofactors, comparator_cofactors) = match &cofactors {
+            Some(all) => (Some(&all.kept[..9 * cases]), all.kept[9 * cases..].to_vec()),
+            None => (None, missing()),
+        };
         Self {
-            comparator: unknowns[border.clone()].to_vec(),
-            comparator_cofactors: cofactors.as_ref().map_or_else(missing, |all| all.border.clone()),
-            cases: unknowns[layout.all_kept()].as_chunks().0.iter().map(|&v| Placement::from(v)).collect(),
-            case_cofactors: squares(cofactors.as_ref().map(|all| &all.kept[..]), layout.kept()),
+            comparator: unknowns[comparator].to_vec(),
+            comparator_cofactors,
+            cases: unknowns[placements].as_chunks().0.iter().map(|&v| Placement::from(v)).collect(),
+            case_cofactors: squares(case_cofactors, cases),
             points: unknowns[layout.all_locals()].as_chunks().0.to_vec(),
             point_cofactors: squares(cofactors.as_ref().map(|all| &all.local[..]), layout.locals()),
             point_redundancy: pairs(prior_redundancy.as_deref(), 0..layout.locals()),

@@ -40,12 +40,12 @@ impl Model for Comparison {
     type Prepared = Prepared;
 
     fn prepare(&self, unknowns: &[f64]) -> Prepared {
-        let border = unknowns.len() - 3 - 2 * self.basis.functions();
-        let points = border - 3 * self.left_handed.len();
+        let cases = unknowns.len() - 3 - 2 * self.basis.functions();
+        let points = cases - 3 * self.left_handed.len();
         Prepared {
             points: unknowns[..points].as_chunks().0.to_vec(),
-            cases: unknowns[points..border].as_chunks().0.iter().map(|&case| Placement::from(case)).collect(),
-            comparator: Comparator::from_unknowns(self.basis, &unknowns[border..]),
+            cases: unknowns[points..cases].as_chunks().0.iter().map(|&case| Placement::from(case)).collect(),
+            comparator: Comparator::from_unknowns(self.basis, &unknowns[cases..]),
         }
     }
 

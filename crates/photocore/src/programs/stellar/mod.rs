@@ -2,7 +2,7 @@
 //! adjusted together.
 //!
 //! Stars are the local unknowns, two each; attitudes are a kept block each, and the interior parameters and coefficients of refraction
-//! the border. A direction of the axis and weights of parameters are ties. A star that is held ties no attitudes to each other: each
+//! one that all images share. A direction of the axis and weights of parameters are ties. A star that is held ties no attitudes to each other: each
 //! of its images has a local block of its own.
 //!
 //! Unit weight is that of the plate coordinates' weights: its mean error has their unit over the root of theirs.
@@ -361,9 +361,12 @@ impl Calibration {
 
     fn layout(&self, model: &StarImages<'_>) -> Result<Layout, LayoutError> {
         let kept = model.images.iter().map(|&image| self.images[image].pointing as u32).collect();
-        Layout::new(2, 2, &vec![3; self.pointings.len()], model.start.clone(), kept)?
-            .with_border(COMMON, vec![0..COMMON as u32; model.images.len()])?
-            .with_ties(model.ties.iter().map(|(_, tie)| tie.clone()).collect())
+        let (count, common) = (model.images.len(), self.pointings.len() as u32);
+        let dims: Vec<usize> = self.pointings.iter().map(|_| 3).chain([COMMON]).collect();
+        Layout::new(2, 2, &dims, model.start.clone(), kept)?
+            .with_further((0..=count).collect(), vec![common; count])?
+            .with_ties(model.ties.iter().map(|(_, tie)| tie.clone()).collect())?
+            .with_pairs((0..common).map(|pointing| [pointing, common]).collect())
     }
 }
 

@@ -227,28 +227,25 @@ fn root(weight: [[f64; 2]; 2], name: impl Fn() -> String) -> Result<Root, Stella
     }
 }
 
-/// Common parameters that the direction of the axis depends on: epsilon, principal point and principal distances.
-const OF_AXIS: usize = 5;
-
 impl Calibration {
     /// The axis, and the weights of parameters, each with what it touches.
     fn ties(&self) -> Result<Vec<(Tied, Tie)>, StellarError> {
-        let mut ties = Vec::new();
+        let (mut ties, common) = (Vec::new(), self.pointings.len() as u32);
         if let Some(axis) = self.axis {
             let root = root(axis.weight, || "the axis".into())?;
-            let tie = Tie { rows: 2, kept: vec![axis.pointing as u32], border: 0..OF_AXIS as u32 };
+            let tie = Tie { rows: 2, kept: vec![axis.pointing as u32, common] };
             ties.push((Tied::Axis(root), tie));
         }
         for row in 0..self.weights.parameters.len() {
-            let touched = self.weighted(row).map(|(parameter, ..)| parameter as u32);
-            let attitudes = 3 * self.pointings.len() as u32;
-            let (own, common): (Vec<u32>, Vec<u32>) = touched.partition(|&parameter| parameter < attitudes);
-            let mut kept: Vec<u32> = own.iter().map(|parameter| parameter / 3).collect();
+            // With the common parameters in any case: their cofactors with every attitude are asked for.
+            let mut kept: Vec<u32> = self
+                .weighted(row)
+                .map(|(parameter, ..)| common.min(parameter as u32 / 3))
+                .chain([common])
+                .collect();
             kept.sort_unstable();
             kept.dedup();
-            let ends = common.iter().min().zip(common.iter().max());
-            let border = ends.map_or(0..0, |(first, last)| first - attitudes..last + 1 - attitudes);
-            ties.push((Tied::Parameters(row), Tie { rows: 1, kept, border }));
+            ties.push((Tied::Parameters(row), Tie { rows: 1, kept }));
         }
         Ok(ties)
     }
@@ -316,12 +313,12 @@ impl Model for StarImages<'_> {
     }
 
     fn observe_tie(&self, sight: &Sight, tie: usize, rows: &mut TieRows<'_>) {
-        let (tied, Tie { kept, border, .. }) = &self.ties[tie];
+        let (tied, Tie { kept, .. }) = &self.ties[tie];
         rows.coefficients.fill(0.0);
         match tied {
             Tied::Axis(root) => {
                 let Some(found) = sight.axis(self.calibration) else { return rows.constant.fill(0.0) };
-                let columns = rows.coefficients.as_chunks_mut::<{ 3 + OF_AXIS }>().0;
+                let columns = rows.coefficients.as_chunks_mut::<{ 3 + COMMON }>().0;
                 for ((root, constant), columns) in root.iter().zip(&mut *rows.constant).zip(columns) {
                     let mix = |a: f64, b: f64| root[0] * a + root[1] * b;
                     *constant = mix(found.constant[0], found.constant[1]);
@@ -332,13 +329,10 @@ impl Model for StarImages<'_> {
             Tied::Parameters(row) => {
                 rows.constant[0] = self.calibration.off_given(sight, *row);
                 for (parameter, _, element) in self.calibration.weighted(*row) {
-                    let block = kept.iter().position(|&block| block as usize == parameter / 3);
-                    let common = parameter.checked_sub(3 * self.calibration.pointings.len());
-                    let column = match (common, block) {
-                        (Some(common), _) => 3 * kept.len() + common - border.start as usize,
-                        (None, block) => 3 * block.unwrap_or_default() + parameter % 3,
-                    };
-                    rows.coefficients[column] = element;
+                    // Every block but the last has three unknowns.
+                    let attitude = (parameter / 3).min(self.calibration.pointings.len());
+                    let before = kept.iter().take_while(|&&block| (block as usize) < attitude).count();
+                    rows.coefficients[3 * before + parameter - 3 * attitude] = element;
                 }
             }
         }

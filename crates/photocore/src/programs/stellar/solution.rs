@@ -85,15 +85,19 @@ impl Solution {
         let scaled = |values: Vec<f64>| values.into_iter().map(|value| value / unit).collect::<Vec<f64>>();
         let cofactors = adjustment.cofactors.take();
         let place_cofactors = place_cofactors(calibration, model, cofactors.as_ref(), unit);
+        let attitudes = calibration.pointings.len();
         let free = problem.sd[problem.layout().all_locals().end..].iter().filter(|&&sd| sd != 0.0).count();
         let mut solution = Self {
             observations: calibration.observations(&sight, model, place_cofactors)?,
             parameters: sight.parameters,
             axis_test: Tested::NONE,
             cofactors: cofactors.map(|found| ParameterCofactors {
-                own: scaled(found.kept),
-                cross: scaled(found.kept_border),
-                common: scaled(found.border),
+                own: scaled(found.kept[..9 * attitudes].to_vec()),
+                // An attitude that nothing touches is fixed.
+                cross: scaled(
+                    found.pairs.iter().map(|&value| if value.is_nan() { 0.0 } else { value }).collect(),
+                ),
+                common: scaled(found.kept[9 * attitudes..].to_vec()),
             }),
             whole: whole
                 .map(|(logarithm, cofactors)| (logarithm + free as f64 * unit.ln(), scaled(cofactors))),
