@@ -195,9 +195,10 @@ impl<const C: usize> Reduced<C> {
         let mut values = &self.values[..];
         for (block, range) in &self.ranges {
             let own = skip_ref(&mut values, range.len());
-            let columns = others[block * C * count..].chunks_exact_mut(count).take(C);
-            for (k, column) in columns.enumerate() {
-                column[range.clone()].iter_mut().zip(own).for_each(|(right, value)| *right += value[k]);
+            for k in 0..C {
+                let first = (block * C + k) * count + range.start;
+                let column = others.get_mut(first..first + range.len()).unwrap_or_default();
+                column.iter_mut().zip(own).for_each(|(right, value)| *right += value[k]);
             }
         }
     }

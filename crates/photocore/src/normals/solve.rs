@@ -9,7 +9,6 @@ use super::eliminated::Elimination;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::options::SolveOptions;
-use super::panels::skip_ref;
 use super::stack::Gathered;
 use super::system::System;
 use super::vectorised::LANES;
@@ -123,16 +122,16 @@ impl Elimination<'_> {
                     .copy_from_slice(&others[symbolic.range(position)]);
             }
         }
+        let l = layout.local_dim();
         for ((_, stacks), found) in self.parts().into_iter().zip(&found) {
-            let mut found = &found[..];
-            for locals in stacks.iter().take_while(|_| !self.control.stopped()) {
+            let mut rows = found.chunks_exact(l);
+            for locals in stacks.iter() {
                 for first in (0..columns).step_by(C) {
-                    for &local in locals {
-                        let own = skip_ref(&mut found, layout.local_dim());
+                    for (&local, own) in locals.iter().zip(&mut rows) {
+                        let start = first * unknowns + layout.local_range(local as usize).start;
                         for k in 0..C.min(columns - first) {
-                            let solution = &mut solutions[(first + k) * unknowns..];
-                            let range = layout.local_range(local as usize);
-                            solution[range].iter_mut().zip(own).for_each(|(x, row)| *x = row[k]);
+                            let x = &mut solutions[start + k * unknowns..][..l];
+                            x.iter_mut().zip(own).for_each(|(x, row)| *x = row[k]);
                         }
                     }
                 }
