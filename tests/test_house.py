@@ -5,6 +5,8 @@ import re
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import pytest
+
 import photogram
 from rust_files import imports as rust_imports
 
@@ -102,11 +104,21 @@ def test_floors_of_the_crate():
     assert arrows >= {("programs", "network"), ("network", "adjustment"), ("adjustment", "normals")}
 
 
-def test_files_of_network_name_each_other_in_no_circle():
-    """The types of a network stand below what is made of them, and its adjustment above all."""
-    graph = {file: arrows for file, arrows in rust_imports(CRATE).items() if file[:1] == ("network",)}
-    assert len(graph) > 60
-    inside = {file: {other for other in arrows if other in graph} for file, arrows in graph.items()}
+def _inside(folder):
+    """Return what the files of a folder of the crate name of each other."""
+    graph = {file: arrows for file, arrows in rust_imports(CRATE).items() if file[:1] == (folder,)}
+    return {file: {other for other in arrows if other in graph} for file, arrows in graph.items()}
+
+
+@pytest.mark.parametrize("folder", ["normals", "adjustment", "network"])
+def test_files_of_the_engine_name_each_other_in_no_circle(folder):
+    inside = _inside(folder)
+    assert len(inside) > 20
+    assert list(TopologicalSorter(inside).static_order())
+
+
+def test_the_adjustment_of_a_network_stands_above_its_types():
+    inside = _inside("network")
     order = list(TopologicalSorter(inside).static_order())
     types, driver = order.index(("network",)), order.index(("network", "adjust"))
     assert types < order.index(("network", "problem")) < driver

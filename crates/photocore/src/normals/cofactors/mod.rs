@@ -17,6 +17,8 @@ use super::vectorised::dot;
 use super::watch::Control;
 use super::workspace::zeros;
 
+pub(super) use others::AtHome;
+
 /// Cofactors: the inverse normal matrix where it is needed. All blocks are square, row by row.
 #[derive(Debug, Clone)]
 pub struct Cofactors {
@@ -120,21 +122,6 @@ impl GroupCofactors {
         }
         Some(Self { shares, by_local, alone })
     }
-}
-
-/// The cofactors of the local blocks at home in one supernode, and of their equations, in the order of the incidence.
-#[derive(Default)]
-pub(super) struct AtHome {
-    local: Vec<f64>,
-    equations: Vec<f64>,
-    /// Of the equations of the ties at home there, in their order: a square block for each.
-    ties: Vec<f64>,
-    /// See [`GroupCofactors`]; in the order of the incidence too, empty where they are not asked for.
-    shares: Vec<f64>,
-    by_local: Vec<f64>,
-    alone: Vec<f64>,
-    /// Time that it took.
-    pub seconds: f64,
 }
 
 /// Local blocks at one supernode from which on several threads work at them.

@@ -3,10 +3,24 @@
 use pulp::Simd;
 use smallvec::{SmallVec, smallvec};
 
-use super::AtHome;
 use crate::normals::layout::Layout;
 use crate::normals::stack::{Part, Slot, Stack};
 use crate::normals::vectorised::{Kernel, LANES, Rows, dot, run, size};
+
+/// The cofactors of the local blocks at home in one supernode, and of their equations, in the order of the incidence.
+#[derive(Default)]
+pub(in crate::normals) struct AtHome {
+    pub local: Vec<f64>,
+    pub equations: Vec<f64>,
+    /// Of the equations of the ties at home there, in their order: a square block for each.
+    pub ties: Vec<f64>,
+    /// See [`GroupCofactors`](super::GroupCofactors); in the order of the incidence too, empty where they are not asked for.
+    pub shares: Vec<f64>,
+    pub by_local: Vec<f64>,
+    pub alone: Vec<f64>,
+    /// Time that it took.
+    pub seconds: f64,
+}
 
 /// Everything that the local blocks of a stack are tied to: main blocks in the order of the slots, then segments.
 #[derive(Default)]
