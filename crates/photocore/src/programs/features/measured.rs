@@ -177,7 +177,7 @@ impl Measured {
                 _ if !each.is_length => ("its direction", each.sd),
                 _ => continue,
             };
-            if !(sd <= LOOSE) {
+            if sd.is_nan() || sd > LOOSE {
                 return Err(FeatureError::Loose { form, what, sd });
             }
         }
@@ -321,7 +321,7 @@ impl Fitted {
             let [by, by_other] = [a, b].map(|row| &self.partials[row].motions);
             let block: Matrix3 = covariance.fixed_view::<3, 3>(point, point).into();
             let with = together.fixed_rows::<3>(point);
-            let cross = (own.transpose() * &with * by_other)[0] + (other.transpose() * &with * by)[0];
+            let cross = own.dot(&(with * by_other)) + other.dot(&(with * by));
             own.dot(&(block * other)) + cross + (by.transpose() * &motions * by_other)[0]
         };
         let of = |point: usize| {
