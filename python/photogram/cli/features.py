@@ -18,7 +18,6 @@ from photogram.cli.projects import (
     Additions,
     Example,
     ProjectPath,
-    project_path,
     read_project,
     with_additions,
     with_options,
@@ -96,9 +95,10 @@ def features(
     """Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.
 
     PATH is a result that `photogram adjust --parquet` has written, or a project, which is adjusted first.
+    --example is that of `photogram new --kind metrology`.
     Those that the project declares are fitted where no option names others.
     """
-    path = project_path(job, path)
+    path = job.packaged("flange") if path is None else path
     with job:
         from photogram import Result, read_result
         from photogram import features as fitted
