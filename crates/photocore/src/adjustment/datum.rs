@@ -166,10 +166,11 @@ pub(super) fn moved<M: Model>(
             false => Some(problem.open(&unknowns, &motions, pool).ok_or(DatumError::NotFree)?.combinations),
         };
         let apart = problem.model.step_between(&unknowns, reference);
-        let carried = Carried::new(&motions, combinations, datum, &apart).ok_or(DatumError::NotCarried)?;
+        let carried = pool.install(|| Carried::new(&motions, combinations, datum, &apart));
+        let carried = carried.ok_or(DatumError::NotCarried)?;
         stalls += usize::from(carried.length >= least);
         if carried.length <= rounding || stalls == STALLS {
-            let basis = carried.basis(&motions, datum).ok_or(DatumError::NotCarried)?;
+            let basis = pool.install(|| carried.basis(&motions, datum)).ok_or(DatumError::NotCarried)?;
             return Ok((unknowns, basis));
         }
         least = least.min(carried.length);

@@ -204,7 +204,7 @@ impl<M: Model> Problem<M> {
             // What moves nothing that is observed is no motion of this network.
             if k == m && scale[k] == 0.0 { 1.0 } else { sums.together[k * stride + m] * scale[k] * scale[m] }
         });
-        let eigen = scaled.self_adjoint_eigen(Side::Lower).ok()?;
+        let eigen = pool.install(|| scaled.self_adjoint_eigen(Side::Lower)).ok()?;
         let open: Vec<usize> = (0..count).filter(|&k| eigen.S()[k] < NULL).collect();
         let combinations =
             Mat::from_fn(count, open.len(), |k, column| scale[k] * eigen.U()[(k, open[column])]);

@@ -186,8 +186,11 @@ pub fn orient(
 ) -> Result<Solution, SimilarityError> {
     let held = options.scale.is_some();
     determinacy::check_counts(stations, held)?;
-    let chosen = start::choose(stations, options.start, options.scale)?;
-    determinacy::check_geometry(stations, &chosen.similarity, held)?;
+    // The solvers of the library ask how many threads there are: outside of a pool that would start those of the whole process.
+    let chosen = pool.install(|| {
+        let chosen = start::choose(stations, options.start, options.scale)?;
+        determinacy::check_geometry(stations, &chosen.similarity, held).map(|()| chosen)
+    })?;
     match options.method {
         Method::Rigorous => adjust(stations, options, chosen, None, pool, watch),
         Method::Report | Method::FillIn => {
@@ -241,7 +244,8 @@ fn adjust(
     if let Some(cycles) = &cycles {
         adjusted.status = if cycles.converged { Status::Converged } else { Status::NotConverged };
     }
-    let solution = Solution::new(&weighted, &problem, &adjusted, chosen, cycles, options.scale.is_some())?;
+    let solution = pool
+        .install(|| Solution::new(&weighted, &problem, &adjusted, chosen, cycles, options.scale.is_some()))?;
     let scale = solution.similarity.scale;
     if scale.is_nan() || scale <= 0.0 { Err(SimilarityError::Scale(scale)) } else { Ok(solution) }
 }
