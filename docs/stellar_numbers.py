@@ -42,7 +42,7 @@ def night() -> CalibratedNight:
 
 def adjustment_lines() -> list[str]:
     """Show the figures of the packaged plate."""
-    _, (_, problems), (_, figures) = summary(plate())
+    *_, (_, problems), (_, figures) = summary(plate())
     # The digits of sums that vanish, and the last ones of parts of a minimum, are noise.
     noisy = ("sums of", "weighted sum of squares, plate", "weighted sum of squares, stars")
     return [*problems, "", *(line for line in figures if not line.startswith(noisy))]

@@ -26,8 +26,8 @@ PACKAGES = (
     "photogram.stellar",
 )
 MADE_BY_THE_LIBRARY = {
-    "photogram": "Cleaned Differences FirstValues GroupSums Iteration Message Orientation Plan Pose Progress"
-    " Resection Result Simulation Snooped VarianceComponents VarianceFunction",
+    "photogram": "Cleaned Differences Feature Features FirstValues GroupSums Iteration Message Orientation Plan"
+    " Pose Progress Resection Result Simulation Snooped VarianceComponents VarianceFunction",
     "photogram.absolute_orientation": "Model Orientation Strip",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Comparison Decomposition Identity Place PlateResult"
@@ -149,6 +149,7 @@ def good(tmp_path_factory):
             "adjust": {"block": block},
             "check": {"network": block},
             "snoop": {"block": block},
+            "features": {"result": calibrated, "definitions": {"d": ("distance", block.point_ids[:2])}},
             "first_values": {"block": block},
             "adjust_started": {"started": photogram.first_values(block)},
             "camera_from": {"path": star_camera, "name": "stars", "weighted": True},

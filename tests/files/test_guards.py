@@ -59,6 +59,7 @@ RUNS = {
     ),
     "adjust": (["adjust", "project"], ["project/images.csv", "project/project.toml"]),
     "check": (["check", "project"], ["project/images.csv"]),
+    "features": (["features", "project", "--distance", "d=south-1,t01"], ["project/images.csv"]),
     "info": (["info", "project"], ["project/images.csv"]),
     "convert": (["convert", "project"], ["project/images.csv"]),
     "new": (["new"], []),

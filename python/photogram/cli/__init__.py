@@ -5,7 +5,6 @@ Nothing but what ends it cleanly is imported before that is in place.
 
 from __future__ import annotations
 
-import gc
 import sys
 from typing import TYPE_CHECKING
 
@@ -26,6 +25,8 @@ time.
 def main() -> None:
     """Run the command line: every end is an exit code, see `docs/command-line.md`."""
     end_by_signals()
+    import gc
+
     gc.set_threshold(NEW_OBJECTS)
     from photogram.cli.streams import finish, open_streams, stream_fault
 

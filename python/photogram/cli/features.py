@@ -106,7 +106,7 @@ def features(
         from photogram.formats.results import is_result
         from photogram.io.json import to_json
         from photogram.results.features_report import features_document, features_sections
-        from photogram.show.sections import verdict_section
+        from photogram.show.sections import verdict_sections
 
         definitions = wanted.definitions()
         if is_result(path):
@@ -127,7 +127,7 @@ def features(
             {} if out is None else {out / name: each for name, each in feature_files(found).items()},
             {} if json is None else {json: to_json(features_document(found))},
             summary=lambda: print_sections(
-                [verdict_section(verdict), *features_sections(found)], "--json FILE"
+                [*verdict_sections(verdict), *features_sections(found)], "--json FILE"
             ),
             code=verdict.exit_code(strict=strict),
         )

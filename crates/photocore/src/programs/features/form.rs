@@ -30,7 +30,7 @@ pub enum Deviation {
     /// The coordinate along an axis.
     Along(usize),
     /// The length of so many coordinates less the radius.
-    Radial(usize),
+    Round(usize),
 }
 
 impl Form {
@@ -39,9 +39,9 @@ impl Form {
         match self {
             Self::Line => &[Deviation::Along(0), Deviation::Along(1)],
             Self::Plane => &[Deviation::Along(2)],
-            Self::Circle => &[Deviation::Radial(2), Deviation::Along(2)],
-            Self::Sphere => &[Deviation::Radial(3)],
-            Self::Cylinder => &[Deviation::Radial(2)],
+            Self::Circle => &[Deviation::Round(2), Deviation::Along(2)],
+            Self::Sphere => &[Deviation::Round(3)],
+            Self::Cylinder => &[Deviation::Round(2)],
         }
     }
 
@@ -77,7 +77,7 @@ impl Deviation {
     pub fn value(self, y: &Vector3, radius: f64) -> f64 {
         match self {
             Self::Along(axis) => y[axis],
-            Self::Radial(count) => y.rows(0, count).norm() - radius,
+            Self::Round(count) => y.rows(0, count).norm() - radius,
         }
     }
 
@@ -107,7 +107,7 @@ impl Deviation {
                 curvature[(a, b)] = moved[a].dot(&(bending * moved[b])) + point.dot(&second);
             }
         }
-        motions[RADIUS] = if matches!(self, Self::Radial(_)) { -1.0 } else { 0.0 };
+        motions[RADIUS] = if matches!(self, Self::Round(_)) { -1.0 } else { 0.0 };
         Partials { value: self.value(y, radius), motions, point, curvature, mixed }
     }
 
@@ -115,7 +115,7 @@ impl Deviation {
     fn by_point(self, y: &Vector3) -> (Vector3, Matrix3) {
         match self {
             Self::Along(axis) => (Vector3::ith(axis, 1.0), Matrix3::zeros()),
-            Self::Radial(count) => {
+            Self::Round(count) => {
                 let own = Vector3::from_fn(|k, _| if k < count { y[k] } else { 0.0 });
                 let length = own.norm();
                 if length == 0.0 {

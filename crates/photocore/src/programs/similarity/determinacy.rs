@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use faer::{Mat, Side};
+use nalgebra::DMatrix;
 
 use super::model::{CHANGES, SCALE};
 use super::transform::Similarity;
@@ -166,9 +166,11 @@ fn extents(positions: &[Vector3]) -> [f64; 3] {
 
 /// Eigenvalues of a symmetric matrix, ascending; NaN when it is not finite.
 fn eigenvalues<const N: usize>(matrix: &[[f64; N]; N]) -> [f64; N] {
-    let matrix = Mat::from_fn(N, N, |i, j| matrix[i][j]);
-    match matrix.self_adjoint_eigenvalues(Side::Lower) {
-        Ok(values) => std::array::from_fn(|i| values[i]),
-        Err(_) => [f64::NAN; N],
+    if !matrix.as_flattened().iter().all(|value| value.is_finite()) {
+        return [f64::NAN; N];
     }
+    let values = DMatrix::from_row_slice(N, N, matrix.as_flattened()).symmetric_eigenvalues();
+    let mut values: [f64; N] = std::array::from_fn(|i| values[i]);
+    values.sort_unstable_by(f64::total_cmp);
+    values
 }
