@@ -26,8 +26,8 @@ PACKAGES = (
     "photogram.stellar",
 )
 MADE_BY_THE_LIBRARY = {
-    "photogram": "Cleaned Differences Feature Features FirstValues GroupSums Iteration Message Orientation Plan"
-    " Pose Progress Resection Result Simulation Snooped VarianceComponents VarianceFunction",
+    "photogram": "Cleaned Differences Feature Features FirstValues GroupSums Iteration Message Orientation"
+    " Plan Pose Progress Resection Result Simulation Snooped VarianceComponents VarianceFunction",
     "photogram.absolute_orientation": "Model Orientation Strip",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Comparison Decomposition Identity Place PlateResult"

@@ -195,7 +195,7 @@ def test_a_project_declares_them(run, tmp_path):
     member = json.loads((tmp_path / "all.json").read_text())["features"][0]
     assert member["quantities"][0]["value"] == diameter["value"]
     deviations = pd.read_csv(tmp_path / "tables" / "feature_deviations.csv")
-    assert deviations["direction"].value_counts().to_dict() == {"radial": 8, "axial": 8}
+    assert deviations["direction"].value_counts().to_dict() == {"outward": 8, "axial": 8}
     others = run(
         "features", "kept", "--plane", "top=hole-1,hole-3,hole-5,hole-7", "--line", "l=c01,c02", "-k", "3"
     )

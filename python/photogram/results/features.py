@@ -191,7 +191,7 @@ class Features:
 
 def directions(kind: str) -> tuple[str, ...]:
     """Return in which directions points deviate from a feature."""
-    return {"circle": ("radial", "axial"), "plane": ("axial",)}.get(kind, ("radial",))
+    return {"circle": ("outward", "axial"), "plane": ("axial",)}.get(kind, ("outward",))
 
 
 def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
