@@ -157,6 +157,14 @@ def test_cameras_must_lie_beside(files):
         formats.read(files)
 
 
+def test_a_link_that_leads_nowhere_is_an_error_of_ours(files):
+    images = files / "job.phc"
+    images.unlink()
+    images.symlink_to("nowhere")
+    with pytest.raises(InputError, match=r"no file \*\.phc that can be read"):
+        formats.read(files)
+
+
 def test_damaged_files_end_in_errors_of_ours(files, tmp_path):
     source = tmp_path / "whole"
     source.mkdir()

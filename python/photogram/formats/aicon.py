@@ -68,7 +68,8 @@ def read(path: Path, wishes: Wishes) -> Project:
     """
     folder = path if path.is_dir() else path.parent
     images = one_file(folder, IMAGES) if path.is_dir() else path
-    assert images is not None
+    if images is None:
+        raise InputError(f"has no file *{IMAGES} that can be read", file=folder)
     beside = {
         suffix: each if (each := images.with_suffix(suffix)).is_file() else one_file(folder, suffix)
         for suffix in (CAMERAS, POSES, POINTS, BARS)
