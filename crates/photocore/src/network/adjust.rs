@@ -12,7 +12,7 @@ use crate::adjustment::{self, AdjustError, Adjustment, Event, Method};
 impl Network {
     /// Adjusts the network by least squares.
     ///
-    /// Points that their image points cannot determine are left out first (see [`Dropped`]). So are points that run into the station
+    /// Points that their image points cannot determine are left out first (see [`super::Dropped`]). So are points that run into the station
     /// of a photo: the adjustment goes on without them from where it was. `watch` is called on the calling thread; when it breaks, the
     /// adjustment stops. Observations of points that are left out do not take part.
     ///
@@ -27,7 +27,7 @@ impl Network {
         self.adjusted(options, (None, false), None, pool, watch)
     }
 
-    /// The same, and keeps what tests of it need ([`Solution::settled`]) where it converges by least squares and there is memory: it
+    /// The same, and keeps what tests of it need ([`Solution::converged`]) where it converges by least squares and there is memory: it
     /// takes about a twentieth longer.
     ///
     /// # Errors

@@ -25,7 +25,7 @@ pub struct Surroundings {
     /// The median of the positions of all photos of the larger network; None for those of this one.
     pub middle: Option<[f64; 3]>,
     /// Photos with the numbers of those of their pose unknowns that are held for the datum of the larger network
-    /// ([`Network::held_for_datum`]), here and above.
+    /// ([`super::Network::held_for_datum`]), here and above.
     pub held: Vec<(usize, usize)>,
 }
 

@@ -4,7 +4,7 @@
 //! origin as their centre. With y the point in the frame at its present place, and the frame moved by t, turned by w (small), the point
 //! is at
 //!
-//! v = exp(-[w]) (y - t) = y - t - w x (y - t) + 1/2 w x (w x y) + ...,
+//! v = exp(-\[w\]) (y - t) = y - t - w x (y - t) + 1/2 w x (w x y) + ...,
 //!
 //! and a deviation is a coordinate of v, or the length of its first coordinates less the radius. What kinds of features differ in is
 //! which motions change them.
