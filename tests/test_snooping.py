@@ -17,8 +17,10 @@ from photogram.network.observations import Distance
 from photogram.results import network_trial
 from photogram.statistics import lambda0
 from photogram.statistics.snooping.linear import LinearTrial
+from photogram.statistics.snooping.returning import with_prediction
 from photogram.statistics.snooping.robust_start import _robust_sizes
 from photogram.statistics.snooping.snooping import Settings, snooped
+from photogram.statistics.snooping.suspects import Prediction
 from shared_data import SHARED
 
 DATA = Path(__file__).parent / "data" / "statistics"
@@ -453,3 +455,11 @@ def test_nothing_is_robust_where_nothing_is_tested():
     for active in (True, False):
         tests = SimpleNamespace(active=np.full(2, active), redundancy=np.full(4, -1e-17))
         assert _robust_sizes(SimpleNamespace(tests=tests, suspects=suspects)) is None
+
+
+def test_what_the_rest_says_of_a_component_is_of_that_component():
+    """Components of a control point that leave in two rounds are two entries of one group."""
+    entry = SimpleNamespace(rows=(61,), with_=lambda **given: given)
+    prediction = Prediction(9.0, (59, 60, 61), (4.0, -7.0, -4792.0), (0.4, 7.0, 60.0))
+    found = with_prediction(SimpleNamespace(predicted={0: (prediction, -3.0)}, log=[entry]), 0)
+    assert found["prediction_error"] == (-4792.0,)

@@ -82,10 +82,12 @@ def with_prediction(work: TakingOut, place: int) -> Removal:
     if place not in work.predicted:
         return work.log[place]
     prediction, log_p = work.predicted[place]
+    # Another entry may have taken out other components of the same group.
+    errors = dict(zip(prediction.rows, prediction.error, strict=True))
     return work.log[place].with_(
         prediction=prediction.statistic,
         prediction_log_probability=log_p,
-        prediction_error=prediction.error,
+        prediction_error=tuple(errors.get(row, math.nan) for row in work.log[place].rows),
     )
 
 
