@@ -11,7 +11,7 @@ from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.findings import names, tested_observations
 from photogram.results.observed import image_lines, observed_lines
 from photogram.results.weakest import weakest_lines
-from photogram.show.sections import Section, composed, headline, problems, verdict_sections
+from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
 from photogram.show.ways import report_of
 from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
 from photogram.statistics.outliers import outliers
@@ -54,7 +54,7 @@ def summary(result: AdjustedCollection) -> list[Section]:
     """Return what a reader wants first, as titled sections: verdict, problems, adjustment, suspects."""
     return [
         *verdict_sections(result.verdict),
-        ("Problems", problems_of(result)),
+        ("Problems", problems_or_none(problems_of(result), result.verdict)),
         ("Adjustment", _adjustment(result)),
         (f"Image points with |t| > {NOTABLE:g} (externally studentized), largest first", _suspects(result)),
     ]
@@ -82,7 +82,6 @@ def problems_of(result: AdjustedCollection) -> list[str]:
         [*found, *result.messages],
         result.status,
         result.variance_of_unit_weight,
-        result.verdict,
         global_test(omega, freedom),
     )
 

@@ -22,7 +22,7 @@ from photogram.results.result import Result
 from photogram.results.unknowns import unknown_lines
 from photogram.results.weakest import weakest_lines
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
-from photogram.show.sections import Section, composed, headline, problems, verdict_sections
+from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
 from photogram.show.ways import report_of
 from photogram.statistics.limits import normal_limit
 from photogram.statistics.outliers import outliers
@@ -88,7 +88,7 @@ def summary(result: Result) -> list[Section]:
     """Return what a reader wants first, as titled sections: verdict, problems, adjustment, residuals."""
     return [
         *verdict_sections(result.verdict),
-        ("Problems", problems_of(result)),
+        ("Problems", problems_or_none(problems_of(result), result.verdict)),
         ("Adjustment", _adjustment(result)),
         *features_sections(result.features),
         ("Residuals", _residuals(result)),
@@ -100,9 +100,7 @@ def problems_of(result: Result) -> list[str]:
     """Return what keeps a reader from using the values: a failed test and outliers before other remarks."""
     found = outliers(tested_observations(result), normal_limit, "standardized residuals")
     messages = [*found, *result.messages]
-    return problems(
-        messages, result.status, result.variance_of_unit_weight, result.verdict, result.global_test
-    )
+    return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
 
 
 def _adjustment(result: Result) -> list[str]:

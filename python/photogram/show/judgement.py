@@ -65,7 +65,7 @@ def tests_section(verdict: Verdict) -> Section:
 
 def remarks_section(sentences: Iterable[object]) -> Section:
     """Return the section of what was remarked on; empty, and so not shown, where that is nothing."""
-    told = [said for each in sentences if not (said := str(each)).startswith("none")]
+    told = [str(each) for each in sentences]
     return Section("remarks", "Remarks", [Remarks(told)] if told else [])
 
 

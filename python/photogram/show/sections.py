@@ -62,7 +62,6 @@ def problems(
     messages: Sequence[Message],
     status: str,
     variance_of_unit_weight: float | None,
-    verdict: Verdict,
     test: GlobalTest | None = None,
 ) -> list[str]:
     """Return what keeps a reader from using the values of an adjustment, or should make them careful.
@@ -76,7 +75,7 @@ def problems(
         found.insert(0, f"the adjustment has {status}: do not use these values")
     if variance_of_unit_weight is None:
         found.append("there are no degrees of freedom: covariances are scaled by 1")
-    return problems_or_none(found, verdict)
+    return found
 
 
 def problems_or_none(messages: Iterable[Message | str], verdict: Verdict) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -70,7 +69,7 @@ def block_page(result: Result) -> Page:
         photos_section(result, photos),
         points_section(result, points),
         iterations_section(result),
-        remarks_section(_remarks(result)),
+        remarks_section(problems_of(result)),
     ]
     return Page(
         what="Adjustment of a block of photos",
@@ -313,7 +312,3 @@ def _plain(value: object) -> str | float | None:
     if value is None or isinstance(value, str):
         return value
     return float(value)  # type: ignore[arg-type]
-
-
-def _remarks(result: Result) -> Sequence[str]:
-    return problems_of(result)
