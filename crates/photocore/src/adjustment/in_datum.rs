@@ -34,24 +34,19 @@ impl Linearized {
         linearized.factor.forget();
         Ok(linearized)
     }
-}
 
-impl Inverted {
-    /// Moves an adjusted network to another datum, and computes all cofactors there.
+    /// All cofactors, in the datum that it was taken to.
     ///
     /// # Errors
-    /// Those of [`Linearized::in_datum`].
-    pub fn in_datum<M: Model>(
+    /// An interruption, no memory.
+    pub fn inverted<M: Model>(
+        self,
         problem: &Problem<M>,
-        adjusted: Adjusted<'_>,
-        datum: &Datum,
-        reference: &[f64],
         pool: &ThreadPool,
         between: Between<'_>,
-    ) -> Result<Self, DatumError> {
-        let linearized = Linearized::in_datum(problem, adjusted, datum, reference, pool, between)?;
-        let equations = linearized.equations(problem, pool);
-        Ok(linearized.invert(&equations, &InvertOptions::default(), pool, between)?)
+    ) -> Result<Inverted, DatumError> {
+        let equations = self.equations(problem, pool);
+        Ok(self.invert(&equations, &InvertOptions::default(), pool, between)?)
     }
 }
 
@@ -81,7 +76,8 @@ impl Adjustment {
             (self.unknowns, _) = moved(problem, adjusted, datum, reference, pool)?;
             return Ok(0.0);
         }
-        let mut inverted = Inverted::in_datum(problem, adjusted, datum, reference, pool, between)?;
+        let linearized = Linearized::in_datum(problem, adjusted, datum, reference, pool, between)?;
+        let mut inverted = linearized.inverted(problem, pool, between)?;
         self.unknowns = std::mem::take(&mut inverted.values);
         self.put(problem, inverted);
         self.redundancy_excess = options.loss.is_none().then(|| self.excess());

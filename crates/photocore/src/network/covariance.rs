@@ -9,9 +9,7 @@ use super::model::Owner;
 use super::problem::Assembled;
 use super::state::{InnerConstraints, NetworkDatum, State};
 use super::{Network, NetworkError, Options, Solution};
-use crate::adjustment::{
-    Adjusted, Adjustment, Classes, CofactorError, Datum, Event, Inverted, Linearized, Phase,
-};
+use crate::adjustment::{Adjusted, Adjustment, Classes, CofactorError, Datum, Event, Linearized, Phase};
 use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::normals::Function;
 
@@ -142,7 +140,11 @@ impl Network {
         let (problem, adjusted) = (&assembled.problem, state.adjusted(options));
         let found = {
             let mut between = forming(watch, &assembled);
-            Inverted::in_datum(problem, adjusted, &carried, reference, pool, &mut between)?
+            Linearized::in_datum(problem, adjusted, &carried, reference, pool, &mut between)?.inverted(
+                problem,
+                pool,
+                &mut between,
+            )?
         };
         let adjustment = Adjustment::inverted(problem, adjusted.loss, found, pool);
         let lost = adjustment.lost.unwrap_or(0.0);

@@ -6,9 +6,11 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::form::{ByMotions, Curvature, MOTIONS, Partials, RADIUS};
+use super::form::{ByMotions, Curvature, MOTIONS, Partials};
+use super::placed::Placed;
+use super::start::starts;
 use super::{FeatureError, Form};
-use crate::geometry::{Matrix3, Vector3, angle_axis_rotation};
+use crate::geometry::Vector3;
 
 /// Steps at the most, and the step below which the feature rests; lengths are those of points with a mean square distance of 1.
 const STEPS: usize = 200;
@@ -26,17 +28,6 @@ const ROUNDING: f64 = 1e-20;
 /// The cosine of axes, above which two features are the same one.
 const SAME: f64 = 1.0 - 1e-6;
 
-/// A feature in its place.
-#[derive(Debug, Clone)]
-pub struct Placed {
-    /// The origin of its frame.
-    pub centre: Vector3,
-    /// Unit vectors of the frame, in columns.
-    pub axes: Matrix3,
-    /// The radius; 0 where there is none.
-    pub radius: f64,
-}
-
 /// Sums over the points.
 struct Sums {
     gradient: ByMotions,
@@ -44,68 +35,16 @@ struct Sums {
     newton: Curvature,
 }
 
-impl Placed {
-    /// The third axis.
-    pub fn axis(&self) -> Vector3 {
-        self.axes.column(2).into()
-    }
-
-    /// A point in the frame.
-    pub fn own(&self, point: &Vector3) -> Vector3 {
-        self.axes.transpose() * (point - self.centre)
-    }
-
-    /// The sum of the squares of all deviations.
-    pub fn square_sum(&self, form: Form, points: &[Vector3]) -> f64 {
-        let of = |p: &Vector3| {
-            let y = self.own(p);
-            form.deviations().iter().map(|each| each.value(&y, self.radius).powi(2)).sum::<f64>()
-        };
-        points.iter().map(of).sum()
-    }
-
-    /// The deviations of all points, point by point.
-    pub fn linearize(&self, form: Form, points: &[Vector3]) -> Vec<Partials> {
-        let of = |p: &Vector3| {
-            let y = self.own(p);
-            form.deviations().iter().map(move |each| each.linearize(&y, self.radius))
-        };
-        points.iter().flat_map(of).collect()
-    }
-
-    fn moved(&self, motions: &ByMotions) -> Self {
-        let turn = angle_axis_rotation(&motions.fixed_rows::<3>(3).into());
-        Self {
-            centre: self.centre + self.axes * motions.fixed_rows::<3>(0),
-            axes: self.axes * turn,
-            radius: self.radius + motions[RADIUS],
-        }
-    }
-
-    /// The same feature: the largest component of its axis is positive, and along what does not change it the origin of the frame is at
-    /// the foot of the mean of the points, which is 0.
-    fn oriented(mut self, form: Form) -> Self {
-        let axis = self.axis();
-        if axis[axis.iamax()] < 0.0 {
-            self.axes.fixed_columns_mut::<2>(1).neg_mut();
-        }
-        let back = self.own(&Vector3::zeros());
-        let free = |k: usize| if form.motions().contains(&k) { 0.0 } else { back[k] };
-        self.centre += self.axes * Vector3::from_fn(|k, _| free(k));
-        self
-    }
-}
-
 /// Fits a feature to points that are counted from their mean and scaled to a mean square of 1.
 pub fn fit(form: Form, points: &[Vector3]) -> Result<Placed, FeatureError> {
-    let starts = super::start::starts(form, points);
+    let starts = starts(form, points);
     if starts.is_empty() {
         return Err(FeatureError::Undetermined(form));
     }
     let mut found: Vec<(f64, Placed)> = vec![];
     let mut failed = FeatureError::NotAtRest(form);
     for start in starts {
-        match settled(form, points, start) {
+        match at_rest(form, points, start) {
             Ok(placed) => found.push((placed.square_sum(form, points), placed)),
             Err(error) => failed = error,
         }
@@ -120,7 +59,8 @@ pub fn fit(form: Form, points: &[Vector3]) -> Result<Placed, FeatureError> {
     Ok(best.oriented(form))
 }
 
-fn settled(form: Form, points: &[Vector3], start: Placed) -> Result<Placed, FeatureError> {
+/// Where the steps from a start end.
+fn at_rest(form: Form, points: &[Vector3], start: Placed) -> Result<Placed, FeatureError> {
     let mut at = start;
     let mut sum = at.square_sum(form, points);
     let mut before = f64::INFINITY;

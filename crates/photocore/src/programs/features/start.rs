@@ -3,7 +3,7 @@
 use nalgebra::{Matrix4, Vector4};
 
 use super::Form;
-use super::fit::Placed;
+use super::placed::Placed;
 use crate::geometry::{Matrix3, Vector3};
 
 /// Directions of the axis of a cylinder that are tried, over half a sphere: one every 8 degrees.

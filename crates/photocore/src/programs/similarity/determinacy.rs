@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::DMatrix;
 
 use super::model::{CHANGES, SCALE};
+use super::moments::EIGEN_STEPS;
 use super::transform::Similarity;
 use super::{SimilarityError, Station};
 use crate::geometry::{Matrix3, Vector3};
@@ -166,11 +167,10 @@ fn extents(positions: &[Vector3]) -> [f64; 3] {
 
 /// Eigenvalues of a symmetric matrix, ascending; NaN when it is not finite.
 fn eigenvalues<const N: usize>(matrix: &[[f64; N]; N]) -> [f64; N] {
-    if !matrix.as_flattened().iter().all(|value| value.is_finite()) {
-        return [f64::NAN; N];
-    }
-    let values = DMatrix::from_row_slice(N, N, matrix.as_flattened()).symmetric_eigenvalues();
-    let mut values: [f64; N] = std::array::from_fn(|i| values[i]);
+    // Steps are limited: squares of large numbers overflow, and nothing would come to rest.
+    let matrix = DMatrix::from_row_slice(N, N, matrix.as_flattened());
+    let Some(eigen) = matrix.try_symmetric_eigen(f64::EPSILON, EIGEN_STEPS) else { return [f64::NAN; N] };
+    let mut values: [f64; N] = std::array::from_fn(|i| eigen.eigenvalues[i]);
     values.sort_unstable_by(f64::total_cmp);
     values
 }

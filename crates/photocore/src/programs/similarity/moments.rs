@@ -27,7 +27,7 @@ const NEAR: f64 = 1e-3;
 /// Values of S are good to this fraction of its largest terms.
 const ROUNDING: f64 = 1e-14;
 /// Steps of the eigenvalue iteration at the most.
-const EIGEN_STEPS: usize = 1000;
+pub const EIGEN_STEPS: usize = 1000;
 /// Descents start every sixty degrees.
 const SIXTH: f64 = std::f64::consts::TAU / 6.0;
 
