@@ -22,6 +22,7 @@ from photogram.giant import Project, write_project
 from photogram.perspective_center import run_deck
 from photogram.perspective_center.document import to_json as run_to_json
 from photogram.perspective_center.summary import summary
+from photogram.show.judgement import remarks_section
 from photogram.show.ways import page_of
 
 EXAMPLES = files("photogram") / "examples"
@@ -446,3 +447,9 @@ def test_a_planted_contradiction_is_seen(block):
     ):
         with pytest.raises(AssertionError):
             assert_one_judgement(*mixed)
+
+
+def test_a_remark_that_begins_with_none_is_a_remark():
+    """Pages once took it for the word that there are none."""
+    [part] = remarks_section(["none of the images of photo 7 fits"]).parts
+    assert "none of the images of photo 7 fits" in str(part)
