@@ -468,3 +468,8 @@ def test_a_fisheye_sees_behind_its_own_plane():
     np.testing.assert_allclose(result.photo_positions, stations, atol=1e-6)
     np.testing.assert_allclose(result.photo_attitudes, 0.0, atol=1e-6)
     assert not any("behind" in str(message) for message in result.messages)
+
+
+def test_a_standard_deviation_without_a_variance_is_refused():
+    with pytest.raises(InputError, match=r"sd of k1 .* is too large for a variance: 1e\+200"):
+        Camera("simple_radial", {"f": 10.0, "cx": 0.0, "cy": 0.0, "k1": 0.0}, sd={"k1": 1e200})

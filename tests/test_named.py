@@ -261,6 +261,8 @@ def test_simulations_that_are_too_large():
         simulate(forward_overlap=0.99999)
     with pytest.raises(InputError, match="GiB of memory"):
         simulate(strips=10**6, photos_per_strip=10**6)
+    with pytest.raises(InputError, match=r"tilt: photos that see 7.* rad .* look up to 0\.02 rad aside"):
+        simulate(principal_distance=-15274000.0, tilt=0.01)
     assert len(simulate(strips=1, photos_per_strip=12, forward_overlap=0.9).block.photo_ids) == 12
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -24,6 +25,8 @@ Weights = Literal["corrected", "measured"]
 """Of a backward camera: what the standard deviations of images are those of."""
 
 _MEASURED = "_measured"
+_SQUARED = math.sqrt(sys.float_info.max)
+"""Standard deviations beyond have no variance."""
 """What the core calls backward cameras whose residuals lie in the measured image."""
 
 ImageUnit = Literal["mm", "px"]
@@ -231,6 +234,11 @@ class Camera(Valued, Brief):
         for name, value in given.items():
             if not value >= 0:
                 raise InputError(f"sd of {name} of the camera {self.title} is no standard deviation: {value}")
+            if _SQUARED < value < math.inf:
+                raise InputError(
+                    f"sd of {name} of the camera {self.title} is too large for a variance: {value};"
+                    " infinity leaves the parameter free"
+                )
             if value > 0 and name in self.constants:
                 raise InputError(f"{name} of the camera {self.title} is a constant: its sd is 0")
         return {name: given.get(name, 0.0) for name in self.names}

@@ -247,6 +247,11 @@ def simulate(
     half_angle = math.atan(frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab)))
     if not _NARROWEST < half_angle < _WIDEST - 2 * tilt:
         raise InputError("principal_distance and frame_size: the photos see too little, or to the horizon")
+    if 2 * tilt > _FAR_MORE * half_angle:
+        raise InputError(
+            f"tilt: photos that see {half_angle:.2g} rad to either side and look up to {2 * tilt:.2g} rad aside"
+            " do not overlap"
+        )
     reach = 1.02 * (flying_height + relief) * math.tan(half_angle + 2 * tilt)
     plan = _plan(strips, photos_per_strip, forward_overlap, side_overlap, footprint, points_per_photo, reach)
     terrain = _terrain(plan, relief, footprint, terrain_random)
