@@ -471,5 +471,5 @@ def test_a_fisheye_sees_behind_its_own_plane():
 
 
 def test_a_standard_deviation_without_a_variance_is_refused():
-    with pytest.raises(InputError, match=r"sd of k1 .* is too large for a variance: 1e\+200"):
-        Camera("simple_radial", {"f": 10.0, "cx": 0.0, "cy": 0.0, "k1": 0.0}, sd={"k1": 1e200})
+    with pytest.raises(InputError, match=r"sd of k .* is too large for a variance: 1e\+200"):
+        Camera("simple_radial", {"f": 10.0, "cx": 0.0, "cy": 0.0, "k": 0.0}, sd={"k": 1e200})
