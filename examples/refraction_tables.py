@@ -9,7 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from photogram import Refraction, geometry
+from photogram import Refraction
+from photogram.network import geometry
 from photogram.network.refraction import Air, Water
 
 HEIGHTS_M = (500, 1000, 3000, 6000, 9000, 11000, 15000, 20000, 40000)

@@ -114,7 +114,7 @@ def test_positions_and_translations() -> None:
 def test_angles_are_those_of_the_block() -> None:
     angles = np.array([[0.1, -0.2, 2.0], [3.0, 1.2, -1.0]])
     ground_to_photo = Attitudes.of("omega_phi_kappa", angles).values("matrix_to_photo")
-    assert np.array_equal(ground_to_photo, photogram.geometry.rotation_matrix(angles))
+    assert np.array_equal(ground_to_photo, photogram.network.geometry.rotation_matrix(angles))
 
 
 @pytest.mark.parametrize(

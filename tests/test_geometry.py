@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photogram import InputError, geometry
+from photogram import InputError
+from photogram.network import geometry
 from photogram.network.geometry import Spheroid
 
 GIANT = Path(__file__).parent / "data" / "giant"

@@ -38,8 +38,7 @@ def modules():
     for path in sorted(SOURCES.rglob("*.py")):
         parts = path.relative_to(SOURCES.parent).with_suffix("").parts
         found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
-    for name in ("photogram", "photogram.former_names"):
-        del found[name]
+    del found["photogram"]
     return found
 
 

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from noise import measured
-from photogram import Block, Result, Simulation, Spheroid, adjust, geometry, simulate
+from photogram import Block, Result, Simulation, Spheroid, adjust, simulate
 from photogram.errors import RankError
+from photogram.network import geometry
 
 Floats = NDArray[np.float64]
 

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import Block, InputError, Refraction, Simulation, Spheroid, adjust, geometry, simulate
+from photogram import Block, InputError, Refraction, Simulation, Spheroid, adjust, simulate
 from photogram.giant import Common, Project, read_project, write_project
 from photogram.giant.assembly import job_refraction
+from photogram.network import geometry
 
 ROOT = Path(__file__).parents[1]
 GOLDEN = json.loads((ROOT / "tests" / "data" / "giant" / "golden_cases.json").read_text())

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram import Block, Camera, InputError, geometry
+from photogram import Block, Camera, InputError
+from photogram.network import geometry
 from photogram.network.geometry import Spheroid
 from photogram.network.simulation import simulate
 

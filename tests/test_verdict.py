@@ -10,10 +10,10 @@ import pytest
 
 from contradictions import contradictions, sentences_of
 from photogram import adjust, resect
-from photogram.geometry import project
+from photogram.network.geometry import project
+from photogram.network.simulation import simulate
 from photogram.show.judgement import judged
 from photogram.show.sections import composed, verdict_sections
-from photogram.simulation import simulate
 from photogram.statistics import Findings, Removed, global_test, group_tests, verdict
 from photogram.statistics.findings import Agreement, GroupFactor, Systematic, by_t, by_w, of_groups
 from photogram.statistics.outliers import Observations

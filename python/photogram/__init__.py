@@ -5,8 +5,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from photogram.former_names import TODAY, found_under_former_names
-
 if TYPE_CHECKING:
     from photogram import absolute_orientation as absolute_orientation
     from photogram import collection as collection
@@ -188,16 +186,12 @@ MODULES = (
 )
 """The packages that users know by name: loaded when they are first asked for, too."""
 
-found_under_former_names()
-
 
 def __getattr__(name: str) -> object:
     if name in _HOMES:
         value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     elif name in MODULES:
         value = import_module(f"{__name__}.{name}")
-    elif name in TODAY:
-        value = import_module(f"{__name__}.{TODAY[name]}")
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

@@ -1,4 +1,4 @@
-"""Options mean the same for every command; former names say what is written now; shells complete them."""
+"""Options mean the same for every command; none is hidden; shells complete them."""
 
 import inspect
 import os
@@ -13,7 +13,7 @@ import pytest
 from typer.models import ArgumentInfo, OptionInfo
 
 from photogram.cli.commands import app
-from photogram.cli.job import Former, Writes
+from photogram.cli.job import Writes
 
 PROMPT = [
     sys.executable,
@@ -40,7 +40,7 @@ def options(command):
     for parameter in inspect.signature(command, eval_str=True).parameters.values():
         kind, *marks = get_args(parameter.annotation)
         info = next(mark for mark in marks if isinstance(mark, OptionInfo | ArgumentInfo))
-        if isinstance(info, OptionInfo) and not info.hidden:
+        if isinstance(info, OptionInfo):
             found[parameter.name] = kind, [mark for mark in marks if mark is not info]
     return found
 
@@ -57,48 +57,11 @@ def test_an_option_means_the_same_for_every_command(name):
     assert "out" in shown or "plots" not in shown
 
 
-@pytest.mark.parametrize(
-    ("command", "former", "now"),
-    [
-        ("perspective-center --example", "--listing x.txt", "--out x"),
-        ("perspective-center --example", "--plot x.svg", "--out x --plots"),
-        ("absolute-orientation --example", "--listing x.txt", "--out x"),
-        ("absolute-orientation --example", "--plot x.png", "--out x --plots"),
-        ("collection --example", "--report x.txt", "--out x"),
-        ("plan --strips 1 --photos-per-strip 4", "--plot x.pdf", "--out x --plots"),
-        ("comparator --example --linear-only", "--no-pictures", "--no-plots"),
-    ],
-)
-def test_a_former_name_does_its_work_and_says_what_is_written_now(run, tmp_path, command, former, now):
-    done = run(*command.split(), *former.split())
-    assert done.exit_code == 0, done.output
-    option, _, file = former.partition(" ")
-    assert f"remark: {option.replace('--no-', '--')} will go" in done.stderr
-    if file:
-        assert (tmp_path / file).stat().st_size > 0
-    assert option not in run(*command.split(), "--help").output.split()
-    clean = run(*command.split(), *now.split())
-    assert clean.exit_code == 0, clean.output
-    assert "will go" not in clean.stderr
-    if file.endswith(".txt"):
-        assert (tmp_path / file).read_bytes() in [path.read_bytes() for path in (tmp_path / "x").iterdir()]
-
-
-def test_quiet_silences_remarks_on_former_names(run, tmp_path):
-    done = run("absolute-orientation", "--example", "--listing", "x.txt", "--quiet")
-    assert (done.exit_code, done.output) == (0, "")
-    assert (tmp_path / "x.txt").is_file()
-
-
-def test_every_hidden_option_is_a_former_name():
-    hidden = 0
+def test_no_option_is_hidden():
     for command in COMMANDS.values():
         for parameter in inspect.signature(command, eval_str=True).parameters.values():
             marks = get_args(parameter.annotation)[1:]
-            former = any(isinstance(mark, Former) for mark in marks)
-            assert former == any(isinstance(mark, OptionInfo) and mark.hidden for mark in marks)
-            hidden += former
-    assert hidden > 5
+            assert not any(isinstance(mark, OptionInfo) and mark.hidden for mark in marks)
 
 
 def test_pictures_without_a_place_are_refused(run, tmp_path):

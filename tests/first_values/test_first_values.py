@@ -7,8 +7,8 @@ import pytest
 import photogram
 from example_scripts import load
 from photogram import AdjustmentError, Block, Camera, InputError, adjust, first_values
-from photogram.geometry import rotation_matrix
 from photogram.giant import read_project
+from photogram.network.geometry import rotation_matrix
 from photogram.network.observations import Attitude, Distance, Position
 from photogram.network.unknowns import Boresight, LeverArm
 from shared_data import SHARED

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fuzz.dense import ENDINGS, KINDS, SAID, TOLERANCE, _compared, compare, random_block
-from photogram import adjust, geometry, simulate
+from photogram import adjust, simulate
+from photogram.network import geometry
 
 BLOCKS = 100
 

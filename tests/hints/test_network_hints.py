@@ -8,9 +8,9 @@ from example_scripts import load
 from photogram import Camera, InputError, RankError, Spheroid, adjust, hints, simulate
 from photogram.adjustment.hints import verdicts
 from photogram.adjustment.regression import eligible, regressions, spread, view
-from photogram.geometry import project
 from photogram.giant import Project, check, write_project
 from photogram.network.directions import image_directions, without_lenses
+from photogram.network.geometry import project
 from photogram.network.observations import Distance
 
 IDENTITY = [[1, 0], [0, 1]]

@@ -3,7 +3,8 @@
 import numpy as np
 from unit_vectors import UnitVectors, project
 
-from photogram import adjust, geometry, simulate
+from photogram import adjust, simulate
+from photogram.network import geometry
 
 IMAGES = 67
 """Three blocks each: of the photo, of the point, of the adjusted image; 201 in all."""

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar.parameters import INDEX, NAMES
 
 PLATE_SD, STAR_SD = 3e-6, 0.2 * ARCSEC

@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from photogram import InputError
-from photogram.angles import ARCSEC
 from photogram.cli import app
 from photogram.io.rows import read_rows
+from photogram.show.angles import ARCSEC
 from photogram.stellar import calibrate
 from photogram.stellar.landmarks import HOUR, landmark
 from photogram.stellar.places import apparent_places, epoch, sidereal_time

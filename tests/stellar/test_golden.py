@@ -8,7 +8,7 @@ import pytest
 from star_plates import columns
 
 from photogram import _photocore
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Site, calibrate, refraction
 from photogram.stellar.combination import constraints, modify
 from photogram.stellar.curves import distortion_curves

@@ -12,9 +12,9 @@ from observer import places_of_j2000
 from typer.testing import CliRunner
 
 from photogram import AdjustmentError, InputError, _photocore
-from photogram.angles import ARCSEC
 from photogram.cli import app
-from photogram.neighbours import mutually_nearest
+from photogram.network.neighbours import mutually_nearest
+from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import star_plates as plates
 
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar import calibrate
 from photogram.stellar.movement import movement, pairs_to_combine
 from photogram.stellar.parameters import INDEX, NAMES

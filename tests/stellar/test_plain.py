@@ -12,8 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from photogram import InputError
-from photogram.angles import ARCSEC
 from photogram.cli import app
+from photogram.show.angles import ARCSEC
 from photogram.stellar import Options
 from photogram.stellar.parameters import INDEX
 from photogram.stellar.plain import inputs, read_plain

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from photogram import InputError
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar import Options, calibrate
 from photogram.stellar.cameras import BrownCamera, PlateCamera, camera_document
 from photogram.stellar.comparator_frame import comparator_frame

@@ -8,7 +8,7 @@ import pytest
 from observer import places_of_j2000
 
 from photogram import AdjustmentError, InputError
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.places import apparent_places, sidereal_time

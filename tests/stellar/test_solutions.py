@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import star_plates as plates
 
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar import calibrate, refraction
 from photogram.stellar.curves import distortion_curves, histogram, refraction_curves, residual_classes
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from photogram.angles import ARCSEC
+from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Site, refraction
 
 EARTH, TROPOPAUSE, TOP = 6378120.0, 11000.0, 80000.0

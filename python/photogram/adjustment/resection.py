@@ -236,7 +236,7 @@ def resect(
     --------
     >>> import numpy as np
     >>> from photogram import resect
-    >>> from photogram.geometry import project
+    >>> from photogram.network.geometry import project
     >>> ground = np.array([[0.0, 0, 10], [800, 50, 20], [750, 900, 0], [30, 820, 40], [400, 420, 5]])
     >>> station, angles = np.array([390.0, 430.0, 1500.0]), np.array([0.02, -0.03, 1.5])
     >>> xy = project(ground, np.tile(station, (5, 1)), np.tile(angles, (5, 1)), np.full(5, -152.0))

@@ -14,9 +14,8 @@ from rich.markup import escape
 
 from photogram.cli.console import output, print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
-from photogram.cli.job import Former, Job, Reads, Writes, with_job
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import (
-    FormerPlot,
     JsonFile,
     PictureFormat,
     PlotFormat,
@@ -117,10 +116,6 @@ def absolute_orientation(
     no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
-    listing: Annotated[
-        Path | None, Writes.FILE, Former("--out DIR writes the report there"), typer.Option(hidden=True)
-    ] = None,
-    plot: FormerPlot = None,
     trace: Annotated[
         Path | None,
         Writes.FILE,
@@ -238,8 +233,8 @@ def absolute_orientation(
             job.reads(file, points)
         if points and not target:
             target = (out or points.parent) / f"{points.stem}-transformed.csv"
-        reports = [path for path in (listing, out and out / "report.txt") if path]
-        pictures = picture_places("residuals", plots, plot_format, out, plot)
+        reports = [out / "report.txt"] if out else []
+        pictures = picture_places("residuals", plots, plot_format, out)
         place = html_place(html, no_html, out)
         job.writes(
             *reports,

@@ -20,7 +20,7 @@ from photogram.cli.components import (
 )
 from photogram.cli.console import ON_TOP, print_sections
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
-from photogram.cli.job import Former, Job, Reads, Writes, with_job
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.maps import CloudFile, CloudOrigin, point_clouds
 from photogram.cli.options import (
     JsonFile,
@@ -91,9 +91,6 @@ def collection(
             " file, packed as FILE is."
             " Default: no files."
         ),
-    ] = None,
-    report: Annotated[
-        Path | None, Writes.FILE, Former("--out DIR writes the report there"), typer.Option(hidden=True)
     ] = None,
     json: JsonFile = None,
     html: HtmlFile = None,
@@ -192,8 +189,6 @@ def collection(
             written[names[1]] = to_bytes(result.adjusted(), packing, found.name)
         if weights is not None and out is not None:
             written[out / COMPONENTS] = weights.report().encode()
-        if report is not None:
-            written[report] = told.report().encode()
 
         def page() -> Page:
             return with_components_page(replace(page_of(told), title=problem.name), estimates, made)

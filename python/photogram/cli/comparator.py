@@ -17,7 +17,7 @@ from rich.markup import escape
 
 from photogram.cli.console import output, print_remark, print_sections, print_withheld
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
-from photogram.cli.job import Former, Job, Reads, Writes, with_job
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Quiet, default_out, out_option
 
 if TYPE_CHECKING:
@@ -92,11 +92,6 @@ def comparator(
             "--plots/--no-plots", help="Make the report, with its pictures (needs the extra `report`)."
         ),
     ] = True,
-    pictures: Annotated[
-        bool | None,
-        Former("say --plots or --no-plots"),
-        typer.Option("--pictures/--no-pictures", hidden=True),
-    ] = None,
     as_published: Annotated[
         bool,
         typer.Option(
@@ -153,9 +148,8 @@ def comparator(
                 )
         folder = out or default_out((paths or [])[0], "-calibrated")
         job.reads(*(grid.source for one in sessions for grid in one.grids.values() if grid.source))
-        drawn = plots if pictures is None else pictures
-        written = _results(calibrations, folder, _run_date(date), pdf=pdf and drawn, quiet=quiet)
-        if html is not None or (drawn and not pdf):
+        written = _results(calibrations, folder, _run_date(date), pdf=pdf and plots, quiet=quiet)
+        if html is not None or (plots and not pdf):
             written |= _pages(job, calibrations, folder, html, no_html)
         documents = {json: _documents(calibrations)} if json is not None else {}
         job.write(written, documents)
@@ -308,9 +302,6 @@ def correct(
         Writes.FILE,
         typer.Argument(metavar="OUT", help="Table to write. Default: standard output.", show_default=False),
     ] = None,
-    out: Annotated[
-        Path | None, Writes.FILE, Former("name the table after FILE"), typer.Option("--out", hidden=True)
-    ] = None,
     invert: Annotated[
         bool, typer.Option("--invert", help="Turn corrected coordinates back into readings.")
     ] = False,
@@ -335,10 +326,9 @@ def correct(
         if not quiet:
             for remark in remarks:
                 print_remark(remark)
-        tables = [path for path in (corrected, out) if path]
-        if not tables:
+        if corrected is None:
             typer.echo(made.decode(), nl=False)
-        job.finish(dict.fromkeys(tables, made))
+        job.finish({corrected: made} if corrected else {})
 
 
 @with_job

@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from enum import Enum
 from functools import wraps
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from photogram.io.writing import Content, OutputSet
     from photogram.show.run import Run
 
-__all__ = ["Former", "Job", "Reads", "Writes", "roles", "with_job"]
+__all__ = ["Job", "Reads", "Writes", "roles", "with_job"]
 
 LARGEST = 2**53
 """What integers of options may be at most: beyond it numbers are not counts."""
@@ -50,13 +50,6 @@ class Writes(Enum):
     FILE = "file"
     DIRECTORY = "directory of results"
     EITHER = "file or directory, which the command finds out"
-
-
-@dataclass(frozen=True)
-class Former:
-    """Mark of a hidden option under its former name, with what is said now; it is remarked on when used."""
-
-    now: str
 
 
 class Job:
@@ -361,14 +354,10 @@ def _given(parameters: Iterable[Parameter], values: Mapping[str, Any]) -> dict[s
 
 
 def _check_value(parameter: Parameter, values: Mapping[str, Any]) -> None:
-    """Refuse a value that says nothing; remark on an option that is about to go."""
+    """Refuse a value that says nothing."""
     value = values.get(parameter.name, parameter.default)
-    metadata = get_args(parameter.annotation)[1:]
     if isinstance(value, int) and abs(value) > LARGEST:
         raise typer.BadParameter("is too large", param_hint=_option(parameter))
-    for mark in metadata:
-        if isinstance(mark, Former) and value != parameter.default and not values.get("quiet"):
-            print_remark(f"{_option(parameter)} will go: {mark.now}")
 
 
 def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.job import Former, Writes
+from photogram.cli.job import Writes
 
 if TYPE_CHECKING:
     from photogram.io.writing import Content
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "KEPT",
-    "FormerPlot",
     "JsonFile",
     "Ordering",
     "OrderingName",
@@ -133,9 +132,6 @@ class PictureFormat(StrEnum):
 
 
 PlotFormat = Annotated[PictureFormat, typer.Option(help="Format of the pictures.")]
-FormerPlot = Annotated[
-    Path | None, Writes.FILE, Former("say --out DIR --plots"), typer.Option("--plot", hidden=True)
-]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 
 Strict = Annotated[
@@ -182,14 +178,11 @@ def as_data(result: AdjustedNetwork, folder: Path | None) -> dict[Path, Content]
     return {folder / name: content for name, content in files_of(result).items()}
 
 
-def picture_places(
-    name: str, plots: bool, ending: PictureFormat, out: Path | None, former: Path | None
-) -> list[Path]:
-    """Return where a picture goes: to the results, under its former option, both, or nowhere."""
+def picture_places(name: str, plots: bool, ending: PictureFormat, out: Path | None) -> list[Path]:
+    """Return where a picture goes: to the results, or nowhere."""
     if plots and out is None:
         raise typer.BadParameter("goes with --out DIR", param_hint="--plots")
-    places = [out / f"{name}.{ending.value}"] if plots and out else []
-    return [*places, former] if former else places
+    return [out / f"{name}.{ending.value}"] if plots and out else []
 
 
 def example_out(out: Path | None, plots: bool, name: str) -> Path | None:

@@ -11,9 +11,8 @@ from rich.markup import escape
 
 from photogram.cli.console import output, print_remark
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
-from photogram.cli.job import Former, Job, Reads, Writes, with_job
+from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import (
-    FormerPlot,
     JsonFile,
     PictureFormat,
     PlotFormat,
@@ -65,10 +64,6 @@ def perspective_center(
     no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
-    listing: Annotated[
-        Path | None, Writes.FILE, Former("--out DIR writes the listing there"), typer.Option(hidden=True)
-    ] = None,
-    plot: FormerPlot = None,
     as_published: Annotated[
         bool,
         typer.Option(
@@ -109,8 +104,8 @@ def perspective_center(
             deck = job.packaged(*EXAMPLE)
             out = example_out(out, plots, "example-resected")
             job.reads(deck)
-        listings = [path for path in (listing, out and out / "listing.txt") if path]
-        pictures = picture_places("residuals", plots, plot_format, out, plot)
+        listings = [out / "listing.txt"] if out else []
+        pictures = picture_places("residuals", plots, plot_format, out)
         place = html_place(html, no_html, out)
         job.writes(*listings, *pictures, *([place] if place else []))
         unknown = [name.strip() for name in calibrate.split(",")] if calibrate else []

@@ -15,7 +15,6 @@ from photogram.cli.console import output, print_remark
 from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import (
-    FormerPlot,
     JsonFile,
     PictureFormat,
     PlotFormat,
@@ -75,7 +74,6 @@ def plan(
     no_html: NoHtml = False,
     plots: Plots = False,
     plot_format: PlotFormat = PictureFormat.PNG,
-    plot: FormerPlot = None,
     quiet: Quiet = False,
 ) -> None:
     """Predict the accuracy of a network before it is flown: two patterns of control side by side.
@@ -93,7 +91,7 @@ def plan(
             projects = [job.packaged(GALVESTON)]
             out = example_out(out, plots, "example-planned")
         report = out and out / "report.txt"
-        pictures = picture_places("plan", plots, plot_format, out, plot)
+        pictures = picture_places("plan", plots, plot_format, out)
         place = html_place(html, no_html, out)
         job.writes(*pictures, *([report] if report else []), *([place] if place else []))
 

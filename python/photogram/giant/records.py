@@ -35,7 +35,7 @@ class Source(records.Source):
 
     @classmethod
     def read(cls, path: Path, strip: str = "") -> Self:
-        """Read a file, as :meth:`photogram.records.Source.read` does."""
+        """Read a file, as :meth:`photogram.io.records.Source.read` does."""
         return replace(super().read(path), strip=strip)
 
     def record(self, number: int) -> Record:

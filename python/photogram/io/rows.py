@@ -2,7 +2,7 @@
 
 Nothing in a file can make reading dear or end it with anything but an :class:`InputError`: a record has a
 greatest length, which keeps every cell below the limit of the module `csv`; columns are looked up by name;
-numbers have one strict spelling (:mod:`photogram.numbers`).
+numbers have one strict spelling (:mod:`photogram.io.numbers`).
 """
 
 from __future__ import annotations
