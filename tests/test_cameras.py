@@ -11,9 +11,9 @@ import pytest
 from example_scripts import load
 from photogram import AdjustmentError, Block, Camera, InputError, RankError, adjust, predict
 from photogram.adjustment.undetermined import in_words
-from photogram.checks.rays import Rays
 from photogram.giant import Project
 from photogram.network.geometry import project
+from photogram.network.rays import Rays
 
 FREE = np.inf
 

@@ -23,12 +23,9 @@ def test_a_former_name_is_the_module_of_today(former):
 
 
 def test_what_lay_inside_a_folder_that_moved_has_its_former_name_too():
-    from photogram.checks.rays import Rays
-    from photogram.giant.checks.rays import Rays as FormerRays
     from photogram.io.writing.outputs import OutputSet
     from photogram.writing.outputs import OutputSet as FormerSet
 
-    assert FormerRays is Rays
     assert FormerSet is OutputSet
 
 
@@ -51,7 +48,7 @@ def test_every_way_to_import_works_in_a_new_process(statement, name):
 
 
 def test_other_names_are_not_found():
-    for name in ("photogram.nothing", "photogram.giant.nothing", "photogram.checks.nothing"):
+    for name in ("photogram.nothing", "photogram.giant.nothing", "photogram.diagnosis.nothing"):
         with pytest.raises(ModuleNotFoundError, match="nothing"):
             import_module(name)
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import Block
-from photogram.checks.rays import Rays
+from photogram.network.rays import Rays
 
 Floats = NDArray[np.float64]
 

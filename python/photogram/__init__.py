@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from photogram import absolute_orientation as absolute_orientation
     from photogram import collection as collection
     from photogram import comparator as comparator
+    from photogram import diagnosis as diagnosis
     from photogram import formats as formats
     from photogram import giant as giant
     from photogram import perspective_center as perspective_center
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.adjustment.snooping import snoop
     from photogram.adjustment.variance_function import variance_function
-    from photogram.checks.checking import check
+    from photogram.diagnosis.diagnose import diagnose
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.formats.results import read_result
     from photogram.messages import Message
@@ -90,9 +91,9 @@ __all__ = [
     "adjust",
     "adjust_started",
     "camera_from",
-    "check",
     "clean",
     "compare",
+    "diagnose",
     "differences",
     "eliminate_terms",
     "features",
@@ -147,10 +148,10 @@ _HOMES = {
     "adjust": "adjustment.adjustment",
     "adjust_started": "adjustment.again",
     "camera_from": "stellar.cameras",
-    "check": "checks.checking",
     "Cleaned": "adjustment.cleaning",
     "clean": "adjustment.cleaning",
     "compare": "results.model_tests",
+    "diagnose": "diagnosis.diagnose",
     "differences": "results.differences",
     "eliminate_terms": "adjustment.elimination",
     "features": "results.fitting",
@@ -179,6 +180,7 @@ MODULES = (
     "absolute_orientation",
     "collection",
     "comparator",
+    "diagnosis",
     "formats",
     "giant",
     "perspective_center",

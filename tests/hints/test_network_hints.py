@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import Camera, InputError, RankError, Spheroid, adjust, hints, simulate
+from photogram import Camera, InputError, RankError, Spheroid, adjust, diagnose, hints, simulate
 from photogram.adjustment.hints import verdicts
 from photogram.adjustment.regression import eligible, regressions, spread, view
 from photogram.geometry import project
-from photogram.giant import Project, check, write_project
+from photogram.giant import Project, write_project
 from photogram.network.directions import image_directions, without_lenses
 from photogram.network.observations import Distance
 
@@ -290,7 +290,7 @@ def test_good_adjustments_look_for_none(monkeypatch):
 def test_the_check_of_a_project_tells_them():
     block = aerial(10)
     feet = block.replace(photo_positions=block.photo_positions / 0.3048)
-    found = [each.text for each in check(Project.from_block(feet)).findings if each.kind == "convention"]
+    found = [each.text for each in diagnose(Project.from_block(feet)).findings if each.kind == "convention"]
     assert len(found) == 1
     assert "positions of the photos are in feet" in found[0]
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from photogram.adjustment.hints import distances_in_millimetres, hints, verdicts
 from photogram.adjustment.hypotheses import TURNS
-from photogram.checks.findings import Finding, Section
-from photogram.checks.views import View
+from photogram.diagnosis.findings import Finding, Section
+from photogram.diagnosis.views import View
 
 __all__ = ["conventions", "further"]
 
