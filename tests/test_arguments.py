@@ -161,7 +161,6 @@ def good(tmp_path_factory):
             "score_test": {"result": calibrated, "names": ["K3"]},
             "terms_test": {"result": calibrated, "names": ["K1"]},
             "group_sums": {"result": photogram.adjust(block)},
-            "hints": {"block": block},
             "orient": {"stations": stations},
             "variance_components": {"network": block, "max_steps": 3},
             "variance_function": {"network": block, "max_steps": 2, "bins": 2},

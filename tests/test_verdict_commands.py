@@ -66,8 +66,15 @@ def test_gross_errors_and_weights_together(run, project, tmp_path):
 
 def test_a_hint_heads_the_verdict():
     block = simulate(strips=2, photos_per_strip=4, seed=5).block
-    down = adjust(block.replace(image_xy=block.image_xy * [1.0, -1.0]))
-    assert down.hints
+    mirrored = block.replace(image_xy=block.image_xy * [1.0, -1.0])
+    plain = adjust(mirrored)
+    assert plain.hints == ()
+    assert plain.verdict.exit
+    assert any("photogram.diagnose" in line for line in plain.verdict.next)
+    found = diagnose(mirrored, plain)
+    down = found.result
+    assert found.verdict.headline == down.verdict.headline
+    assert [each.text for each in found.grave] == list(down.hints) != []
     assert down.verdict.hints == down.hints
     assert down.verdict.exit in (3, 4)
     lines = [down.verdict.headline, *down.verdict.lines]

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from photogram.adjustment.components import variance_components
     from photogram.adjustment.elimination import eliminate_terms
     from photogram.adjustment.first_values import FirstValues, first_values
-    from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.adjustment.snooping import snoop
@@ -99,7 +98,6 @@ __all__ = [
     "features",
     "first_values",
     "group_sums",
-    "hints",
     "orient",
     "plan",
     "predict",
@@ -159,7 +157,6 @@ _HOMES = {
     "terms_test": "results.model_tests",
     "first_values": "adjustment.first_values",
     "group_sums": "results.group_sums",
-    "hints": "adjustment.hints",
     "orient": "absolute_orientation",
     "plan": "planning",
     "predict": "adjustment.prediction",

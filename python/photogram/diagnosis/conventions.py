@@ -1,19 +1,323 @@
-"""Mistakes in conventions: units, axes and angles of images, photos and points, asked for before all else.
+"""Mistakes in conventions: units, axes and angles of images, photos and points, found by trying.
 
-One such mistake makes every observation look wrong. So it is named once and put right for what follows.
+One such mistake makes every observation look wrong. So it is asked for before all else, named once, and put
+right for what follows; the data are never changed.
+
+The verdict is the ratio of the misfit m of images under a hypothesis to that as given
+(:mod:`photogram.diagnosis.regression`); `docs/hints.md` has the table of hypotheses and the limits.
 """
 
 from __future__ import annotations
 
-from photogram.adjustment.hints import distances_in_millimetres, hints, verdicts
-from photogram.adjustment.hypotheses import TURNS
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from photogram.adjustment.resection import Observed, solve
+from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.findings import Finding, Section
+from photogram.diagnosis.hypotheses import TURNS, Hypothesis, attitude_readings, hypotheses
+from photogram.diagnosis.regression import (
+    LEAST,
+    MOST,
+    control_misfit,
+    control_residuals,
+    eligible,
+    given_points,
+    misfits,
+    regressions,
+    spread,
+    view,
+)
 from photogram.diagnosis.views import View
+from photogram.errors import AdjustmentError
+from photogram.messages import Message, listed
+from photogram.network.block import Block, checked
+from photogram.network.directions import without_lenses
+from photogram.network.geometry import rotation_matrix
+from photogram.network.observations import Distance
+from photogram.network.rays import Rays
 
-__all__ = ["conventions", "further"]
+__all__ = ["Verdict", "conventions", "further", "hints", "verdicts"]
 
-MOST = 5
+SUSPICION = 0.35
+"""Misfit m above which photos are looked at more closely."""
+PASSES, PASSES_ROUGH, ROUGH = 0.2, 0.3, 0.1
+"""What the misfit must fall to in the median, where it is then below ROUGH; else poses are rough starts."""
+EACH = 0.5
+"""What it must fall to on each photo that does not fit as it is, and in the median of images of control."""
+AS_GOOD = 1.5
+"""Another hypothesis is as good when its misfit is below so many times the least."""
+SLIGHT = float(np.radians(1.0))
+"""Attitudes that differ from resected ones by less are right."""
+CLEARLY = 5.0
+"""So many times nearer to the resected attitudes must those of a rival reading be."""
+PUT_RIGHT = 5
 """Mistakes that are put right one upon the other, at the most."""
+BAR_FACTOR, BAR_WITHIN, BAR_EACH = 1000.0, 0.05, float(np.log(2))
+"""A distance in millimetres among metres: within so much in the median, and each (logarithm)."""
+
+
+class Verdict:
+    """Hypotheses that pass, the best first; several where it cannot be told which.
+
+    Attributes
+    ----------
+    names
+        Of the hypotheses.
+    text
+        The hint.
+    change
+        Makes of a block what the first hypothesis says was meant.
+    exact
+        Whether that is exactly what was meant.
+    photos
+        Photos that it is about; none for all.
+    """
+
+    def __init__(
+        self, passing: list[tuple[float, Hypothesis]], given: float, photos: Sequence[str] = ()
+    ) -> None:
+        passing.sort(key=lambda each: each[0])
+        least = passing[0][0]
+        best = [each for misfit, each in passing if misfit <= AS_GOOD * least]
+        # One mistake may be right in several forms.
+        best = list({each.text: each for each in reversed(best)}.values())[::-1]
+        self.names = [each.name for each in best]
+        self.change, self.exact = best[0].change, best[0].exact
+        self.photos = photos
+        where = f" (on photo{'s' if len(photos) > 1 else ''} {listed(list(photos))})" if photos else ""
+        fall = f"images would miss their places by {least:.2g} of their spread and not by {given:.2g}"
+        if len(best) == 1:
+            self.text = f"probably {best[0].text}{where}: {fall}"
+        else:
+            rivals = "; or ".join(each.text for each in best)
+            self.text = f"it cannot be told which of these is so{where}: {rivals}: {fall}"
+
+
+def hints(block: Block) -> list[Message]:
+    """Look for mistakes in the conventions of data: units, axes, signs, angles.
+
+    Parameters
+    ----------
+    block
+        A block whose photos have positions and attitudes, be they rough.
+
+    Returns
+    -------
+    Sentences that each name a mistake that would explain why images do not fit; none where they do, or where
+    no single mistake explains it. Nothing is corrected.
+
+    Raises
+    ------
+    InputError
+        What is no block, or has photos without a pose.
+    """
+    with np.errstate(all="ignore"):
+        block = _of_frames(without_lenses(checked(block)))
+        found = [Message(verdict.text) for verdict in verdicts(block)]
+        bar = distances_in_millimetres(block)
+        bars = [] if bar is None else [Message(bar.text)]
+        return [*found, *_latitudes(block), *(_readings(block) if not found else []), *bars]
+
+
+def _of_frames(block: Block) -> Block:
+    """Return a block without the images of mounted photos, whose poses are not those that it gives."""
+    mounted = {each.photo for each in block.mounts}
+    if not mounted:
+        return block
+    own = np.array([photo not in mounted for photo in block.photo_ids])[block.image_photos]
+    return block.replace(
+        mounts=(),
+        image_photos=block.image_photos[own],
+        image_points=block.image_points[own],
+        image_xy=block.image_xy[own],
+        image_sd=block.image_sd[own],
+    )
+
+
+def verdicts(block: Block) -> list[Verdict]:
+    """Return what the comparison of images with predictions says; see :func:`hints`."""
+    photos = eligible(block)
+    if not len(photos):
+        return []
+    seen = misfits(view(block, photos), photos)
+    if np.median(seen) <= SUSPICION:
+        worst = photos[np.argsort(-seen)][:MOST]
+        single = list(_single(block, np.sort(worst[np.sort(-seen)[:MOST] < -SUSPICION])))
+        return single or _of_control(view(block, spread(photos, MOST)), spread(photos, MOST))
+    chosen = spread(photos, MOST)
+    looked = view(block, chosen)
+    passing = _passing(looked, chosen)
+    return [Verdict(passing, float(np.median(misfits(looked, chosen))))] if passing else []
+
+
+def _passing(looked: Block, photos: Indices) -> list[tuple[float, Hypothesis]]:
+    """Return hypotheses under which photos fit, with the misfit that is left."""
+    seen = regressions(looked, photos)
+    passing: dict[str, tuple[float, Hypothesis]] = {}
+    for hypothesis in hypotheses(looked, seen):
+        left = misfits(hypothesis.change(looked), photos)
+        ratio, median = left / seen.misfit, float(np.median(left))
+        limit = PASSES_ROUGH if median > ROUGH else PASSES
+        each = (ratio < EACH) | (np.maximum(left, seen.misfit) < SUSPICION)
+        if np.median(ratio) < limit and each.all() and median < SUSPICION:
+            found = (median, hypothesis)
+            passing[hypothesis.name] = min(
+                passing.get(hypothesis.name, found), found, key=lambda each: each[0]
+            )
+    return list(passing.values())
+
+
+def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
+    """Try what makes given points fit, where rays meet well but not there."""
+    given = control_misfit(looked)
+    if not given_points(looked)[looked.image_points].any() or given <= SUSPICION:
+        return []
+    passing = []
+    for hypothesis in hypotheses(looked):
+        meant = hypothesis.change(looked)
+        left = control_misfit(meant)
+        fits = left < given * (PASSES_ROUGH if left > ROUGH else PASSES) and left < SUSPICION
+        if fits and _most_come_nearer(looked, meant) and np.median(misfits(meant, photos)) < SUSPICION:
+            passing.append((left, hypothesis))
+    return [Verdict(passing, given)] if passing else []
+
+
+def _most_come_nearer(given: Block, meant: Block) -> bool:
+    """Whether a hypothesis on control brings most images nearer, not only those of a few that are far off."""
+    before, after = (float(np.median(control_residuals(each))) for each in (given, meant))
+    return after < EACH * before
+
+
+def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
+    """Try photos one by one, the others being right."""
+    by_names: dict[tuple[str, ...], tuple[list[tuple[float, Hypothesis]], float, list[str]]] = {}
+    for photo in photos.tolist():
+        own = np.array([photo])
+        looked = view(block, own)
+        given = float(misfits(looked, own)[0])
+        passing = []
+        for name, (turn, text) in TURNS.items():
+            change = partial(_turned, photo=block.photo_ids[photo], turn=np.array(turn, dtype=np.float64))
+            left = float(misfits(change(looked), own)[0])
+            if left < PASSES * given and left < SUSPICION:
+                passing.append((left, Hypothesis(name, text, change)))
+        if passing:
+            names = tuple(sorted(each.name for _, each in passing))
+            by_names.setdefault(names, (passing, given, []))[2].append(block.photo_ids[photo])
+    for passing, given, photo_ids in by_names.values():
+        yield Verdict(passing, given, photo_ids)
+
+
+def _turned(block: Block, photo: str, turn: Floats) -> Block:
+    """Return a block with the images of one photo turned or mirrored."""
+    own = (block.image_photos == block.photo_ids.index(photo))[:, np.newaxis]
+    return block.replace(image_xy=np.where(own, block.image_xy @ turn, block.image_xy))
+
+
+def _latitudes(block: Block) -> list[Message]:
+    """Latitudes beyond the poles are certain."""
+    if block.spheroid is None:
+        return []
+    return [
+        Message(f"latitudes of the {what} are beyond 90 degrees: longitude and latitude are exchanged")
+        for what, positions in (("photos", block.photo_positions), ("points", block.point_positions))
+        if (np.abs(positions[:, 1]) > np.pi / 2).any()
+    ]
+
+
+def _readings(block: Block) -> list[Message]:
+    """Compare given attitudes with resected ones: mistakes in small angles, which images hardly show."""
+    if block.spheroid is not None:
+        return []
+    known = given_points(block)
+    counts = np.bincount(block.image_photos[known[block.image_points]], minlength=len(block.photo_ids))
+    photos = spread(np.flatnonzero(counts >= LEAST), MOST)
+    resected = {photo: found for photo in photos.tolist() if (found := _resected(block, photo)) is not None}
+    if len(resected) < 2:
+        return []
+    rows = np.array(list(resected))
+    turned = np.array(list(resected.values()))
+    own = _apart(Rays.of(block).cameras[rows], turned)
+    rivals = sorted(
+        (_apart(matrices[rows], turned), text) for text, matrices in attitude_readings(block).values()
+    )
+    (least, text), (second, _) = rivals[:2]
+    if own < SLIGHT or CLEARLY * least > min(own, second):
+        return []
+    return [
+        Message(
+            f"probably {text}: attitudes would differ from resected ones by {np.degrees(least):.2g} degrees"
+            f" and not by {np.degrees(own):.2g}"
+        )
+    ]
+
+
+def _resected(block: Block, photo: int) -> Floats | None:
+    """(3, 3) attitude, photo to object, from the points that are given."""
+    rows = np.flatnonzero((block.image_photos == photo) & given_points(block)[block.image_points])
+    points = block.image_points[rows]
+    count = len(rows)
+    observed = Observed(
+        block.point_positions[points],
+        np.zeros((count, 3)),
+        block.image_xy[rows],
+        block.image_sd[rows],
+        float(block.known_distances("hints")[photo]),
+        [block.point_ids[point] for point in points],
+    )
+    try:
+        pose = solve(observed, limit=1e-2, max_iterations=50).pose
+    except AdjustmentError:
+        return None
+    found: Floats = rotation_matrix(pose[np.newaxis, 3:])[0].T
+    return found
+
+
+def _apart(given: Floats, found: Floats) -> float:
+    """Rms angle between attitudes, radians."""
+    trace = np.einsum("pij,pij->p", given, found)
+    return float(np.sqrt((np.arccos(np.clip((trace - 1) / 2, -1, 1)) ** 2).mean()))
+
+
+def distances_in_millimetres(block: Block) -> Hypothesis | None:
+    """Compare observed distances with those between points: millimetres for metres, all alike."""
+    bars = [each for each in block.observations if isinstance(each, Distance)]
+    if not bars:
+        return None
+    place = {name: row for row, name in enumerate(block.point_ids)}
+    rays = Rays.of(block)
+    positions = rays.axes.positions(block.point_positions)
+    positions = np.where(given_points(block)[:, np.newaxis], positions, rays.intersect().positions)
+    ratios = np.array(
+        [
+            each.length / np.linalg.norm(positions[place[each.first]] - positions[place[each.second]])
+            for each in bars
+        ]
+    )
+    for factor, text in (
+        (BAR_FACTOR, "in millimetres, all else in metres"),
+        (1 / BAR_FACTOR, "in metres, all else in millimetres"),
+    ):
+        relative = ratios / factor
+        if abs(np.median(relative) - 1) < BAR_WITHIN and (np.abs(np.log(relative)) < BAR_EACH).all():
+            names = listed([each.name for each in bars])
+            text = f"probably observed distances are {text}: {names} are {factor:g} times too long"
+            return Hypothesis("distances", text, partial(_shorter, factor=factor))
+    return None
+
+
+def _shorter(block: Block, factor: float) -> Block:
+    """Return a block with its observed distances divided by a factor."""
+    return block.replace(
+        observations=[
+            replace(each, length=each.length / factor) if isinstance(each, Distance) else each
+            for each in block.observations
+        ]
+    )
 
 
 def conventions(view: View) -> tuple[Section, View, bool]:
@@ -29,7 +333,7 @@ def conventions(view: View) -> tuple[Section, View, bool]:
         "Another unit, axis or sense of angles makes every observation look wrong: it is looked for first.",
     )
     exact = True
-    for _ in range(MOST):
+    for _ in range(PUT_RIGHT):
         whole = [each for each in verdicts(view.seen) if not each.photos and not {*each.names} & {*TURNS}]
         if not whole:
             break

@@ -18,6 +18,7 @@ import numpy as np
 from photogram.adjustment.adjustment import core_threads
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.arrays import shown
+from photogram.diagnosis.adjusted import diagnosis_of
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.control import control
 from photogram.diagnosis.control_sets import Explained, doubtful, explain, free_model
@@ -41,6 +42,8 @@ from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos
 from photogram.network.observations import Position
 from photogram.network.rays import Rays
+from photogram.results.result import Result
+from photogram.results.snooped import Snooped
 from photogram.show.page import Page
 from photogram.show.ways import page_of
 
@@ -81,7 +84,9 @@ class Manner:
     intersect_only: str = ""
 
 
-def diagnose(network: object, *, threads: int | None = None) -> Diagnosis:
+def diagnose(
+    network: object, result: Result | Snooped | None = None, *, threads: int | None = None
+) -> Diagnosis:
     """Look for mistakes and gross errors in a network: units, axes, signs, names, images, control, stations.
 
     Nothing is changed. What an earlier step explains (feet for metres, a mirrored photo) is put right for the
@@ -93,6 +98,11 @@ def diagnose(network: object, *, threads: int | None = None) -> Diagnosis:
     network
         A block with any observations, a project of GIANT files, or a collection of photos. Photos of a block
         may be without poses: they are given first values then.
+    result
+        An adjustment of the block that is to be explained, or what snooping has made of it. Nothing is
+        adjusted then: where it has not converged, or fits badly, mistakes in conventions and exchanged names
+        are looked for, and standard deviations that it contradicts; the `result` that is returned has them
+        in its verdict.
     threads
         Threads of the adjustment; the findings do not depend on it. Default: all processors.
 
@@ -104,7 +114,7 @@ def diagnose(network: object, *, threads: int | None = None) -> Diagnosis:
     Raises
     ------
     InputError
-        What is no network, a block without images.
+        What is no network, a block without images, what is no result of a block.
 
     Examples
     --------
@@ -117,6 +127,11 @@ def diagnose(network: object, *, threads: int | None = None) -> Diagnosis:
     ['control-set']
     """
     core_threads(threads)
+    if result is not None:
+        adjusted = result.result if isinstance(result, Snooped) else result
+        if not isinstance(adjusted, Result):
+            raise InputError(f"result is the result of a block, not {shown(result)}")
+        return diagnosis_of(adjusted)
     return check_of(network, threads)
 
 

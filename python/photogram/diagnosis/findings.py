@@ -197,11 +197,15 @@ class Diagnosis(Brief):
         In the order of Appendix H of the guide.
     result
         The adjustment, where there was one; without what the check left out of it.
+    adjusted_before
+        Whether it is the adjustment that was to be explained: the verdict is its own then, with the mistakes
+        that were found.
     """
 
     title: str
     sections: list[Section]
     result: Result | None
+    adjusted_before: bool = False
 
     def brief(self) -> tuple[str, Rows]:
         """Return how many findings there are, and which, the grave ones first."""
@@ -229,6 +233,8 @@ class Diagnosis(Brief):
         Grave findings make results wrong: exit code 3, that of the command. Mistakes in what data mean stand
         as hints; tests are those of the adjustment, where there was one.
         """
+        if self.adjusted_before and self.result is not None:
+            return self.result.verdict
         grave, look = self.grave, [each for each in self.findings if each.level == "look"]
         hints = tuple(each.text for each in grave if each.kind in CONVENTIONS)
         tests = () if self.result is None else self.result.verdict.tests
