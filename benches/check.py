@@ -1,4 +1,4 @@
-"""Plant one mistake or gross error in each of many simulated networks; count what `photogram.check` names."""
+"""Plant one mistake or gross error in each of many networks; count what `photogram.diagnose` names."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 import giant_check as planted
 from giant_check import GULF, explained, hits, seeds
-from photogram import Attitudes, Block, Camera, Simulation, adjust, check, simulate
+from photogram import Attitudes, Block, Camera, Simulation, adjust, diagnose, simulate
 from photogram.network.geometry import rotation_matrix
 from photogram.network.observations import Position
 from photogram.network.simulated_observations import with_distances, with_gnss
@@ -65,7 +65,7 @@ def parser() -> argparse.ArgumentParser:
 def outcome(plant: Plant, seed: int, verbose: bool) -> tuple[bool, int]:
     """Return whether all that was planted is named, and the number of grave findings that are false."""
     case = plant(seed, np.random.default_rng([seed, 2]))
-    found = check(case.block, threads=1)
+    found = diagnose(case.block, threads=1)
     said = getattr(case, "said", "")
     named = all(
         any(hits(finding, target, kinds) and said in finding.text for finding in found.grave)

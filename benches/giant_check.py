@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram import Block, adjust, simulate
-from photogram.giant import Finding, Project, check
+from photogram import Block, adjust, diagnose, simulate
+from photogram.diagnosis import Finding
+from photogram.giant import Project
 from photogram.network.geometry import Spheroid
 
 GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}
@@ -95,7 +96,7 @@ def outcome(
 ) -> tuple[int, ...]:
     """Return the errors planted, those that are named, and the grave findings that name no error."""
     planted = plant(project(seed), np.random.default_rng([seed, 2]))
-    found = check(Project.from_block(planted.block), threads=1)
+    found = diagnose(Project.from_block(planted.block), threads=1)
     named = [
         any(hits(finding, target, kinds) for finding in found.grave)
         for target, kinds in zip(planted.targets, planted.kinds, strict=True)

@@ -1,10 +1,10 @@
-"""Mistakes made on purpose with a simulated block, and what `photogram.hints` says of each."""
+"""Mistakes made on purpose with a simulated block, and what `photogram.diagnose` says of each."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from photogram import Block, hints, simulate
+from photogram import Block, diagnose, simulate
 
 
 def flown() -> Block:
@@ -33,11 +33,11 @@ def mistakes(block: Block) -> dict[str, Block]:
 
 
 def main() -> None:
-    """Print the hints of each mistake."""
+    """Print which mistakes are named of each."""
     for mistake, block in mistakes(flown()).items():
         print(f"{mistake}:")
-        for hint in hints(block) or ["nothing"]:
-            print(f"    {hint}")
+        for said in diagnose(block).verdict.hints or ["nothing"]:
+            print(f"    {said}")
 
 
 if __name__ == "__main__":

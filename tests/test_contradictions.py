@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from contradictions import assert_one_judgement, contradictions, sentences_of
-from photogram import Camera, adjust, check, plan, simulate, snoop, variance_components
+from photogram import Camera, adjust, diagnose, plan, simulate, snoop, variance_components
 from photogram.absolute_orientation import Stations, orient
 from photogram.absolute_orientation import read_csv as read_stations
 from photogram.cli import app
@@ -173,7 +173,7 @@ def test_adjustments_of_other_kinds(block, state, options, code):
 @pytest.mark.parametrize("state", sorted(BLOCKS.keys() - {"few", "many gross errors"}))
 def test_checks(block, state):
     """What looks for mistakes is never green where the adjustment that it makes is red."""
-    found = check(BLOCKS[state][0](block))
+    found = diagnose(BLOCKS[state][0](block))
     verdict = see(found)
     assert bool(found.grave) == (verdict.exit != 0)
     assert verdict.warning or adjust(BLOCKS[state][0](block)).verdict.usable
@@ -212,7 +212,7 @@ def test_collections(state):
     assert see(adjust_collection(photos)).code == code
     assert see(adjust_collection(photos, loss="huber")).code in ("not-tested", "look-at", "not-converged")
     assert (see(snoop(photos)).code == "accepted") == (state == "good")
-    assert (see(check(photos)).exit == 0) == (state == "good")
+    assert (see(diagnose(photos)).exit == 0) == (state == "good")
     see(adjust_collection(photos, max_iterations=1))
     see(adjust_collection(replace(photos, image_sd=photos.image_sd / 5)))
     see(adjust_collection(replace(photos, image_sd=photos.image_sd * 5)))

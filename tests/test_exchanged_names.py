@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from photogram import Camera, adjust, first_values, simulate, snoop
-from photogram.adjustment import exchanges
+from photogram import Camera, adjust, diagnose, first_values, simulate, snoop
+from photogram.diagnosis import names as names_of_points
 from photogram.results.exchanged import exchanged_names
 
 
@@ -27,6 +27,11 @@ def exchanged(block, seed):
     xy[[a, b]] = xy[[b, a]]
     names = {block.point_ids[block.image_points[row]] for row in (a, b)}
     return block.replace(image_xy=xy), names, block.photo_ids[photo]
+
+
+def explained(block):
+    """Adjust a block, and look for what explains it."""
+    return diagnose(block, adjust(block)).result
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -103,7 +108,7 @@ def test_the_verdict_of_an_adjustment_names_a_pair_before_all_images():
     told, codes = 0, set()
     for seed in range(100):
         block, names, photo = exchanged(block_of(seed).block, seed)
-        result = adjust(block)
+        result = explained(block)
         verdict = result.verdict
         codes.add(verdict.code)
         for each in result.exchanged:
@@ -119,7 +124,7 @@ def test_the_verdict_of_an_adjustment_names_a_pair_before_all_images():
 
 def test_the_headline_of_an_adjustment():
     block, _, _ = exchanged(block_of(2).block, 2)
-    result = adjust(block)
+    result = explained(block)
     assert result.verdict.headline.startswith(
         "Gross errors likely: images of points P000058 and P000072 on photo 0303 have probably each other's"
         " names; 1) image of point "
@@ -128,7 +133,7 @@ def test_the_headline_of_an_adjustment():
 
 
 def test_clean_blocks_have_no_pair():
-    assert not any(adjust(block_of(1000 + seed).block).exchanged for seed in range(100))
+    assert not any(explained(block_of(1000 + seed).block).exchanged for seed in range(100))
 
 
 def test_images_that_are_only_wrong_make_no_adjustment_name_a_pair():
@@ -137,7 +142,7 @@ def test_images_that_are_only_wrong_make_no_adjustment_name_a_pair():
         bad = np.flatnonzero(random.random(len(block.image_xy)) < 0.05)
         xy = block.image_xy.copy()
         xy[bad] += random.uniform(0.04, 1.0, (len(bad), 1)) * random.choice([-1, 1], (len(bad), 2))
-        assert adjust(block.replace(image_xy=xy)).exchanged == ()
+        assert explained(block.replace(image_xy=xy)).exchanged == ()
 
 
 def test_pairs_far_apart_in_a_larger_block_of_a_calibrated_camera():
@@ -150,7 +155,7 @@ def test_pairs_far_apart_in_a_larger_block_of_a_calibrated_camera():
         a, b = np.flatnonzero(block.image_photos == photo)[[2, 9]].tolist()
         xy[[a, b]] = xy[[b, a]]
         names.append({block.point_ids[block.image_points[row]] for row in (a, b)})
-    found = adjust(block.replace(image_xy=xy)).exchanged
+    found = explained(block.replace(image_xy=xy)).exchanged
     assert len(found) == 2
     assert all(any(all(name in each for name in pair) for each in found) for pair in names)
 
@@ -163,12 +168,12 @@ def test_a_pair_of_a_large_block_is_found_among_some_of_its_images(monkeypatch):
         asked.append(len(block.image_xy))
         return first_values(block)
 
-    monkeypatch.setattr(exchanges, "first_values", counted)
+    monkeypatch.setattr(names_of_points, "first_values", counted)
     block, names, photo = exchanged(block_of(2).block, 2)
-    [pair] = adjust(block).exchanged
-    monkeypatch.setattr(exchanges, "MOST_IMAGES", 100)
-    monkeypatch.setattr(exchanges, "EACH", 6)
-    assert adjust(block).exchanged == (pair,)
+    [pair] = explained(block).exchanged
+    monkeypatch.setattr(names_of_points, "MOST_IMAGES", 100)
+    monkeypatch.setattr(names_of_points, "EACH", 6)
+    assert explained(block).exchanged == (pair,)
     assert all(name in pair for name in names)
     assert photo in pair
     assert asked[-1] < 0.8 * asked[0]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram import Block, adjust, simulate, snoop
+from photogram import Block, adjust, diagnose, simulate, snoop
 from photogram.network.geometry import project
 from photogram.results.weakest import weakest_photos, weakest_points
 
@@ -142,7 +142,8 @@ def test_a_point_whose_rays_part_is_left_out(made, metres, given):
     """Its place is at infinity: the adjustment creeps there, and turns the photos, until it is left out."""
     at = made.truth.photo_positions[1] + metres * np.array([0.3, 0.1, -1.0])
     images = {0: np.array([40.0, 50.0])} | images_of(made.truth, [1], at)
-    result = adjust(with_point(made.block, images, at if given else None))
+    block = with_point(made.block, images, at if given else None)
+    result = diagnose(block, adjust(block)).result
     assert result.converged
     assert result.dropped == {"X": "its rays do not meet: it ran off"}
     assert "left out, its rays do not meet: it ran off: X" in [str(each) for each in result.messages]
@@ -220,7 +221,8 @@ def test_one_point_far_off_is_no_matter_of_units(made):
     """Heights in feet would bring it nearer, and leave the other control where it is."""
     at = made.truth.photo_positions[1].copy()
     images = {0: np.array([40.0, 50.0]), 1: np.array([3.0, 4.0])}
-    result = adjust(with_point(made.block, images, at))
+    block = with_point(made.block, images, at)
+    result = diagnose(block, adjust(block)).result
     assert result.hints == ()
     assert result.verdict.code == "gross-errors"
     assert result.verdict.headline.startswith("Gross errors likely: 1) image of point X")

@@ -16,7 +16,7 @@ FLOORS = (
     ("cli",),
     ("formats",),
     PROGRAMS,
-    ("planning", "checks"),
+    ("planning", "diagnosis"),
     ("distributed",),
     ("adjustment",),
     ("results",),

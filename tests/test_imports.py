@@ -28,7 +28,7 @@ def test_every_way_to_import_works_in_a_new_process(statement, name):
 
 
 def test_other_names_are_not_found():
-    for name in ("photogram.nothing", "photogram.giant.nothing", "photogram.checks.nothing"):
+    for name in ("photogram.nothing", "photogram.giant.nothing", "photogram.diagnosis.nothing"):
         with pytest.raises(ModuleNotFoundError, match="nothing"):
             import_module(name)
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):

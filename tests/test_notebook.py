@@ -215,7 +215,7 @@ def made(kind):
         "first_values": lambda: photogram.first_values(
             block.replace(photo_positions=unknown, photo_attitudes=unknown)
         ),
-        "check": lambda: photogram.check(block),
+        "check": lambda: photogram.diagnose(block),
         "plan": lambda: photogram.plan({"a": simulation.truth}),
         "adjusted camera": lambda: adjust(load("self_calibration").measured()).cameras[0],
         "snooped collection": lambda: collection.snooping.snoop_collection(

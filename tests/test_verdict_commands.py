@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from photogram import Camera, adjust, check, simulate
+from photogram import Camera, adjust, diagnose, simulate
 from photogram.cli import app
 from photogram.giant import Project, read_project, write_project
 from photogram.show.ways import page_of
@@ -66,8 +66,15 @@ def test_gross_errors_and_weights_together(run, project, tmp_path):
 
 def test_a_hint_heads_the_verdict():
     block = simulate(strips=2, photos_per_strip=4, seed=5).block
-    down = adjust(block.replace(image_xy=block.image_xy * [1.0, -1.0]))
-    assert down.hints
+    mirrored = block.replace(image_xy=block.image_xy * [1.0, -1.0])
+    plain = adjust(mirrored)
+    assert plain.hints == ()
+    assert plain.verdict.exit
+    assert any("photogram.diagnose" in line for line in plain.verdict.next)
+    found = diagnose(mirrored, plain)
+    down = found.result
+    assert found.verdict.headline == down.verdict.headline
+    assert [each.text for each in found.grave] == list(down.hints) != []
     assert down.verdict.hints == down.hints
     assert down.verdict.exit in (3, 4)
     lines = [down.verdict.headline, *down.verdict.lines]
@@ -79,15 +86,15 @@ def test_a_hint_heads_the_verdict():
 
 def test_a_check_ends_with_a_verdict():
     block = simulate(strips=2, photos_per_strip=4, seed=5).block
-    good = check(block)
+    good = diagnose(block)
     assert (good.verdict.exit, bool(good.grave)) == (0, False)
     assert good.verdict.tests == good.result.verdict.tests
-    down = check(block.replace(image_xy=block.image_xy * [1.0, -1.0]))
+    down = diagnose(block.replace(image_xy=block.image_xy * [1.0, -1.0]))
     assert (down.verdict.code, down.verdict.exit) == ("hint", 3)
     assert json.loads(down.to_json())["verdict"]["headline"] == down.verdict.headline
     xy = block.image_xy.copy()
     xy[int(np.argmax(adjust(block).redundancy[:, 0])), 0] += 1.0
-    assert check(block.replace(image_xy=xy)).verdict.code == "gross-errors"
+    assert diagnose(block.replace(image_xy=xy)).verdict.code == "gross-errors"
 
 
 @pytest.mark.parametrize(
@@ -140,7 +147,7 @@ def test_a_lens_pattern_asks_for_a_calibration_and_not_for_snooping(run, tmp_pat
     words = " ".join([found.verdict.headline, *found.verdict.lines, *page.advice])
     assert "--snoop" not in words
     assert "gross" not in words.lower()
-    looked = check(block)
+    looked = diagnose(block)
     assert [each.kind for each in looked.grave] == ["lens"]
     assert "--self-calibrate c,xp,yp,K1,K2,P1,P2 estimates it" in looked.grave[0].text
     # A wrong observation is still one, and no lens.

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from photogram import absolute_orientation as absolute_orientation
     from photogram import collection as collection
     from photogram import comparator as comparator
+    from photogram import diagnosis as diagnosis
     from photogram import formats as formats
     from photogram import giant as giant
     from photogram import perspective_center as perspective_center
@@ -23,12 +24,11 @@ if TYPE_CHECKING:
     from photogram.adjustment.components import variance_components
     from photogram.adjustment.elimination import eliminate_terms
     from photogram.adjustment.first_values import FirstValues, first_values
-    from photogram.adjustment.hints import hints
     from photogram.adjustment.prediction import predict
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.adjustment.snooping import snoop
     from photogram.adjustment.variance_function import variance_function
-    from photogram.checks.checking import check
+    from photogram.diagnosis.diagnose import diagnose
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.formats.results import read_result
     from photogram.messages import Message
@@ -88,15 +88,14 @@ __all__ = [
     "adjust",
     "adjust_started",
     "camera_from",
-    "check",
     "clean",
     "compare",
+    "diagnose",
     "differences",
     "eliminate_terms",
     "features",
     "first_values",
     "group_sums",
-    "hints",
     "orient",
     "plan",
     "predict",
@@ -145,10 +144,10 @@ _HOMES = {
     "adjust": "adjustment.adjustment",
     "adjust_started": "adjustment.again",
     "camera_from": "stellar.cameras",
-    "check": "checks.checking",
     "Cleaned": "adjustment.cleaning",
     "clean": "adjustment.cleaning",
     "compare": "results.model_tests",
+    "diagnose": "diagnosis.diagnose",
     "differences": "results.differences",
     "eliminate_terms": "adjustment.elimination",
     "features": "results.fitting",
@@ -156,7 +155,6 @@ _HOMES = {
     "terms_test": "results.model_tests",
     "first_values": "adjustment.first_values",
     "group_sums": "results.group_sums",
-    "hints": "adjustment.hints",
     "orient": "absolute_orientation",
     "plan": "planning",
     "predict": "adjustment.prediction",
@@ -177,6 +175,7 @@ MODULES = (
     "absolute_orientation",
     "collection",
     "comparator",
+    "diagnosis",
     "formats",
     "giant",
     "perspective_center",

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from photogram import simulate
-from photogram.checks.heights import neighbours
-from photogram.checks.orientation import MIRRORS
-from photogram.checks.predictions import exchange
-from photogram.checks.robust import critical, fit, mad_sd
-from photogram.checks.structure import parts_of
+from photogram import diagnose, simulate
 from photogram.cli import app
-from photogram.giant import Limits, Project, check, write_project
+from photogram.diagnosis.heights import neighbours
+from photogram.diagnosis.orientation import MIRRORS
+from photogram.diagnosis.predictions import exchange
+from photogram.diagnosis.robust import critical, fit, mad_sd
+from photogram.diagnosis.structure import parts_of
+from photogram.giant import Limits, Project, write_project
+from photogram.giant.checking import check
 from photogram.network.chosen import kept_images, of_photos
 from photogram.network.geometry import Spheroid
 from photogram.network.rays import Rays
@@ -32,7 +33,7 @@ def block():
 
 
 def checked(block, **options):
-    return check(Project.from_block(block), **options)
+    return diagnose(Project.from_block(block), **options)
 
 
 def found(outcome, kind):
@@ -78,7 +79,7 @@ def test_the_packaged_example_passes():
     from photogram.giant import read_project
 
     with as_file(files("photogram") / "examples" / "galveston") as directory:
-        outcome = check(read_project(directory))
+        outcome = diagnose(read_project(directory))
     assert outcome.grave == []
 
 
@@ -349,7 +350,7 @@ def test_section_13_a_gross_error_of_control_is_given_in_full_and_spoils_nothing
 
 @pytest.mark.parametrize("photos", [5, 8])
 def test_a_photo_turned_by_180_degrees_departs_by_180_degrees(photos):
-    from photogram.checks.stations import stations
+    from photogram.diagnosis.stations import stations
 
     block = simulate(strips=1, photos_per_strip=photos, points_per_photo=30, crab=0.001, seed=4).block
     turned = changed(block, "photo_attitudes", 2, 2, np.pi)
@@ -368,7 +369,7 @@ def test_section_13_an_outlying_initial_station(block):
 
 @pytest.mark.giant("13", "7 outlying stations")
 def test_section_13_a_station_off_the_path_without_an_adjustment(block):
-    from photogram.checks.stations import stations
+    from photogram.diagnosis.stations import stations
 
     one = changed(block, "photo_positions", block.photo_ids.index("0305"), 2, 900.0)
     one = changed(one, "photo_attitudes", block.photo_ids.index("0407"), 2, 0.6)
@@ -598,7 +599,7 @@ def test_no_block_is_too_poor_or_too_bad_for_a_check(seed):
 def test_intersection_only_is_checked_with_fixed_stations(block):
     project = Project.from_block(block)
     project.common.intersection_only = True
-    outcome = check(project)
+    outcome = diagnose(project)
     (none,) = found(outcome, "no-adjustment")
     assert none.level == "look"
     assert "the stations are not adjusted ones" in none.text
@@ -607,7 +608,7 @@ def test_intersection_only_is_checked_with_fixed_stations(block):
     row = image(block, "0302", least_rays=4)
     project = Project.from_block(changed(final, "image_xy", row, 0, 0.3))
     project.common.intersection_only = True
-    outcome = check(project)
+    outcome = diagnose(project)
     np.testing.assert_array_equal(outcome.result.photo_positions, outcome.result.block.photo_positions)
     (blunder,) = outcome.grave
     assert blunder.photos == ["0302"]
@@ -616,7 +617,7 @@ def test_intersection_only_is_checked_with_fixed_stations(block):
 def test_every_kind_of_finding_is_documented():
     root = Path(__file__).parents[2]
     package = root / "python" / "photogram"
-    sources = (package / "checks").glob("*.py")
+    sources = (package / "diagnosis").glob("*.py")
     kinds = {kind for path in sources for kind in re.findall(r'"([a-z]+(?:-[a-z]+)+)"', path.read_text())}
     text = (root / "docs" / "giant-check.md").read_text() + (root / "docs" / "check.md").read_text()
     assert {kind for kind in kinds if f"`{kind}`" not in text} == set()

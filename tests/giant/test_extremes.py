@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from damage import FIELDS
 
-from photogram import Spheroid, simulate
+from photogram import Spheroid, diagnose, simulate
 from photogram.errors import InputError
-from photogram.giant import Project, check, read_project
+from photogram.giant import Project, read_project
 from photogram.giant.files import to_bytes
 
 TEXTS = ["1E308", "-1E308", "1+300", "1E155", "1E20", "1E-300", "²", "1²", "٣", "1\x00", "nan", "-inf"]
@@ -79,7 +79,7 @@ def test_a_check_of_absurd_values_ends(size):
         values = getattr(block, name).copy()
         values.reshape(-1)[np.flatnonzero(np.isfinite(values))[0]] = size
         try:
-            report = check(Project.from_block(block.replace(**{name: values})), threads=1).report()
+            report = diagnose(Project.from_block(block.replace(**{name: values})), threads=1).report()
         except InputError:
             continue  # a block may refuse such values: as good
         assert report.endswith("\n")

@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import Camera, InputError, RankError, Spheroid, adjust, hints, simulate
-from photogram.adjustment.hints import verdicts
-from photogram.adjustment.regression import eligible, regressions, spread, view
-from photogram.giant import Project, check, write_project
+from photogram import Camera, InputError, RankError, Spheroid, adjust, diagnose, simulate
+from photogram.diagnosis.adjusted import errors_explained
+from photogram.diagnosis.conventions import hints, verdicts
+from photogram.diagnosis.regression import eligible, regressions, spread, view
+from photogram.giant import Project, write_project
 from photogram.network.directions import image_directions, without_lenses
 from photogram.network.geometry import project
 from photogram.network.observations import Distance
@@ -211,17 +212,29 @@ def verdicts_of(block):
     return [verdict.names for verdict in verdicts(without_lenses(block))]
 
 
+def explained(block):
+    return diagnose(block, adjust(block))
+
+
+def weights_of(block):
+    found = [finding.text for finding in explained(block).findings]
+    return [text for text in found if text.startswith("standard deviations of ")]
+
+
 def test_standard_deviations_that_are_wrong():
     right = aerial(11)
-    assert hints(adjust(right)) == []
-    (small,) = hints(adjust(right.replace(image_sd=right.image_sd / 3)))
-    assert str(small).startswith("standard deviations of image coordinates are about 3 times too small: ")
-    (large,) = hints(adjust(right.replace(image_sd=right.image_sd * 4)))
-    assert "about 4 times too large" in str(large)
+    good = explained(right)
+    assert good.findings == []
+    assert good.verdict.code == "accepted"
+    (small,) = weights_of(right.replace(image_sd=right.image_sd / 3))
+    assert small.startswith("standard deviations of image coordinates are about 3 times too small: ")
+    (large,) = weights_of(right.replace(image_sd=right.image_sd * 4))
+    assert "about 4 times too large" in large
     xy = right.image_xy.copy()
     xy[100] += 0.5
-    assert hints(adjust(right.replace(image_xy=xy))) == []
-    told = adjust(right.replace(image_sd=right.image_sd / 8)).messages
+    wrong = explained(right.replace(image_xy=xy))
+    assert [finding.kind for finding in wrong.grave] == [wrong.verdict.code] == ["gross-errors"]
+    told = explained(right.replace(image_sd=right.image_sd / 8)).result.messages
     assert str(told[0]).startswith("standard deviations of image coordinates are about ")
 
 
@@ -250,17 +263,23 @@ def test_scale_bars_in_millimetres():
 # Where hints are told
 
 
-def test_adjustments_that_fail_tell_hints():
+def test_adjustments_that_fail_are_explained_when_asked():
     block = aerial(9)
     down = block.replace(image_xy=block.image_xy * [1, -1])
-    result = adjust(down)
-    assert not result.converged
-    assert "y of the images has the wrong sign" in str(result.messages[0])
-    with pytest.raises(
-        RankError, match=r"do not intersect\n  hint: probably the principal distance"
-    ) as raised:
-        adjust(block.replace(principal_distances=-block.principal_distances))
+    found = explained(down)
+    assert not found.result.converged
+    assert "y of the images has the wrong sign" in str(found.result.messages[0])
+    assert "y of the images has the wrong sign" in found.grave[0].text
+    sign = block.replace(principal_distances=-block.principal_distances)
+    with pytest.raises(RankError, match=r"do not intersect$") as raised:
+        adjust(sign)
     assert raised.value.points
+    with (
+        pytest.raises(RankError, match=r"do not intersect\n  hint: probably the principal distance"),
+        errors_explained(sign),
+    ):
+        adjust(sign)
+    assert "principal distance of all photos is wrong" in diagnose(sign).verdict.hints[0]
 
 
 def test_the_command_line_tells_them(run, tmp_path):
@@ -279,18 +298,21 @@ def test_the_command_line_tells_them(run, tmp_path):
         assert said in " ".join(done.output.split())
 
 
-def test_good_adjustments_look_for_none(monkeypatch):
+def test_good_adjustments_are_not_looked_at(monkeypatch):
     def looked(_block):
         raise AssertionError
 
-    monkeypatch.setattr("photogram.adjustment.hints.hints", looked)
-    assert adjust(aerial(9)).converged
+    monkeypatch.setattr("photogram.diagnosis.adjusted.hints", looked)
+    assert explained(aerial(9)).verdict.usable
+    bad = aerial(9)
+    with pytest.raises(AssertionError):
+        explained(bad.replace(image_xy=bad.image_xy * [1, -1]))
 
 
 def test_the_check_of_a_project_tells_them():
     block = aerial(10)
     feet = block.replace(photo_positions=block.photo_positions / 0.3048)
-    found = [each.text for each in check(Project.from_block(feet)).findings if each.kind == "convention"]
+    found = [each.text for each in diagnose(Project.from_block(feet)).findings if each.kind == "convention"]
     assert len(found) == 1
     assert "positions of the photos are in feet" in found[0]
 
@@ -300,12 +322,15 @@ def test_the_example(capsys):
     example.main()
     said = capsys.readouterr().out
     assert "no mistake:\n    nothing\n" in said
-    assert said.count("    probably ") == 6
     assert "nothing\n" not in said.split("pixels from", 1)[1]
+    assert "y has the wrong sign" in said
+    assert "positions of the photos are in feet" in said
 
 
 def test_what_is_no_block():
     with pytest.raises(InputError, match="block is not a Block"):
         hints("block")
+    with pytest.raises(InputError, match="result is the result of a block, not 3"):
+        diagnose(aerial(1), 3)
     assert len(spread(np.arange(100), 12)) == 12
     assert len(eligible(aerial(1))) == 10

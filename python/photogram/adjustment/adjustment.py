@@ -14,8 +14,6 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.elsewhere import Division, in_parts
 from photogram.adjustment.ends import behind, folded, harmful, rounded, too_coarse, undetermined
-from photogram.adjustment.exchanges import with_exchanges
-from photogram.adjustment.hints import hinted, with_hints
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.started import started
 from photogram.adjustment.undetermined import one_place, undetermined_combinations
@@ -278,11 +276,10 @@ def _adjusted(
     except _photocore.BlockError as error:
         if error.args[0] in ("not free", "datum"):
             raise refused(block, network, None, error) from None
-        raise hinted(named(block, *error.args), block) from None
+        raise named(block, *error.args) from None
     with turned("the adjusted block"):
         freedom = _freedom(solution, options)
-        found = _result(block, solution, options, freedom, inner, as_published)
-        return with_exchanges(with_hints(found))
+        return _result(block, solution, options, freedom, inner, as_published)
 
 
 def adjusted_again(

@@ -289,15 +289,17 @@ def _snooped(
     job: Job, project: Project, block: Block, threads: int | None, options: dict[str, Any]
 ) -> Snooped:
     from photogram import snoop
+    from photogram.diagnosis.adjusted import diagnosed, errors_explained
 
-    with job.status("adjusting and testing") as status:
-        return snoop(
+    with job.status("adjusting and testing") as status, errors_explained(block):
+        found = snoop(
             block,
             unit_variance=project.options.unit_variance,
             threads=threads,
             **options,
             progress=shown(status, "weighted sum of squares", 1.0) if status is not None else None,
         )
+        return replace(found, result=diagnosed(cast("Result", found.result)))
 
 
 def adjusted_block(
@@ -313,6 +315,7 @@ def adjusted_block(
     """Adjust a block as its project says, but for what a user chooses, with its features."""
     from photogram import FirstValues, InnerConstraints, InputError, MinimumConstraints, adjust_started
     from photogram import adjust as adjust_block
+    from photogram.diagnosis.adjusted import diagnosed, errors_explained
     from photogram.formats.additions import repeated_remarks
     from photogram.results.fitting import with_features
 
@@ -332,10 +335,12 @@ def adjusted_block(
             **vars(division),
             "verdict": True,
         }
-        if isinstance(block, FirstValues):
-            result = adjust_started(block, **how)
-        else:
-            result = adjust_block(block, **how)
+        with errors_explained(block):
+            if isinstance(block, FirstValues):
+                result = adjust_started(block, **how)
+            else:
+                result = adjust_block(block, **how)
+        result = diagnosed(result)
     if chosen == "control" and result.datum.is_chosen:
         raise InputError(
             "control gives no datum: --control FILE adds it, --datum inner or minimum does without it",

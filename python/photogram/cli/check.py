@@ -16,7 +16,7 @@ from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Quiet, Threads, default_out, out_option
 
 if TYPE_CHECKING:
-    from photogram.checks.findings import Check
+    from photogram.diagnosis.findings import Diagnosis
 
 __all__ = ["EXAMPLE", "CheckedOut", "check", "text_files"]
 
@@ -37,7 +37,7 @@ def text_files(out: Path, report: str) -> dict[Path, bytes]:
     return {out / TEXT: report.encode()}
 
 
-def _shorten(found: Check, inside: str, shown: str) -> None:
+def _shorten(found: Diagnosis, inside: str, shown: str) -> None:
     """Write in the findings where a packaged project lies as people are told."""
     for section in found.sections:
         section.findings = [replace(each, text=each.text.replace(inside, shown)) for each in section.findings]
@@ -76,7 +76,7 @@ def check(
     """
     with job:
         from photogram.giant import Limits, read_project
-        from photogram.giant import check as check_project
+        from photogram.giant.checking import check as check_project
         from photogram.show.ways import page_of
 
         if directory is None:

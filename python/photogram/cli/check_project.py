@@ -44,7 +44,7 @@ def check_project(
     The project is not changed. The exit code is 3 when something grave is found.
     """
     with job:
-        from photogram import check
+        from photogram import diagnose
         from photogram.show.ways import page_of
 
         path = project_path(job, path)
@@ -54,7 +54,7 @@ def check_project(
         if not quiet:
             print_sections(described(project), "`photogram info`")
         with job.status("checking"):
-            found = check(project.block, threads=threads)
+            found = diagnose(project.block, threads=threads)
         job.finish(
             text_files(out, found.report()),
             {} if json is None else {json: found.to_json()},

@@ -285,11 +285,12 @@ def _adjust(
 ) -> tuple[Result, Snooped | None, Cleaned | None]:
     """Adjust the block as COMMON asks, or snoop it, with the progress on standard error."""
     from photogram import AsPublished, Result, adjust, snoop
+    from photogram.diagnosis.adjusted import diagnosed, errors_explained
 
     common = project.common
     said = common.unit_variance if as_published else common.unbiased_variance
     basis = unit_variance.value if unit_variance else said
-    with job.status("adjusting") as status:
+    with job.status("adjusting") as status, errors_explained(block):
         progress = shown(status, "weighted sum of squares", 1.0) if status is not None else None
         if snooping is not None:
             snooping["unit_variance"] = basis
@@ -298,7 +299,8 @@ def _adjust(
             log = made.snooped if made else snoop(block, threads=threads, **snooping)
             if not isinstance(log.result, Result):
                 raise TypeError("a block gives the result of a block")
-            result = replace(log.result, messages=[*project.messages, *log.result.messages])
+            result = diagnosed(log.result)
+            result = replace(result, messages=[*project.messages, *result.messages])
             return result, replace(log, result=result), made
         result = adjust(
             block,
@@ -312,6 +314,7 @@ def _adjust(
             threads=threads,
             verdict=True,
         )
+        result = diagnosed(result)
     return replace(result, messages=[*project.messages, *result.messages]), None, None
 
 

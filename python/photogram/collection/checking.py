@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from photogram.checks.checking import Manner, check_block, check_of
-from photogram.checks.findings import Check, Section
 from photogram.collection.adjust import adjust
 from photogram.collection.as_block import as_block
 from photogram.collection.collection import Collection
+from photogram.diagnosis.diagnose import Manner, check_block, check_of
+from photogram.diagnosis.findings import Diagnosis, Section
 from photogram.errors import AdjustmentError
 
 
 @check_of.register
-def _(network: Collection, threads: int | None) -> Check:
+def _(network: Collection, threads: int | None) -> Diagnosis:
     section = Section("Start", "Values of a collection may be far off: a robust adjustment comes first.")
     try:
         adjusted = adjust(network, loss="huber", covariance=False, threads=threads)
@@ -22,4 +22,4 @@ def _(network: Collection, threads: int | None) -> Check:
     except AdjustmentError as error:
         section.lines.append(f"no robust adjustment: {error}")
     sections, result = check_block(as_block(network), Manner({"threads": threads}))
-    return Check("", [section, *sections], result)
+    return Diagnosis("", [section, *sections], result)

@@ -40,7 +40,7 @@ def collection_findings(result: AdjustedCollection) -> Findings:
         systematic=_patterns(result),
         remarks=unseen(result),
         snoop="--snoop (photogram.snoop)",
-        check="`photogram.check` of the collection",
+        check="`photogram.diagnose` of the collection",
         take_out="`--snoop` (`photogram.snoop`) takes gross errors out one after the other; `--loss huber`"
         " or `cauchy` lowers their weights.",
         if_usable=[NO_DATUM] if result.datum else [],

@@ -12,8 +12,6 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import remarks_on
-from photogram.adjustment.exchanges import with_exchanges
-from photogram.adjustment.hints import with_hints
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.core import read_outcome
 from photogram.distributed.driver import Outcome
@@ -123,8 +121,7 @@ def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InP
     messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
     options = manifest.options
     freedom = outcome.degrees_of_freedom
-    found_all = InParts.from_solution(block, solution, options, datum, messages, freedom)
-    return cast("InParts", with_exchanges(with_hints(found_all)))
+    return InParts.from_solution(block, solution, options, datum, messages, freedom)
 
 
 def _rest(

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools
-from photogram.checks.checking import Manner, check_block, check_of
-from photogram.checks.findings import Check, Finding, Section
-from photogram.checks.parts import Names
-from photogram.checks.words import Words
+from photogram.diagnosis.diagnose import Manner, check_block, check_of
+from photogram.diagnosis.findings import Diagnosis, Finding, Names, Section
+from photogram.diagnosis.words import Words
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.limits import Limits
 from photogram.giant.project import Project
@@ -40,7 +39,7 @@ def _type_code(kept: Bools) -> int:
     return int(CODES[~kept].sum())
 
 
-def check(project: Project, *, limits: Limits | None = None, threads: int | None = None) -> Check:
+def check(project: Project, *, limits: Limits | None = None, threads: int | None = None) -> Diagnosis:
     """Check a project as Appendix H of the guide teaches: first by intersection, then by adjustment.
 
     Nothing is changed or written. What an earlier step explains (a wrong sign, a turned photo) is put right
@@ -69,11 +68,11 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
     why = "COMMON column 10 asks for intersection only" if common.intersection_only else ""
     options = {"unit_variance": common.unbiased_variance, "threads": threads}
     sections, result = check_block(block, Manner(options, _GuideWords(), why))
-    return Check(project.title, [_input(project, block, limits), *sections], result)
+    return Diagnosis(project.title, [_input(project, block, limits), *sections], result)
 
 
 @check_of.register
-def _(network: Project, threads: int | None) -> Check:
+def _(network: Project, threads: int | None) -> Diagnosis:
     return check(network, threads=threads)
 
 

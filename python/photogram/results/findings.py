@@ -66,7 +66,7 @@ def block_findings(result: Result) -> Findings:
         snoop="" if intersected else "--snoop (photogram.snoop)",
         weigh="--sd control=...",
         calibrate=how_to_calibrate(result.block),
-        check="`photogram check` (`photogram.check`)",
+        check="`photogram check` (`photogram.diagnose`)",
         take_out=""
         if intersected
         else "`--snoop` (`photogram.snoop`) takes gross errors out one after the other, and says which cannot"

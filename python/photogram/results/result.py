@@ -126,9 +126,9 @@ class Result(AdjustedNetwork):
         How the core adjusted the block, and where that ended: what covariances are computed from.
     hints
         Mistakes in conventions (units, axes, signs, angles) that would explain why images do not fit, as
-        sentences; see :func:`photogram.hints`. They head the verdict.
+        sentences, as :func:`photogram.diagnose` finds them; none before. They head the verdict.
     exchanged
-        Names of points that are probably exchanged on a photo, as sentences, where there are gross errors.
+        Names of points that are probably exchanged on a photo, likewise, where there are gross errors.
     set_aside
         What first values took out and does not fit the adjusted block either: photos, images, by name; see
         :func:`photogram.adjust_started`.

@@ -12,21 +12,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.checks.adjusting import Adjuster
-from photogram.checks.findings import Finding, Section
-from photogram.checks.gross import Suspects
-from photogram.checks.parts import Listing
-from photogram.checks.predictions import (
+from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.findings import Finding, Listing, Section
+from photogram.diagnosis.gross import Suspects
+from photogram.diagnosis.predictions import (
     exchange,
     exchanged_pair,
     exchanged_where_rays_meet,
     freed,
     tests_of_predictions,
 )
-from photogram.checks.rivals import ODDS, rival_images
-from photogram.checks.robust import critical, mad_sd
-from photogram.checks.views import View
-from photogram.checks.words import small_unit
+from photogram.diagnosis.rivals import ODDS, rival_images
+from photogram.diagnosis.robust import critical, mad_sd
+from photogram.diagnosis.views import View
+from photogram.diagnosis.words import small_unit
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos

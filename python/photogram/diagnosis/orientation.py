@@ -10,8 +10,8 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.checks.findings import Finding, Section
-from photogram.checks.words import Words
+from photogram.diagnosis.findings import Finding, Section
+from photogram.diagnosis.words import Words
 from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius, meet
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from photogram import _photocore
-from photogram.checks.parts import Figure, Part
 from photogram.io import json
 from photogram.show.brief import Brief, Rows
 from photogram.show.sections import composed, headline
@@ -16,7 +17,7 @@ from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Verdict
 if TYPE_CHECKING:
     from photogram.results.result import Result
 
-__all__ = ["Check", "Finding", "Level", "Section"]
+__all__ = ["Diagnosis", "Figure", "Finding", "Level", "Listing", "Names", "Part", "Section"]
 
 Level = Literal["grave", "look"]
 CONVENTIONS = frozenset(
@@ -38,6 +39,7 @@ _CORRECT = (
 )
 _LOOK = ("Look at what was found first.",)
 _ADJUST = ("Adjust: `photogram adjust`, `giant` for a GIANT project, `collection` for a collection.",)
+NAMES_ON_A_LINE = 4
 SHOWN = 40
 """Findings of one level that a section of the text shows at most; the JSON document has all."""
 
@@ -66,6 +68,80 @@ class Finding:
     photos: list[str] = field(default_factory=list)
     points: list[str] = field(default_factory=list)
     values: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure with its name.
+
+    Attributes
+    ----------
+    name, value
+        The value with its unit.
+    """
+
+    name: str
+    value: str
+
+    def lines(self) -> list[str]:
+        """Return it as text."""
+        return [f"{self.name:<50}{self.value}"]
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A small table.
+
+    Attributes
+    ----------
+    columns
+        Heads with their units, and how values stand in text, as for `format`: `>12.2f`.
+    rows
+        The values.
+    """
+
+    columns: Sequence[tuple[str, str]]
+    rows: Sequence[Sequence[str | float]]
+
+    def lines(self) -> list[str]:
+        """Return it as text."""
+        heads = "".join(format(head, re.sub(r"\.\d+f", "", layout)) for head, layout in self.columns)
+        layouts = [layout for _, layout in self.columns]
+        return [heads, *("".join(map(format, row, layouts)) for row in self.rows)]
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names below a heading of the 1987 program.
+
+    Attributes
+    ----------
+    heading
+        In capital letters, as it was printed.
+    names
+        Of photos or points.
+    above
+        What was printed above the first of them.
+    """
+
+    heading: str
+    names: Sequence[str]
+    above: str = ""
+
+    def lines(self) -> list[str]:
+        """Return them as text."""
+        cells = [f"{name:<10}" for name in self.names]
+        return [
+            *([self.above] if self.above else []),
+            self.heading,
+            *(
+                "  " + "".join(cells[first : first + NAMES_ON_A_LINE]).rstrip()
+                for first in range(0, len(cells), NAMES_ON_A_LINE)
+            ),
+        ]
+
+
+Part: TypeAlias = str | Figure | Listing | Names
 
 
 @dataclass
@@ -110,7 +186,7 @@ class Section:
 
 
 @dataclass(repr=False)
-class Check(Brief):
+class Diagnosis(Brief):
     """The outcome of a check.
 
     Attributes
@@ -121,11 +197,15 @@ class Check(Brief):
         In the order of Appendix H of the guide.
     result
         The adjustment, where there was one; without what the check left out of it.
+    adjusted_before
+        Whether it is the adjustment that was to be explained: the verdict is its own then, with the mistakes
+        that were found.
     """
 
     title: str
     sections: list[Section]
     result: Result | None
+    adjusted_before: bool = False
 
     def brief(self) -> tuple[str, Rows]:
         """Return how many findings there are, and which, the grave ones first."""
@@ -153,6 +233,8 @@ class Check(Brief):
         Grave findings make results wrong: exit code 3, that of the command. Mistakes in what data mean stand
         as hints; tests are those of the adjustment, where there was one.
         """
+        if self.adjusted_before and self.result is not None:
+            return self.result.verdict
         grave, look = self.grave, [each for each in self.findings if each.level == "look"]
         hints = tuple(each.text for each in grave if each.kind in CONVENTIONS)
         tests = () if self.result is None else self.result.verdict.tests

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.checks.findings import Finding, Section
-from photogram.checks.robust import MAD_TO_SD
-from photogram.checks.stations import flown
+from photogram.diagnosis.findings import Finding, Section
+from photogram.diagnosis.robust import MAD_TO_SD
+from photogram.diagnosis.stations import flown
 from photogram.network.rays import local_axes
 from photogram.results.result import Result
 

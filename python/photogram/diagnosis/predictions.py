@@ -12,8 +12,8 @@ from itertools import combinations
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.checks.robust import normal_of_chi_square
-from photogram.checks.views import View
+from photogram.diagnosis.robust import normal_of_chi_square
+from photogram.diagnosis.views import View
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 from photogram.results.result import Result

@@ -19,13 +19,13 @@ from itertools import combinations
 
 import numpy as np
 
-from photogram.adjustment.hypotheses import FOOT
-from photogram.adjustment.regression import spread
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.checks.adjusting import Adjuster
-from photogram.checks.editing import tests
-from photogram.checks.predictions import freed
-from photogram.checks.robust import critical, mad_sd
+from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.editing import tests
+from photogram.diagnosis.hypotheses import FOOT
+from photogram.diagnosis.predictions import freed
+from photogram.diagnosis.regression import spread
+from photogram.diagnosis.robust import critical, mad_sd
 from photogram.network.block import Block
 from photogram.network.observations import Control
 from photogram.network.rays import LocalAxes, local_axes

@@ -7,8 +7,8 @@ from typing import Self
 
 import numpy as np
 
-from photogram.adjustment.hypotheses import Change
 from photogram.arguments.types import Bools, Indices
+from photogram.diagnosis.hypotheses import Change
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images
 from photogram.network.directions import seen_without_lenses

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from photogram import adjust, check, simulate
-from photogram.checks.adjusting import Adjuster
-from photogram.checks.control_sets import doubtful, explain, free_model
-from photogram.checks.robust import mad_sd
+from photogram import adjust, diagnose, simulate
+from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.control_sets import doubtful, explain, free_model
+from photogram.diagnosis.robust import mad_sd
 
 BLOCK = simulate(
     strips=3, photos_per_strip=6, points_per_photo=40, control_spacing=2, control_sd=0.05, seed=11
@@ -59,7 +59,7 @@ def test_heights_in_feet_with_a_gross_error_beside(axis, size):
     full = np.flatnonzero(held.all(axis=1))
     point = int(full[len(full) // 2])
     positions[point, axis] += size
-    found = check(BLOCK.replace(point_positions=positions), threads=1)
+    found = diagnose(BLOCK.replace(point_positions=positions), threads=1)
     assert [each.kind for each in found.grave] == ["control-set", "control-misfit"]
     assert "heights of the control are in feet" in found.grave[0].text
     assert found.grave[1].points == [BLOCK.point_ids[point]]
@@ -93,7 +93,7 @@ def test_a_blunder_beside_the_mistake_is_named_too():
     row = int(np.flatnonzero(rays[block.image_points] >= 4)[9])
     xy = block.image_xy.copy()
     xy[row, 1] += 1.0
-    found = check(block.replace(image_xy=xy))
+    found = diagnose(block.replace(image_xy=xy))
     kinds = {each.kind: each for each in found.grave}
     assert {*kinds} in ({"control-set", "blunder"}, {"control-set", "gross-error"})
     (other,) = {*kinds} - {"control-set"}

@@ -7,8 +7,7 @@ from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
-from photogram.checks.findings import Check, Finding, Section
-from photogram.checks.parts import Figure, Listing, Names
+from photogram.diagnosis.findings import Diagnosis, Figure, Finding, Listing, Names, Section
 from photogram.results.page.pictures import drawings
 from photogram.show.judgement import judged, verdict_table
 from photogram.show.page import Cell, Column, Fact, Facts, Page, Part, Remarks, Row, Table, Text
@@ -24,7 +23,7 @@ NAMED = 6
 """Photos and points that a row names."""
 
 
-def check_page(found: Check) -> Page:
+def check_page(found: Diagnosis) -> Page:
     """Return the report of a check for the browser."""
     grave, look = len(found.grave), len(found.findings) - len(found.grave)
     verdict = found.verdict
@@ -55,7 +54,7 @@ _INTRO = (
 )
 
 
-def _table(found: Check) -> Table:
+def _table(found: Diagnosis) -> Table:
     rows: list[Row] = []
     ordered = sorted(
         ((section.title, each) for section in found.sections for each in section.findings),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram.checks.page import check_page
+from photogram.diagnosis.page import check_page
 from photogram.show.page import Table
 
 
@@ -13,7 +13,7 @@ def test_the_page_says_what_the_verdict_says(feet):
     block = photogram.simulate(strips=2, photos_per_strip=5, seed=3).block
     if feet:
         block = block.replace(point_positions=block.point_positions * [1, 1, 1 / 0.3048])
-    found = photogram.check(block)
+    found = photogram.diagnose(block)
     page = check_page(found)
     (judgement,) = page.judgements
     assert judgement.headline == found.verdict.headline
@@ -27,7 +27,7 @@ def test_the_page_says_what_the_verdict_says(feet):
 
 def test_iterations_are_no_findings():
     block = photogram.simulate(strips=2, photos_per_strip=5, seed=3).block
-    found = photogram.check(block)
+    found = photogram.diagnose(block)
     (numbers,) = [section for section in found.sections if section.title == "Key numbers"]
     squares = [each.weighted_sum_of_squares for each in found.result.iterations]
     assert not any("iteration 1" in line for line in numbers.lines)

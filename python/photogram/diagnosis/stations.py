@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.checks.findings import Finding, Level, Section
-from photogram.checks.robust import MAD_TO_SD, fit
+from photogram.diagnosis.findings import Finding, Level, Section
+from photogram.diagnosis.robust import MAD_TO_SD, fit
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.rays import local_axes

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from photogram.checks.editing import Edited
-from photogram.checks.findings import Finding, Level, Section
-from photogram.checks.robust import mad_sd
-from photogram.checks.words import Words, small_unit
+from photogram.diagnosis.editing import Edited
+from photogram.diagnosis.findings import Finding, Level, Section
+from photogram.diagnosis.robust import mad_sd
+from photogram.diagnosis.words import Words, small_unit
 from photogram.results.result import Result
 
 __all__ = ["key_numbers"]

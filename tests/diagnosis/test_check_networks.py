@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from golden_network import free_network, golden_file
-from photogram import Camera, InputError, check, simulate
+from photogram import Camera, InputError, diagnose, simulate
 from photogram.collection import Collection, adjust
 from photogram.collection import simulate as simulate_collection
 from photogram.giant import Project
@@ -48,14 +48,14 @@ def clean():
 
 @pytest.mark.parametrize("name", clean())
 def test_clean_networks_have_no_grave_finding(name):
-    found = check(clean()[name])
+    found = diagnose(clean()[name])
     assert found.grave == []
     assert found.result.converged
 
 
 @pytest.mark.parametrize("bars", [True, False])
 def test_the_golden_free_network_has_no_grave_finding(bars):
-    assert check(free_network(golden_file("free_network.json"), bars=bars)).grave == []
+    assert diagnose(free_network(golden_file("free_network.json"), bars=bars)).grave == []
 
 
 def test_errors_of_images_in_pixels_are_told_in_pixels():
@@ -64,7 +64,7 @@ def test_errors_of_images_in_pixels_are_told_in_pixels():
     row = int(np.flatnonzero(rays[block.image_points] >= 4)[7])
     xy = block.image_xy.copy()
     xy[row, 1] += 40
-    (finding,) = check(block.replace(image_xy=xy)).grave
+    (finding,) = diagnose(block.replace(image_xy=xy)).grave
     assert block.photo_ids[block.image_photos[row]] in finding.photos
     assert finding.points == [block.point_ids[block.image_points[row]]]
     assert " px" in finding.text
@@ -78,7 +78,7 @@ def test_an_observed_distance_that_is_wrong_is_named():
     first, second = known[0], known[-1]
     length = float(np.linalg.norm(places[first] - places[second]))
     wrong = Distance(first, second, length + 30, sd=0.05)
-    (finding,) = check(block.replace(observations=[*block.observations, wrong])).grave
+    (finding,) = diagnose(block.replace(observations=[*block.observations, wrong])).grave
     assert finding.kind == "observation-misfit"
     assert finding.points == [first, second]
     assert finding.values["error_m"] == pytest.approx(30, abs=1)
@@ -95,7 +95,7 @@ def test_photos_that_cannot_be_started_are_named():
         image_xy=block.image_xy[keep],
         image_sd=block.image_sd[keep],
     )
-    found = check(block)
+    found = diagnose(block)
     (missing,) = [each for each in found.grave if each.kind == "no-first-values"]
     assert missing.photos == [block.photo_ids[11]]
 
@@ -116,21 +116,23 @@ def test_half_a_pixel_is_told_where_the_network_knows_it():
         **{**PIXELS, "image_sd": 0.05},
     ).block
     wrong = replace(OPENCV, parameters={**OPENCV.parameters, "cx": 5999.5, "cy": 5999.5})
-    (told,) = [each for each in check(truth.replace(cameras=[wrong])).findings if each.kind == "half-pixel"]
+    (told,) = [
+        each for each in diagnose(truth.replace(cameras=[wrong])).findings if each.kind == "half-pixel"
+    ]
     assert told.level == "look"
     assert told.values["cx_px"] == pytest.approx(0.5, abs=0.1)
-    assert not [each for each in check(truth).findings if each.kind == "half-pixel"]
+    assert not [each for each in diagnose(truth).findings if each.kind == "half-pixel"]
 
 
 def test_mistakes_of_observed_positions_are_put_right_for_what_follows():
     block = with_gnss(simulate(seed=3, **SIZE), sd=0.1).block
     wrong = [replaced(each, np.add(each.position, [0, 0, 46.2])) for each in block.observations]
-    found = check(block.replace(observations=wrong))
+    found = diagnose(block.replace(observations=wrong))
     assert kinds(found) == {"observed-positions"}
     assert "46.2" in found.grave[0].text or "46.1" in found.grave[0].text
     assert found.result.variance_of_unit_weight < 2
     wrong[4] = replaced(wrong[4], np.add(wrong[4].position, [0, 3.0, 0]))
-    found = check(block.replace(observations=wrong))
+    found = diagnose(block.replace(observations=wrong))
     assert kinds(found) == {"observed-positions", "observation-misfit"}
     assert found.grave[1].photos == [wrong[4].photo]
 
@@ -142,18 +144,18 @@ def replaced(position, coordinates):
 def test_weighted_stations_above_the_ellipsoid():
     block = simulate(seed=3, position_sd=0.1, **SIZE).block
     observed = np.add(block.photo_positions_observed, [0, 0, 40.0])
-    assert kinds(check(block.replace(photo_positions_observed=observed))) == {"observed-positions"}
+    assert kinds(diagnose(block.replace(photo_positions_observed=observed))) == {"observed-positions"}
 
 
 def test_a_collection_is_checked():
     collection = simulate_collection(photos=8, points=120, seed=3).collection
-    found = check(collection)
+    found = diagnose(collection)
     assert found.grave == []
     xy = collection.image_xy.copy()
     rays = np.bincount(collection.image_points)
     row = int(np.flatnonzero(rays[collection.image_points] >= 5)[20])
     xy[row, 0] += 50
-    (finding,) = check(collection.replace(image_xy=xy)).grave
+    (finding,) = diagnose(collection.replace(image_xy=xy)).grave
     assert f"photo {collection.image_photos[row]}" in finding.photos
     assert finding.points == [f"point {collection.image_points[row]}"]
 
@@ -163,7 +165,7 @@ def test_the_block_of_a_collection_sees_what_it_sees():
 
     collection = simulate_collection(photos=6, points=60, seed=4).collection
     adjusted = adjust(collection)
-    result = check(collection).result
+    result = diagnose(collection).result
     assert result.sums_of_squares.plates == pytest.approx(adjusted.weighted_sum_of_squares, rel=1e-6)
     assert len(as_block(collection).cameras) == len(collection.photo_parameters)
     assert isinstance(collection, Collection)
@@ -171,19 +173,19 @@ def test_the_block_of_a_collection_sees_what_it_sees():
 
 def test_a_project_is_checked_in_the_words_of_the_guide():
     block = simulate(seed=3, **SIZE).block
-    found = check(Project.from_block(block))
+    found = diagnose(Project.from_block(block))
     assert found.sections[0].title == "Input"
     assert "FRAMES" in found.report()
-    assert "FRAMES" not in check(block).report()
+    assert "FRAMES" not in diagnose(block).report()
 
 
 def test_what_is_no_network_is_refused():
     with pytest.raises(InputError, match="a block, a project or a collection"):
-        check(3)
+        diagnose(3)
 
 
 def test_one_adjustment_serves_for_several_questions(monkeypatch):
-    from photogram.checks import adjusting
+    from photogram.diagnosis import adjusting
 
     calls = []
 
@@ -193,6 +195,6 @@ def test_one_adjustment_serves_for_several_questions(monkeypatch):
 
     adjust_block = adjusting.adjust
     monkeypatch.setattr(adjusting, "adjust", counted)
-    assert check(simulate(seed=3, **SIZE).block).grave == []
+    assert diagnose(simulate(seed=3, **SIZE).block).grave == []
     assert len(calls) == 1
-    assert "photogram.checks.adjusting" in sys.modules
+    assert "photogram.diagnosis.adjusting" in sys.modules

@@ -18,31 +18,36 @@ import numpy as np
 from photogram.adjustment.adjustment import core_threads
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.arrays import shown
-from photogram.checks.adjusting import Adjuster
-from photogram.checks.control import control
-from photogram.checks.control_sets import Explained, doubtful, explain, free_model
-from photogram.checks.conventions import conventions, further
-from photogram.checks.editing import _BESIDE, HOPELESS, Edited, blunder_section, edit
-from photogram.checks.findings import Check, Finding, Level, Section
-from photogram.checks.gross import Suspects, disproved, gross, without
-from photogram.checks.heights import two_ray_heights
-from photogram.checks.key_numbers import key_numbers
-from photogram.checks.left_out import disagreeing, held_values, points_left_out
-from photogram.checks.lenses import half_pixel, lenses_estimated, lenses_put_right
-from photogram.checks.orientation import orientation, spare_explained
-from photogram.checks.positions import Wrong, wrong_positions
-from photogram.checks.residuals import residuals
-from photogram.checks.stations import stations
-from photogram.checks.structure import structure_section
-from photogram.checks.views import View
-from photogram.checks.words import Words
+from photogram.diagnosis.adjusted import diagnosis_of
+from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.control import control
+from photogram.diagnosis.control_sets import Explained, doubtful, explain, free_model
+from photogram.diagnosis.conventions import conventions, further
+from photogram.diagnosis.editing import _BESIDE, HOPELESS, Edited, blunder_section, edit
+from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section
+from photogram.diagnosis.gross import Suspects, disproved, gross, without
+from photogram.diagnosis.heights import two_ray_heights
+from photogram.diagnosis.key_numbers import key_numbers
+from photogram.diagnosis.left_out import disagreeing, held_values, points_left_out
+from photogram.diagnosis.lenses import half_pixel, lenses_estimated, lenses_put_right
+from photogram.diagnosis.orientation import orientation, spare_explained
+from photogram.diagnosis.positions import Wrong, wrong_positions
+from photogram.diagnosis.residuals import residuals
+from photogram.diagnosis.stations import stations
+from photogram.diagnosis.structure import structure_section
+from photogram.diagnosis.views import View
+from photogram.diagnosis.words import Words
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos
 from photogram.network.observations import Position
 from photogram.network.rays import Rays
+from photogram.results.result import Result
+from photogram.results.snooped import Snooped
+from photogram.show.page import Page
+from photogram.show.ways import page_of
 
-__all__ = ["Manner", "check", "check_block", "check_of"]
+__all__ = ["Manner", "check_block", "check_of", "diagnose"]
 
 FINAL_STATIONS = 5.0
 """Stations count as adjusted when half the residuals are below so many standard deviations."""
@@ -50,6 +55,14 @@ HARDLY = 10.0
 """So many times the usual residual before the adjustment comes from coarse stations."""
 MOST_SETS = 5
 """Mistakes in the control as a whole that are put right one upon the other, at the most."""
+
+
+@page_of.register(Diagnosis)
+def page(found: Diagnosis) -> Page:
+    """Return the page of a diagnosis, made by what is loaded when one is asked for."""
+    from photogram.diagnosis.page import check_page
+
+    return check_page(found)
 
 
 @dataclass(frozen=True)
@@ -71,7 +84,9 @@ class Manner:
     intersect_only: str = ""
 
 
-def check(network: object, *, threads: int | None = None) -> Check:
+def diagnose(
+    network: object, result: Result | Snooped | None = None, *, threads: int | None = None
+) -> Diagnosis:
     """Look for mistakes and gross errors in a network: units, axes, signs, names, images, control, stations.
 
     Nothing is changed. What an earlier step explains (feet for metres, a mirrored photo) is put right for the
@@ -83,6 +98,11 @@ def check(network: object, *, threads: int | None = None) -> Check:
     network
         A block with any observations, a project of GIANT files, or a collection of photos. Photos of a block
         may be without poses: they are given first values then.
+    result
+        An adjustment of the block that is to be explained, or what snooping has made of it. Nothing is
+        adjusted then: where it has not converged, or fits badly, mistakes in conventions and exchanged names
+        are looked for, and standard deviations that it contradicts; the `result` that is returned has them
+        in its verdict.
     threads
         Threads of the adjustment; the findings do not depend on it. Default: all processors.
 
@@ -94,32 +114,37 @@ def check(network: object, *, threads: int | None = None) -> Check:
     Raises
     ------
     InputError
-        What is no network, a block without images.
+        What is no network, a block without images, what is no result of a block.
 
     Examples
     --------
-    >>> from photogram import check, simulate
+    >>> from photogram import diagnose, simulate
     >>> block = simulate(strips=2, photos_per_strip=5).block
-    >>> check(block).grave
+    >>> diagnose(block).grave
     []
     >>> feet = block.point_positions * [1, 1, 1 / 0.3048]
-    >>> [finding.kind for finding in check(block.replace(point_positions=feet)).grave]
+    >>> [finding.kind for finding in diagnose(block.replace(point_positions=feet)).grave]
     ['control-set']
     """
     core_threads(threads)
+    if result is not None:
+        adjusted = result.result if isinstance(result, Snooped) else result
+        if not isinstance(adjusted, Result):
+            raise InputError(f"result is the result of a block, not {shown(result)}")
+        return diagnosis_of(adjusted)
     return check_of(network, threads)
 
 
 @singledispatch
-def check_of(network: object, threads: int | None) -> Check:
+def check_of(network: object, threads: int | None) -> Diagnosis:
     """Check a network; defined for each class of networks in the files above it."""
     del threads
     raise InputError(f"a check is of a block, a project or a collection, not of {shown(network)}")
 
 
 @check_of.register
-def _(network: Block, threads: int | None) -> Check:
-    return Check(network.title, *check_block(network, Manner({"threads": threads})))
+def _(network: Block, threads: int | None) -> Diagnosis:
+    return Diagnosis(network.title, *check_block(network, Manner({"threads": threads})))
 
 
 def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from photogram.checks.findings import Finding, Level
+from photogram.diagnosis.findings import Finding, Level
 from photogram.results.findings import HARMFUL
 from photogram.results.held import HELD
 from photogram.results.result import Result

@@ -8,10 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.checks.findings import Finding, Section
-from photogram.checks.parts import Listing
-from photogram.checks.robust import critical, normal_of_chi_square
-from photogram.checks.words import small_unit
+from photogram.diagnosis.findings import Finding, Listing, Section
+from photogram.diagnosis.robust import critical, normal_of_chi_square
+from photogram.diagnosis.words import small_unit
 from photogram.network.block import Block
 from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius

@@ -1,7 +1,10 @@
-"""Hints: what may be wrong with data that do not fit, found by trying; nothing is ever corrected.
+"""Mistakes in conventions: units, axes and angles of images, photos and points, found by trying.
+
+One such mistake makes every observation look wrong. So it is asked for before all else, named once, and put
+right for what follows; the data are never changed.
 
 The verdict is the ratio of the misfit m of images under a hypothesis to that as given
-(:mod:`photogram.adjustment.regression`); `docs/hints.md` has the table of hypotheses and the limits.
+(:mod:`photogram.diagnosis.regression`); `docs/hints.md` has the table of hypotheses and the limits.
 """
 
 from __future__ import annotations
@@ -12,8 +15,11 @@ from functools import partial
 
 import numpy as np
 
-from photogram.adjustment.hypotheses import TURNS, Hypothesis, attitude_readings, hypotheses
-from photogram.adjustment.regression import (
+from photogram.adjustment.resection import Observed, solve
+from photogram.arguments.types import Floats, Indices
+from photogram.diagnosis.findings import Finding, Section
+from photogram.diagnosis.hypotheses import TURNS, Hypothesis, attitude_readings, hypotheses
+from photogram.diagnosis.regression import (
     LEAST,
     MOST,
     control_misfit,
@@ -25,19 +31,16 @@ from photogram.adjustment.regression import (
     spread,
     view,
 )
-from photogram.adjustment.resection import Observed, solve
-from photogram.adjustment.weights import weight_hints
-from photogram.arguments.types import Floats, Indices
-from photogram.errors import AdjustmentError, OutOfMemoryError
+from photogram.diagnosis.views import View
+from photogram.errors import AdjustmentError
 from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
 from photogram.network.directions import without_lenses
 from photogram.network.geometry import rotation_matrix
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
-from photogram.results.result import Result
 
-__all__ = ["Verdict", "distances_in_millimetres", "hinted", "hints", "verdicts", "with_hints"]
+__all__ = ["Verdict", "conventions", "further", "hints", "verdicts"]
 
 SUSPICION = 0.35
 """Misfit m above which photos are looked at more closely."""
@@ -51,8 +54,8 @@ SLIGHT = float(np.radians(1.0))
 """Attitudes that differ from resected ones by less are right."""
 CLEARLY = 5.0
 """So many times nearer to the resected attitudes must those of a rival reading be."""
-BAD = 5.0
-"""Sigma0 above which an adjustment that has converged is doubted."""
+PUT_RIGHT = 5
+"""Mistakes that are put right one upon the other, at the most."""
 BAR_FACTOR, BAR_WITHIN, BAR_EACH = 1000.0, 0.05, float(np.log(2))
 """A distance in millimetres among metres: within so much in the median, and each (logarithm)."""
 
@@ -94,15 +97,13 @@ class Verdict:
             self.text = f"it cannot be told which of these is so{where}: {rivals}: {fall}"
 
 
-def hints(block: Block | Result) -> list[Message]:
+def hints(block: Block) -> list[Message]:
     """Look for mistakes in the conventions of data: units, axes, signs, angles.
 
     Parameters
     ----------
     block
-        A block whose photos have positions and attitudes, be they rough; or the result of an adjustment,
-        whose block is looked at, and, where nothing is found, the standard deviations of each kind of
-        observation.
+        A block whose photos have positions and attitudes, be they rough.
 
     Returns
     -------
@@ -112,21 +113,8 @@ def hints(block: Block | Result) -> list[Message]:
     Raises
     ------
     InputError
-        What is no block and no result, or has photos without a pose.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from photogram import hints, simulate
-    >>> block = simulate(strips=2, photos_per_strip=4).block
-    >>> hints(block)
-    []
-    >>> down = block.replace(image_xy=block.image_xy * [1, -1])
-    >>> print(hints(down)[0])  # doctest: +ELLIPSIS
-    probably y of the images has the wrong sign: it is counted down, not up: images would miss ...
+        What is no block, or has photos without a pose.
     """
-    if isinstance(block, Result):
-        return hints(block.block) or (weight_hints(block) if block.converged else [])
     with np.errstate(all="ignore"):
         block = _of_frames(without_lenses(checked(block)))
         found = [Message(verdict.text) for verdict in verdicts(block)]
@@ -148,31 +136,6 @@ def _of_frames(block: Block) -> Block:
         image_xy=block.image_xy[own],
         image_sd=block.image_sd[own],
     )
-
-
-def hinted(error: AdjustmentError, block: Block) -> AdjustmentError:
-    """Return an error with the hints of its block in its text."""
-    if isinstance(error, OutOfMemoryError):
-        return error
-    error.args = ("\n".join([str(error), *(f"  hint: {hint}" for hint in hints(block))]), *error.args[1:])
-    return error
-
-
-def with_hints(result: Result) -> Result:
-    """Return a result, with hints for its verdict where it has not converged or images fit badly.
-
-    They stand among its messages too, and so do those on standard deviations, which are no mistakes of
-    conventions: the verdict has tests of its own for them.
-    """
-    variance = result.variance_of_unit_weight
-    fits = variance is None or variance <= BAD**2
-    if (result.converged and fits) or result.loss is not None:
-        return result
-    conventions = hints(result.block)
-    found = conventions or (weight_hints(result) if result.converged else [])
-    if not found:
-        return result
-    return replace(result, hints=tuple(map(str, conventions)), messages=[*found, *result.messages])
 
 
 def verdicts(block: Block) -> list[Verdict]:
@@ -355,3 +318,41 @@ def _shorter(block: Block, factor: float) -> Block:
             for each in block.observations
         ]
     )
+
+
+def conventions(view: View) -> tuple[Section, View, bool]:
+    """Name the mistakes of whole sets that explain the images, and put them right.
+
+    Signs, quarter turns and mirrored plates are left to the section on the sides of the cameras, which has
+    words for groups of photos and single ones.
+
+    Returns the section, the view of what was meant, and whether it is exactly that.
+    """
+    section = Section(
+        "Units, axes and angles (images against their predictions)",
+        "Another unit, axis or sense of angles makes every observation look wrong: it is looked for first.",
+    )
+    exact = True
+    for _ in range(PUT_RIGHT):
+        whole = [each for each in verdicts(view.seen) if not each.photos and not {*each.names} & {*TURNS}]
+        if not whole:
+            break
+        best = whole[0]
+        section.findings.append(Finding("convention", "grave", best.text))
+        view, exact = view.changed(best.change), exact and best.exact
+    bars = distances_in_millimetres(view.seen)
+    if bars is not None:
+        section.findings.append(Finding("convention", "grave", bars.text))
+        view = view.changed(bars.change)
+    if section.findings:
+        section.parts.append("the sections below hold with this put right")
+    if not exact:
+        section.parts.append(
+            "the size of a pixel and the origin are known only about: nothing below is called grave"
+        )
+    return section, view, exact
+
+
+def further(section: Section, view: View) -> None:
+    """Add the hints that the sides of the cameras have not explained, nor anything before."""
+    section.findings += [Finding("convention", "grave", str(hint)) for hint in hints(view.block)]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram.checks.editing import Edited
-from photogram.checks.findings import Finding, Level, Section
-from photogram.checks.words import Words
+from photogram.diagnosis.editing import Edited
+from photogram.diagnosis.findings import Finding, Level, Section
+from photogram.diagnosis.words import Words
 from photogram.results.result import Result
 
 __all__ = ["control"]

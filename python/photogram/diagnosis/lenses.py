@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from photogram.checks.adjusting import Adjuster
-from photogram.checks.findings import Finding
+from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.findings import Finding
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.results.lenses import usual_parameters

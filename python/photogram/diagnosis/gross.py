@@ -11,8 +11,8 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.checks.findings import Finding, Level, Section
-from photogram.checks.robust import fit, mad_sd
+from photogram.diagnosis.findings import Finding, Level, Section
+from photogram.diagnosis.robust import fit, mad_sd
 from photogram.network.block import Block
 from photogram.network.rays import Rays, meet
 from photogram.results.result import Result

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.checks.findings import Finding, Section
-from photogram.checks.parts import Figure
-from photogram.checks.words import Words
+from photogram.diagnosis.findings import Figure, Finding, Section
+from photogram.diagnosis.words import Words
 from photogram.messages import listed
 from photogram.network.block import Block
 from photogram.network.structuring import structure

@@ -19,9 +19,9 @@ from itertools import permutations, product
 
 import numpy as np
 
-from photogram.adjustment.hypotheses import FOOT
 from photogram.arguments.types import Floats
-from photogram.checks.adjusting import Adjuster
+from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.hypotheses import FOOT
 from photogram.network.block import Block
 from photogram.network.observations import Position
 from photogram.network.rays import local_axes

@@ -1,0 +1,74 @@
+"""What is wrong where an adjustment has failed or fits badly: looked for when somebody asks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from photogram.adjustment.first_values import FirstValues
+from photogram.diagnosis.conventions import hints
+from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section
+from photogram.diagnosis.names import with_exchanges
+from photogram.diagnosis.weights import weight_hints
+from photogram.errors import AdjustmentError, OutOfMemoryError
+from photogram.network.block import Block
+from photogram.results.result import Result
+
+__all__ = ["diagnosed", "diagnosis_of", "errors_explained"]
+
+BAD = 5.0
+"""Sigma0 above which an adjustment that has converged is doubted."""
+
+
+@contextmanager
+def errors_explained(block: Block | FirstValues) -> Iterator[None]:
+    """Let an adjustment that fails say which mistakes in the data of its block would explain it."""
+    try:
+        yield
+    except OutOfMemoryError:
+        raise
+    except AdjustmentError as error:
+        block = block.usable() if isinstance(block, FirstValues) else block
+        error.args = (
+            "\n".join([str(error), *(f"  hint: {hint}" for hint in hints(block))]),
+            *error.args[1:],
+        )
+        raise
+
+
+def diagnosed(result: Result) -> Result:
+    """Return a result, with what explains it where it has not converged or fits badly.
+
+    Mistakes in conventions (`hints`) and exchanged names (`exchanged`) are for its verdict. The hints stand
+    among its messages too, and so do those on standard deviations, which are no mistakes of conventions: the
+    verdict has tests of its own for them.
+    """
+    return with_exchanges(_with_hints(result))
+
+
+def _with_hints(result: Result) -> Result:
+    variance = result.variance_of_unit_weight
+    fits = variance is None or variance <= BAD**2
+    if (result.converged and fits) or result.loss is not None:
+        return result
+    conventions = hints(result.block)
+    found = conventions or (weight_hints(result) if result.converged else [])
+    if not found:
+        return result
+    return replace(result, hints=tuple(map(str, conventions)), messages=[*found, *result.messages])
+
+
+def diagnosis_of(result: Result) -> Diagnosis:
+    """Return what explains an adjustment that has failed or fits badly; its verdict is the judgement."""
+    found = diagnosed(result)
+    section = Section("Adjustment", "One mistake in the data makes every observation look wrong.")
+    section.findings += [Finding("convention", "grave", hint) for hint in found.hints]
+    section.findings += [Finding("exchanged-points", "grave", names) for names in found.exchanged]
+    if found.converged and not found.hints:
+        section.findings += [Finding("weights", "look", str(hint)) for hint in weight_hints(found)]
+    verdict = found.verdict
+    if (verdict.exit or verdict.warning) and not any(each.level == "grave" for each in section.findings):
+        level: Level = "grave" if verdict.exit else "look"
+        section.findings.insert(0, Finding(verdict.code, level, verdict.headline))
+    return Diagnosis(result.block.title, [section], found, adjusted_before=True)
