@@ -8,9 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.findings import names, tested_observations
+from photogram.collection.findings import tested_observations
+from photogram.collection.tables import collection_photos
+from photogram.results.network_tables import control, stations
 from photogram.results.observed import image_lines, observed_lines
 from photogram.results.weakest import weakest_lines
+from photogram.show.lines import Field, field, table_lines
 from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
 from photogram.show.ways import report_of
 from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
@@ -28,23 +31,22 @@ NOTABLE = 3.0
 @report_of.register(AdjustedCollection)
 def report(result: AdjustedCollection) -> str:
     """Return the report of an adjusted collection."""
-    (photos, points), heads = names(result), _heads(result)
     sections = [
         *summary(result),
         ("Reliability", _reliability(result)),
         ("Iterations", _iterations(result)),
         (
             "Weighted and fixed points: adjusted minus given, redundancy, standardized difference",
-            observed_lines("point", points, "XYZ", np.ones(3), result.control),
+            observed_lines(control(result), "point"),
         ),
         (
             "Weighted and fixed parameters: adjusted minus given, redundancy, standardized difference",
-            observed_lines("photo", photos, heads, np.ones(len(heads)), result.stations),
+            observed_lines(stations(result), "photo"),
         ),
         ("Photos: values and standard deviations", _photos(result)),
         ("Points: standard deviations", _points(result)),
         ("Weakest points and photos", weakest_lines(result)),
-        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
+        ("Image points: observed minus computed, redundancy, standardized residual", image_lines(result)),
         ("Work", _work(result)),
     ]
     return composed(headline("collection of photos"), sections)
@@ -142,26 +144,12 @@ def _iterations(result: AdjustedCollection) -> list[str]:
     return head + lines
 
 
-def _images(result: AdjustedCollection) -> list[str]:
-    return image_lines(result, result.collection.image_photos, *names(result), "px")
-
-
-def _heads(result: AdjustedCollection) -> list[str]:
-    given = result.collection
-    return [
-        f"{name}, {unit}" if unit else name for name, unit in zip(given.parameters, given.units, strict=True)
-    ]
-
-
 def _photos(result: AdjustedCollection) -> list[str]:
-    lines = ["  photo images" + "".join(f"{name:>14}" for name in _heads(result))]
-    for photo, (values, deviations) in enumerate(zip(result.photo_parameters, result.photo_sd, strict=True)):
-        lines.append(
-            f"{photo:7d}{result.photo_images[photo]:7d}" + "".join(f"{value:14.6g}" for value in values)
-        )
-        if np.isfinite(deviations).all():
-            lines.append(f"{'sd':>14}" + "".join(f"{deviation:14.2g}" for deviation in deviations))
-    return lines
+    own, count, values, sd = collection_photos(result)
+    rows = [[*field(own, 10, head="photo"), *field(count, 6, ".0f", "images"), *field(values, 14, ".6g")]]
+    if np.isfinite(sd.values).any():
+        rows.append([Field("", [f"{'sd':<16}"] * len(own.values)), *field(sd, 14, ".2g", "")])
+    return table_lines(*rows)
 
 
 def _points(result: AdjustedCollection) -> list[str]:

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from photogram.results.findings import axes, tested_observations
+from photogram.results.axes import image_axes, point_axes
+from photogram.results.findings import tested_observations
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.page.cameras import cameras_section
 from photogram.results.page.features import features_section
-from photogram.results.page.frame import block_frame, degrees
-from photogram.results.page.observed import Images, worst_images, worst_of
+from photogram.results.page.observed import worst_images, worst_of
 from photogram.results.page.parts import (
     images_facts,
     iterations_section,
@@ -30,21 +30,22 @@ from photogram.results.page.tables import (
     points_section,
     stations_section,
 )
-from photogram.results.report import image_unit, problems_of
+from photogram.results.report import problems_of
 from photogram.results.result import Result
-from photogram.results.unknowns import unknown_lines
+from photogram.results.tables import block_points, unknowns
+from photogram.show.cells import page_table, unit_written
 from photogram.show.judgement import judged, remarks_section
 from photogram.show.page import Column, Drawing, Fact, Facts, Page, Part, Section, Table, significant
 from photogram.statistics.findings import by_w
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["block_images", "block_page"]
+__all__ = ["block_page"]
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def block_page(result: Result) -> Page:
     """Return the report of an adjusted block for the browser."""
-    block, images = result.block, block_images(result)
+    block = result.block
     pictures = drawings(result)
     groups = [by_w(each) for each in tested_observations(result)]
     found = worst_of(groups)
@@ -57,7 +58,7 @@ def block_page(result: Result) -> Page:
         _residuals_section(pictures),
         _redundancy_section(result, pictures),
         tests_section(result, pictures.get("tests")),
-        worst_section(result, images, groups, found),
+        worst_section(result, groups, found),
         control_section(result),
         check_section(result),
         beside_section(result),
@@ -66,8 +67,8 @@ def block_page(result: Result) -> Page:
             result, [pictures[name] for name in ("correlations", "distortion") if name in pictures]
         ),
         _unknowns_section(result),
-        photos_section(result, photos),
-        points_section(result, points),
+        photos_section(result, photos, _datum(result)),
+        points_section(result, block_points(result), points, _datum(result)),
         iterations_section(result),
         remarks_section(problems_of(result)),
     ]
@@ -82,18 +83,9 @@ def block_page(result: Result) -> Page:
     )
 
 
-def block_images(result: Result) -> Images:
-    """Return what the images of a block are called and measured in."""
-    block = result.block
-    unit, factor = image_unit(result)
-    return Images(
-        block.image_photos, block.photo_ids, block.point_ids, unit.replace("um", "µm"), factor, block.image_xy
-    )
-
-
 def _highlights(result: Result) -> list[Fact]:
-    used, frame = result.used_images, block_frame(result)
-    unit, factor = image_unit(result)
+    used, axes, (image, _) = result.used_images, point_axes(result.block), image_axes(result.block.image_unit)
+    factors = np.array([axis.factor for axis in axes])
     found = [
         unit_weight(result),
         Fact(
@@ -103,42 +95,23 @@ def _highlights(result: Result) -> list[Fact]:
         ),
         Fact("Degrees of freedom", f"{result.degrees_of_freedom:,.0f}"),
     ]
-    residuals = result.residuals[used] * factor
+    residuals = result.residuals[used] * image.factor
     if residuals.size:
         rms = math.sqrt(float((residuals**2).mean()))
-        found.append(Fact("rms of image residuals", significant(rms, 3), unit.replace("um", "µm")))
+        found.append(Fact("rms of image residuals", significant(rms, 3), unit_written(image.small)))
     check = result.used_points & (result.point_kinds == "check")
     if check.any():
-        values = result.point_differences[check] * frame.factors
-        worst = _rms_of(values)
-        note = ", ".join(
-            f"{name} {significant(each, 2)}"
-            for name, each in zip(frame.names, worst, strict=True)
-            if math.isfinite(each)
-        )
-        found.append(
-            Fact(
-                "Check points",
-                f"{np.count_nonzero(check)}",
-                note=f"rms {note} {frame.units[2]}" if len(set(frame.units)) == 1 else f"rms {note}",
-            )
-        )
+        worst = zip(axes, _rms_of(result.point_differences[check] * factors), strict=True)
+        note = ", ".join(f"{axis.name} {significant(each, 2)}" for axis, each in worst if math.isfinite(each))
+        unit = "" if result.geographic else f" {axes[2].small}"
+        found.append(Fact("Check points", f"{np.count_nonzero(check)}", note=f"rms {note}{unit}"))
     height = result.point_sd[result.used_points]
-    known = height[np.isfinite(height).all(axis=1)] * frame.factors
+    known = height[np.isfinite(height).all(axis=1)] * factors
     if len(known):
-        middle = np.median(known, axis=0)
-        note = ", ".join(
-            f"{name} {significant(float(each), 2)} {u}"
-            for name, each, u in zip(frame.names[:2], middle, frame.units, strict=False)
-        )
-        found.append(
-            Fact(
-                f"sd of points in {frame.names[2]}, median",
-                significant(float(middle[2]), 2),
-                frame.units[2],
-                note,
-            )
-        )
+        x, y, z = (significant(float(each), 2) for each in np.median(known, axis=0))
+        units = [unit_written(axis.small) for axis in axes]
+        note = f"{axes[0].name} {x} {units[0]}, {axes[1].name} {y} {units[1]}"
+        found.append(Fact(f"sd of points in {axes[2].name}, median", z, units[2], note))
     return found
 
 
@@ -152,7 +125,7 @@ def _rms_of(values: np.ndarray) -> list[float]:
 
 
 def _size_section(result: Result) -> Section:
-    block, frame = result.block, block_frame(result)
+    block = result.block
     kinds = result.point_kinds[result.used_points].tolist()
     held = (np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]).sum(axis=0)
     facts = [
@@ -168,7 +141,7 @@ def _size_section(result: Result) -> Section:
         ),
         Fact(
             "Held components of control",
-            ", ".join(f"{axis} {count}" for axis, count in zip(axes(result), held, strict=True)),
+            ", ".join(f"{axis.name} {count}" for axis, count in zip(point_axes(block), held, strict=True)),
         ),
         Fact("Image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
         *(
@@ -190,20 +163,12 @@ def _size_section(result: Result) -> Section:
             f"{variance:.6f}" if variance is not None else "undefined",
             note=_BASIS[result.unit_variance],
         ),
-        *images_facts(result, image_unit(result)[0].replace("um", "µm"), image_unit(result)[1]),
+        *images_facts(result),
     ]
-    turn, sd = degrees(), result.photo_sd
-    precision = precision_table(
-        [
-            ("points", frame.names, frame.units, result.point_sd[result.used_points] * frame.factors),
-            ("photos", frame.names, frame.units, sd[:, :3] * frame.factors),
-            ("photos", turn.names, turn.units, sd[:, 3:] * turn.factors),
-        ]
-    )
     parts: list[Part] = [
         Facts("How much", facts),
         Facts("How good", good),
-        *([precision] if precision else []),
+        *precision_table(result),
     ]
     return Section("size", "How much, how good", parts)
 
@@ -271,44 +236,18 @@ def _redundancy_table(result: Result) -> Table | None:
 
 
 def _unknowns_section(result: Result) -> Section:
-    if not unknown_lines(result.unknowns):
+    if not result.unknowns:
         return Section("unknowns", "Common unknowns", [])
-    from photogram.results.tables import table
-
-    found = table(result, "unknown")
-    count = len(found["unknown"])
-    names = (
-        "kind",
-        "unknown",
-        "component",
-        "unit",
-        "sd_given",
-        "value",
-        "change",
-        "sd",
-        "redundancy",
-        "standardized",
-    )
-    rows = [[_plain(found[name][k]) for name in names] for k in range(count)]
-    columns = (
-        Column("Kind", text=True),
-        Column("Name", text=True),
-        Column("Component", text=True),
-        Column("Unit", text=True),
-        Column("sd given", figures=3),
-        Column("Adjusted", figures=7),
-        Column("Change", figures=3),
-        Column("sd adjusted", figures=3),
-        Column("Redundancy", decimals=3),
-        Column("Test value w", decimals=2),
-    )
     intro = (
         "Lever arms, boresights, sensors, levels, planes and lines that several observations have in common."
     )
-    return Section("unknowns", "Common unknowns", [Table("Common unknowns", columns, rows)], intro)
+    table = page_table("Common unknowns", unknowns(result.unknowns))
+    return Section("unknowns", "Common unknowns", [table], intro)
 
 
-def _plain(value: object) -> str | float | None:
-    if value is None or isinstance(value, str):
-        return value
-    return float(value)  # type: ignore[arg-type]
+def _datum(result: Result) -> str:
+    return (
+        f"Coordinates and standard deviations refer to the datum that is {result.datum}."
+        if not result.datum.is_chosen
+        else f"Datum: {result.datum}."
+    )

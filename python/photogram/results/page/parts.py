@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.arguments.types import Floats
 from photogram.results.network import AdjustedNetwork
-from photogram.results.page.observed import Images, Worst, limit_of, worst_table
+from photogram.results.network_tables import terms_of
+from photogram.results.page.observed import Worst, limit_of, worst_table
+from photogram.show.cells import unit_written
 from photogram.show.judgement import verdict_table
 from photogram.show.page import Column, Drawing, Fact, Facts, Part, Row, Section, Table, significant
 from photogram.statistics.findings import Tested
@@ -50,10 +51,10 @@ def findings_test(result: AdjustedNetwork) -> tuple[float, float] | None:
     return None
 
 
-def images_facts(result: AdjustedNetwork, unit: str, factor: float) -> list[Fact]:
+def images_facts(result: AdjustedNetwork) -> list[Fact]:
     """Return how well images fit and are checked."""
-    used = result.used_images
-    residuals = result.residuals[used] * factor
+    used, (axis, _) = result.used_images, terms_of(result).image_axes
+    unit, residuals = unit_written(axis.small), result.residuals[used] * axis.factor
     if not len(residuals):
         return []
     with np.errstate(over="ignore"):
@@ -89,19 +90,18 @@ def images_facts(result: AdjustedNetwork, unit: str, factor: float) -> list[Fact
     return facts
 
 
-Spread = tuple[str, Sequence[str], Sequence[str], Floats]
-"""What has standard deviations, names and units of its components, and (n, k) of them."""
-
-
-def precision_table(spreads: Sequence[Spread]) -> Table | None:
-    """Return how the standard deviations of adjusted values are spread; None where none were computed."""
-    rows: list[Row] = []
-    for what, names, units, deviations in spreads:
-        for name, unit, column in zip(names, units, deviations.T, strict=True):
-            known = column[np.isfinite(column)]
+def precision_table(result: AdjustedNetwork) -> list[Table]:
+    """Return how the standard deviations of adjusted values are spread; none where none were computed."""
+    terms, rows = terms_of(result), list[Row]()
+    for what, axes, deviations in (
+        ("points", terms.point_axes, result.point_sd[result.used_points]),
+        ("photos", terms.photo_axes, result.photo_sd),
+    ):
+        for axis, column in zip(axes, deviations.T, strict=True):
+            known = column[np.isfinite(column)] * axis.factor
             if known.size:
                 figures = [float(each) for each in np.quantile(known, (0.5, 0.9, 1.0))]
-                rows.append([what, name, *figures, unit])
+                rows.append([what, axis.name, *figures, unit_written(axis.small)])
     columns = (
         Column("Standard deviations of", text=True),
         Column("Component", text=True),
@@ -111,7 +111,7 @@ def precision_table(spreads: Sequence[Spread]) -> Table | None:
         Column("Unit", text=True),
     )
     note = "A posteriori: scaled by the unit variance where that is estimated."
-    return Table("Precision", columns, rows, note) if rows else None
+    return [Table("Precision", columns, rows, note)] if rows else []
 
 
 def tests_section(result: AdjustedNetwork, drawing: Drawing | None) -> Section:
@@ -122,16 +122,14 @@ def tests_section(result: AdjustedNetwork, drawing: Drawing | None) -> Section:
     return Section("tests", "Tests", parts, intro)
 
 
-def worst_section(
-    result: AdjustedNetwork, images: Images, groups: Sequence[Tested], worst: Sequence[Worst]
-) -> Section:
+def worst_section(result: AdjustedNetwork, groups: Sequence[Tested], worst: Sequence[Worst]) -> Section:
     """Return the worst observations."""
     intro = (
         "A residual alone says little: an error shows in it only by the share of its redundancy number."
         " The test"
         " value takes both into account. Names of photos and points lead to their rows below."
     )
-    parts = [worst_table(result, images, limit_of(groups), worst)] if worst else []
+    parts = [worst_table(result, limit_of(groups), worst)] if worst else []
     return Section("worst", "Worst observations", parts, intro)
 
 
