@@ -6,7 +6,7 @@ from typing import Any
 
 from photogram import _photocore
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.tables import collection_photos
+from photogram.collection.tables import collection_photos, costs
 from photogram.io import json
 from photogram.results.network_tables import control, images, points, stations
 from photogram.results.weakest import weakest_photos, weakest_points
@@ -45,14 +45,7 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
         "loss": None if result.loss is None else {"name": result.loss[0], "scale": result.loss[1]},
         "initial_cost": 0.5 * result.initial_weighted_sum_of_squares,
         "cost": result.cost,
-        "iterations": [
-            {
-                "number": iteration.number,
-                "cost": 0.5 * iteration.weighted_sum_of_squares,
-                "damping": iteration.damping,
-            }
-            for iteration in result.iterations
-        ],
+        "iterations": records(costs(result))[1:],
         "weighted_sum_of_squares": result.weighted_sum_of_squares,
         "degrees_of_freedom": result.degrees_of_freedom,
         "variance_of_unit_weight": result.variance_of_unit_weight,

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.findings import tested_observations
-from photogram.collection.tables import collection_photos
+from photogram.collection.tables import collection_photos, costs
 from photogram.results.network_tables import control, stations
 from photogram.results.observed import image_lines, observed_lines
 from photogram.results.weakest import weakest_lines
@@ -20,7 +20,7 @@ from photogram.statistics.limits import externally_studentized, global_test, stu
 from photogram.statistics.outliers import outliers
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["problems_of", "report", "summary"]
+__all__ = ["problems_of", "report", "size_of", "summary"]
 
 SUSPECTS = 20
 """Image points with large standardized residuals that are listed at most."""
@@ -89,8 +89,7 @@ def problems_of(result: AdjustedCollection) -> list[str]:
 
 
 def _adjustment(result: AdjustedCollection) -> list[str]:
-    collection, variance = result.collection, result.variance_of_unit_weight
-    residuals = result.residuals[result.used_images]
+    variance, residuals = result.variance_of_unit_weight, result.residuals[result.used_images]
     rows = [
         ("status", result.status),
         ("iterations", f"{len(result.iterations)}"),
@@ -105,13 +104,21 @@ def _adjustment(result: AdjustedCollection) -> list[str]:
             f"{math.sqrt(variance):.6f}" if variance is not None else "undefined",
         ),
         ("degrees of freedom", f"{result.degrees_of_freedom}"),
-        ("photos", f"{np.count_nonzero(result.photo_images)} used of {len(collection.photo_parameters)}"),
-        ("points", f"{np.count_nonzero(result.used_points)} used of {len(collection.point_positions)}"),
-        ("image points", f"{len(residuals)} used of {len(collection.image_xy)}"),
+        *size_of(result),
         ("rms of residuals, px", ", ".join(f"{value:.4f}" for value in np.sqrt((residuals**2).mean(axis=0)))),
         ("median length of residuals, px", f"{np.median(np.hypot(*residuals.T)):.4f}"),
     ]
     return [f"{name:<36}{value}" for name, value in rows]
+
+
+def size_of(result: AdjustedCollection) -> list[tuple[str, str]]:
+    """Return what the collection consists of: names and what there is."""
+    counts = {
+        "photos": result.photo_images > 0,
+        "points": result.used_points,
+        "image points": result.used_images,
+    }
+    return [(name, f"{np.count_nonzero(used)} used of {len(used)}") for name, used in counts.items()]
 
 
 def _suspects(result: AdjustedCollection) -> list[str]:
@@ -136,12 +143,14 @@ def _suspects(result: AdjustedCollection) -> list[str]:
 
 
 def _iterations(result: AdjustedCollection) -> list[str]:
-    head = [" no.            cost   damping", f"   0{0.5 * result.initial_weighted_sum_of_squares:16.6e}"]
-    lines = [
-        f"{each.number:4d}{0.5 * each.weighted_sum_of_squares:16.6e}{each.damping:10.1e}"
-        for each in result.iterations
-    ]
-    return head + lines
+    number, cost, damping = costs(result)
+    return table_lines(
+        [
+            *field(number, 4, ".0f", "no."),
+            *field(cost, 16, ".6e", "cost"),
+            *field(damping, 10, ".1e", "damping"),
+        ]
+    )
 
 
 def _photos(result: AdjustedCollection) -> list[str]:

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.results.axes import image_axes
-from photogram.results.network_tables import Terms, control, images, photos, points, stations, terms_of
+from photogram.results.network_tables import (
+    Terms,
+    control,
+    images,
+    iterations,
+    photos,
+    points,
+    stations,
+    terms_of,
+)
 from photogram.show.quantity import Axis, Quantity, frame
 from photogram.show.ways import columns_of
 
-__all__ = ["TABLES", "collection_photos"]
+__all__ = ["TABLES", "collection_photos", "costs"]
 
 
 @columns_of.register(AdjustedCollection)
@@ -47,6 +57,12 @@ def collection_photos(result: AdjustedCollection) -> list[Quantity]:
         result.photo_images, name="images", member="images", about=about, head="Images", decimals=0
     )
     return [own, count, *rest]
+
+
+def costs(result: AdjustedCollection) -> list[Quantity]:
+    """Return the history: numbers, costs (half the sum that is minimised), damping; first the start."""
+    number, squares, _, damping = iterations(result)
+    return [number, replace(squares, values=0.5 * squares.values, member="cost"), damping]
 
 
 TABLES: dict[str, Callable[[AdjustedCollection], list[Quantity]]] = {

@@ -11,7 +11,7 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.results.calibration_report import calibration_members
 from photogram.results.features_report import features_document
-from photogram.results.network_tables import control, images, photos, stations
+from photogram.results.network_tables import control, images, iterations, photos, stations
 from photogram.results.report import problems_of
 from photogram.results.result import Result, SumsByKind
 from photogram.results.tables import block_points, camera_parameters, check_points, observations
@@ -51,15 +51,7 @@ def _document(result: Result) -> dict[str, Any]:
         "messages": [str(message) for message in result.messages],
         "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
         "initial_weighted_sum_of_squares": result.initial_weighted_sum_of_squares,
-        "iterations": [
-            {
-                "number": iteration.number,
-                "weighted_sum_of_squares": iteration.weighted_sum_of_squares,
-                "largest_change_sd": iteration.largest_change,
-                "damping": iteration.damping,
-            }
-            for iteration in result.iterations
-        ],
+        "iterations": records(iterations(result))[1:],
         "weighted_sum_of_squares": _by_kind(sums),
         "redundancy": None if result.redundancies is None else _by_kind(result.redundancies),
         "degrees_of_freedom": result.degrees_of_freedom,

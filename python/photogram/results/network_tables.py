@@ -19,6 +19,7 @@ __all__ = [
     "deviation",
     "difference",
     "images",
+    "iterations",
     "names",
     "part",
     "photos",
@@ -132,6 +133,19 @@ def images(result: AdjustedNetwork, first: int | None = None) -> list[Quantity]:
         Quantity(result.residuals[used], axes, "deviation", name="residual", member=f"residual_{unit}"),
         redundancy(result.redundancy[used], axes),
         test_value(result.standardized[used], axes),
+    ]
+
+
+def iterations(result: AdjustedNetwork) -> list[Quantity]:
+    """Return the history: numbers, sums after the corrections, largest changes, damping; first the start."""
+    first = [(0, result.initial_weighted_sum_of_squares, np.nan, np.nan)]
+    rows = [(i.number, i.weighted_sum_of_squares, i.largest_change, i.damping) for i in result.iterations]
+    number, squares, change, damping = np.array([*first, *rows]).T
+    return [
+        Quantity(number.astype(int), member="number", head="Iteration", decimals=0),
+        Quantity(squares, member="weighted_sum_of_squares", head="Weighted sum of squares", figures=7),
+        Quantity(change, member="largest_change_sd", head="Largest change over sd"),
+        Quantity(damping, member="damping", head="Damping", figures=2),
     ]
 
 

@@ -16,13 +16,18 @@ from photogram.results.axes import image_axes, point_axes
 from photogram.results.calibration_report import calibration_sections
 from photogram.results.features_report import features_sections
 from photogram.results.findings import tested_observations
-from photogram.results.group_sums import observables, sums_of
-from photogram.results.grouping import grouped
 from photogram.results.kinds import ObservedKind
-from photogram.results.network_tables import control, part, photos, stations
+from photogram.results.network_tables import control, iterations, part, photos, stations
 from photogram.results.observed import image_lines, observed_lines
 from photogram.results.result import Result
-from photogram.results.tables import block_points, check_points, observed_components, unheld, unknowns
+from photogram.results.tables import (
+    block_points,
+    check_points,
+    observed_components,
+    redundancy_by_kind,
+    unheld,
+    unknowns,
+)
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, stacked, table_lines
 from photogram.show.quantity import Axis, Quantity, labelled
@@ -35,11 +40,11 @@ from photogram.statistics.reliability import TESTABLE
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
 
-__all__ = ["bandwidths", "problems_of", "report", "summary"]
+__all__ = ["ORDERINGS", "bandwidths", "problems_of", "report", "size_of", "summary"]
 
 _SUSPECTS = 20
 _BLUNDER = 3.0
-_ORDERINGS = {
+ORDERINGS = {
     "input": "in input order",
     "rcm": "by reverse Cuthill-McKee",
     "amd": "by minimum degree",
@@ -108,12 +113,7 @@ def problems_of(result: Result) -> list[str]:
 
 
 def _adjustment(result: Result) -> list[str]:
-    block, sums = result.block, result.sums_of_squares
-    kinds = result.point_kinds[result.used_points].tolist()
-    variance = result.variance_of_unit_weight
-    held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
-    counts = zip(point_axes(block), held.sum(axis=0), strict=True)
-    components = ", ".join(f"{axis.name} {count}" for axis, count in counts)
+    sums, variance = result.sums_of_squares, result.variance_of_unit_weight
     basis = {
         "free": "rule of 1987",
         "constrained": "all weighted values",
@@ -137,10 +137,22 @@ def _adjustment(result: Result) -> list[str]:
             for each in result.kinds.values()
         ),
         ("weighted sum of squares, total", f"{sums.total:.6f}"),
+        *size_of(result),
+    ]
+    return [f"{name:<36}{value}" for name, value in rows]
+
+
+def size_of(result: Result) -> list[tuple[str, str]]:
+    """Return what the block consists of: names and what there is."""
+    block = result.block
+    kinds = result.point_kinds[result.used_points].tolist()
+    held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
+    counts = zip(point_axes(block), held.sum(axis=0), strict=True)
+    return [
         ("photos", f"{len(block.photo_ids)}"),
         *([("cameras", f"{len(block.cameras)}")] if block.cameras else []),
         ("points", ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("pass", "control", "check"))),
-        ("held components of control", components),
+        ("held components of control", ", ".join(f"{axis.name} {count}" for axis, count in counts)),
         ("image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
         *(
             (f"observations, {each.kind}", f"{each.used} used of {len(each.rows)}")
@@ -151,7 +163,6 @@ def _adjustment(result: Result) -> list[str]:
         ("datum", str(result.datum)),
         ("refraction", block.refraction.describe(block.linear_unit) if block.refraction else "none"),
     ]
-    return [f"{name:<36}{value}" for name, value in rows]
 
 
 def _residuals(result: Result) -> list[str]:
@@ -184,20 +195,15 @@ def _residuals(result: Result) -> list[str]:
 
 def _redundancy(result: Result) -> list[str]:
     """List number, redundancy and sum of squares of every kind; the redundancies sum to the excess."""
-    if result.redundancies is None or result.loss is not None:
-        return []
-    grouping = grouped(observables(result), "kind")
-    counts, squares, redundancy = sums_of(result, grouping)
-    lines = [f"{'kind':<36}{'number':>8}{'redundancy':>14}{'v P v':>14}{'factor of sd':>14}"]
-    rows = zip(grouping.groups.names, counts, squares, redundancy, strict=True)
-    for name, count, square, r in rows:
-        factor = f"{math.sqrt(square / r):>14.3f}" if r > TESTABLE else f"{'-':>14}"
-        lines.append(f"{name:<36}{count:>8}{r:>14.4f}{square:>14.4f}{factor}")
-    others = result.redundancies.total - float(redundancy.sum())
-    if abs(others) > TESTABLE:
-        lines.append(f"{'cameras and common unknowns':<36}{'':>8}{others:>14.4f}")
-    lines.append(f"{'all':<36}{'':>8}{result.redundancies.total:>14.4f}{result.sums_of_squares.total:>14.4f}")
-    return lines
+    names, *numbers = redundancy_by_kind(result)
+    heads = (
+        ("number", ".0f", 8),
+        ("redundancy", ".4f", 14),
+        ("v P v", ".4f", 14),
+        ("factor of sd", ".3f", 14),
+    )
+    fields = [field(each, w, form, head) for each, (head, form, w) in zip(numbers, heads, strict=True)]
+    return table_lines([*field(names, 36, head="kind"), *chain(*fields)])
 
 
 def _reliability(result: Result) -> list[str]:
@@ -206,13 +212,15 @@ def _reliability(result: Result) -> list[str]:
 
 
 def _iterations(result: Result) -> list[str]:
-    lines = [f"{'number':>6} {'weighted sum of squares':>24} {'largest change / sd':>20} {'damping':>9}"]
-    lines.append(f"{0:>6} {result.initial_weighted_sum_of_squares:>24.6f}")
-    lines += [
-        f"{i.number:>6} {i.weighted_sum_of_squares:>24.6f} {i.largest_change:>20.3e} {i.damping:>9.1e}"
-        for i in result.iterations
-    ]
-    return lines
+    number, squares, change, damping = iterations(result)
+    return table_lines(
+        [
+            *field(number, 6, ".0f", "number"),
+            *field(squares, 24, ".6f", "weighted sum of squares", " "),
+            *field(change, 20, ".3e", "largest change / sd", " "),
+            *field(damping, 9, ".1e", "damping", " "),
+        ]
+    )
 
 
 def _suspects(result: Result) -> list[str]:
@@ -310,10 +318,10 @@ def _points(result: Result) -> list[str]:
 
 
 def _work(result: Result) -> list[str]:
-    order = _ORDERINGS[result.ordering]
+    order = ORDERINGS[result.ordering]
     lines = [f"photos eliminated {order}; normal equations formed {result.formations} times"]
     lines += [
-        f"{f'multiply-adds if {_ORDERINGS[name]}':<36}{count:.3e}"
+        f"{f'multiply-adds if {ORDERINGS[name]}':<36}{count:.3e}"
         for name, count in result.predictions.items()
         if name != result.ordering
     ]

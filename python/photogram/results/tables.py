@@ -13,6 +13,8 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.results.axes import TURNS, component_axis, image_axes, point_axes
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.features import Features
+from photogram.results.group_sums import observables, sums_of
+from photogram.results.grouping import grouped
 from photogram.results.kinds import ObservedKind
 from photogram.results.network_tables import (
     Terms,
@@ -32,6 +34,7 @@ from photogram.results.result import Result
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.quantity import Axis, Quantity, component, frame, joined, long
 from photogram.show.ways import columns_of
+from photogram.statistics.reliability import TESTABLE
 
 __all__ = [
     "TABLES",
@@ -40,6 +43,7 @@ __all__ = [
     "check_points",
     "observations",
     "observed_components",
+    "redundancy_by_kind",
     "unheld",
     "unknowns",
 ]
@@ -181,6 +185,36 @@ _EMPTY, _NONE = np.zeros((0, 1)), np.zeros(0)
 _NOTHING = ObservedKind(
     *("", np.zeros(0, dtype=np.int64), [], ("",), ("",)), *(_EMPTY, _EMPTY, _EMPTY, _EMPTY), *(_NONE, _NONE)
 )
+
+
+def redundancy_by_kind(result: Result) -> list[Quantity]:
+    """Return number, redundancy and weighted sum of squares of every kind, and the factor of its deviations.
+
+    The redundancies sum to the degrees of freedom; nothing without them, or with a loss.
+    """
+    names, numbers = list[str](), np.zeros((0, 3))
+    if result.redundancies is not None and result.loss is None:
+        grouping = grouped(observables(result), "kind")
+        counts, squares, redundancy = sums_of(result, grouping)
+        names, numbers = list(grouping.groups.names), np.column_stack([counts, redundancy, squares])
+        others = result.redundancies.total - float(redundancy.sum())
+        if abs(others) > TESTABLE:
+            names.append("cameras and common unknowns")
+            numbers = np.vstack([numbers, [np.nan, others, np.nan]])
+        names.append("all")
+        total = [np.nan, result.redundancies.total, result.sums_of_squares.total]
+        numbers = np.vstack([numbers, total])
+    count, redundancy, squares = numbers.T
+    own = redundancy > TESTABLE
+    own[-1:] = False
+    factor = np.sqrt(np.divide(squares, redundancy, out=np.full(len(own), np.nan), where=own))
+    return [
+        Quantity(names, kind="name", head="Kind of observation"),
+        Quantity(count, head="Number", decimals=0),
+        Quantity(redundancy, head="Redundancy", decimals=2),
+        Quantity(squares, head="Weighted sum of squares", decimals=2),
+        Quantity(factor, head="Factor of sd", decimals=3),
+    ]
 
 
 def unknowns(every: Sequence[AdjustedUnknown]) -> list[Quantity]:

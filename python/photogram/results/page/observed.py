@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.arguments.types import Indices
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import terms_of
 from photogram.show.cells import unit_written
@@ -38,10 +37,10 @@ def worst_of(groups: Sequence[Tested], count: int = WORST) -> list[Worst]:
     return found[:count]
 
 
-def worst_images(worst: Sequence[Worst]) -> Indices:
-    """Return the images among the worst observations."""
+def worst_images(result: AdjustedNetwork, worst: Sequence[Worst]) -> tuple[list[int], list[int]]:
+    """Return photos and points of the images among the worst observations."""
     own = [place[0] for _, tested, place in worst if tested.kind == "image coordinates"]
-    return np.array(own, dtype=np.int64)
+    return terms_of(result).image_photos[own].tolist(), result.image_points[own].tolist()
 
 
 def worst_table(result: AdjustedNetwork, limit: float | None, worst: Sequence[Worst]) -> Table:
