@@ -67,7 +67,7 @@ def test_a_weighted_principal_point_is_an_observation():
 
 def test_report_and_document_name_the_parameters_of_the_camera():
     result = adjust(radial(MADE.collection))
-    assert "cx, px" in result.report()
+    assert "cx px" in result.report()
     document = json.loads(result.to_json())
     assert document["camera"] == "radial"
     assert document["parameters"][6:] == ["f", "cx", "cy", "k1", "k2"]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from photogram.absolute_orientation.orientation import Orientation
-from photogram.results.tables import named
+from photogram.show.quantity import Axis, Quantity, chosen, frame
 from photogram.show.ways import columns_of
 
 __all__ = ["control"]
@@ -17,13 +17,12 @@ __all__ = ["control"]
 def control(result: Orientation, what: str) -> dict[str, Any]:
     """Return the columns of the stations that took part; there is no other table."""
     parts = {
-        "residual_": result.residuals,
-        "residual_ground_": result.residuals_ground,
-        "redundancy_": result.redundancy,
-        "standardized_": result.standardized,
-        "studentized_": result.studentized,
+        "residual": result.residuals,
+        "residual_ground": result.residuals_ground,
+        "redundancy": result.redundancy,
+        "standardized": result.standardized,
+        "studentized": result.studentized,
     }
-    columns: dict[str, Any] = {"id": np.array(result.stations.ids, dtype=object)[result.took_part]}
-    for prefix, values in parts.items():
-        columns |= named("XYZ", values[result.took_part], prefix)
-    return columns
+    ids, axes = np.array(result.stations.ids, dtype=object), tuple(map(Axis, "XYZ"))
+    table = [Quantity(ids, name="id"), *(Quantity(values, axes, name=name) for name, values in parts.items())]
+    return frame(chosen(table, np.flatnonzero(result.took_part)))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from photogram import _photocore
 from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.tables import collection_photos, costs
 from photogram.io import json
-from photogram.results.network import Observed
+from photogram.results.network_tables import control, images, points, stations
 from photogram.results.weakest import weakest_photos, weakest_points
+from photogram.show.quantity import Quantity, records
 from photogram.show.ways import document_of
 
 __all__ = ["to_json"]
@@ -45,14 +45,7 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
         "loss": None if result.loss is None else {"name": result.loss[0], "scale": result.loss[1]},
         "initial_cost": 0.5 * result.initial_weighted_sum_of_squares,
         "cost": result.cost,
-        "iterations": [
-            {
-                "number": iteration.number,
-                "cost": 0.5 * iteration.weighted_sum_of_squares,
-                "damping": iteration.damping,
-            }
-            for iteration in result.iterations
-        ],
+        "iterations": records(costs(result))[1:],
         "weighted_sum_of_squares": result.weighted_sum_of_squares,
         "degrees_of_freedom": result.degrees_of_freedom,
         "variance_of_unit_weight": result.variance_of_unit_weight,
@@ -69,8 +62,8 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
         "photos": _photos(result),
         "points": _points(result),
         "observations": _observations(result),
-        "control": _observed(result.control),
-        "stations": _observed(result.stations),
+        "control": records(control(result)),
+        "stations": records(stations(result)),
         "ordering": result.ordering,
         "predictions": dict(result.predictions),
         "operations": dict(result.operations),
@@ -92,60 +85,15 @@ def _units(result: AdjustedCollection) -> dict[str, str]:
 
 
 def _photos(result: AdjustedCollection) -> list[dict[str, Any]]:
-    columns = zip(
-        result.photo_parameters, result.photo_covariances, result.photo_images.tolist(), strict=True
-    )
-    return [
-        {"parameters": parameters, "covariance": np.ascontiguousarray(covariance), "images": images}
-        for parameters, covariance, images in columns
-    ]
+    return records([*collection_photos(result), Quantity(result.photo_covariances, member="covariance")])
 
 
 def _points(result: AdjustedCollection) -> list[dict[str, Any]]:
-    used = np.flatnonzero(result.used_points)
-    columns = zip(
-        used.tolist(),
-        result.point_positions[used],
-        result.point_covariances[used],
-        result.point_rays[used].tolist(),
-        strict=True,
-    )
-    return [
-        {"number": number, "position": position, "covariance": covariance, "rays": rays}
-        for number, position, covariance, rays in columns
-    ]
+    covariances = Quantity(result.point_covariances[result.used_points], member="covariance")
+    return records([*points(result), covariances])
 
 
 def _observations(result: AdjustedCollection) -> list[dict[str, Any]]:
-    collection, used = result.collection, result.used_images
-    columns = zip(
-        collection.image_photos[used].tolist(),
-        collection.image_points[used].tolist(),
-        result.residuals[used],
-        result.redundancy[used],
-        result.standardized[used],
-        result.image_weights[used].tolist(),
-        strict=True,
+    return records(
+        [*images(result), Quantity(result.image_weights[result.used_images], member="weight_factor")]
     )
-    return [
-        {
-            "photo": photo,
-            "point": point,
-            "residual_px": residual,
-            "redundancy": redundancy,
-            "standardized": standardized,
-            "weight_factor": weight,
-        }
-        for photo, point, residual, redundancy, standardized, weight in columns
-    ]
-
-
-def _observed(given: Observed) -> list[dict[str, Any]]:
-    """Return points or photos as observations of their own unknowns."""
-    columns = zip(
-        given.rows.tolist(), given.differences, given.sd, given.redundancy, given.tests, strict=True
-    )
-    return [
-        {"number": number, "difference": difference, "sd": sd, "redundancy": redundancy, "standardized": test}
-        for number, difference, sd, redundancy, test in columns
-    ]

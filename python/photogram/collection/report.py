@@ -8,16 +8,19 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.findings import names, tested_observations
+from photogram.collection.findings import tested_observations
+from photogram.collection.tables import collection_photos, costs
+from photogram.results.network_tables import control, stations
 from photogram.results.observed import image_lines, observed_lines
 from photogram.results.weakest import weakest_lines
+from photogram.show.lines import Field, field, table_lines
 from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
 from photogram.show.ways import report_of
 from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
 from photogram.statistics.outliers import outliers
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["problems_of", "report", "summary"]
+__all__ = ["problems_of", "report", "size_of", "summary"]
 
 SUSPECTS = 20
 """Image points with large standardized residuals that are listed at most."""
@@ -28,23 +31,22 @@ NOTABLE = 3.0
 @report_of.register(AdjustedCollection)
 def report(result: AdjustedCollection) -> str:
     """Return the report of an adjusted collection."""
-    (photos, points), heads = names(result), _heads(result)
     sections = [
         *summary(result),
         ("Reliability", _reliability(result)),
         ("Iterations", _iterations(result)),
         (
             "Weighted and fixed points: adjusted minus given, redundancy, standardized difference",
-            observed_lines("point", points, "XYZ", np.ones(3), result.control),
+            observed_lines(control(result), "point"),
         ),
         (
             "Weighted and fixed parameters: adjusted minus given, redundancy, standardized difference",
-            observed_lines("photo", photos, heads, np.ones(len(heads)), result.stations),
+            observed_lines(stations(result), "photo"),
         ),
         ("Photos: values and standard deviations", _photos(result)),
         ("Points: standard deviations", _points(result)),
         ("Weakest points and photos", weakest_lines(result)),
-        ("Image points: observed minus computed, redundancy, standardized residual", _images(result)),
+        ("Image points: observed minus computed, redundancy, standardized residual", image_lines(result)),
         ("Work", _work(result)),
     ]
     return composed(headline("collection of photos"), sections)
@@ -87,8 +89,7 @@ def problems_of(result: AdjustedCollection) -> list[str]:
 
 
 def _adjustment(result: AdjustedCollection) -> list[str]:
-    collection, variance = result.collection, result.variance_of_unit_weight
-    residuals = result.residuals[result.used_images]
+    variance, residuals = result.variance_of_unit_weight, result.residuals[result.used_images]
     rows = [
         ("status", result.status),
         ("iterations", f"{len(result.iterations)}"),
@@ -103,13 +104,21 @@ def _adjustment(result: AdjustedCollection) -> list[str]:
             f"{math.sqrt(variance):.6f}" if variance is not None else "undefined",
         ),
         ("degrees of freedom", f"{result.degrees_of_freedom}"),
-        ("photos", f"{np.count_nonzero(result.photo_images)} used of {len(collection.photo_parameters)}"),
-        ("points", f"{np.count_nonzero(result.used_points)} used of {len(collection.point_positions)}"),
-        ("image points", f"{len(residuals)} used of {len(collection.image_xy)}"),
+        *size_of(result),
         ("rms of residuals, px", ", ".join(f"{value:.4f}" for value in np.sqrt((residuals**2).mean(axis=0)))),
         ("median length of residuals, px", f"{np.median(np.hypot(*residuals.T)):.4f}"),
     ]
     return [f"{name:<36}{value}" for name, value in rows]
+
+
+def size_of(result: AdjustedCollection) -> list[tuple[str, str]]:
+    """Return what the collection consists of: names and what there is."""
+    counts = {
+        "photos": result.photo_images > 0,
+        "points": result.used_points,
+        "image points": result.used_images,
+    }
+    return [(name, f"{np.count_nonzero(used)} used of {len(used)}") for name, used in counts.items()]
 
 
 def _suspects(result: AdjustedCollection) -> list[str]:
@@ -134,34 +143,22 @@ def _suspects(result: AdjustedCollection) -> list[str]:
 
 
 def _iterations(result: AdjustedCollection) -> list[str]:
-    head = [" no.            cost   damping", f"   0{0.5 * result.initial_weighted_sum_of_squares:16.6e}"]
-    lines = [
-        f"{each.number:4d}{0.5 * each.weighted_sum_of_squares:16.6e}{each.damping:10.1e}"
-        for each in result.iterations
-    ]
-    return head + lines
-
-
-def _images(result: AdjustedCollection) -> list[str]:
-    return image_lines(result, result.collection.image_photos, *names(result), "px")
-
-
-def _heads(result: AdjustedCollection) -> list[str]:
-    given = result.collection
-    return [
-        f"{name}, {unit}" if unit else name for name, unit in zip(given.parameters, given.units, strict=True)
-    ]
+    number, cost, damping = costs(result)
+    return table_lines(
+        [
+            *field(number, 4, ".0f", "no."),
+            *field(cost, 16, ".6e", "cost"),
+            *field(damping, 10, ".1e", "damping"),
+        ]
+    )
 
 
 def _photos(result: AdjustedCollection) -> list[str]:
-    lines = ["  photo images" + "".join(f"{name:>14}" for name in _heads(result))]
-    for photo, (values, deviations) in enumerate(zip(result.photo_parameters, result.photo_sd, strict=True)):
-        lines.append(
-            f"{photo:7d}{result.photo_images[photo]:7d}" + "".join(f"{value:14.6g}" for value in values)
-        )
-        if np.isfinite(deviations).all():
-            lines.append(f"{'sd':>14}" + "".join(f"{deviation:14.2g}" for deviation in deviations))
-    return lines
+    own, count, values, sd = collection_photos(result)
+    rows = [[*field(own, 10, head="photo"), *field(count, 6, ".0f", "images"), *field(values, 14, ".6g")]]
+    if np.isfinite(sd.values).any():
+        rows.append([Field("", [f"{'sd':<16}"] * len(own.values)), *field(sd, 14, ".2g", "")])
+    return table_lines(*rows)
 
 
 def _points(result: AdjustedCollection) -> list[str]:

@@ -11,11 +11,11 @@ import numpy as np
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
 from photogram.collection.core import CollectionOptions
+from photogram.collection.tables import TABLES
 from photogram.io.parquet import Column
 from photogram.io.writing import Content
 from photogram.messages import Message
 from photogram.network.frame import Frame
-from photogram.results.columns import plain_columns
 from photogram.results.iteration import Iteration
 from photogram.results.saved import (
     GIVEN_SD,
@@ -25,9 +25,10 @@ from photogram.results.saved import (
     image_parts,
     point_parts,
     read_saved,
+    sheet,
     written,
 )
-from photogram.show.ways import columns_of, files_of
+from photogram.show.ways import files_of
 
 __all__ = ["KIND", "collection_files", "read_collection_result"]
 
@@ -46,7 +47,7 @@ def collection_files(result: AdjustedCollection) -> dict[str, Content]:
         "points": [_numbers("point", np.arange(len(given.point_positions)))],
         "images": [_numbers("photo", given.image_photos), _numbers("point", given.image_points)],
     }
-    tables = {name: plain_columns(columns_of(result, kind), "") for name, kind in _TABLES.items()}
+    tables = {name: sheet(TABLES[kind](result)) for name, kind in _TABLES.items()}
     summary = {
         "camera": given.camera,
         "status": result.status,

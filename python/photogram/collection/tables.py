@@ -1,74 +1,75 @@
-"""The tables of an adjusted collection: named columns; photos and points are numbers from 0."""
+"""The tables of an adjusted collection; photos and points are numbers from 0."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.results.tables import images, named, observed
+from photogram.results.axes import image_axes
+from photogram.results.network_tables import (
+    Terms,
+    control,
+    images,
+    iterations,
+    photos,
+    points,
+    stations,
+    terms_of,
+)
+from photogram.show.quantity import Axis, Quantity, frame
 from photogram.show.ways import columns_of
 
-__all__ = ["table"]
-
-AXES = ("X", "Y", "Z")
+__all__ = ["TABLES", "collection_photos", "costs"]
 
 
 @columns_of.register(AdjustedCollection)
-def table(result: AdjustedCollection, what: str) -> dict[str, Any]:
-    """Return the columns of photos, points, images, control or stations."""
-    return _TABLES[what](result)
+def _columns(result: AdjustedCollection, what: str) -> dict[str, Any]:
+    return frame(TABLES[what](result))
 
 
-def _photos(result: AdjustedCollection) -> dict[str, Any]:
-    names = _parameters(result)
-    return {
-        "photo": np.arange(len(result.photo_parameters)),
-        "images": result.photo_images,
-        **named(names, result.photo_parameters),
-        **named(names, result.photo_sd, "sd_"),
-    }
-
-
-def _points(result: AdjustedCollection) -> dict[str, Any]:
-    used = result.used_points
-    return {
-        "point": np.flatnonzero(used),
-        "rays": result.point_rays[used],
-        **named(AXES, result.point_positions[used]),
-        **named(AXES, result.point_sd[used], "sd_"),
-    }
-
-
-def _images(result: AdjustedCollection) -> dict[str, Any]:
-    used, collection = result.used_images, result.collection
-    return {
-        "photo": collection.image_photos[used],
-        "point": collection.image_points[used],
-        **images(result, "px"),
-    }
-
-
-def _control(result: AdjustedCollection) -> dict[str, Any]:
-    return {"point": result.control.rows, **observed(AXES, result.control)}
-
-
-def _stations(result: AdjustedCollection) -> dict[str, Any]:
-    return {"photo": result.stations.rows, **observed(_parameters(result), result.stations)}
-
-
-def _parameters(result: AdjustedCollection) -> list[str]:
-    """Return the names of parameters with their units."""
+@terms_of.register(AdjustedCollection)
+def _terms(result: AdjustedCollection) -> Terms:
     given = result.collection
-    return [f"{name}_{unit}".rstrip("_") for name, unit in zip(given.parameters, given.units, strict=True)]
+    named = zip(given.parameters, given.units, strict=True)
+    return Terms(
+        photos=np.arange(len(result.photo_parameters)),
+        points=np.arange(len(result.point_positions)),
+        image_photos=given.image_photos,
+        photo_axes=tuple(Axis.of(name, unit, f"_{unit}".rstrip("_")) for name, unit in named),
+        point_axes=tuple(Axis.of(name, "") for name in "XYZ"),
+        image_axes=image_axes("px"),
+        photo_values=result.photo_parameters,
+        point_given=given.point_positions,
+        layers={"Rotations": slice(0, 3), "Translations": slice(3, 6), "Cameras": slice(6, None)},
+        parts={"parameters": slice(None)},
+    )
 
 
-_TABLES: dict[str, Callable[[AdjustedCollection], dict[str, Any]]] = {
-    "photo": _photos,
-    "point": _points,
-    "image": _images,
-    "control": _control,
-    "station": _stations,
+def collection_photos(result: AdjustedCollection) -> list[Quantity]:
+    """Return adjusted photos with the number of their images."""
+    own, *rest = photos(result)
+    about = "number of images"
+    count = Quantity(
+        result.photo_images, name="images", member="images", about=about, head="Images", decimals=0
+    )
+    return [own, count, *rest]
+
+
+def costs(result: AdjustedCollection) -> list[Quantity]:
+    """Return the history: numbers, costs (half the sum that is minimised), damping; first the start."""
+    number, squares, _, damping = iterations(result)
+    return [number, replace(squares, values=0.5 * squares.values, member="cost"), damping]
+
+
+TABLES: dict[str, Callable[[AdjustedCollection], list[Quantity]]] = {
+    "photo": collection_photos,
+    "point": points,
+    "image": images,
+    "control": control,
+    "station": stations,
 }
+"""The tables by the kind of things that have their rows."""

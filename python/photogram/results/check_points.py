@@ -12,8 +12,9 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
 from photogram.network.observations import Control
+from photogram.results.axes import point_axes
 from photogram.results.network import AdjustedNetwork
-from photogram.results.outward import outward
+from photogram.show.quantity import Axis
 from photogram.statistics.agreement import agreement
 from photogram.statistics.findings import Agreement
 
@@ -119,7 +120,7 @@ def _agreement(
         network.point_cofactors[found.rows],
         survey,
         name=partial(_named, found.names),
-        apart=partial(_apart, found.differences, *outward(block)),
+        apart=partial(_apart, found.differences, point_axes(block)),
     )
     if not whole:
         return alone
@@ -135,19 +136,13 @@ def _named(names: tuple[str, ...], place: tuple[int, ...]) -> str:
     return names[place[0]]
 
 
-def _apart(
-    differences: Floats,
-    axes: tuple[str, ...],
-    units: tuple[str, ...],
-    factors: Floats,
-    place: tuple[int, ...],
-    sd: Floats,
-) -> str:
+def _apart(differences: Floats, axes: tuple[Axis, ...], place: tuple[int, ...], sd: Floats) -> str:
     """Say how far a point is off in the component of the largest difference over its standard deviation."""
     own = differences[place[0]]
     with np.errstate(all="ignore"):
         k = int(np.nanargmax(np.abs(own) / np.where(sd > 0, sd, 1e-300)))
-    return f"{own[k] * factors[k]:+.3g} {units[k]} in {axes[k]} (sd {sd[k] * factors[k]:.2g})"
+    axis = axes[k]
+    return f"{own[k] * axis.factor:+.3g} {axis.small} in {axis.name} (sd {sd[k] * axis.factor:.2g})"
 
 
 def _given(block: Block, rows: Indices, differences: Floats) -> tuple[Floats, Bools]:

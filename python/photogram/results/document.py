@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,13 +11,13 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.results.calibration_report import calibration_members
 from photogram.results.features_report import features_document
+from photogram.results.network_tables import control, images, iterations, photos, stations
 from photogram.results.report import problems_of
 from photogram.results.result import Result, SumsByKind
+from photogram.results.tables import block_points, camera_parameters, check_points, observations
 from photogram.results.weakest import weakest_photos, weakest_points
+from photogram.show.quantity import Quantity, chosen, records
 from photogram.show.ways import document_of
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
 
 __all__ = ["to_json"]
 
@@ -51,15 +51,7 @@ def _document(result: Result) -> dict[str, Any]:
         "messages": [str(message) for message in result.messages],
         "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
         "initial_weighted_sum_of_squares": result.initial_weighted_sum_of_squares,
-        "iterations": [
-            {
-                "number": iteration.number,
-                "weighted_sum_of_squares": iteration.weighted_sum_of_squares,
-                "largest_change_sd": iteration.largest_change,
-                "damping": iteration.damping,
-            }
-            for iteration in result.iterations
-        ],
+        "iterations": records(iterations(result))[1:],
         "weighted_sum_of_squares": _by_kind(sums),
         "redundancy": None if result.redundancies is None else _by_kind(result.redundancies),
         "degrees_of_freedom": result.degrees_of_freedom,
@@ -80,9 +72,9 @@ def _document(result: Result) -> dict[str, Any]:
         "points": _points(result),
         "observations": _observations(result),
         "observations_beside_images": _beside_images(result),
-        "control": _control(result),
-        "stations": _stations(result),
-        "check_points": _check_points(result),
+        "control": records(control(result)),
+        "stations": records(stations(result)),
+        "check_points": records(check_points(result)),
         "weakest": {
             "points": [vars(each) for each in weakest_points(result)],
             "photos": [vars(each) for each in weakest_photos(result)],
@@ -128,34 +120,14 @@ def _units(result: Result) -> dict[str, str]:
     }
 
 
-def _outward(result: Result, positions: Floats) -> Floats:
-    """Longitude and latitude in degrees, as the document has them."""
-    if not result.block.geographic:
-        return positions
-    outward = positions.copy()
-    outward[:, :2] = np.degrees(outward[:, :2])
-    return outward
-
-
 def _photos(result: Result) -> list[dict[str, Any]]:
-    columns = zip(
-        result.block.photo_ids,
-        _outward(result, result.photo_positions).tolist(),
-        result.photo_attitudes.tolist(),
-        result.photo_covariances,
-        strict=True,
-    )
-    return [
-        {
-            "id": name,
-            "position": position,
-            "attitude_rad": attitude,
-            "position_covariance": covariance[:3, :3].tolist(),
-            "attitude_covariance": covariance[3:, 3:].tolist(),
-            "covariance": covariance.tolist(),
-        }
-        for name, position, attitude, covariance in columns
+    covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
+    own = [
+        Quantity(covariances[:, place, place], member="position_covariance"),
+        Quantity(covariances[:, turn, turn], member="attitude_covariance"),
+        Quantity(covariances, member="covariance"),
     ]
+    return records([*photos(result), *own])
 
 
 def _cameras(result: Result) -> list[dict[str, Any]]:
@@ -166,19 +138,7 @@ def _cameras(result: Result) -> list[dict[str, Any]]:
             "image_unit": each.camera.unit,
             "photos": each.photos,
             "images": each.images,
-            "parameters": [
-                {"name": name, "unit": each.camera.unit_of(name), "value": value, "sd": sd, "given": given}
-                | {"sd_given": sd_given, "redundancy": redundancy}
-                for name, value, sd, given, sd_given, redundancy in zip(
-                    each.names,
-                    each.values.tolist(),
-                    each.sd.tolist(),
-                    each.given.values.tolist(),
-                    each.given.deviations.tolist(),
-                    each.redundancy.tolist(),
-                    strict=True,
-                )
-            ],
+            "parameters": records(camera_parameters([each])),
             "covariance": each.covariance.tolist(),
         }
         for each in result.cameras
@@ -208,62 +168,27 @@ def _unknowns(result: Result) -> list[dict[str, Any]]:
 
 
 def _points(result: Result) -> list[dict[str, Any]]:
-    columns = zip(
-        result.block.point_ids,
-        _outward(result, result.point_positions).tolist(),
-        result.point_covariances.tolist(),
-        result.point_rays.tolist(),
-        result.point_kinds.tolist(),
-        strict=True,
-    )
-    return [
-        {"id": name, "position": position, "covariance": covariance, "rays": rays, "kind": kind}
-        for name, position, covariance, rays, kind in columns
-        if rays
-    ]
+    covariances = Quantity(result.point_covariances[result.used_points], member="covariance")
+    return records([*block_points(result), covariances])
 
 
 def _observations(result: Result) -> list[dict[str, Any]]:
-    block, used = result.block, result.used_images
-    columns = zip(
-        block.image_photos[used].tolist(),
-        block.image_points[used].tolist(),
-        result.residuals[used].tolist(),
-        result.redundancy[used].tolist(),
-        result.standardized[used].tolist(),
-        result.image_weights[used].tolist(),
-        strict=True,
-    )
-    return [
-        {
-            "photo": block.photo_ids[photo],
-            "point": block.point_ids[point],
-            f"residual_{block.image_unit}": residual,
-            "redundancy": redundancy,
-            "standardized": standardized,
-            **({"weight_factor": weight} if result.loss else {}),
-        }
-        for photo, point, residual, redundancy, standardized, weight in columns
-    ]
+    weights = Quantity(result.image_weights[result.used_images], member="weight_factor")
+    return records([*images(result), *([weights] if result.loss else [])])
 
 
 def _beside_images(result: Result) -> list[dict[str, Any]]:
-    return [
-        {
-            "kind": each.kind,
-            "of": list(result.block.observations[row].of),
-            "components": list(each.components),
-            "units": list(each.units),
-            "sd": each.sd[k].tolist(),
-            "residual": each.residuals[k].tolist(),
-            "redundancy": each.redundancy[k].tolist(),
-            "standardized": each.standardized[k].tolist(),
-            **({"weight_factor": each.weights[k].item()} if result.loss else {}),
-        }
-        for each in result.kinds.values()
-        for k, row in enumerate(each.rows.tolist())
-        if np.isfinite(each.squares[k])
-    ]
+    found = []
+    for each in result.kinds.values():
+        rows = np.flatnonzero(np.isfinite(each.squares))
+        own = [
+            Quantity([list(result.block.observations[row].of) for row in each.rows[rows]], member="of"),
+            Quantity([each.components] * len(rows), member="components"),
+            Quantity([each.units] * len(rows), member="units"),
+            *([Quantity(each.weights[rows], member="weight_factor")] if result.loss else []),
+        ]
+        found += records([*chosen(observations(each), rows), *own])
+    return found
 
 
 def _global_test(result: Result) -> dict[str, Any] | None:
@@ -277,60 +202,3 @@ def _global_test(result: Result) -> dict[str, Any] | None:
         "probability": test.probability,
         "rejected": "high" if test.rejected_high else "low" if test.rejected_low else None,
     }
-
-
-def _control(result: Result) -> list[dict[str, Any]]:
-    given = result.control
-    columns = zip(
-        given.rows.tolist(),
-        _outward(result, given.differences).tolist(),
-        _outward(result, given.sd).tolist(),
-        given.redundancy.tolist(),
-        given.tests.tolist(),
-        strict=True,
-    )
-    return [
-        {
-            "id": result.block.point_ids[row],
-            "position_difference": residual,
-            "position_sd": sd,
-            "redundancy": redundancy,
-            "standardized": standardized,
-        }
-        for row, residual, sd, redundancy, standardized in columns
-    ]
-
-
-def _stations(result: Result) -> list[dict[str, Any]]:
-    given = result.stations
-    columns = zip(
-        given.rows.tolist(),
-        _outward(result, given.differences[:, :3]).tolist(),
-        _outward(result, given.sd[:, :3]).tolist(),
-        given.differences[:, 3:].tolist(),
-        given.sd[:, 3:].tolist(),
-        given.redundancy.tolist(),
-        given.tests.tolist(),
-        strict=True,
-    )
-    return [
-        {
-            "id": result.block.photo_ids[row],
-            "position_difference": position,
-            "position_sd": position_sd,
-            "attitude_difference_rad": attitude,
-            "attitude_sd_rad": attitude_sd,
-            "redundancy": redundancy,
-            "standardized": standardized,
-        }
-        for row, position, position_sd, attitude, attitude_sd, redundancy, standardized in columns
-    ]
-
-
-def _check_points(result: Result) -> list[dict[str, Any]]:
-    checks = result.check_points
-    arrays = (checks.differences, checks.sd, checks.given_sd)
-    columns = [_outward(result, each).tolist() for each in arrays]
-    names = ("id", "difference", "sd", "given_sd", "assumed", "statistic", "p")
-    rows = zip(checks.names, *columns, checks.assumed.tolist(), *checks.statistics, strict=True)
-    return [dict(zip(names, row, strict=True)) for row in rows]

@@ -6,13 +6,13 @@ import numpy as np
 
 from photogram.arguments.arrays import chosen, finite_rows
 from photogram.messages import Undetermined, counted
+from photogram.results.axes import point_axes
 from photogram.results.groups_tested import groups_tested
 from photogram.results.held import held_tested
 from photogram.results.kinds import tested_kind
 from photogram.results.lenses import fall_by_lens, how_to_calibrate
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observed import tested
-from photogram.results.outward import outward
 from photogram.results.patterns import CameraImages, patterns
 from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
@@ -21,7 +21,7 @@ from photogram.statistics.findings import Findings, Removed, Systematic, Tested,
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["HARMFUL", "axes", "block_findings", "has_redundancy", "tested_observations", "unseen"]
+__all__ = ["HARMFUL", "block_findings", "has_redundancy", "tested_observations", "unseen"]
 
 ROBUST = "a robust loss changes the weights"
 """Why there is no global test with one."""
@@ -132,17 +132,15 @@ def _left_out(result: Result) -> list[str]:
 
 def _on_checks(result: Result) -> list[str]:
     """Say which check points are tested with what nobody has given, and why they are not tested."""
-    checks, (_, units, factors) = result.check_points, outward(result.block)
+    checks, axes = result.check_points, point_axes(result.block)
     if not len(checks.rows):
         return []
     if checks.agreement is None:
         return [f"check points are not tested: {checks.untested}"]
     if not checks.assumed.any():
         return []
-    own = checks.given_sd[checks.assumed][0] * factors
-    assumed = " and ".join(
-        dict.fromkeys(f"{value:.2g} {unit}" for value, unit in zip(own.tolist(), units, strict=True))
-    )
+    own = zip(checks.given_sd[checks.assumed][0].tolist(), axes, strict=True)
+    assumed = " and ".join(dict.fromkeys(f"{value * axis.factor:.2g} {axis.small}" for value, axis in own))
     return [
         f"standard deviations of {checks.assumed.sum()} of {counted(len(checks.rows), 'check point')} are not"
         f" given: those of control are assumed ({assumed}); --sd check=... says how good they are"
@@ -165,7 +163,7 @@ def _patterns(result: Result) -> list[Systematic]:
         cameras,
         block.photo_ids,
         ("um", 1000.0) if block.image_unit == "mm" else ("px", 1.0),
-        axes(result),
+        [axis.name for axis in point_axes(block)],
         lambda own: fall_by_lens(result, own),
     )
 
@@ -173,14 +171,10 @@ def _patterns(result: Result) -> list[Systematic]:
 def tested_observations(result: Result) -> list[Observations]:
     """Return all observations of a block with their standardized residuals, kind by kind."""
     block = result.block
-    unknowns = (*axes(result), "omega", "phi", "kappa")
-    of_unknowns = tested(result, block.image_photos, block.photo_ids, block.point_ids, unknowns, axes(result))
+    axes = [axis.name for axis in point_axes(block)]
+    unknowns = (*axes, "omega", "phi", "kappa")
+    of_unknowns = tested(result, block.image_photos, block.photo_ids, block.point_ids, unknowns, axes)
     return of_unknowns + [tested_kind(each) for each in result.kinds.values()]
-
-
-def axes(result: Result) -> tuple[str, str, str]:
-    """Return what the coordinates are called."""
-    return outward(result.block)[0]
 
 
 def has_redundancy(result: AdjustedNetwork) -> bool:

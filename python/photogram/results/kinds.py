@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,14 +10,13 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.network.block import Block
 from photogram.network.observations import observation_rows
-from photogram.show.angles import ARCSEC
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["ObservedKind", "kind_lines", "observed_kinds", "tested_kind"]
+__all__ = ["ObservedKind", "observed_kinds", "tested_kind"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,23 +124,3 @@ def tested_kind(kind: ObservedKind) -> Observations:
 
     standardized = np.where(kind.redundancy > TESTABLE, kind.standardized, np.nan)
     return Observations(f"components of observations of the kind {kind.kind}", standardized, named)
-
-
-def kind_lines(kinds: Mapping[str, ObservedKind]) -> list[str]:
-    """Write a line for each component of every observation, rotations in arcsec."""
-    lines = []
-    for each in kinds.values():
-        units = ["arcsec" if unit == "rad" else unit for unit in each.units]
-        outward = np.array([1.0 / ARCSEC if unit == "rad" else 1.0 for unit in each.units])
-        columns = ("sd", "residual", "redundancy", "standardized")
-        lines.append(f"{each.kind:<28}{'component':<22}" + "".join(f"{column:>14}" for column in columns))
-        parts = (each.sd * outward, each.residuals * outward, each.redundancy, each.standardized)
-        for i, k in np.argwhere(~np.isnan(each.residuals)).tolist():
-            cells = (_cell(part[i, k], decimals) for part, decimals in zip(parts, (5, 5, 3, 2), strict=True))
-            component = f"{each.components[k]} {units[k]}"
-            lines.append(f"{each.names[i]:<28}{component:<22}{''.join(cells)}")
-    return lines
-
-
-def _cell(value: float, decimals: int) -> str:
-    return f"{value:>14.{decimals}f}" if math.isfinite(value) else f"{'-':>14}"

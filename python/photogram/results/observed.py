@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
+from itertools import chain
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
-from photogram.results.network import AdjustedNetwork, Observed
+from photogram.arguments.types import Floats, Indices
+from photogram.results.network import AdjustedNetwork
+from photogram.results.network_tables import images, part
+from photogram.show.lines import field, stacked, table_lines
+from photogram.show.quantity import Quantity, labelled
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
@@ -64,82 +67,20 @@ def tested(
     ]
 
 
-def image_lines(
-    result: AdjustedNetwork,
-    image_photos: Indices,
-    photos: Sequence[str],
-    points: Sequence[str],
-    unit: str,
-    factor: float = 1.0,
-) -> list[str]:
-    """List the image observations, one point a line: what `tested` has, and residuals times `factor`."""
-    used = np.flatnonzero(result.used_images)
-    parts = (result.residuals * factor, result.redundancy, result.standardized)
-    heads = (f"{axis} {head}" for axis in "xy" for head in (f"residual {unit}", "redundancy", "standardized"))
-    lines = [f"{'photo':<10} {'point':<10}" + "".join(f"{head:>16}" for head in heads)]
-    listed = used[:LISTED]
-    figures = np.stack([part[listed] for part in parts], axis=2).reshape(len(listed), -1)
-    whole = "{:>16.2f}{:>16.3f}{:>16.2f}" * 2
-    rows = zip(
-        image_photos[listed].tolist(),
-        result.image_points[listed].tolist(),
-        figures.tolist(),
-        np.atleast_1d(np.isfinite(figures).all(axis=1)).tolist(),
-        strict=True,
-    )
-    for photo, point, row, finite in rows:
-        cells = whole.format(*row) if finite else "".join(map(_image_cell, row, (2, 3, 2) * 2))
-        lines.append(f"{photos[photo]:<10} {points[point]:<10}{cells}")
-    if len(used) > LISTED:
-        lines.append(f"and {len(used) - LISTED} more; the JSON document and the table of images have all")
-    return lines if len(used) else []
+def image_lines(result: AdjustedNetwork) -> list[str]:
+    """List the image observations, one point a line: what `tested` has."""
+    photos, points, *numbers = images(result, LISTED)
+    forms = ((".2f", "{name} residual {unit}"), (".3f", "{name} redundancy"), (".2f", "{name} standardized"))
+    own = [part(each, slice(axis, axis + 1)) for axis in (0, 1) for each in numbers]
+    fields = [field(each, 16, *form) for each, form in zip(own, forms * 2, strict=True)]
+    names = [*field(photos, 10, head="photo"), *field(points, 10, head="point", gap=" ")]
+    found = table_lines([*names, *chain(*fields)])
+    if (count := int(result.used_images.sum())) > LISTED:
+        found.append(f"and {count - LISTED} more; the JSON document and the table of images have all")
+    return found
 
 
-def _image_cell(value: float, decimals: int) -> str:
-    return f"{f'{value:.{decimals}f}' if math.isfinite(value) else '-':>16}"
-
-
-def observed_lines(
-    kind: str, names: Sequence[str], columns: Sequence[str], factors: Floats, given: Observed
-) -> list[str]:
-    """List observed components, four lines for each point or photo: what was observed, and how it fits.
-
-    Parameters
-    ----------
-    kind
-        `point` or `photo`.
-    names
-        Of all points or photos.
-    columns, factors
-        The components with their units, and what leads to these.
-    given
-        The observations.
-    """
-    if not len(given.rows):
-        return []
-    sd, differences = given.sd * factors, given.differences * factors
-    lines = [f"{kind:<10}{'':<14}" + "".join(f"{column:>18}" for column in columns)]
-    held = np.isfinite(sd)
-    weighted = held & (sd > 0)
-    for row, name in enumerate(names[index] for index in given.rows.tolist()):
-        deviations = [
-            "free" if math.isinf(each) else "fixed" if each == 0 else f"{each:.5f}" for each in sd[row]
-        ]
-        parts = (
-            ("sd", deviations),
-            ("difference", _cells(differences[row], held[row], 5)),
-            ("redundancy", _cells(given.redundancy[row], weighted[row], 3)),
-            ("standardized", _cells(given.tests[row], weighted[row], 2)),
-        )
-        lines += [
-            f"{name if part == 'sd' else '':<10}{part:<14}" + "".join(f"{cell:>18}" for cell in cells)
-            for part, cells in parts
-        ]
-    return lines
-
-
-def _cells(values: Floats, there: Bools, decimals: int) -> list[str]:
-    return [
-        f"{value:.{decimals}f}" if use and math.isfinite(value) else "-"
-        for value, use in zip(values, there, strict=True)
-    ]
+def observed_lines(table: Sequence[Quantity], kind: str) -> list[str]:
+    """List observed photos or points, four lines for each: what was observed, and how it fits."""
+    forms = {"sd": ".5f", "difference": ".5f", "redundancy": ".3f", "standardized": ".2f"}
+    return stacked(table[0], kind, [(labelled(table, label), form) for label, form in forms.items()])

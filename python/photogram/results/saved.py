@@ -25,6 +25,7 @@ from photogram.io.structure import Decoder, Encoder
 from photogram.io.writing import Content
 from photogram.network.frame import Frame
 from photogram.results.network import AdjustedNetwork
+from photogram.show.quantity import Table
 
 __all__ = [
     "GIVEN_SD",
@@ -38,6 +39,7 @@ __all__ = [
     "read_saved",
     "read_summary",
     "rows_of",
+    "sheet",
     "written",
 ]
 
@@ -226,6 +228,39 @@ class Saved:
             return _photocore.BlockState(unknowns.tolist(), *rest)
         except (TypeError, ValueError) as error:
             raise InputError(f"keeps no state ({error})", file=self.folder / SUMMARY) from None
+
+
+_RENAMED = {"standardized": "test", "d": "difference"}
+"""What is called otherwise in Parquet."""
+
+
+def sheet(table: Table) -> list[Column]:
+    """Return the columns of Parquet: angles in radians, names in small letters, units beside them."""
+    found = []
+    for each in table:
+        if each.name is None:
+            continue
+        name = _RENAMED.get(each.name, each.name)
+        if each.kind == "name":
+            found.append(Column(name, _repeated(each.values), "", each.about))
+        elif each.single:
+            unit = "1" if each.kind == "number" else "as the column unit says"
+            found.append(Column(name, np.asarray(each.values), unit, each.about.removesuffix(": {}")))
+        else:
+            for axis, column in zip(each.axes, each.values.T, strict=True):
+                own = f"{name}_{axis.name.lower()}".removeprefix("_")
+                unit = "1" if each.kind == "number" else axis.unit
+                found.append(Column(own, column, unit, each.about.format(axis.name)))
+    return found
+
+
+def _repeated(names: Any) -> Any:
+    """Return names as a column of few different ones; numbers of photos and points as they are."""
+    values = np.asarray(names)
+    if values.dtype.kind in "iu":
+        return values
+    few, rows = np.unique(values.astype(str), return_inverse=True)
+    return Repeated(few.tolist(), rows)
 
 
 def written(

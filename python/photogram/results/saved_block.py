@@ -21,7 +21,6 @@ from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
 from photogram.results.cameras import AdjustedCamera
-from photogram.results.columns import plain_columns
 from photogram.results.datum import ResultDatum
 from photogram.results.features import Feature, Features, Quantity
 from photogram.results.iteration import Iteration
@@ -36,10 +35,12 @@ from photogram.results.saved import (
     point_parts,
     read_saved,
     rows_of,
+    sheet,
     written,
 )
+from photogram.results.tables import TABLES
 from photogram.results.unknowns import AdjustedUnknown
-from photogram.show.ways import columns_of, files_of
+from photogram.show.ways import files_of
 
 __all__ = ["KIND", "block_files", "read_block_result"]
 
@@ -97,9 +98,7 @@ def block_files(result: Result) -> dict[str, Content]:
             _named("point", block.point_ids, block.image_points),
         ],
     }
-    tables = {
-        name: plain_columns(columns_of(result, kind), block.linear_unit) for name, kind in _TABLES.items()
-    }
+    tables = {name: sheet(TABLES[kind](result)) for name, kind in _TABLES.items()}
     summary = {
         "title": block.title,
         "linear_unit": block.linear_unit,

@@ -1,199 +1,309 @@
-"""The tables of results: named columns.
-
-Every column that has a unit other than the linear unit of the object space says it in its name.
-"""
+"""The tables of an adjusted block, quantity by quantity."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from operator import attrgetter
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
-from photogram.network.block import ATTITUDE_COLUMNS, position_columns
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.results.axes import TURNS, component_axis, image_axes, point_axes
+from photogram.results.cameras import AdjustedCamera
 from photogram.results.features import Features
-from photogram.results.network import AdjustedNetwork, Observed
+from photogram.results.group_sums import observables, sums_of
+from photogram.results.grouping import grouped
+from photogram.results.kinds import ObservedKind
+from photogram.results.network_tables import (
+    Terms,
+    control,
+    deviation,
+    difference,
+    images,
+    names,
+    photos,
+    points,
+    redundancy,
+    stations,
+    terms_of,
+    test_value,
+)
 from photogram.results.result import Result
+from photogram.results.unknowns import AdjustedUnknown
+from photogram.show.quantity import Axis, Quantity, component, frame, joined, long
 from photogram.show.ways import columns_of
+from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["images", "named", "observed", "table"]
+__all__ = [
+    "TABLES",
+    "block_points",
+    "camera_parameters",
+    "check_points",
+    "observations",
+    "observed_components",
+    "redundancy_by_kind",
+    "unheld",
+    "unknowns",
+]
+
+_EITHER = "standard deviation that was given, or is assumed: {}"
+_FEATURES: dict[str, tuple[Literal["name", "value", "number"], str]] = {
+    "feature": ("name", "name of the feature"),
+    "kind": ("name", "what it is"),
+    "points": ("number", "number of points"),
+    "point": ("name", "name of the point"),
+    "quantity": ("name", "what is said of it"),
+    "direction": ("name", "of the deviation"),
+    "unit": ("name", "unit of the numbers of this row; empty for plain numbers"),
+    "value": ("value", "adjusted"),
+    "sd": ("value", "standard deviation"),
+    "k": ("number", "coverage factor"),
+    "expanded": ("value", "expanded uncertainty, k times the standard deviation"),
+    "deviation": ("value", "distance of the point from the feature"),
+}
+"""What the columns of features have."""
 
 
 @columns_of.register(Result)
-def table(result: Result, what: str) -> dict[str, Any]:
-    """Return the columns of one kind of thing: `_TABLES` lists them."""
-    return _TABLES[what](result)
+def _columns(result: Result, what: str) -> dict[str, Any]:
+    return frame(TABLES[what](result))
 
 
-def _photos(result: Result) -> dict[str, Any]:
-    """`photo`, position, attitude, and `sd_` of each; angles in degrees."""
-    names = [*position_columns(result.block), *ATTITUDE_COLUMNS]
-    values = np.hstack([result.photo_positions, result.photo_attitudes])
-    photos = _ids(result.block.photo_ids)
-    return {"photo": photos, **named(names, values), **named(names, result.photo_sd, "sd_")}
+@terms_of.register(Result)
+def _terms(result: Result) -> Terms:
+    block, axes = result.block, point_axes(result.block)
+    return Terms(
+        photos=np.array(block.photo_ids, dtype=object),
+        points=np.array(block.point_ids, dtype=object),
+        image_photos=block.image_photos,
+        photo_axes=(*axes, *TURNS),
+        point_axes=axes,
+        image_axes=image_axes(block.image_unit),
+        photo_values=np.hstack([result.photo_positions, result.photo_attitudes]),
+        point_given=block.point_positions,
+        layers={"Positions": slice(0, 3), "Attitudes": slice(3, 6)},
+        parts={"position": slice(0, 3), "attitude_rad": slice(3, 6)},
+        split=True,
+    )
 
 
-def _points(result: Result) -> dict[str, Any]:
-    """`point`, `kind`, `rays`, coordinates, and `sd_` of each; angles in degrees."""
-    used, names = result.used_points, position_columns(result.block)
-    return {
-        "point": _ids(result.block.point_ids)[used],
-        "kind": result.point_kinds[used],
-        "rays": result.point_rays[used],
-        **named(names, result.point_positions[used]),
-        **named(names, result.point_sd[used], "sd_"),
-    }
+def block_points(result: Result) -> list[Quantity]:
+    """Return the points that took part, with what they are."""
+    own, *rest = points(result)
+    kinds = result.point_kinds[result.used_points]
+    return [
+        own,
+        Quantity(kinds, kind="name", name="kind", member="kind", about="what it is", head="Kind"),
+        *rest,
+    ]
 
 
-def _images(result: Result) -> dict[str, Any]:
-    """Residuals in the unit of image coordinates, redundancy numbers, standardized residuals."""
-    block, used = result.block, result.used_images
-    return {
-        "photo": _ids(block.photo_ids)[block.image_photos[used]],
-        "point": _ids(block.point_ids)[block.image_points[used]],
-        **images(result, block.image_unit),
-    }
-
-
-def _check_points(result: Result) -> dict[str, Any]:
-    """`d_`, adjusted minus given; standard deviations of both (`sd_`, `given_sd_`); test and probability."""
-    checks, names = result.check_points, position_columns(result.block)
+def check_points(result: Result) -> list[Quantity]:
+    """Return check points: adjusted minus given, standard deviations of both, tests with probabilities."""
+    checks = result.check_points
     statistic, p = checks.statistics
-    return {
-        "point": _ids(checks.names),
-        **named(names, checks.differences, "d_"),
-        **named(names, checks.sd, "sd_"),
-        **named(names, checks.given_sd, "given_sd_"),
-        "assumed": checks.assumed,
-        "statistic": statistic,
-        "probability": p,
-    }
-
-
-def _control(result: Result) -> dict[str, Any]:
-    control = result.control
-    points = _ids(result.block.point_ids)[control.rows]
-    return {"point": points, **observed(position_columns(result.block), control)}
-
-
-def _stations(result: Result) -> dict[str, Any]:
-    stations = result.stations
-    names = [*position_columns(result.block), *ATTITUDE_COLUMNS]
-    return {"photo": _ids(result.block.photo_ids)[stations.rows], **observed(names, stations)}
-
-
-def _beside_images(result: Result) -> dict[str, Any]:
-    """Name what there is of each component: one row; what was not observed or left out has none."""
-    rows = [
-        (each.kind, each.names[i], each.components[k], each.units[k], *(values[i, k] for values in numbers))
-        for each in result.kinds.values()
-        for numbers in [(each.sd, each.residuals, each.redundancy, each.standardized)]
-        for i, k in np.argwhere(~np.isnan(each.residuals)).tolist()
+    return [
+        *_compared(result, checks.rows, checks.differences, checks.given_sd, checks.assumed),
+        Quantity(
+            checks.assumed,
+            name="assumed",
+            member="assumed",
+            about="whether nothing was given: standard deviations of control are assumed",
+        ),
+        Quantity(
+            statistic,
+            name="statistic",
+            member="statistic",
+            about="of the test: T, or F where the unit weight is estimated",
+        ),
+        Quantity(p, name="probability", member="p", about="of a statistic as large where nothing is wrong"),
     ]
-    names = ("kind", "of", "component", "unit", "sd", "residual", "redundancy", "standardized")
-    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
 
-def _cameras(result: Result) -> dict[str, Any]:
-    """Name what there is of each parameter: `sd_given` is infinite for free ones and 0 for those held."""
-    rows = [
-        (each.name, each.camera.model, name, each.camera.unit_of(name), *numbers)
-        for each in result.cameras
-        for name, *numbers in zip(
-            each.names,
-            each.given.values,
-            each.given.deviations,
-            each.values,
-            each.sd,
-            each.redundancy,
-            strict=True,
-        )
+def unheld(result: Result) -> list[Quantity]:
+    """Return those components of control that are not held, but have a value to compare with."""
+    held = np.isfinite(result.block.point_sd)
+    there = held.any(axis=1, keepdims=True) & ~held & result.used_points[:, np.newaxis]
+    differences = np.where(there, result.point_differences, np.nan)
+    rows = np.flatnonzero(np.isfinite(differences).any(axis=1))
+    unknown = np.full((len(rows), 3), np.nan)
+    return _compared(result, rows, differences[rows], unknown, np.zeros(len(rows), dtype=bool))
+
+
+def _compared(
+    result: Result, rows: Indices, differences: Floats, given_sd: Floats, assumed: Bools
+) -> list[Quantity]:
+    terms, axes, sd = terms_of(result), point_axes(result.block), result.point_sd[rows]
+    labels = np.where(assumed, "sd assumed", "sd given").tolist()
+    with np.errstate(all="ignore"):
+        tests = differences / np.hypot(sd, np.nan_to_num(given_sd))
+    return [
+        names(terms, "point", rows, "id"),
+        Quantity(terms.point_given[rows], axes, "value", head="Given"),
+        Quantity(result.point_positions[rows], axes, "value", head="Adjusted"),
+        difference(differences, axes),
+        deviation(sd, axes, label="sd adjusted", head="sd adjusted"),
+        deviation(
+            given_sd, axes, name="given_sd", member="given_sd", label=labels, head="sd given", about=_EITHER
+        ),
+        Quantity(tests, axes, head="Test value", decimals=2),
     ]
-    names = ("camera", "model", "parameter", "unit", "given", "sd_given", "value", "sd", "redundancy")
-    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
 
-def _unknowns(result: Result) -> dict[str, Any]:
-    """Name what there is of each component: `sd_given` is infinite for free ones and 0 for those held."""
-    rows = [
-        (each.kind, each.name, component, unit, *numbers)
-        for each in result.unknowns
-        for component, unit, *numbers in zip(
-            each.components,
-            each.units,
-            each.given.deviations,
-            each.values,
-            each.change,
-            each.sd,
-            each.redundancy,
-            each.standardized,
-            strict=True,
-        )
+def observations(kind: ObservedKind) -> list[Quantity]:
+    """Return the observations of one kind."""
+    axes = tuple(map(component_axis, kind.components, kind.units))
+    kinds, names = (np.array(texts, dtype=object) for texts in ([kind.kind] * len(kind.names), kind.names))
+    return [
+        Quantity(kinds, kind="name", name="kind", member="kind", about="what it is"),
+        Quantity(names, kind="name", name="of", about="names of points and photos", head="Of"),
+        deviation(kind.sd, axes, head="sd given"),
+        Quantity(
+            kind.residuals,
+            axes,
+            "deviation",
+            "residual",
+            "residual",
+            "observed minus adjusted",
+            "residual",
+            "Residual",
+        ),
+        redundancy(kind.redundancy, axes),
+        test_value(kind.standardized, axes),
     ]
-    names = ("kind", "unknown", "component", "unit", "sd_given", "value", "change", "sd", "redundancy")
-    return {name: [row[k] for row in rows] for k, name in enumerate((*names, "standardized"))}
 
 
-def _features(result: Result) -> dict[str, Any]:
-    """`value`, `sd`, `k`, and `expanded`, k times sd, of each quantity."""
-    return (result.features or Features(())).columns()
+def observed_components(kinds: Iterable[ObservedKind]) -> list[Quantity]:
+    """Return the components of observations, one under the other; not what was not observed or left out."""
+    every = [long(observations(each), np.argwhere(~np.isnan(each.residuals))) for each in kinds]
+    return joined(every or [long(observations(_NOTHING), np.argwhere(_EMPTY))])
 
 
-def _deviations(result: Result) -> dict[str, Any]:
-    """Distances of points from their features, in each direction, with `sd`."""
-    return (result.features or Features(())).deviation_columns()
+_EMPTY, _NONE = np.zeros((0, 1)), np.zeros(0)
+_NOTHING = ObservedKind(
+    *("", np.zeros(0, dtype=np.int64), [], ("",), ("",)), *(_EMPTY, _EMPTY, _EMPTY, _EMPTY), *(_NONE, _NONE)
+)
 
 
-_TABLES: dict[str, Callable[[Result], dict[str, Any]]] = {
-    "photo": _photos,
-    "point": _points,
-    "image": _images,
-    "check": _check_points,
-    "control": _control,
-    "station": _stations,
-    "observation": _beside_images,
-    "camera": _cameras,
-    "unknown": _unknowns,
-    "feature": _features,
-    "deviation": _deviations,
+def redundancy_by_kind(result: Result) -> list[Quantity]:
+    """Return number, redundancy and weighted sum of squares of every kind, and the factor of its deviations.
+
+    The redundancies sum to the degrees of freedom; nothing without them, or with a loss.
+    """
+    names, numbers = list[str](), np.zeros((0, 3))
+    if result.redundancies is not None and result.loss is None:
+        grouping = grouped(observables(result), "kind")
+        counts, squares, redundancy = sums_of(result, grouping)
+        names, numbers = list(grouping.groups.names), np.column_stack([counts, redundancy, squares])
+        others = result.redundancies.total - float(redundancy.sum())
+        if abs(others) > TESTABLE:
+            names.append("cameras and common unknowns")
+            numbers = np.vstack([numbers, [np.nan, others, np.nan]])
+        names.append("all")
+        total = [np.nan, result.redundancies.total, result.sums_of_squares.total]
+        numbers = np.vstack([numbers, total])
+    count, redundancy, squares = numbers.T
+    own = redundancy > TESTABLE
+    own[-1:] = False
+    factor = np.sqrt(np.divide(squares, redundancy, out=np.full(len(own), np.nan), where=own))
+    return [
+        Quantity(names, kind="name", head="Kind of observation"),
+        Quantity(count, head="Number", decimals=0),
+        Quantity(redundancy, head="Redundancy", decimals=2),
+        Quantity(squares, head="Weighted sum of squares", decimals=2),
+        Quantity(factor, head="Factor of sd", decimals=3),
+    ]
+
+
+def unknowns(every: Sequence[AdjustedUnknown]) -> list[Quantity]:
+    """Return the components of common unknowns: standard deviations given are infinite for free ones."""
+    axes = tuple(
+        component_axis(*both) for each in every for both in zip(each.components, each.units, strict=True)
+    )
+    rows: dict[str, Any] = {"of": np.arange(len(axes))}
+    value = Quantity(_all(every, "values"), axes, "deviation", "value", "", "adjusted", **rows, label="value")
+    return [
+        Quantity(_each(every, "kind"), kind="name", name="kind", about="what it is", head="Kind"),
+        Quantity(_each(every, "name"), kind="name", name="unknown", about="name of the unknown", head="Name"),
+        *component(axes, **rows),
+        deviation(_all(every, "given.deviations"), axes, **rows, **_GIVEN_SD),
+        replace(value, head="Adjusted", figures=7),
+        difference(_all(every, "change"), axes, **rows, name="change", label="change", head="Change"),
+        deviation(_all(every, "sd"), axes, **rows, head="sd adjusted"),
+        redundancy(_all(every, "redundancy"), axes, **rows),
+        test_value(_all(every, "standardized"), axes, **rows),
+    ]
+
+
+def camera_parameters(every: Sequence[AdjustedCamera]) -> list[Quantity]:
+    """Return the parameters of cameras: standard deviations given are infinite for free ones, 0 for held."""
+    axes = tuple(Axis(name, each.camera.unit_of(name)) for each in every for name in each.names)
+    rows: dict[str, Any] = {"of": np.arange(len(axes))}
+    names, units = component(axes, **rows)
+    about = "which of its parameters"
+    return [
+        Quantity(_each(every, "name"), kind="name", name="camera", about="name of the camera"),
+        Quantity(_each(every, "camera.model"), kind="name", name="model", about="model of the camera"),
+        replace(names, name="parameter", member="name", about=about),
+        replace(units, member="unit"),
+        Quantity(_all(every, "given.values"), axes, "value", "given", "given", "as it was given", **rows),
+        deviation(_all(every, "given.deviations"), axes, **rows, member="sd_given", **_GIVEN_SD),
+        Quantity(_all(every, "values"), axes, "value", "value", "value", "adjusted", **rows),
+        deviation(_all(every, "sd"), axes, **rows),
+        redundancy(_all(every, "redundancy"), axes, **rows),
+    ]
+
+
+_GIVEN_SD: dict[str, Any] = {
+    "name": "sd_given",
+    "label": "sd given",
+    "head": "sd given",
+    "about": "standard deviation that was given: infinite free, 0 held",
 }
 
 
-def images(result: AdjustedNetwork, unit: str) -> dict[str, Any]:
-    """Name what there is of the image observations that took part."""
-    used = result.used_images
-    return {
-        **named((f"residual_x_{unit}", f"residual_y_{unit}"), result.residuals[used]),
-        **named(("redundancy_x", "redundancy_y"), result.redundancy[used]),
-        **named(("standardized_x", "standardized_y"), result.standardized[used]),
-    }
+def _all(every: Sequence[Any], what: str) -> Floats:
+    """Return an array of each, one behind the other."""
+    return np.concatenate([np.zeros(0), *map(attrgetter(what), every)])
 
 
-def observed(names: Sequence[str], given: Observed) -> dict[str, Any]:
-    """Name what there is of observed components: differences and `sd_` in their units, plain numbers without.
-
-    Differences are adjusted minus given, as of check points, and test values have their sign. Where `sd_`
-    is 0 a component is fixed, where it is infinite it is not observed.
-    """
-    plain = [name.removesuffix("_deg").removesuffix("_rad").removesuffix("_px") for name in names]
-    return {
-        **named(names, given.differences, "d_"),
-        **named(names, given.sd, "sd_"),
-        **named(plain, given.redundancy, "redundancy_"),
-        **named(plain, given.tests, "standardized_"),
-    }
+def _each(every: Sequence[Any], what: str) -> Any:
+    """Return a text of each, as often as it has numbers."""
+    counts = [len(each.values) for each in every]
+    return np.repeat(np.array([*map(attrgetter(what), every)], dtype=object), counts)
 
 
-def named(names: Sequence[str], values: Floats, prefix: str = "") -> dict[str, Any]:
-    """Name the columns of an array, in degrees where the name says so."""
-    with np.errstate(over="ignore"):  # infinite then
-        return {
-            prefix + name: np.degrees(column) if name.endswith("_deg") else column
-            for name, column in zip(names, values.T, strict=True)
-        }
+def _features(result: Result) -> list[Quantity]:
+    """Return value, standard deviation, k and U of each quantity of features."""
+    return _told((result.features or Features(())).columns())
 
 
-def _ids(names: Sequence[str]) -> NDArray[np.object_]:
-    return np.array(names, dtype=object)
+def _feature_deviations(result: Result) -> list[Quantity]:
+    """Return distances of points from their features, in each direction."""
+    return _told((result.features or Features(())).deviation_columns())
+
+
+def _told(columns: Mapping[str, Any]) -> list[Quantity]:
+    return [
+        Quantity(values, kind=kind, name=name, about=about)
+        for name, values in columns.items()
+        for kind, about in [_FEATURES[name]]
+    ]
+
+
+TABLES: dict[str, Callable[[Result], list[Quantity]]] = {
+    "photo": photos,
+    "point": block_points,
+    "image": images,
+    "check": check_points,
+    "control": control,
+    "station": stations,
+    "observation": lambda result: observed_components(result.kinds.values()),
+    "camera": lambda result: camera_parameters(result.cameras),
+    "unknown": lambda result: unknowns(result.unknowns),
+    "feature": _features,
+    "deviation": _feature_deviations,
+}
+"""The tables by the kind of things that have their rows."""

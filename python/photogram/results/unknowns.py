@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,12 +11,11 @@ from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.types import Floats
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
-from photogram.show.angles import ARCSEC
 
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["AdjustedUnknown", "adjusted_unknowns", "unknown_lines"]
+__all__ = ["AdjustedUnknown", "adjusted_unknowns"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,24 +125,3 @@ def adjusted_unknowns(
             )
         )
     return tuple(found)
-
-
-def unknown_lines(unknowns: Sequence[AdjustedUnknown]) -> list[str]:
-    """Write a line for each component, rotations in arcsec."""
-    if not unknowns:
-        return []
-    columns = ("value", "change", "sd given", "sd", "redundancy")
-    lines = [f"{'unknown':<28}{'component':<22}" + "".join(f"{column:>15}" for column in columns)]
-    for each in unknowns:
-        sd_given = np.where(np.isfinite(each.given.deviations), each.given.deviations, np.nan)
-        parts = (each.values, each.change, sd_given, each.sd)
-        for k, (name, unit) in enumerate(zip(each.components, each.units, strict=True)):
-            outward = 1.0 / ARCSEC if unit == "rad" else 1.0
-            cells = "".join(_cell(part[k] * outward, 6) for part in parts) + _cell(each.redundancy[k], 3)
-            shown = f"{name} {'arcsec' if unit == 'rad' else unit}".rstrip()
-            lines.append(f"{each.given.title:<28}{shown:<22}{cells}")
-    return lines
-
-
-def _cell(value: float, decimals: int) -> str:
-    return f"{value:>15.{decimals}f}" if math.isfinite(value) else f"{'-':>15}"

@@ -12,8 +12,8 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
 from photogram.formats.placing import Placed, placed
 from photogram.formats.project import frame_of
+from photogram.results.axes import point_axes
 from photogram.results.ellipses import CONFIDENCE, ellipses, fitting_scale
-from photogram.results.findings import axes
 from photogram.results.footprints import footprints
 from photogram.results.result import Result
 from photogram.statistics.limits import normal_limit
@@ -333,7 +333,7 @@ def _images(result: Result, tests: Floats, places: Floats) -> Iterator[_Suspect]
 def _observed(found: Placed, places: Floats) -> Iterator[_Suspect]:
     """Return components of control and stations."""
     result, block = found.result, found.result.block
-    names = (*axes(result), *_ANGLES)
+    names = (*(axis.name for axis in point_axes(result.block)), *_ANGLES)
     units = (
         *(("rad", "rad") if block.geographic else (block.linear_unit,) * 2),
         block.linear_unit,

@@ -7,23 +7,108 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.arguments.types import Floats
 from photogram.results.network import AdjustedNetwork
-from photogram.results.page.observed import Images, Worst, limit_of, worst_table
-from photogram.show.judgement import verdict_table
+from photogram.results.network_tables import iterations, terms_of
+from photogram.results.page.observed import Worst, limit_of, worst_images, worst_of, worst_table
+from photogram.results.page.pictures import drawings
+from photogram.results.page.tables import photos_section, points_section
+from photogram.results.report import ORDERINGS
+from photogram.show.cells import page_table, unit_written
+from photogram.show.judgement import remarks_section, verdict_table
 from photogram.show.page import Column, Drawing, Fact, Facts, Part, Row, Section, Table, significant
+from photogram.show.quantity import Quantity
 from photogram.statistics.findings import Tested
 
 __all__ = [
-    "images_facts",
-    "iterations_section",
-    "precision_table",
-    "tests_section",
-    "unit_weight",
-    "worst_section",
+    "highlights",
+    "network_sections",
+    "size_section",
 ]
 
 _NOT_CHECKED = 0.01
+
+
+def network_sections(
+    result: AdjustedNetwork,
+    groups: Sequence[Tested],
+    size: Section,
+    given: Sequence[Section],
+    table: Sequence[Quantity],
+    problems: Sequence[str],
+    *,
+    redundancy: Sequence[Table] = (),
+    beside: Sequence[Section] = (),
+    datum: str = "",
+) -> list[Section]:
+    """Return the sections of the page of a network.
+
+    Parameters
+    ----------
+    result, groups
+        The network, and its tested observations.
+    size, given
+        How much and how good it is, and the sections of what was given.
+    table
+        Its points.
+    problems
+        Remarks at the end.
+    redundancy
+        Beside the picture of redundancy numbers.
+    beside
+        What stands beside the plan.
+    datum
+        What coordinates refer to.
+    """
+    pictures, found = drawings(result), worst_of(groups)
+    photos, points = worst_images(result, found)
+    intro = (
+        "The redundancy number of an observation is the share of its error that shows in its own"
+        " residual; the rest"
+        " goes into the unknowns. Their sum is the number of observations beyond what is needed."
+    )
+    return [
+        Section("network", "Plan of the network", [pictures["network"]]),
+        *beside,
+        size,
+        Section("residuals", "Image residuals", [pictures["residuals"]]),
+        Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], intro),
+        tests_section(result, pictures["tests"]),
+        worst_section(result, groups, found),
+        *given,
+        photos_section(result, photos, datum),
+        points_section(result, table, points, datum),
+        iterations_section(result),
+        remarks_section(problems),
+    ]
+
+
+def size_section(
+    result: AdjustedNetwork, much: Sequence[tuple[str, str]], more: Sequence[Fact], good: Sequence[Fact]
+) -> Section:
+    """Return how much there is, `more` of it, and how good it is."""
+    facts = [Fact(f"{name[:1].upper()}{name[1:]}", value) for name, value in much]
+    facts.append(Fact("Degrees of freedom", f"{result.degrees_of_freedom:.8g}"))
+    parts: list[Part] = [
+        Facts("How much", [*facts, *more]),
+        Facts("How good", [*good, *images_facts(result)]),
+        *precision_table(result),
+    ]
+    return Section("size", "How much, how good", parts)
+
+
+def highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
+    """Return what a reader wants first of every network, with its number of photos."""
+    used, (axis, _) = result.used_images, terms_of(result).image_axes
+    images, points = np.count_nonzero(used), np.count_nonzero(result.used_points)
+    found = [
+        unit_weight(result),
+        Fact("Photos", f"{photos:,}", note=f"{points:,} points, {images:,} images"),
+        Fact("Degrees of freedom", f"{result.degrees_of_freedom:,.0f}"),
+    ]
+    if images:
+        rms = math.sqrt(float(((result.residuals[used] * axis.factor) ** 2).mean()))
+        found.append(Fact("rms of image residuals", significant(rms, 3), unit_written(axis.small)))
+    return found
 
 
 def unit_weight(result: AdjustedNetwork) -> Fact:
@@ -50,10 +135,10 @@ def findings_test(result: AdjustedNetwork) -> tuple[float, float] | None:
     return None
 
 
-def images_facts(result: AdjustedNetwork, unit: str, factor: float) -> list[Fact]:
+def images_facts(result: AdjustedNetwork) -> list[Fact]:
     """Return how well images fit and are checked."""
-    used = result.used_images
-    residuals = result.residuals[used] * factor
+    used, (axis, _) = result.used_images, terms_of(result).image_axes
+    unit, residuals = unit_written(axis.small), result.residuals[used] * axis.factor
     if not len(residuals):
         return []
     with np.errstate(over="ignore"):
@@ -89,19 +174,18 @@ def images_facts(result: AdjustedNetwork, unit: str, factor: float) -> list[Fact
     return facts
 
 
-Spread = tuple[str, Sequence[str], Sequence[str], Floats]
-"""What has standard deviations, names and units of its components, and (n, k) of them."""
-
-
-def precision_table(spreads: Sequence[Spread]) -> Table | None:
-    """Return how the standard deviations of adjusted values are spread; None where none were computed."""
-    rows: list[Row] = []
-    for what, names, units, deviations in spreads:
-        for name, unit, column in zip(names, units, deviations.T, strict=True):
-            known = column[np.isfinite(column)]
+def precision_table(result: AdjustedNetwork) -> list[Table]:
+    """Return how the standard deviations of adjusted values are spread; none where none were computed."""
+    terms, rows = terms_of(result), list[Row]()
+    for what, axes, deviations in (
+        ("points", terms.point_axes, result.point_sd[result.used_points]),
+        ("photos", terms.photo_axes, result.photo_sd),
+    ):
+        for axis, column in zip(axes, deviations.T, strict=True):
+            known = column[np.isfinite(column)] * axis.factor
             if known.size:
                 figures = [float(each) for each in np.quantile(known, (0.5, 0.9, 1.0))]
-                rows.append([what, name, *figures, unit])
+                rows.append([what, axis.name, *figures, unit_written(axis.small)])
     columns = (
         Column("Standard deviations of", text=True),
         Column("Component", text=True),
@@ -111,60 +195,36 @@ def precision_table(spreads: Sequence[Spread]) -> Table | None:
         Column("Unit", text=True),
     )
     note = "A posteriori: scaled by the unit variance where that is estimated."
-    return Table("Precision", columns, rows, note) if rows else None
+    return [Table("Precision", columns, rows, note)] if rows else []
 
 
-def tests_section(result: AdjustedNetwork, drawing: Drawing | None) -> Section:
+def tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
     """Return all tests, and the picture of single ones."""
     table = verdict_table(result.verdict)
-    parts: list[Part] = [*([drawing] if drawing else []), *([table] if table.rows else [])]
+    parts: list[Part] = [drawing, *([table] if table.rows else [])]
     intro = "How the residuals agree with the standard deviations that were given, as a whole and one by one."
     return Section("tests", "Tests", parts, intro)
 
 
-def worst_section(
-    result: AdjustedNetwork, images: Images, groups: Sequence[Tested], worst: Sequence[Worst]
-) -> Section:
+def worst_section(result: AdjustedNetwork, groups: Sequence[Tested], worst: Sequence[Worst]) -> Section:
     """Return the worst observations."""
     intro = (
         "A residual alone says little: an error shows in it only by the share of its redundancy number."
         " The test"
         " value takes both into account. Names of photos and points lead to their rows below."
     )
-    parts = [worst_table(result, images, limit_of(groups), worst)] if worst else []
+    parts = [worst_table(result, limit_of(groups), worst)] if worst else []
     return Section("worst", "Worst observations", parts, intro)
 
 
 def iterations_section(result: AdjustedNetwork) -> Section:
     """Return the history."""
-    columns = (
-        Column("Iteration", decimals=0),
-        Column("Weighted sum of squares", figures=7),
-        Column("Largest change over sd", figures=3),
-        Column("Damping", figures=2),
-    )
-    first: Row = [0, result.initial_weighted_sum_of_squares, None, None]
-    rows: list[Row] = [
-        first,
-        *([i.number, i.weighted_sum_of_squares, i.largest_change, i.damping] for i in result.iterations),
-    ]
     facts = [
         Fact("Status", result.status),
-        Fact("Photos eliminated", _ORDERINGS.get(result.ordering, result.ordering)),
+        Fact("Photos eliminated", ORDERINGS.get(result.ordering, result.ordering)),
     ]
     if result.loss is not None:
         facts.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
     note = "Damping is 0 for a step of Gauss-Newton. The sum is that after the corrections of the iteration."
-    return Section(
-        "iterations", "Iterations", [Table("Iterations", columns, rows, note), Facts("Course", facts)]
-    )
-
-
-_ORDERINGS = {
-    "input": "in input order",
-    "rcm": "by reverse Cuthill-McKee",
-    "amd": "by minimum degree",
-    "dissection": "by nested dissection",
-    "graph-dissection": "by dissection of the graph",
-    "parts": "in parts, and the separators between them",
-}
+    table = page_table("Iterations", iterations(result), note)
+    return Section("iterations", "Iterations", [table, Facts("Course", facts)])

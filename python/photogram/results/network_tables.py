@@ -1,0 +1,220 @@
+"""What is known of the photos, points and images of every network, quantity by quantity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.results.network import AdjustedNetwork, Observed
+from photogram.show.quantity import Axis, Link, Quantity
+
+__all__ = [
+    "Terms",
+    "control",
+    "deviation",
+    "difference",
+    "images",
+    "iterations",
+    "names",
+    "part",
+    "photos",
+    "points",
+    "redundancy",
+    "stations",
+    "terms_of",
+    "test_value",
+]
+
+_FREE = {np.inf: "free", 0.0: "fixed"}
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """What the photos, points and images of a network are called and measured in.
+
+    Attributes
+    ----------
+    photos, points
+        (P,), (n,) names, or numbers from 0.
+    image_photos
+        (m,) the photo of each image.
+    photo_axes, point_axes, image_axes
+        Unknowns of a photo, coordinates of a point, image coordinates.
+    photo_values
+        (P, k) adjusted unknowns.
+    point_given
+        (n, 3) coordinates as they were given.
+    layers, parts
+        What the unknowns of a photo consist of: how people call it, and JSON documents.
+    split
+        Whether JSON documents tell differences of positions from those of attitudes.
+    """
+
+    photos: np.ndarray
+    points: np.ndarray
+    image_photos: Indices
+    photo_axes: tuple[Axis, ...]
+    point_axes: tuple[Axis, ...]
+    image_axes: tuple[Axis, ...]
+    photo_values: Floats
+    point_given: Floats
+    layers: Mapping[str, slice]
+    parts: Mapping[str, slice]
+    split: bool = False
+
+    @property
+    def identity(self) -> str:
+        """How JSON documents call the name or number of a thing."""
+        return "number" if self.points.dtype.kind == "i" else "id"
+
+
+@singledispatch
+def terms_of(result: AdjustedNetwork) -> Terms:
+    """Return what the photos, points and images of a network are called and measured in."""
+    raise NotImplementedError(type(result).__name__)
+
+
+def names(terms: Terms, kind: str, rows: Indices, member: str = "", *, here: bool = False) -> Quantity:
+    """Return the names of photos or points, which lead to their rows on a page, or are these."""
+    every = terms.photos if kind == "photo" else terms.points
+    return Quantity(
+        every[rows],
+        kind="name",
+        name=kind,
+        member=member,
+        about=f"name of the {kind}",
+        head=kind.capitalize(),
+        link=Link(kind, rows, here),
+    )
+
+
+def part(each: Quantity, of: slice) -> Quantity:
+    """Return some components of a quantity."""
+    return replace(each, values=each.values[:, of], axes=each.axes[of])
+
+
+def photos(result: AdjustedNetwork) -> list[Quantity]:
+    """Return adjusted photos: names, values, standard deviations."""
+    terms = terms_of(result)
+    rows = np.arange(len(terms.photos))
+    return [
+        names(terms, "photo", rows, "id" if terms.identity == "id" else "", here=True),
+        Quantity(
+            terms.photo_values, terms.photo_axes, "value", name="", member=terms.parts, head="{}", figures=6
+        ),
+        deviation(result.photo_sd, terms.photo_axes, member=""),
+    ]
+
+
+def points(result: AdjustedNetwork) -> list[Quantity]:
+    """Return the points that took part: names, rays, coordinates, standard deviations."""
+    terms, used = terms_of(result), np.flatnonzero(result.used_points)
+    rays, places, sd = result.point_rays[used], result.point_positions[used], result.point_sd[used]
+    return [
+        names(terms, "point", used, terms.identity, here=True),
+        Quantity(rays, name="rays", member="rays", head="Rays", decimals=0),
+        Quantity(places, terms.point_axes, "value", name="", member="position", head="{}", figures=7),
+        deviation(sd, terms.point_axes, member=""),
+    ]
+
+
+def images(result: AdjustedNetwork, first: int | None = None) -> list[Quantity]:
+    """Return the images that took part, or the first of them: residuals, redundancy numbers, test values."""
+    terms, used = terms_of(result), np.flatnonzero(result.used_images)[:first]
+    axes, (unit, *_) = terms.image_axes, (axis.unit for axis in terms.image_axes)
+    return [
+        names(terms, "photo", terms.image_photos[used], "photo"),
+        names(terms, "point", result.image_points[used], "point"),
+        Quantity(result.residuals[used], axes, "deviation", name="residual", member=f"residual_{unit}"),
+        redundancy(result.redundancy[used], axes),
+        test_value(result.standardized[used], axes),
+    ]
+
+
+def iterations(result: AdjustedNetwork) -> list[Quantity]:
+    """Return the history: numbers, sums after the corrections, largest changes, damping; first the start."""
+    first = [(0, result.initial_weighted_sum_of_squares, np.nan, np.nan)]
+    rows = [(i.number, i.weighted_sum_of_squares, i.largest_change, i.damping) for i in result.iterations]
+    number, squares, change, damping = np.array([*first, *rows]).T
+    return [
+        Quantity(number.astype(int), member="number", head="Iteration", decimals=0),
+        Quantity(squares, member="weighted_sum_of_squares", head="Weighted sum of squares", figures=7),
+        Quantity(change, member="largest_change_sd", head="Largest change over sd"),
+        Quantity(damping, member="damping", head="Damping", figures=2),
+    ]
+
+
+def control(result: AdjustedNetwork) -> list[Quantity]:
+    """Return points as observations of their own coordinates."""
+    terms, own = terms_of(result), result.control
+    values = result.point_positions, result.point_sd
+    return _observed("point", terms, own, terms.point_axes, terms.point_given[own.rows], *values)
+
+
+def stations(result: AdjustedNetwork) -> list[Quantity]:
+    """Return photos as observations of their own unknowns."""
+    terms, own = terms_of(result), result.stations
+    given = (terms.photo_values + result.photo_residuals)[own.rows]
+    return _observed("photo", terms, own, terms.photo_axes, given, terms.photo_values, result.photo_sd)
+
+
+def _observed(
+    kind: str,
+    terms: Terms,
+    own: Observed,
+    axes: tuple[Axis, ...],
+    given: Floats,
+    adjusted: Floats,
+    sd: Floats,
+) -> list[Quantity]:
+    """Return prior, posterior, difference and test of observed components."""
+    rows = own.rows
+
+    def members(what: str) -> Any:
+        if not terms.split:
+            return what
+        of_photo = {f"attitude_{what}_rad": slice(3, 6)} if kind == "photo" else {}
+        return {f"position_{what}": slice(0, 3), **of_photo}
+
+    return [
+        names(terms, kind, rows, terms.identity),
+        Quantity(given, axes, "value", head="Given"),
+        Quantity(adjusted[rows], axes, "value", head="Adjusted"),
+        difference(own.differences, axes, member=members("difference")),
+        deviation(own.sd, axes, member=members("sd"), label="sd", head="sd given", words=_FREE),
+        Quantity(sd[rows], axes, "deviation", head="sd adjusted"),
+        redundancy(own.redundancy, axes, seen=np.isfinite(own.sd) & (own.sd > 0)),
+        test_value(own.tests, axes),
+    ]
+
+
+def difference(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
+    """Return adjusted minus given values."""
+    about, head = "adjusted minus given: {}", "Adjusted - given"
+    own = {"name": "d", "member": "difference", "label": "difference", "about": about, "head": head}
+    return Quantity(values, axes, "difference", **(own | more))
+
+
+def deviation(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
+    """Return standard deviations."""
+    own = {"name": "sd", "member": "sd", "label": "sd", "about": "standard deviation: {}", "head": "sd {}"}
+    return Quantity(values, axes, "deviation", **(own | more))
+
+
+def redundancy(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
+    """Return redundancy numbers."""
+    own: dict[str, Any] = dict.fromkeys(("name", "member", "label"), "redundancy")
+    about = "redundancy number: {}"
+    return Quantity(values, axes, **own, about=about, head="Redundancy", decimals=3, **more)
+
+
+def test_value(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
+    """Return residuals over their standard deviations, a priori unit weight."""
+    own: dict[str, Any] = dict.fromkeys(("name", "member", "label"), "standardized")
+    about = "residual over its standard deviation, a priori unit weight: {}"
+    return Quantity(values, axes, **own, about=about, head="Test value w", decimals=2, **more)

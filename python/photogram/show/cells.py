@@ -1,0 +1,166 @@
+"""Tables of quantities on a page: a column for each component, or a row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import cycle
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.show.lines import degrees_written, unit_of
+from photogram.show.page import Cell, Column, Table, decimals_of, fixed
+from photogram.show.quantity import Axis, Quantity, long
+from photogram.show.quantity import Table as Quantities
+
+__all__ = ["LISTED", "long_table", "page_table", "unit_written"]
+
+LISTED = 120
+"""Rows of a table with a row for each component at most."""
+_SIGNS = {"arcsec": "″", "deg": "°", "um": "µm"}
+_MOST_OF_DEGREES = 9
+
+Written = Cell | str | float | None
+"""What stands in a cell."""
+
+
+def unit_written(unit: str) -> str:
+    """Return a unit with the signs that a page has for it."""
+    return _SIGNS.get(unit, unit)
+
+
+def page_table(caption: str, table: Quantities, note: str = "", by: Floats | None = None) -> Table:
+    """Return a table of quantities; those without a head are left out.
+
+    Parameters
+    ----------
+    caption, note
+        Of the table on the page.
+    table
+        A column for each of their components, or one where each row is of one component.
+    by
+        Deviations (r, k) that say how many decimals the components have: two figures of the median.
+    """
+    columns: list[Column] = []
+    cells: list[list[Written]] = []
+    for each in table:
+        if not each.head:
+            continue
+        if each.of is not None and each.kind == "name":
+            columns.append(Column(each.head, text=True))
+            mixed = _mixed(each)
+            cells.append([_component(each.axes[k], mixed) for k in each.of.tolist()])
+        elif each.of is not None:
+            decimals = [] if by is None or each.kind == "deviation" else _decimals(each, by)
+            unit = "" if _mixed(each) else _unit(each, each.axes[0])
+            columns.append(_column(each, each.head, unit, max(decimals, default=None)))
+            rows = each.of.tolist()
+            counts = [decimals[k] for k in rows] if decimals else []
+            cells.append(_numbers(each, each.outward(), [each.axes[k] for k in rows], counts))
+        elif not each.axes:
+            columns.append(_column(each, each.head, "", None))
+            cells.append(_cells(each))
+        else:
+            counts = [None] * len(each.axes) if by is None else _decimals(each, by)
+            values = each.outward().T
+            for axis, count, own in zip(each.axes, counts, values, strict=True):
+                columns.append(_column(each, each.head.format(axis.name), _unit(each, axis), count))
+                cells.append(_numbers(each, own, [axis] * len(own), [count or 0]))
+    return Table(caption, columns, [*zip(*cells, strict=True)], note)
+
+
+def long_table(
+    caption: str, table: Quantities, tests: Floats, by: Floats | None = None, what: str = ""
+) -> list[Table]:
+    """Return a table with a row for each component that is there, those of the largest tests; none without.
+
+    Parameters
+    ----------
+    caption
+        Of the table on the page.
+    table
+        What it has; quantities without a head are left out.
+    tests
+        (n, k) test values, infinite where there is none, NaN where the component is not there.
+    by
+        Deviations (r, k) that say how many decimals values and differences have.
+    what
+        What rows are called where they are not all.
+    """
+    places = np.argwhere(~np.isnan(tests))
+    if not len(places):
+        return []
+    sizes = np.abs(tests[tuple(places.T)])
+    order = np.argsort(np.where(np.isinf(sizes), 1.0, -sizes), kind="stable")
+    kept = np.sort(order[:LISTED])
+    some = f"The {len(kept)} of {len(places)}{what} with the largest test values."
+    note = "" if len(kept) == len(places) else some
+    return [page_table(caption, long(table, places[kept]), note, by)]
+
+
+def _mixed(each: Quantity) -> bool:
+    return len({axis.small for axis in each.axes}) > 1
+
+
+def _component(axis: Axis, mixed: bool) -> str:
+    return f"{axis.name}, {unit_written(axis.small)}" if mixed and axis.small else axis.name
+
+
+def _column(each: Quantity, head: str, unit: str, decimals: int | None) -> Column:
+    count = each.decimals if decimals is None else decimals
+    return Column(head, unit, decimals=count, figures=each.figures, text=each.kind == "name")
+
+
+def _unit(each: Quantity, axis: Axis) -> str:
+    if each.kind == "value" and axis.angle == "dms":
+        return "° ′ ″"
+    return unit_written(unit_of(each, axis))
+
+
+def _decimals(each: Quantity, by: Floats) -> list[int]:
+    """Return the decimals of components: two figures of the median deviation, of degrees four more."""
+    found = []
+    for axis, column in zip(each.axes, np.reshape(by, (-1, len(each.axes))).T, strict=True):
+        count = decimals_of(column * axis.factor)
+        if each.kind == "number":
+            count = each.decimals or 0
+        elif each.kind == "value":
+            count = min(count + (4 if axis.angle == "deg" else 0), _MOST_OF_DEGREES)
+        elif each.kind == "difference":
+            count += 1
+        found.append(count)
+    return found
+
+
+def _cells(each: Quantity) -> list[Written]:
+    """Write names, and numbers that have no axis."""
+    plain = np.asarray(each.values).tolist()
+    if each.kind != "name":
+        return [*plain]
+    if each.link is None:
+        return [*map(str, plain)]
+    ids = [f"{each.link.kind}-{row}" for row in each.link.rows.tolist()]
+    if each.link.here:
+        return [Cell(str(name), id=own) for name, own in zip(plain, ids, strict=True)]
+    return [Cell(str(name), goes_to=own) for name, own in zip(plain, ids, strict=True)]
+
+
+def _numbers(each: Quantity, values: Floats, axes: Sequence[Axis], decimals: Sequence[int]) -> list[Written]:
+    """Write numbers as people see them, with the axis and the decimals of each."""
+    words = each.words or {}
+    counts = cycle(decimals or [0])
+    return [
+        words[value] if value in words else _number(each, value, axis, count)
+        for value, axis, count in zip(values.tolist(), axes, counts, strict=False)
+    ]
+
+
+def _number(each: Quantity, value: float, axis: Axis, decimals: int) -> Written:
+    if math.isfinite(value) and each.kind == "value" and axis.angle == "dms":
+        return Cell(degrees_written(value, decimals), sorts=math.degrees(value))
+    if each.kind == "value" and axis.angle:
+        return math.degrees(value)
+    # Differences of components that share a column have decimals of their own.
+    own = each.kind == "difference" and math.isfinite(value)
+    return Cell(fixed(value, decimals), sorts=value) if own else value

@@ -1,0 +1,142 @@
+"""Tables of reports as text: quantities side by side, each row on one line or on several."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.show.angles import degrees_minutes_seconds
+from photogram.show.quantity import Axis, Quantity
+
+__all__ = ["Field", "field", "stacked", "table_lines"]
+
+
+@dataclass(frozen=True)
+class Field:
+    """What stands in one place of each row: texts of one width under a head."""
+
+    head: str
+    texts: Sequence[str]
+
+
+def field(
+    quantity: Quantity, width: int, form: str = "", head: str = "{name} {unit}", gap: str = ""
+) -> list[Field]:
+    """Return a quantity as fields, one for each of its components.
+
+    Parameters
+    ----------
+    quantity
+        Numbers are set to the right, names to the left.
+    width
+        Of each.
+    form
+        How numbers are written, `.3f`; those that are not finite are `-` unless the quantity has a word for
+        them.
+    head
+        `{name}` and `{unit}` stand for those of the component.
+    gap
+        What stands before each.
+    """
+    if quantity.kind == "name":
+        plain = [*map(str, np.asarray(quantity.values).tolist())]
+        if quantity.of is not None:
+            components = [f"{axis.name} {axis.small}".rstrip() for axis in quantity.axes]
+            plain = [components[k] for k in quantity.of.tolist()]
+        texts = [f"{gap}{text:<{width}}" for text in plain]
+        return [Field(f"{gap}{head:<{width}}", texts)]
+    values = quantity.outward()
+    if quantity.single:
+        axis = Axis("")
+        return [_numbers(quantity, axis, values, width, form, head, gap)]
+    return [
+        _numbers(quantity, axis, column, width, form, head, gap)
+        for axis, column in zip(quantity.axes, values.T, strict=True)
+    ]
+
+
+def _numbers(
+    quantity: Quantity, axis: Axis, values: Floats, width: int, form: str, head: str, gap: str
+) -> Field:
+    unit = unit_of(quantity, axis)
+    named = f"{gap}{head.format(name=axis.name, unit=unit).strip():>{width}}"
+    if quantity.kind == "value" and axis.angle == "dms":
+        texts = [degrees_written(value, 5) if math.isfinite(value) else "-" for value in values.tolist()]
+        return Field(named, [f"{gap}{text:>{width}}" for text in texts])
+    if quantity.kind == "value" and axis.angle == "deg":
+        values = np.degrees(values)
+    whole = f"{gap}%{width}{form}"
+    texts = [whole % value for value in values.tolist()]
+    words: Mapping[float, str] = quantity.words or {}
+    odd = ~np.isfinite(values)
+    for number in words:
+        odd = odd | (values == number)
+    for row in np.flatnonzero(odd).tolist():
+        texts[row] = f"{gap}{words.get(float(values[row]), '-'):>{width}}"
+    return Field(named, texts)
+
+
+def unit_of(quantity: Quantity, axis: Axis) -> str:
+    """Return the unit in which people read a component of a quantity."""
+    if quantity.kind == "number":
+        return ""
+    if quantity.kind == "value":
+        return {"dms": "", "deg": "deg"}.get(axis.angle, axis.unit)
+    return axis.small
+
+
+def degrees_written(angle: float, decimals: int) -> str:
+    """Return an angle in degrees, minutes and seconds with decimals."""
+    degrees, minutes, seconds = degrees_minutes_seconds(angle, decimals)
+    width = decimals + 3 if decimals else 2
+    return f"{'-' if angle < 0 else ''}{degrees} {minutes:02d} {seconds:0{width}.{decimals}f}"
+
+
+def table_lines(*rows: Sequence[Field]) -> list[str]:
+    """Return a table: heads, then of each thing a line for each of the given rows; nothing without things.
+
+    Of rows without heads there is no line of heads.
+    """
+    if not rows[0][0].texts:
+        return []
+    heads = ["".join(each.head for each in row) for row in rows]
+    found = [head for head in heads if head.strip()]
+    texts = [map("".join, zip(*(each.texts for each in row), strict=True)) for row in rows]
+    for of_one in zip(*texts, strict=True):
+        found += of_one
+    return found
+
+
+def stacked(
+    names: Quantity,
+    head: str,
+    quantities: Sequence[tuple[Quantity, str]],
+    first: Sequence[Field] = (),
+    above: str = "{name} {unit}",
+) -> list[str]:
+    """Return a table in which each thing has a line for each quantity, under the names of the components.
+
+    Parameters
+    ----------
+    names, head
+        Of the things, and what they are.
+    quantities
+        With the forms in which their numbers are written.
+    first
+        What stands behind the first of the lines.
+    above
+        Heads of the components.
+    """
+    named = field(names, 10, head=head)
+    blank = [Field("", [" " * 10] * len(named[0].texts))]
+    rows = []
+    for place, (each, form) in enumerate(quantities):
+        labels = [each.label] * len(named[0].texts) if isinstance(each.label, str) else each.label
+        label = [Field(f"{'':<14}" if place == 0 else "", [f"{text:<14}" for text in labels])]
+        own = field(each, 18, form, above if place == 0 else "")
+        rows.append([*(named if place == 0 else blank), *label, *own, *(first if place == 0 else ())])
+    return table_lines(*rows)

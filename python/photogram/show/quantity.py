@@ -1,0 +1,236 @@
+"""Quantities: each declared once, as arrays with a name and a unit, and written everywhere from here.
+
+A table is a list of quantities of the same n things. `frame` makes files of commas and data frames of it,
+`records` JSON documents, `results.saved` Parquet, `show.lines` text, `show.cells` pages for the browser.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.show.angles import ARCSEC
+
+__all__ = [
+    "Axis",
+    "Link",
+    "Quantity",
+    "Table",
+    "chosen",
+    "component",
+    "frame",
+    "joined",
+    "labelled",
+    "long",
+    "records",
+]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A component of positions, attitudes, parameters or image coordinates.
+
+    Attributes
+    ----------
+    name
+        What it is called.
+    unit
+        Of its numbers; empty where it has none.
+    angle
+        How an angle is written for people: in degrees, minutes and seconds (`dms`), in degrees (`deg`), or as
+        it is.
+    suffix
+        What the names of its columns say of the unit.
+    small, factor
+        The unit in which people read its differences and deviations, and what leads to it.
+    """
+
+    name: str
+    unit: str = ""
+    angle: Literal["", "dms", "deg"] = ""
+    suffix: str = ""
+    small: str = ""
+    factor: float = 1.0
+
+    @classmethod
+    def of(cls, name: str, unit: str, suffix: str = "") -> Axis:
+        """Return an axis whose deviations have its own unit."""
+        return cls(name, unit, suffix=suffix, small=unit)
+
+    @classmethod
+    def turned(cls, name: str, angle: Literal["", "dms", "deg"] = "") -> Axis:
+        """Return an axis in radians, whose deviations are seconds of arc."""
+        return cls(name, "rad", angle, "_deg" if angle else "_rad", "arcsec", 1.0 / ARCSEC)
+
+
+@dataclass(frozen=True)
+class Link:
+    """Of which photos or points (`kind`) names are: `rows` of all; on a page theirs are `here`, or not."""
+
+    kind: str
+    rows: Indices
+    here: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """What is known of n things: one number or name of each, or k components.
+
+    Attributes
+    ----------
+    values
+        (n,), or (n, k) with k axes.
+    axes
+        The components; also of what has one of them in each row, as `of` says.
+    kind
+        `value`: in the unit of its axis, angles as people write them; `deviation`, `difference`: in its small
+        unit; `number`: without a unit; `name`: text, or the number of a thing.
+    name
+        Of its columns in files and data frames, before the names of the axes; None: it is not there.
+    member
+        Its name in JSON documents, or names of parts of its components; empty: it is not there.
+    about
+        A line for Parquet; `{}` stands for the name of an axis.
+    label
+        What stands before its line in a report as text, of all things or of each.
+    head, decimals, figures
+        Of its columns on a page; `{}` stands for the name of an axis. Significant figures where decimals are
+        None, and nothing else tells them. Without a head it is not there.
+    words
+        What stands for single numbers: `fixed` for 0.
+    seen
+        Where people see a number, of the form of the values; None: everywhere.
+    link
+        What a name leads to on a page.
+    of
+        (n,) which of the axes each row is of.
+    """
+
+    values: Any
+    axes: tuple[Axis, ...] = ()
+    kind: Literal["value", "deviation", "difference", "number", "name"] = "number"
+    name: str | None = None
+    member: str | Mapping[str, slice] = ""
+    about: str = ""
+    label: str | Sequence[str] = ""
+    head: str = ""
+    decimals: int | None = None
+    figures: int = 3
+    words: Mapping[float, str] | None = None
+    seen: Bools | None = None
+    link: Link | None = None
+    of: Indices | None = None
+
+    @property
+    def single(self) -> bool:
+        """Whether each thing has one value."""
+        return not self.axes or self.of is not None
+
+    def outward(self) -> Floats:
+        """Return the numbers that people see, in the units in which they read deviations and differences."""
+        values = np.asarray(self.values, dtype=float)
+        if self.seen is not None:
+            values = np.where(self.seen, values, np.nan)
+        if self.kind in ("deviation", "difference") and self.axes:
+            factors = np.array([axis.factor for axis in self.axes])
+            values = values * (factors if self.of is None else factors[self.of])
+        return values
+
+
+Table = Sequence[Quantity]
+"""Quantities of the same things."""
+
+
+def labelled(table: Table, label: str) -> Quantity:
+    """Return the quantity that has a label."""
+    return next(each for each in table if each.label == label)
+
+
+def chosen(table: Table, rows: Indices) -> list[Quantity]:
+    """Return the table of some of its things."""
+    found = []
+    for each in table:
+        link = each.link and replace(each.link, rows=each.link.rows[rows])
+        of = None if each.of is None else each.of[rows]
+        seen = None if each.seen is None else each.seen[rows]
+        found.append(replace(each, values=np.asarray(each.values)[rows], seen=seen, link=link, of=of))
+    return found
+
+
+def long(table: Table, places: Indices) -> list[Quantity]:
+    """Return a table with a row for each of some components: (r, 2) of which thing, and of which axis."""
+    rows, axis = places[:, 0], places[:, 1]
+    axes = next(each.axes for each in table if each.axes)
+    found = chosen([each for each in table if not each.axes], rows)
+    found = [*chosen([each for each in table if not each.axes], rows), *component(axes, axis)]
+    for each in table:
+        if each.axes:
+            seen = None if each.seen is None else each.seen[rows, axis]
+            found.append(replace(each, values=each.values[rows, axis], seen=seen, of=axis))
+    return found
+
+
+def component(axes: tuple[Axis, ...], of: Indices) -> list[Quantity]:
+    """Return which component each row of a table is of, and its unit."""
+    names, units = (
+        np.array([getattr(each, what) for each in axes], dtype=object) for what in ("name", "unit")
+    )
+    about = "unit of the numbers of this row; empty for plain numbers"
+    return [
+        Quantity(
+            names[of], axes, "name", "component", "", "which of its components", head="Component", of=of
+        ),
+        Quantity(units[of], (), "name", "unit", "", about),
+    ]
+
+
+def joined(tables: Sequence[Table]) -> list[Quantity]:
+    """Return tables of the same quantities, one under the other."""
+    found = []
+    for parts in zip(*tables, strict=True):
+        values = np.concatenate([np.asarray(each.values) for each in parts])
+        axes = tuple(axis for each in parts for axis in each.axes)
+        of = None
+        if parts[0].of is not None:
+            before = np.cumsum([0, *(len(each.axes) for each in parts)])[:-1]
+            of = np.concatenate([each.of + first for each, first in zip(parts, before, strict=True)])
+        found.append(replace(parts[0], values=values, axes=axes, of=of))
+    return found
+
+
+def frame(table: Table) -> dict[str, Any]:
+    """Return the columns of files and data frames: angles in degrees, names that say other units."""
+    found: dict[str, Any] = {}
+    for each in table:
+        if each.name is None:
+            continue
+        if each.single:
+            found[each.name] = each.values
+            continue
+        for axis, column in zip(each.axes, each.values.T, strict=True):
+            unit = "" if each.kind == "number" else axis.suffix
+            name = f"{each.name}_{axis.name}{unit}".removeprefix("_")
+            with np.errstate(over="ignore"):  # infinite then
+                found[name] = np.degrees(column) if axis.angle and unit else column
+    return found
+
+
+def records(table: Table) -> list[dict[str, Any]]:
+    """Return the rows of a JSON document: longitudes and latitudes in degrees, other angles in radians."""
+    columns: dict[str, Any] = {}
+    for each in table:
+        values = each.values
+        turned = [k for k, axis in enumerate(each.axes) if axis.angle == "dms" and each.kind != "number"]
+        if turned and each.of is None:
+            values = values.copy()
+            values[:, turned] = np.degrees(values[:, turned])
+        parts = each.member if isinstance(each.member, Mapping) else {each.member: slice(None)}
+        for name, part in parts.items():
+            if name:
+                own = values if isinstance(each.member, str) else values[:, part]
+                columns[name] = own.tolist() if isinstance(own, np.ndarray) else own
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
