@@ -249,8 +249,8 @@ def simulate(
         raise InputError("principal_distance and frame_size: the photos see too little, or to the horizon")
     if 2 * tilt > _FAR_MORE * half_angle:
         raise InputError(
-            f"tilt: photos that see {half_angle:.2g} rad to either side and look up to {2 * tilt:.2g} rad aside"
-            " do not overlap"
+            f"tilt: photos that see {half_angle:.2g} rad to either side and look up to {2 * tilt:.2g} rad"
+            " aside do not overlap"
         )
     reach = 1.02 * (flying_height + relief) * math.tan(half_angle + 2 * tilt)
     plan = _plan(strips, photos_per_strip, forward_overlap, side_overlap, footprint, points_per_photo, reach)
