@@ -73,7 +73,7 @@ impl Leverages {
 
     /// Weighted sum of squares of what takes part.
     pub fn sum_of_squares<M: Model>(&self, problem: &Problem<M>) -> f64 {
-        let priors = problem.prior_sum_of_squares(&self.values, 0..self.values.len());
+        let priors = problem.terms(&self.values).sum_of_squares(0..self.values.len());
         problem.sum_of_squares(&self.residuals) + priors
     }
 

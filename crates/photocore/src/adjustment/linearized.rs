@@ -99,7 +99,7 @@ impl Linearized {
         let (start, problem) = (Instant::now(), equations.problem());
         let prior = problem.prior_equations(&values, &held);
         let factor = unless_stopped(problem.system.factor(pool, equations, &prior, options, between))?;
-        let sum_of_squares = factor.sum_of_squares + problem.prior_sum_of_squares(&values, 0..values.len());
+        let sum_of_squares = factor.sum_of_squares + problem.terms(&values).sum_of_squares(0..values.len());
         let (took, share) = (start.elapsed().as_secs_f64(), factor.formation_share);
         let seconds = Seconds { form: took * share, factor: took * (1.0 - share), ..Seconds::default() };
         Ok(Self {

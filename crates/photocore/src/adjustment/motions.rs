@@ -250,22 +250,12 @@ impl<M: Model> Problem<M> {
         self.for_ties(|tie, rows| {
             candidates.add_tie(&mut sums, &equations, tie, rows);
         });
-        let mut together = self.weighted(values);
-        together.retain(|own| own.unknowns().all(|unknown| stays(&unknown)));
-        for own in &together {
-            for row in own.rows() {
-                candidates.add_row(&mut sums, own.unknowns().zip(row.iter().copied()));
+        for term in
+            self.terms(values).within(0..values.len()).filter(|term| term.unknowns().all(|i| stays(&i)))
+        {
+            for row in term.rows() {
+                candidates.add_row(&mut sums, term.unknowns().zip(row.iter().copied()));
             }
-        }
-        let apart = |unknown: &usize| {
-            let before = together.partition_point(|own| own.unknowns().end <= *unknown);
-            together.get(before).is_none_or(|own| own.first > *unknown)
-        };
-        for unknown in self.weighted_among(0..values.len()).filter(stays).filter(apart) {
-            let (weight, moved) = (self.sd[unknown].powi(2).recip(), candidates.of(unknown));
-            add_square(&mut sums.together, weight, moved);
-            let apart = moved.as_flattened().iter().zip(sums.apart.as_flattened_mut());
-            apart.for_each(|(g, sum)| *sum += weight * g * g);
         }
         sums
     }

@@ -4,7 +4,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::equations::ObservationEquations;
-use super::problem::{Model, Problem, Weighted};
+use super::problem::{Model, Problem};
 
 /// Equations a x = l of unit weight: first those of observations, in the order of groups and rows, then of ties and rows; then one for each
 /// unknown, that of it as an observation of itself, empty where it is none.
@@ -28,10 +28,10 @@ impl ObservationRows {
         let mut all = Self::empty();
         of_locals.into_iter().for_each(|part| all.append(part));
         equations.each_row_of_ties(|_, row| all.push(row.taken(), row.constant));
-        let weighted = problem.weighted(values);
+        let terms = problem.terms(values);
         let fixed = |unknown: usize| problem.sd[unknown] == 0.0 || held.contains(&unknown);
         for unknown in 0..values.len() {
-            let (row, constant) = problem.prior_row(&problem.sd, values, &weighted, unknown);
+            let (row, constant) = terms.row(unknown);
             all.push(row.into_iter().filter(|&(column, _)| !fixed(column)), constant);
         }
         all
@@ -83,36 +83,5 @@ impl ObservationRows {
         let mut right = vec![0.0; unknowns];
         self.row(row).for_each(|(unknown, value)| right[unknown] += value);
         right
-    }
-}
-
-impl<M> Problem<M> {
-    /// The equation of an unknown as an observation of itself, of unit weight: coefficients and observed minus computed; empty where it is
-    /// none.
-    ///
-    /// * `sd`: standard deviations of all unknowns;
-    /// * `weighted`: what the model says of them at the given values ([`Model::weighted`]).
-    pub fn prior_row(
-        &self,
-        sd: &[f64],
-        values: &[f64],
-        weighted: &[Weighted],
-        unknown: usize,
-    ) -> (Vec<(usize, f64)>, f64) {
-        if !(sd[unknown] > 0.0 && sd[unknown].is_finite()) {
-            return (vec![], 0.0);
-        }
-        let place = weighted.partition_point(|own| own.unknowns().end <= unknown);
-        match weighted.get(place).filter(|own| own.unknowns().contains(&unknown)) {
-            Some(own) => {
-                let k = unknown - own.first;
-                let row = own.unknowns().zip(own.rows().nth(k).unwrap_or_default().iter().copied());
-                (row.collect(), own.constant[k])
-            }
-            None => {
-                let weight = sd[unknown].recip();
-                (vec![(unknown, weight)], weight * (self.prior[unknown] - values[unknown]))
-            }
-        }
     }
 }

@@ -1,9 +1,6 @@
 //! Models, and problems: a model with everything that is known beforehand.
 
-use std::ops::Range;
-
-use smallvec::SmallVec;
-
+use super::terms::{Term, is_weighted};
 use crate::normals::{GroupRows, Layout, Prior, System, TieRows};
 
 /// How observations follow from unknowns.
@@ -58,9 +55,9 @@ pub trait Model: Sync {
         to.iter().zip(from).map(|(to, from)| to - from).collect()
     }
 
-    /// The equations of weighted unknowns to which steps are not added (see [`Model::advance`]), at the given values, in ascending order.
-    /// `prior` and `sd` are those of the problem. All other weighted unknowns have equations of one unknown each.
-    fn weighted(&self, _values: &[f64], _prior: &[f64], _sd: &[f64]) -> Vec<Weighted> {
+    /// What was known beforehand of unknowns that were observed together, or to which steps are not added (see [`Model::advance`]), at the
+    /// given values, in ascending order. `prior` and `sd` are those of the problem. All other weighted unknowns have terms of one unknown.
+    fn terms(&self, _values: &[f64], _prior: &[f64], _sd: &[f64]) -> Vec<Term> {
         vec![]
     }
 
@@ -136,30 +133,6 @@ pub struct Motions {
     pub preferred: Vec<usize>,
 }
 
-/// The equations, of unit weight, of unknowns of one kept block, one after the other, that are weighted together: they step together, or
-/// were observed with a covariance matrix.
-#[derive(Debug, Clone)]
-pub struct Weighted {
-    /// The first of the unknowns.
-    pub first: usize,
-    /// Observed minus computed, as many as unknowns. There are as many of these as photos, of three unknowns each: on the stack.
-    pub constant: SmallVec<[f64; 3]>,
-    /// The partials of the computed by the step, square, row by row; zero where nothing is observed.
-    pub coefficients: SmallVec<[f64; 9]>,
-}
-
-impl Weighted {
-    /// Where the unknowns stand.
-    pub(super) fn unknowns(&self) -> Range<usize> {
-        self.first..self.first + self.constant.len()
-    }
-
-    /// The partials, row by row.
-    pub(super) fn rows(&self) -> impl Iterator<Item = &[f64]> {
-        self.coefficients.chunks_exact(self.constant.len())
-    }
-}
-
 /// A model with everything that is known beforehand.
 #[derive(Debug)]
 pub struct Problem<M> {
@@ -185,52 +158,18 @@ impl<M> Problem<M> {
 
     /// Whether an unknown counts as an observation: neither free nor fixed.
     pub fn is_weighted(&self, unknown: usize) -> bool {
-        self.sd[unknown] > 0.0 && self.sd[unknown].is_finite()
-    }
-
-    /// The weighted ones of some unknowns. Nearly all are free: these are passed over a stretch at a time.
-    pub(super) fn weighted_among(&self, of: Range<usize>) -> impl Iterator<Item = usize> {
-        const STRETCH: usize = 64;
-        let stretches = of.clone().step_by(STRETCH).map(move |first| first..of.end.min(first + STRETCH));
-        let free = |stretch: &Range<usize>| {
-            let not_free = |all: u64, sd: &f64| all | (sd.to_bits() ^ f64::INFINITY.to_bits());
-            self.sd[stretch.clone()].iter().fold(0, not_free) == 0
-        };
-        stretches.filter(move |stretch| !free(stretch)).flatten().filter(|&unknown| self.is_weighted(unknown))
+        is_weighted(self.sd[unknown])
     }
 }
 
 impl<M: Model> Problem<M> {
-    /// Weighted sum of squares of observed minus computed unknowns, of some of them.
-    pub fn prior_sum_of_squares(&self, values: &[f64], of: Range<usize>) -> f64 {
-        let square = |i: usize| ((self.prior[i] - values[i]) / self.sd[i]).powi(2);
-        let plain = |range: Range<usize>| self.weighted_among(range).map(square).sum::<f64>();
-        let (mut sum, mut from) = (0.0, of.start);
-        for own in self.weighted(values).iter().filter(|own| of.contains(&own.first)) {
-            sum += plain(from..own.first) + own.constant.iter().map(|value| value * value).sum::<f64>();
-            from = own.unknowns().end;
-        }
-        sum + plain(from..of.end)
-    }
-
-    /// See [`Model::weighted`].
-    pub(super) fn weighted(&self, values: &[f64]) -> Vec<Weighted> {
-        self.model.weighted(values, &self.prior, &self.sd)
-    }
-
-    /// The equations of the unknowns themselves at the given values. A fixed or held unknown has an equation of its own,
-    /// x = 0 with unit weight, and no other (see [`super::equations`]); an outer one has none here.
+    /// The normal equations of the terms at the given values. A fixed or held unknown has an equation of its own, x = 0 with unit weight,
+    /// and no other (see [`super::equations`]); an outer one has none here.
     pub(super) fn prior_equations(&self, values: &[f64], held: &[usize]) -> Prior {
-        let mut weight: Vec<f64> =
-            self.sd.iter().map(|&sd| if sd == 0.0 { 1.0 } else { (sd * sd).recip() }).collect();
-        held.iter().for_each(|&unknown| weight[unknown] = 1.0);
-        let mut right = vec![0.0; values.len()];
-        for i in self.weighted_among(0..values.len()) {
-            right[i] = weight[i] * (self.prior[i] - values[i]);
-        }
-        let mut prior = Prior { weight, right, between: vec![] };
         let is_held = |unknown: usize| self.sd[unknown] == 0.0 || held.contains(&unknown);
-        self.weighted(values).iter().for_each(|own| add_weighted(&mut prior, own, &is_held));
+        let weight = (0..values.len()).map(|unknown| f64::from(u8::from(is_held(unknown)))).collect();
+        let mut prior = Prior { weight, right: vec![0.0; values.len()], between: vec![] };
+        self.terms(values).within(0..values.len()).for_each(|term| add_term(&mut prior, &term, &is_held));
         let layout = self.layout();
         layout.unknowns_of(layout.outer()).for_each(|unknown| prior.weight[unknown] = 0.0);
         prior
@@ -244,13 +183,13 @@ impl<M: Model> Problem<M> {
     }
 }
 
-/// Puts the equations of unknowns that are weighted together in the place of those of each; none is of a held one.
-fn add_weighted(prior: &mut Prior, own: &Weighted, is_held: &dyn Fn(usize) -> bool) {
-    for (i, unknown) in own.unknowns().enumerate().filter(|&(_, unknown)| !is_held(unknown)) {
-        let product = |j: usize| own.rows().map(|row| row[i] * row[j]).sum::<f64>();
+/// Adds A^T A and A^T l of a term; none is of a held unknown.
+fn add_term(prior: &mut Prior, term: &Term, is_held: &dyn Fn(usize) -> bool) {
+    for (i, unknown) in term.unknowns().enumerate().filter(|&(_, unknown)| !is_held(unknown)) {
+        let product = |j: usize| term.rows().map(|row| row[i] * row[j]).sum::<f64>();
         prior.weight[unknown] = product(i);
-        prior.right[unknown] = own.rows().zip(&own.constant).map(|(row, constant)| row[i] * constant).sum();
-        let others = (0..i).filter(|&j| !is_held(own.first + j));
-        prior.between.extend(others.map(|j| (unknown, own.first + j, product(j))));
+        prior.right[unknown] = term.rows().zip(&term.constant).map(|(row, constant)| row[i] * constant).sum();
+        let others = (0..i).filter(|&j| !is_held(term.first + j));
+        prior.between.extend(others.map(|j| (unknown, term.first + j, product(j))));
     }
 }

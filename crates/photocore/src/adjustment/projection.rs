@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::equations::ObservationEquations;
 use super::linearized::Linearized;
-use super::problem::{Model, Problem, Weighted};
+use super::problem::{Model, Problem};
 use super::result::AdjustError;
 use super::walk::Buffers;
 use crate::normals::{Between, SolveOptions};
@@ -63,8 +63,6 @@ struct Rows<'a, M: Model> {
     values: &'a [f64],
     /// Which unknowns are fixed or held.
     fixed: Vec<bool>,
-    /// Those that are weighted together with others.
-    together: Vec<Weighted>,
 }
 
 impl<'a, M: Model> Rows<'a, M> {
@@ -72,8 +70,7 @@ impl<'a, M: Model> Rows<'a, M> {
         let Linearized { values, held, .. } = linearized;
         let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
         held.iter().for_each(|&unknown| fixed[unknown] = true);
-        let (together, equations) = (problem.weighted(values), linearized.equations(problem, pool));
-        Self { problem, equations, values, fixed, together }
+        Self { problem, equations: linearized.equations(problem, pool), values, fixed }
     }
 
     /// The local blocks of a part.
@@ -160,13 +157,12 @@ impl<'a, M: Model> Rows<'a, M> {
         }
     }
 
-    /// The same of ties and of weighted unknowns.
+    /// The same of ties and of terms.
     fn each_other_row(&self, mut take: impl FnMut(usize, &Taken)) {
         self.equations.each_row_of_ties(|_, row| take(row.number, &row.taken().collect()));
         let (problem, first) = (self.problem, self.problem.observation_sd.len());
-        for unknown in problem.weighted_among(0..problem.sd.len()) {
-            let (row, _) = problem.prior_row(&problem.sd, self.values, &self.together, unknown);
-            take(first + unknown, &row.into_iter().filter(|&(other, _)| !self.fixed[other]).collect());
-        }
+        problem.terms(self.values).each_row(|unknown, row, _| {
+            take(first + unknown, &row.filter(|&(other, _)| !self.fixed[other]).collect());
+        });
     }
 }

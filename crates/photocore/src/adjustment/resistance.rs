@@ -39,12 +39,11 @@ impl<M: Model> Problem<M> {
         self.for_ties(|tie, rows| {
             candidates.add_tie(&mut sums[classes.of_ties[tie]], &equations, tie, rows);
         });
-        let weighted = self.weighted(values);
+        let mut observed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();
+        self.terms(values).within(0..values.len()).for_each(|term| observed[term.unknowns()].fill(true));
         let mut shares: Vec<f64> = sums.iter().map(|own| own.share(count)).collect();
         for (unknown, &class) in classes.of_unknowns.iter().enumerate() {
-            let observed =
-                self.sd[unknown].is_finite() || weighted.iter().any(|own| own.unknowns().contains(&unknown));
-            if observed && motions.vectors.iter().any(|vector| vector[unknown] != 0.0) {
+            if observed[unknown] && motions.vectors.iter().any(|vector| vector[unknown] != 0.0) {
                 shares[class] = 1.0;
             }
         }

@@ -279,7 +279,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// The same of values that are prepared already.
     pub(super) fn objective_at(&self, unknowns: &[f64], prepared: &M::Prepared) -> f64 {
         let residuals = self.problem.residuals_at(self.pool, prepared);
-        self.observed_sum(&residuals) + self.problem.prior_sum_of_squares(unknowns, 0..unknowns.len())
+        self.observed_sum(&residuals) + self.problem.terms(unknowns).sum_of_squares(0..unknowns.len())
     }
 
     /// The observations' part of it.
@@ -360,7 +360,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         if let Some((last, _)) = end.last {
             let reached = &adjustment.unknowns;
             let sum_of_squares = self.observed_sum(&adjustment.residuals)
-                + problem.prior_sum_of_squares(reached, 0..reached.len());
+                + problem.terms(reached).sum_of_squares(0..reached.len());
             self.accept(Iteration { sum_of_squares, ..last }, &end.unknowns, reached)?;
         }
         drop(end.unknowns);

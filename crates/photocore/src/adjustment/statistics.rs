@@ -5,8 +5,9 @@ use std::ops::Range;
 
 use rayon::ThreadPool;
 
-use super::problem::{Model, Problem, Weighted};
-use crate::normals::Cofactors;
+use super::problem::{Model, Problem};
+use super::terms::weighted_among;
+use crate::normals::{Cofactors, dot};
 
 /// What an adjustment counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,12 +60,12 @@ impl<M> Problem<M> {
         let elsewhere = outer.chain(held.iter().copied()).collect::<BTreeSet<usize>>().len();
         Counts {
             observations: self.observation_sd.len(),
-            weighted: self.weighted_among(0..self.sd.len()).count(),
+            weighted: weighted_among(&self.sd, 0..self.sd.len()).count(),
             unknowns: self.sd.iter().filter(|&&sd| sd != 0.0).count() - elsewhere,
         }
     }
 
-    /// Redundancy number of each unknown as an observation of itself, 1 - w q; zero unless it is weighted. The cofactors of
+    /// Redundancy number of each unknown as an observation of itself, 1 - a Q a^T of its equation a; zero unless it is weighted. The cofactors of
     /// fixed and held unknowns, which stand in the normal equations with unit weight, are set to zero on the way; `values` are those at
     /// which these were formed.
     pub(super) fn finish_cofactors(
@@ -77,52 +78,35 @@ impl<M> Problem<M> {
         M: Model,
     {
         let mut redundancy = vec![0.0; self.sd.len()];
-        self.for_diagonal(cofactors, |unknown, q| {
-            if self.is_weighted(unknown) {
-                redundancy[unknown] = 1.0 - *q / (self.sd[unknown] * self.sd[unknown]);
-            } else if self.sd[unknown] == 0.0 || held.contains(&unknown) {
-                *q = 0.0;
-            }
-        });
-        self.stepping_together(cofactors, &self.weighted(values), &mut redundancy);
-        redundancy
-    }
-
-    /// The redundancy numbers of weighted unknowns that step together, of equations a of unit weight: 1 - a Q a^T.
-    fn stepping_together(&self, cofactors: &Cofactors, weighted: &[Weighted], redundancy: &mut [f64]) {
-        let layout = self.layout();
-        let (mut weighted, mut start) = (weighted.iter().peekable(), 0);
-        for kept in 0..layout.kept() {
-            let (range, width) = (layout.kept_range(kept), layout.kept_dim(kept));
-            while let Some(own) = weighted.next_if(|own| own.first < range.end) {
-                let first = start + (own.first - range.start) * (width + 1);
-                for (row, unknown) in own.rows().zip(own.unknowns()).filter(|&(_, i)| self.is_weighted(i)) {
-                    let q_row = |i: usize| &cofactors.kept[first + i * width..];
-                    let along = |i: usize| row.iter().zip(q_row(i)).map(|(a, q)| a * q).sum::<f64>();
-                    let share: f64 = row.iter().enumerate().map(|(i, a)| a * along(i)).sum();
-                    redundancy[unknown] = 1.0 - share;
+        let terms = self.terms(values);
+        let mut terms = terms.within(0..values.len()).peekable();
+        let mut finish = |block: &mut [f64], unknowns: Range<usize>| {
+            let width = unknowns.len();
+            for (d, unknown) in unknowns.clone().enumerate() {
+                if self.sd[unknown] == 0.0 || held.contains(&unknown) {
+                    block[d * (width + 1)] = 0.0;
                 }
             }
-            start += width * width;
-        }
-    }
-
-    /// Hands out the cofactor of every unknown.
-    fn for_diagonal(&self, cofactors: &mut Cofactors, mut take: impl FnMut(usize, &mut f64)) {
-        let layout = self.layout();
-        let mut diagonal = |block: &mut [f64], unknowns: Range<usize>| {
-            let dim = unknowns.len();
-            unknowns.enumerate().for_each(|(d, unknown)| take(unknown, &mut block[d * (dim + 1)]));
+            while let Some(term) = terms.next_if(|term| term.first < unknowns.end) {
+                let first = (term.first - unknowns.start) * (width + 1);
+                for (row, unknown) in term.rows().zip(term.unknowns()).filter(|&(_, i)| self.is_weighted(i)) {
+                    let along = |i: usize| dot(row, &block[first + i * width..][..row.len()]);
+                    redundancy[unknown] =
+                        1.0 - row.iter().enumerate().map(|(i, a)| a * along(i)).sum::<f64>();
+                }
+            }
         };
-        let l = layout.local_dim();
+        let (layout, l) = (self.layout(), self.layout().local_dim());
         for (local, block) in cofactors.local.chunks_exact_mut(l * l).enumerate() {
-            diagonal(block, layout.local_range(local));
+            finish(block, layout.local_range(local));
         }
-        let mut start = 0;
+        let mut rest = &mut cofactors.kept[..];
         for kept in 0..layout.kept() {
-            diagonal(&mut cofactors.kept[start..], layout.kept_range(kept));
-            start += layout.kept_dim(kept).pow(2);
+            let (block, behind) = rest.split_at_mut(layout.kept_dim(kept).pow(2));
+            finish(block, layout.kept_range(kept));
+            rest = behind;
         }
+        redundancy
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;
 
 use super::Camera;
-use crate::adjustment::Weighted;
+use crate::adjustment::Term;
 
 /// The observation of the weighted parameters of a camera.
 #[derive(Debug, Clone)]
@@ -27,14 +27,14 @@ impl CameraPrior {
     }
 
     /// Its equations at given values of the unknowns: L^-1 (p0 - p), S = L L^T.
-    pub fn equations(&self, values: &[f64], prior: &[f64]) -> Weighted {
+    pub fn equations(&self, values: &[f64], prior: &[f64]) -> Term {
         let count = self.root.nrows();
         // Where nothing is observed the column is zero, and what stands there any number.
         let weighted = |k: usize| self.root.column(k).iter().any(|&value| value != 0.0);
         let apart = DVector::from_fn(count, |k, _| {
             if weighted(k) { prior[self.first + k] - values[self.first + k] } else { 0.0 }
         });
-        Weighted {
+        Term {
             first: self.first,
             constant: SmallVec::from_slice((&self.root * apart).as_slice()),
             coefficients: SmallVec::from_slice(self.root.transpose().as_slice()),

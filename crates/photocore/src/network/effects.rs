@@ -20,7 +20,7 @@ impl Trial {
         let found = self.found()?;
         let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
         let around = self.around(suspects, &problem.observation_sd, found, pool);
-        let weighted = self.weighted(&problem.sd, &found.values);
+        let terms = self.terms(&problem.sd, &found.values);
         let mut all = Vec::new();
         for &index in suspects {
             let suspect = &self.suspects[index];
@@ -58,7 +58,7 @@ impl Trial {
                 }
                 home => {
                     let some: Vec<usize> = (0..rows).collect();
-                    let a = self.prior_rows(suspect, &some, &problem.sd, &found.values, &weighted);
+                    let a = self.term_rows(suspect, &some, &terms);
                     let along = a * self.cofactors_at(found, home);
                     for row in 0..rows {
                         let mut effect = [f64::NAN; 9];

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::NetworkError;
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
-use crate::adjustment::{Few, GroupTest, Leverages, Weighted};
+use crate::adjustment::{Few, GroupTest, Leverages, Terms};
 use crate::normals::GroupCofactors;
 
 /// Tests of all suspects; the rows and square blocks of one stand after those of another.
@@ -127,13 +127,13 @@ impl Trial {
     pub fn tests(&self, pool: &ThreadPool) -> Result<Tests, NetworkError> {
         let found = self.found()?;
         let groups = found.cofactors.groups.as_ref().ok_or(NetworkError::State)?;
-        let weighted = self.weighted(&self.assembled.problem.sd, &found.values);
+        let terms = self.terms(&self.assembled.problem.sd, &found.values);
         let mut all = Tests::unknown(self.suspects.len(), &self.row_starts, &self.block_starts);
         let parts = all.parts(&self.row_starts, &self.block_starts);
         let fill = |(suspects, mut part): (&[Suspect], Part<'_>)| {
             for suspect in suspects {
                 let size = suspect.rows.len();
-                part.put(size, self.test(suspect, found, groups, &weighted));
+                part.put(size, self.test(suspect, found, groups, &terms));
             }
         };
         pool.install(|| self.suspects.par_chunks(TOGETHER).zip(parts).for_each(fill));
@@ -146,7 +146,7 @@ impl Trial {
         suspect: &Suspect,
         found: &Leverages,
         groups: &GroupCofactors,
-        weighted: &[Weighted],
+        terms: &Terms<'_>,
     ) -> Option<Tested> {
         if let Home::Group { group, .. } = suspect.home {
             return self.image_test(group, found, groups);
@@ -156,7 +156,7 @@ impl Trial {
         if taking.is_empty() {
             return None;
         }
-        let (residual, shares, by_point) = self.shares(suspect, found, groups, weighted, &taking);
+        let (residual, shares, by_point) = self.shares(suspect, found, groups, terms, &taking);
         let left = |shares: &[f64]| -> Vec<f64> {
             let count = taking.len();
             (0..count * count).map(|k| f64::from(u8::from(k / count == k % count)) - shares[k]).collect()
@@ -224,13 +224,13 @@ impl Trial {
         suspect: &Suspect,
         found: &Leverages,
         groups: &GroupCofactors,
-        weighted: &[Weighted],
+        terms: &Terms<'_>,
         taking: &[usize],
     ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let problem = &self.assembled.problem;
         let residual = |&k: &usize| match suspect.rows[k].0 {
             Row::Equation(equation) => found.residuals[equation] / self.observation_sd[equation],
-            Row::Unknown(unknown) => problem.prior_row(&problem.sd, &found.values, weighted, unknown).1,
+            Row::Unknown(unknown) => terms.row(unknown).1,
         };
         let residuals = taking.iter().map(residual).collect();
         let count = taking.len();
@@ -240,7 +240,7 @@ impl Trial {
                 (sub(block, suspect.rows.len(), taking), vec![0.0; count * count])
             }
             Home::Group { .. } | Home::Point(_) | Home::Block(_) => {
-                let rows = self.prior_rows(suspect, taking, &problem.sd, &found.values, weighted);
+                let rows = self.term_rows(suspect, taking, terms);
                 let q = self.cofactors_at(found, suspect.home);
                 let alone = match suspect.home {
                     Home::Point(place) if place < problem.model.locals => {
@@ -257,19 +257,12 @@ impl Trial {
     }
 
     /// The equations of some rows of a suspect, of unit weight, by the unknowns of its block.
-    pub(super) fn prior_rows(
-        &self,
-        suspect: &Suspect,
-        some: &[usize],
-        sd: &[f64],
-        values: &[f64],
-        weighted: &[Weighted],
-    ) -> DMatrix<f64> {
+    pub(super) fn term_rows(&self, suspect: &Suspect, some: &[usize], terms: &Terms<'_>) -> DMatrix<f64> {
         let range = self.unknowns_at(suspect.home);
         let mut rows = DMatrix::zeros(some.len(), range.len());
         for (i, &k) in some.iter().enumerate() {
             if let Row::Unknown(unknown) = suspect.rows[k].0 {
-                let (row, _) = self.assembled.problem.prior_row(sd, values, weighted, unknown);
+                let (row, _) = terms.row(unknown);
                 row.into_iter().for_each(|(column, value)| rows[(i, column - range.start)] = value);
             }
         }

@@ -13,7 +13,7 @@ use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObser
 use super::parts::{MOTIONS, Parts};
 use super::stations::{Bent, Placed, Refracted, Station, Stations, write_in_its_place};
 use super::{Image, Minimum, Point, Screens};
-use crate::adjustment::{Model, Motions, Weighted};
+use crate::adjustment::{Model, Motions, Term};
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::camera::{CameraModel, each_camera};
 use crate::geometry::{
@@ -379,7 +379,7 @@ impl Model for Bundle {
         step
     }
 
-    fn weighted(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Weighted> {
+    fn terms(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Term> {
         let mut all = self.weighted_angles(values, prior, sd);
         if !self.camera_priors.is_empty() {
             all.extend(self.camera_priors.iter().map(|own| own.equations(values, prior)));

@@ -9,7 +9,7 @@ use super::NetworkError;
 use super::group_tests::{in_units, sub};
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
-use crate::adjustment::{Leverages, TieCofactors, Weighted};
+use crate::adjustment::{Leverages, Terms, TieCofactors};
 use crate::normals::{LocalCofactors, dot};
 
 /// What is out against what the rest predicts of it.
@@ -56,7 +56,7 @@ impl Trial {
         let found = self.found()?;
         let problem = &self.assembled.problem;
         let around = self.around(suspects, &self.observation_sd, found, pool);
-        let weighted = self.weighted(&self.sd, &found.values);
+        let terms = self.terms(&self.sd, &found.values);
         let predict = |&index: &usize| {
             let suspect = &self.suspects[index];
             let out: Vec<usize> =
@@ -73,12 +73,12 @@ impl Trial {
                 }
                 Home::Tie(tie) => sub(&around.ties.get(&tie)?.equations, suspect.rows.len(), &out),
                 Home::Point(_) | Home::Block(_) => {
-                    let rows = self.prior_rows(suspect, &out, &self.sd, &found.values, &weighted);
+                    let rows = self.term_rows(suspect, &out, &terms);
                     let shares = &rows * self.cofactors_at(found, suspect.home) * rows.transpose();
                     shares.transpose().as_slice().to_vec()
                 }
             };
-            self.prediction(suspect, &out, &shares, found, &weighted)
+            self.prediction(suspect, &out, &shares, found, &terms)
         };
         Ok(suspects.iter().map(predict).collect())
     }
@@ -116,15 +116,13 @@ impl Trial {
         out: &[usize],
         shares: &[f64],
         found: &Leverages,
-        weighted: &[Weighted],
+        terms: &Terms<'_>,
     ) -> Option<Prediction> {
         let count = out.len();
         let c = DMatrix::identity(count, count) + DMatrix::from_row_slice(count, count, shares);
         let residual = |&k: &usize| match suspect.rows[k].0 {
             Row::Equation(equation) => found.residuals[equation] / self.observation_sd[equation],
-            Row::Unknown(unknown) => {
-                self.assembled.problem.prior_row(&self.sd, &found.values, weighted, unknown).1
-            }
+            Row::Unknown(unknown) => terms.row(unknown).1,
         };
         let d = DVector::from_iterator(count, out.iter().map(residual));
         let statistic = d.dot(&c.clone().cholesky()?.solve(&d));
@@ -158,15 +156,15 @@ impl Trial {
     pub fn on_points(&self, points: &[usize], pool: &ThreadPool) -> Result<Vec<OnPoint>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let (observation_sd, sd) = (&problem.observation_sd[..], &problem.sd[..]);
-        let weighted = self.weighted(sd, &found.values);
-        let further = |place: usize| self.further(place, sd, &found.values, &weighted);
+        let terms = self.terms(sd, &found.values);
+        let further = |place: usize| self.further(place, &terms);
         let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
         let cofactors = found.of_locals(problem, observation_sd, &places, further, pool);
         let mut found_at = places.iter().zip(cofactors);
         let of = |&point: &usize| {
             let known = self.local(point).and_then(|_| found_at.next());
             known.map_or_else(OnPoint::default, |(&place, own)| {
-                let (rows, residual) = self.rows_at(place, (observation_sd, sd), found, &weighted);
+                let (rows, residual) = self.rows_at(place, observation_sd, found, &terms);
                 let (count, shares) = (rows.len(), sub(&own.equations, own.rows(), &rows));
                 let identity = |k: usize| f64::from(u8::from(k / count == k % count));
                 let cofactors = shares.iter().enumerate().map(|(k, share)| identity(k) - share).collect();
@@ -184,15 +182,15 @@ impl Trial {
     pub fn on_gone_points(&self, points: &[usize], pool: &ThreadPool) -> Result<Vec<OnPoint>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let given = (&self.observation_sd[..], &self.sd[..]);
-        let weighted = self.weighted(&self.sd, &found.values);
-        let further = |place: usize| self.further(place, &self.sd, &found.values, &weighted);
+        let terms = self.terms(&self.sd, &found.values);
+        let further = |place: usize| self.further(place, &terms);
         let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
         let cofactors = found.of_gone(problem, given, &places, further, pool);
         let mut found_at = places.iter().zip(cofactors);
         let of = |&point: &usize| {
             let known = self.local(point).and_then(|_| found_at.next()).filter(|(_, own)| !own.is_empty());
             known.map_or_else(OnPoint::default, |(&place, own)| {
-                let (rows, observed) = self.rows_at(place, given, found, &weighted);
+                let (rows, observed) = self.rows_at(place, &self.observation_sd, found, &terms);
                 let cofactors = sub(&own, own.len().isqrt(), &rows);
                 let residual = cofactors.chunks_exact(rows.len()).map(|row| dot(row, &observed)).collect();
                 OnPoint { suspects: self.on_place[place].clone(), residual, cofactors }
@@ -207,20 +205,20 @@ impl Trial {
     }
 
     /// The equations of the coordinates of a local point that are observations themselves.
-    fn further(&self, place: usize, sd: &[f64], values: &[f64], weighted: &[Weighted]) -> Vec<f64> {
+    fn further(&self, place: usize, terms: &Terms<'_>) -> Vec<f64> {
         let mut own = self.on_place[place].iter().map(|&index| &self.suspects[index]);
         let Some(suspect) = own.find(|suspect| matches!(suspect.home, Home::Point(_))) else { return vec![] };
         let all: Vec<usize> = (0..suspect.rows.len()).collect();
-        self.prior_rows(suspect, &all, sd, values, weighted).transpose().as_slice().to_vec()
+        self.term_rows(suspect, &all, terms).transpose().as_slice().to_vec()
     }
 
     /// The place of each row of the suspects at a local point among its equations, and how much each is off, of unit weight.
     fn rows_at(
         &self,
         place: usize,
-        (observation_sd, sd): (&[f64], &[f64]),
+        observation_sd: &[f64],
         found: &Leverages,
-        weighted: &[Weighted],
+        terms: &Terms<'_>,
     ) -> (Vec<usize>, Vec<f64>) {
         let problem = &self.assembled.problem;
         let groups = problem.layout().groups_of(place);
@@ -235,7 +233,7 @@ impl Trial {
                 rows.push(first + k);
                 off.push(match row {
                     Row::Equation(equation) => found.residuals[equation] / observation_sd[equation],
-                    Row::Unknown(unknown) => problem.prior_row(sd, &found.values, weighted, unknown).1,
+                    Row::Unknown(unknown) => terms.row(unknown).1,
                 });
             }
         }

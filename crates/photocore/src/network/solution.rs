@@ -271,7 +271,7 @@ pub(super) fn sums_of_squares(
     observations: &[Option<AdjustedObservation>],
 ) -> SumsOfSquares {
     let stations = problem.model.of_stations();
-    let squares = |range: Range<usize>| problem.prior_sum_of_squares(unknowns, range);
+    let squares = |range: Range<usize>| problem.terms(unknowns).sum_of_squares(range);
     let rows = problem.layout().rows();
     let of_images = &problem.observation_sd[..rows * problem.model.images.len()];
     SumsOfSquares {

@@ -7,7 +7,7 @@ use super::problem::Assembled;
 use super::state::State;
 use super::suspects::{Home, Row, Subject, Suspect};
 use super::{Network, NetworkError, Options};
-use crate::adjustment::{self, AdjustError, Leverages, Loss, Method, Status, Stop, Watch, Weighted};
+use crate::adjustment::{self, AdjustError, Leverages, Loss, Method, Status, Stop, Terms, Watch};
 use crate::geometry::PoseNumbers;
 
 /// A network tried without some of its observations.
@@ -344,9 +344,10 @@ impl Trial {
         self.found.as_ref().ok_or(NetworkError::State)
     }
 
-    pub(super) fn weighted(&self, sd: &[f64], values: &[f64]) -> Vec<Weighted> {
+    /// What was known beforehand of the unknowns, with the given standard deviations.
+    pub(super) fn terms<'a>(&'a self, sd: &'a [f64], values: &'a [f64]) -> Terms<'a> {
         let problem = &self.assembled.problem;
-        adjustment::Model::weighted(&problem.model, values, &problem.prior, sd)
+        Terms::new(&problem.model, values, &problem.prior, sd)
     }
 
     /// Whether a row takes part.

@@ -4,7 +4,7 @@ use smallvec::SmallVec;
 
 use super::model::Bundle;
 use super::observations::misalignment;
-use crate::adjustment::Weighted;
+use crate::adjustment::Term;
 use crate::geometry::{AttitudeNumbers, Matrix3, RotationSense, Vector3};
 
 /// Angles are the observation of a rotation where their phi may well be 90 degrees: by so many of their standard deviations, or
@@ -18,7 +18,7 @@ impl Bundle {
     ///
     /// With rho = K d(angles) the row of an angle a, observed as a0 with the standard deviation s, is that of K^-1, and its constant
     /// a0 - a, both divided by s: the sum of squares is that of a program whose unknowns are the angles.
-    pub(super) fn weighted_angles(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Weighted> {
+    pub(super) fn weighted_angles(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Term> {
         let of_photo = |photo: usize| {
             let sense = self.turning_sense(photo)?;
             let first = self.of_block(photo).start + 3;
@@ -34,7 +34,7 @@ impl Bundle {
             } else {
                 angle_equations(sense, angles, observed, &sd)
             };
-            Some(Weighted {
+            Some(Term {
                 first,
                 constant: SmallVec::from_buf(constant.into()),
                 coefficients: SmallVec::from_slice(coefficients.transpose().as_slice()),

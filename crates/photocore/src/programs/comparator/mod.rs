@@ -252,7 +252,7 @@ impl Solution {
         let residuals = std::mem::take(&mut adjustment.residuals);
         let redundancy = adjustment.redundancy.take();
         let sum_of_squares =
-            problem.sum_of_squares(&residuals) + problem.prior_sum_of_squares(&unknowns, 0..unknowns.len());
+            problem.sum_of_squares(&residuals) + problem.terms(&unknowns).sum_of_squares(0..unknowns.len());
         let cases = problem.model.left_handed.len();
         let (placements, comparator) =
             (layout.all_kept().start..layout.kept_range(cases).start, layout.kept_range(cases));

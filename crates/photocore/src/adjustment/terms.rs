@@ -1,0 +1,128 @@
+//! Terms: what was known beforehand of the unknowns of one block, as equations of unit weight beside those of observations.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use smallvec::{SmallVec, smallvec};
+
+use super::problem::{Model, Problem};
+
+/// What was known beforehand of unknowns of one block, one after the other: an equation of unit weight for each of them.
+#[derive(Debug, Clone)]
+pub struct Term {
+    /// The first of the unknowns.
+    pub first: usize,
+    /// Observed minus computed, as many as unknowns. There may be several of each photo: on the stack.
+    pub constant: SmallVec<[f64; 3]>,
+    /// The partials of the computed by the step, square, row by row; zero where nothing is observed.
+    pub coefficients: SmallVec<[f64; 9]>,
+}
+
+impl Term {
+    /// Where the unknowns stand.
+    pub fn unknowns(&self) -> Range<usize> {
+        self.first..self.first + self.constant.len()
+    }
+
+    /// The partials, row by row.
+    pub fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.coefficients.chunks_exact(self.constant.len())
+    }
+
+    /// Of an unknown that was observed by itself.
+    fn single(unknown: usize, apart: f64, sd: f64) -> Self {
+        let weight = sd.recip();
+        Self { first: unknown, constant: smallvec![weight * apart], coefficients: smallvec![weight] }
+    }
+}
+
+/// All terms of a problem at given values of its unknowns: those of its model ([`Model::terms`]), and one of each other weighted unknown.
+#[derive(Debug)]
+pub struct Terms<'a> {
+    values: &'a [f64],
+    prior: &'a [f64],
+    sd: &'a [f64],
+    of_model: Vec<Term>,
+}
+
+impl<'a> Terms<'a> {
+    /// At the given values; `prior` and `sd` are observed values and standard deviations of the unknowns.
+    pub fn new<M: Model>(model: &M, values: &'a [f64], prior: &'a [f64], sd: &'a [f64]) -> Self {
+        Self { values, prior, sd, of_model: model.terms(values, prior, sd) }
+    }
+
+    /// Those that begin among some unknowns, ascending.
+    pub fn within(&self, of: Range<usize>) -> impl Iterator<Item = Cow<'_, Term>> {
+        let mut of_model = &self.of_model[self.of_model.partition_point(|term| term.first < of.start)..];
+        let end = of.end;
+        let mut apart = weighted_among(self.sd, of).peekable();
+        std::iter::from_fn(move || {
+            let next = of_model.first().filter(|term| term.first < end);
+            let Some(term) = next else {
+                return apart.next().map(|unknown| Cow::Owned(self.single(unknown)));
+            };
+            if let Some(unknown) = apart.next_if(|&unknown| unknown < term.first) {
+                return Some(Cow::Owned(self.single(unknown)));
+            }
+            while apart.next_if(|&unknown| unknown < term.unknowns().end).is_some() {}
+            of_model = &of_model[1..];
+            Some(Cow::Borrowed(term))
+        })
+    }
+
+    /// The rows of weighted unknowns, one of each, ascending: the unknown, its equation's coefficients of unknowns, observed minus computed.
+    pub fn each_row(&self, mut take: impl FnMut(usize, &mut dyn Iterator<Item = (usize, f64)>, f64)) {
+        for term in self.within(0..self.sd.len()) {
+            for (k, row) in term.rows().enumerate().filter(|&(k, _)| is_weighted(self.sd[term.first + k])) {
+                take(term.first + k, &mut term.unknowns().zip(row.iter().copied()), term.constant[k]);
+            }
+        }
+    }
+
+    /// The row of an unknown; empty where it is not weighted.
+    pub fn row(&self, unknown: usize) -> (Vec<(usize, f64)>, f64) {
+        if !is_weighted(self.sd[unknown]) {
+            return (vec![], 0.0);
+        }
+        let place = self.of_model.partition_point(|term| term.unknowns().end <= unknown);
+        let term = match self.of_model.get(place).filter(|term| term.first <= unknown) {
+            Some(term) => Cow::Borrowed(term),
+            None => Cow::Owned(self.single(unknown)),
+        };
+        let k = unknown - term.first;
+        let row = term.rows().nth(k).unwrap_or_default();
+        (term.unknowns().zip(row.iter().copied()).collect(), term.constant[k])
+    }
+
+    /// Sum of squares of those that begin among some unknowns.
+    pub fn sum_of_squares(&self, of: Range<usize>) -> f64 {
+        self.within(of).map(|term| term.constant.iter().map(|value| value * value).sum::<f64>()).sum()
+    }
+
+    fn single(&self, unknown: usize) -> Term {
+        Term::single(unknown, self.prior[unknown] - self.values[unknown], self.sd[unknown])
+    }
+}
+
+/// Whether an unknown of this standard deviation counts as an observation: neither free nor fixed.
+pub(super) fn is_weighted(sd: f64) -> bool {
+    sd > 0.0 && sd.is_finite()
+}
+
+/// The weighted ones of some unknowns. Nearly all are free: these are passed over a stretch at a time.
+pub(super) fn weighted_among(sd: &[f64], of: Range<usize>) -> impl Iterator<Item = usize> {
+    const STRETCH: usize = 64;
+    let stretches = of.clone().step_by(STRETCH).map(move |first| first..of.end.min(first + STRETCH));
+    let free = |stretch: &Range<usize>| {
+        let not_free = |all: u64, sd: &f64| all | (sd.to_bits() ^ f64::INFINITY.to_bits());
+        sd[stretch.clone()].iter().fold(0, not_free) == 0
+    };
+    stretches.filter(move |stretch| !free(stretch)).flatten().filter(|&unknown| is_weighted(sd[unknown]))
+}
+
+impl<M: Model> Problem<M> {
+    /// What was known beforehand of the unknowns, at given values.
+    pub fn terms<'a>(&'a self, values: &'a [f64]) -> Terms<'a> {
+        Terms::new(&self.model, values, &self.prior, &self.sd)
+    }
+}
