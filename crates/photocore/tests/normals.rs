@@ -9,10 +9,10 @@ use faer::Mat;
 use faer::linalg::solvers::Solve;
 use photocore::normals::{
     Equations, Factor, FactorOptions, Function, GroupRows, InvertOptions, Layout, LayoutError, Ordering,
-    Prior, SelectedInverse, SolveOptions, Stopped, System, Tie, TieRows,
+    Prior, SelectedInverse, SolveOptions, System, Tie, TieRows,
 };
+use photocore::{Stopped, Threads};
 use proptest::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// A system of given equations, dense.
 #[derive(Debug)]
@@ -107,8 +107,8 @@ impl Dense {
     }
 }
 
-fn pool(threads: usize) -> ThreadPool {
-    ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
+fn threads(count: usize) -> Threads {
+    Threads::new(count).unwrap()
 }
 
 fn go(_: usize) -> ControlFlow<()> {
@@ -211,16 +211,18 @@ fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
 
 /// Solution, every selected block, local cofactors and adjusted equations against the dense inverse.
 fn compare_with_dense(dense: &Dense, ordering: Ordering) {
-    let pool = pool(2);
+    let threads = threads(2);
     let system = System::new(dense.layout.clone(), ordering).unwrap();
     let layout = system.layout();
-    let factor = done(system.factor(&pool, dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads, dense, &dense.prior, &FactorOptions::default(), &mut go));
     assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
-    let solution = done(system.solve(&pool, &factor, dense, &dense.prior, &SolveOptions::default(), &mut go));
+    let solution =
+        done(system.solve(&threads, &factor, dense, &dense.prior, &SolveOptions::default(), &mut go));
     let rights = vec![1.0; 11 * layout.unknowns()];
-    let alone = done(system.factor(&pool, dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
-    let written = done(system.solve(&pool, &alone, dense, &dense.prior, &SolveOptions::default(), &mut go));
-    let further = done(system.solve(&pool, &alone, dense, &dense.prior, &solved_for(&rights), &mut go));
+    let alone = done(system.factor(&threads, dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
+    let written =
+        done(system.solve(&threads, &alone, dense, &dense.prior, &SolveOptions::default(), &mut go));
+    let further = done(system.solve(&threads, &alone, dense, &dense.prior, &solved_for(&rights), &mut go));
     let cholesky = dense.normal_matrix().llt(faer::Side::Lower).unwrap();
     let ones = cholesky.solve(Mat::<f64>::full(layout.unknowns(), 1, 1.0));
     for (i, value) in further.iter().enumerate() {
@@ -234,12 +236,12 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
         assert_close(written[i], *value, 1e-12 * expected.norm_max(), "solution from the equations");
     }
     let right: Vec<f64> = dense.normal_right().col(0).iter().copied().collect();
-    let again = done(system.solve(&pool, &factor, dense, &dense.prior, &solved_for(&right), &mut go));
+    let again = done(system.solve(&threads, &factor, dense, &dense.prior, &solved_for(&right), &mut go));
     for (value, other) in again.iter().zip(&solution) {
         assert_close(*value, *other, 1e-11 * expected.norm_max(), "solution for its right-hand side");
     }
     if factor.has_cached() {
-        let (chord, decrease) = done(system.chord(&pool, &factor, dense, &dense.prior, &mut go));
+        let (chord, decrease) = done(system.chord(&threads, &factor, dense, &dense.prior, &mut go));
         assert_close(decrease, factor.decrease, 1e-11 * factor.decrease, "decrease");
         for (value, other) in chord.iter().zip(&solution) {
             assert_close(*value, *other, 1e-11 * expected.norm_max(), "chord from the same values");
@@ -249,7 +251,8 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
     compare_columns(dense, &system, &factor, &inverse);
     compare_functions(dense, &system, &factor, &inverse);
-    let found = done(system.invert(&pool, factor, dense, &dense.prior, &InvertOptions::default(), &mut go));
+    let found =
+        done(system.invert(&threads, factor, dense, &dense.prior, &InvertOptions::default(), &mut go));
     let (cofactors, selected) = (found.cofactors, found.selected);
     compare_blocks(layout, &selected, &inverse);
     let l = layout.local_dim();
@@ -275,7 +278,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
 /// factor does all else.
 fn compare_chord(dense: &Dense, system: &System, factor: &Factor) {
     let there = Dense::new(dense.layout.clone(), 97);
-    let (chord, _) = done(system.chord(&pool(2), factor, &there, &there.prior, &mut go));
+    let (chord, _) = done(system.chord(&threads(2), factor, &there, &there.prior, &mut go));
     let count = dense.layout.locals() * dense.layout.local_dim();
     let (before, after, right) = (dense.normal_matrix(), there.normal_matrix(), there.normal_right());
     let (right, others) = right.split_at_row(count);
@@ -330,8 +333,8 @@ fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Ma
         rights[k * unknowns + column] = 1.0;
         rights[columns.len() * unknowns + column] = 1.0;
     }
-    let pool = pool(2);
-    let solved = done(system.solve(&pool, factor, dense, &dense.prior, &solved_for(&rights), &mut go));
+    let threads = threads(2);
+    let solved = done(system.solve(&threads, factor, dense, &dense.prior, &solved_for(&rights), &mut go));
     let largest = inverse.norm_max();
     for i in 0..unknowns {
         let mut sum = 0.0;
@@ -347,7 +350,7 @@ fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Ma
 
 /// Cofactors of unknowns and of sums of them, every two of them and one kind with the other.
 fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &Mat<f64>) {
-    let (unknowns, pool) = (system.layout().unknowns(), pool(2));
+    let (unknowns, threads) = (system.layout().unknowns(), threads(2));
     let several: Vec<Function> =
         (0..unknowns).rev().step_by(unknowns.div_ceil(40)).map(|unknown| vec![(unknown, 1.0)]).collect();
     // One of them takes an unknown twice, and one takes all.
@@ -364,9 +367,9 @@ fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &
         (&several, Some(&vec![])),
     ] {
         let reduced =
-            done(system.reduce(&pool, dense, &dense.prior, rows, columns.map(Vec::as_slice), &mut go));
+            done(system.reduce(&threads, dense, &dense.prior, rows, columns.map(Vec::as_slice), &mut go));
         assert!(system.memory_of(&reduced) >= 8 * rows.len() * columns.map_or(rows.len(), Vec::len));
-        let found = done(system.cofactors_of(&pool, factor, &reduced, &mut go));
+        let found = done(system.cofactors_of(&threads, factor, &reduced, &mut go));
         let others = columns.unwrap_or(rows);
         assert_eq!(found.len(), rows.len() * others.len());
         let along = |functions: &[Function]| {
@@ -511,7 +514,7 @@ fn what_a_shared_camera_and_photos_leave_open_is_named() {
         dense.matrix[(row, own)] = dense.matrix[(row, photo)];
     }
     let system = System::new(layout, Ordering::Auto).unwrap();
-    let factor = done(system.factor(&pool(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.blocks(), vec![vec![5, camera]]);
     assert_eq!(deficiency.unknowns(system.layout()), vec![vec![photo, own]]);
@@ -527,21 +530,22 @@ fn same_bits(plain: Layout) {
     let tie = |k: u32| Tie { rows: 2, kept: vec![k, k + 40, 7] };
     let dense = Dense::new(plain.with_ties((10..30).map(tie).collect()).unwrap(), 3);
     let rights: Vec<f64> = (0..20 * dense.layout.unknowns()).map(|k| (k % 17) as f64 - 8.0).collect();
-    let run = |threads: usize| {
-        let pool = pool(threads);
+    let run = |count: usize| {
+        let threads = threads(count);
         let system = System::new(dense.layout.clone(), Ordering::Auto).unwrap();
-        let factor = done(system.factor(&pool, &dense, &dense.prior, &FactorOptions::default(), &mut go));
+        let factor = done(system.factor(&threads, &dense, &dense.prior, &FactorOptions::default(), &mut go));
         let solution =
-            done(system.solve(&pool, &factor, &dense, &dense.prior, &SolveOptions::default(), &mut go));
-        let more = done(system.solve(&pool, &factor, &dense, &dense.prior, &solved_for(&rights), &mut go));
-        let alone = done(system.factor(&pool, &dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
-        let written = done(system.solve(&pool, &alone, &dense, &dense.prior, &solved_for(&rights), &mut go));
+            done(system.solve(&threads, &factor, &dense, &dense.prior, &SolveOptions::default(), &mut go));
+        let more = done(system.solve(&threads, &factor, &dense, &dense.prior, &solved_for(&rights), &mut go));
+        let alone = done(system.factor(&threads, &dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
+        let written =
+            done(system.solve(&threads, &alone, &dense, &dense.prior, &solved_for(&rights), &mut go));
         let functions: Vec<Function> =
             (0..dense.layout.unknowns()).step_by(3).map(|unknown| vec![(unknown, 1.0)]).collect();
-        let reduced = done(system.reduce(&pool, &dense, &dense.prior, &functions, None, &mut go));
-        let of_functions = done(system.cofactors_of(&pool, &factor, &reduced, &mut go));
+        let reduced = done(system.reduce(&threads, &dense, &dense.prior, &functions, None, &mut go));
+        let of_functions = done(system.cofactors_of(&threads, &factor, &reduced, &mut go));
         let cofactors =
-            done(system.invert(&pool, factor, &dense, &dense.prior, &InvertOptions::default(), &mut go))
+            done(system.invert(&threads, factor, &dense, &dense.prior, &InvertOptions::default(), &mut go))
                 .cofactors;
         let numbers =
             [solution, more, written, of_functions, cofactors.local, cofactors.kept, cofactors.equations];
@@ -563,7 +567,7 @@ fn what_the_equations_do_not_determine_is_named() {
         dense.matrix[(row, range.start + 4)] = dense.matrix[(row, range.start + 1)];
     }
     let system = System::new(layout, Ordering::ReverseCuthillMckee).unwrap();
-    let factor = done(system.factor(&pool(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.defect(), 1);
     assert_eq!(deficiency.blocks(), vec![vec![3]]);
@@ -575,7 +579,7 @@ fn local_block_without_equations_is_named() {
     let mut dense = Dense::new(layout.clone(), 5);
     dense.prior.weight[layout.local_range(1)].fill(0.0);
     let system = System::new(layout, Ordering::Auto).unwrap();
-    let factor = done(system.factor(&pool(1), &dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads(1), &dense, &dense.prior, &FactorOptions::default(), &mut go));
     assert_eq!(factor.deficient_locals, vec![1]);
 }
 

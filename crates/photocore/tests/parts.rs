@@ -10,10 +10,10 @@ use std::ops::ControlFlow;
 use cut::{Cut, TREES};
 use photocore::normals::{
     Contribution, Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, LayoutError, Ordering,
-    Prior, SolveOptions, Stopped, System, Tie, TieRows,
+    Prior, SolveOptions, System, Tie, TieRows,
 };
+use photocore::{Stopped, Threads};
 use proptest::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Numbers between -1 and 1 that a seed and two places give.
 fn number(seed: u64, i: usize, j: usize) -> f64 {
@@ -153,8 +153,8 @@ fn piece<'a>(all: &Piece<'_>, cut: &Cut, p: usize) -> Piece<'a> {
     Piece { seed: all.seed, layout: own, locals, groups, ties, kept, prior, below: vec![] }
 }
 
-fn pool(threads: usize) -> ThreadPool {
-    ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
+fn threads(count: usize) -> Threads {
+    Threads::new(count).unwrap()
 }
 
 fn go(_: usize) -> ControlFlow<()> {
@@ -173,7 +173,7 @@ fn upward<'a>(
     all: &Piece<'_>,
     cut: &Cut,
     ordering: Ordering,
-    pool: &ThreadPool,
+    threads: &Threads,
 ) -> Vec<(Piece<'a>, System, Factor)> {
     let mut left: Vec<Option<Contribution<'static>>> = vec![];
     let mut nodes = vec![];
@@ -181,7 +181,8 @@ fn upward<'a>(
         let mut piece = piece(all, cut, p);
         piece.below = cut.children(p).iter().map(|&child| left[child].take().unwrap()).collect();
         let system = System::new(piece.layout.clone(), ordering).unwrap();
-        let mut factor = done(system.factor(pool, &piece, &piece.prior, &FactorOptions::default(), &mut go));
+        let mut factor =
+            done(system.factor(threads, &piece, &piece.prior, &FactorOptions::default(), &mut go));
         assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
         let contribution = factor.take_contribution();
         let outer = system.symbolic().outer_unknowns();
@@ -200,15 +201,16 @@ fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
 
 /// Solution, sums and cofactors of a system that is cut against those of one piece.
 fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u64, ordering: Ordering) {
-    let pool = pool(2);
+    let threads = threads(2);
     let cut = Cut::new(tree, &touched(&layout), node_of);
     let all = whole(layout, seed);
     let system = System::new(all.layout.clone(), ordering).unwrap();
-    let factor = done(system.factor(&pool, &all, &all.prior, &FactorOptions::default(), &mut go));
-    let expected = done(system.solve(&pool, &factor, &all, &all.prior, &SolveOptions::default(), &mut go));
+    let factor = done(system.factor(&threads, &all, &all.prior, &FactorOptions::default(), &mut go));
+    let expected = done(system.solve(&threads, &factor, &all, &all.prior, &SolveOptions::default(), &mut go));
     let (sum, decrease) = (factor.sum_of_squares, factor.decrease);
-    let cofactors = done(system.invert(&pool, factor, &all, &all.prior, &InvertOptions::default(), &mut go));
-    let nodes = upward(&all, &cut, ordering, &pool);
+    let cofactors =
+        done(system.invert(&threads, factor, &all, &all.prior, &InvertOptions::default(), &mut go));
+    let nodes = upward(&all, &cut, ordering, &threads);
     let sums = nodes.iter().map(|(.., factor)| factor.sum_of_squares).sum();
     assert_close(sums, sum, 1e-12 * sum, "sum of squares");
     assert_close(
@@ -222,7 +224,7 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
         let (outer_step, outer_cofactors) = std::mem::take(&mut handed[p]);
         let step = done(system.solve(
-            &pool,
+            &threads,
             &factor,
             &piece,
             &piece.prior,
@@ -236,7 +238,7 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
             assert_close(*x, expected[unknown], 1e-9 * largest, "solution");
         }
         let found = done(system.invert(
-            &pool,
+            &threads,
             factor,
             &piece,
             &piece.prior,
@@ -357,14 +359,14 @@ fn bits_of_a_node_do_not_depend_on_the_number_of_threads() {
     let node_of = (0..120).map(|photo| usize::from(photo % 30 >= 15)).chain([2; 4]).collect();
     let cut = Cut::new(&[Some(2), Some(2), None], &touched(&layout), node_of);
     let all = whole(layout, 5);
-    let left = [1, 3].map(|threads| {
-        let pool = pool(threads);
+    let left = [1, 3].map(|count| {
+        let threads = threads(count);
         let mut numbers = vec![];
         for p in 0..2 {
             let piece = piece(&all, &cut, p);
             let system = System::new(piece.layout.clone(), Ordering::Auto).unwrap();
             let mut factor =
-                done(system.factor(&pool, &piece, &piece.prior, &FactorOptions::default(), &mut go));
+                done(system.factor(&threads, &piece, &piece.prior, &FactorOptions::default(), &mut go));
             let Contribution { matrix, right, diagonal } = factor.take_contribution();
             numbers.extend([matrix, right, diagonal].concat());
             assert!(factor.take_contribution().matrix.is_empty(), "handed out once");

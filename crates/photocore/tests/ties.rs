@@ -5,12 +5,12 @@
 use std::ops::ControlFlow;
 
 use faer::{Mat, Side};
+use photocore::Threads;
 use photocore::adjustment::{
     Datum, DatumError, Leverages, Linearized, Loss, Method, Model, Motions, Options, Problem, Published,
     Status, Stop, adjust,
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Points in the plane; distances from kept points to local ones are groups, those between kept points ties.
 struct Trilateration {
@@ -106,8 +106,8 @@ fn network(held: Vec<usize>) -> Problem<Trilateration> {
     }
 }
 
-fn pool() -> ThreadPool {
-    ThreadPoolBuilder::new().num_threads(2).build().unwrap()
+fn threads() -> Threads {
+    Threads::new(2).unwrap()
 }
 
 fn options() -> Options {
@@ -116,6 +116,7 @@ fn options() -> Options {
         max_iterations: 100,
         covariance: true,
         loss: None,
+        threads: 0,
     }
 }
 
@@ -172,13 +173,13 @@ fn kept_block(problem: &Problem<Trilateration>, cofactors: &[f64], kept: usize, 
 fn inner_constraints_over_everything_are_the_pseudo_inverse() {
     // One point and the direction to another are held.
     let problem = network(vec![16, 17, 19]);
-    let pool = pool();
-    let mut found = adjust(&problem, &options(), &pool, &mut go).unwrap();
+    let threads = threads();
+    let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
     assert_eq!(found.status, Status::Converged);
     let (redundancy, formed) = (found.redundancy.take().unwrap(), found.formations);
     let all = (0..problem.layout().unknowns()).map(|unknown| (unknown, 1.0)).collect();
     let datum = Datum { carriers: all, left: vec![], relative: false };
-    found.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go).unwrap();
+    found.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go).unwrap();
     assert_eq!(found.formations, formed + 1);
     let (free, cofactors) = (&found, found.cofactors.as_ref().unwrap());
     let a = design(&problem, &free.unknowns);
@@ -217,9 +218,9 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
 
     // Without cofactors it is moved all the same, and nothing is factored.
     let bare = Options { covariance: false, ..options() };
-    let mut moved = adjust(&problem, &bare, &pool, &mut go).unwrap();
+    let mut moved = adjust(&problem, &bare, &threads, &mut go).unwrap();
     let formations = moved.formations;
-    moved.take_to(&problem, &bare, &datum, &problem.initial, &pool, &mut go).unwrap();
+    moved.take_to(&problem, &bare, &datum, &problem.initial, &threads, &mut go).unwrap();
     assert!(moved.cofactors.is_none() && moved.redundancy.is_none());
     assert_eq!(moved.formations, formations);
     let apart = moved.unknowns.iter().zip(&free.unknowns).map(|(x, other)| (x - other).abs());
@@ -228,17 +229,17 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
 
 #[test]
 fn a_datum_does_not_depend_on_where_the_network_comes_from() {
-    let pool = pool();
+    let threads = threads();
     let in_datum_of = |held: Vec<usize>| {
         let problem = network(held);
-        let mut found = adjust(&problem, &options(), &pool, &mut go).unwrap();
+        let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
         // Carried by three kept points only.
         let datum = Datum {
             carriers: (20..26).map(|unknown| (unknown, 1.0)).collect(),
             left: vec![],
             relative: false,
         };
-        found.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go).unwrap();
+        found.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go).unwrap();
         found.cofactors.unwrap()
     };
     let one = in_datum_of(vec![16, 17, 19]);
@@ -252,24 +253,24 @@ fn a_datum_does_not_depend_on_where_the_network_comes_from() {
 #[test]
 fn too_few_carriers_are_refused() {
     let problem = network(vec![16, 17, 19]);
-    let pool = pool();
-    let mut found = adjust(&problem, &options(), &pool, &mut go).unwrap();
+    let threads = threads();
+    let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
     // One point carries shifts, but no rotation about itself; one coordinate of four points no shift along the other.
     for carriers in [vec![16, 17], vec![16, 18, 20, 22]] {
         let carriers = carriers.into_iter().map(|unknown| (unknown, 1.0)).collect();
         let datum = Datum { carriers, left: vec![], relative: false };
-        let refused = found.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go);
+        let refused = found.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go);
         assert_eq!(refused.unwrap_err(), DatumError::NotCarried);
     }
 }
 
 #[test]
 fn what_is_open_is_found_by_trying_and_held() {
-    let pool = pool();
+    let threads = threads();
     let adjusted = |change: &dyn Fn(&mut Problem<Trilateration>), method: Method| {
         let mut problem = network(vec![16, 17, 19]);
         change(&mut problem);
-        (adjust(&problem, &Options { method, ..options() }, &pool, &mut go).unwrap(), problem)
+        (adjust(&problem, &Options { method, ..options() }, &threads, &mut go).unwrap(), problem)
     };
     for method in [
         Method::default(),
@@ -294,7 +295,7 @@ fn what_is_open_is_found_by_trying_and_held() {
             left: vec![],
             relative: false,
         };
-        let refused = placed.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go);
+        let refused = placed.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go);
         assert_eq!(refused.unwrap_err(), DatumError::NotFree);
     }
 }
@@ -305,7 +306,7 @@ fn a_loss_takes_the_weight_of_a_wrong_tie() {
     let wrong = problem.layout().groups() + 5;
     problem.model.lengths[wrong] += 3.0;
     let robust = Options { loss: Some(Loss::Huber(1.5)), covariance: false, ..options() };
-    let found = adjust(&problem, &robust, &pool(), &mut go).unwrap();
+    let found = adjust(&problem, &robust, &threads(), &mut go).unwrap();
     let weights = found.weights.unwrap();
     assert_eq!(weights.len(), 32 + 36);
     let least = (0..weights.len()).min_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap();
@@ -315,12 +316,13 @@ fn a_loss_takes_the_weight_of_a_wrong_tie() {
 
 #[test]
 fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say() {
-    let (problem, pool) = (network(vec![]), pool());
+    let (problem, threads) = (network(vec![]), threads());
     let mut go_on = |_| ControlFlow::Continue(());
-    let adjusted = adjust(&problem, &Options::default(), &pool, &mut |_| ControlFlow::Continue(())).unwrap();
+    let adjusted =
+        adjust(&problem, &Options::default(), &threads, &mut |_| ControlFlow::Continue(())).unwrap();
     let (values, held) = (adjusted.unknowns.clone(), adjusted.datum.clone());
     let leverages =
-        Leverages::at(&problem, values.clone(), held.clone(), &pool, &mut |_| ControlFlow::Continue(()))
+        Leverages::at(&problem, values.clone(), held.clone(), &threads, &mut |_| ControlFlow::Continue(()))
             .unwrap();
     let local = 3;
     let layout = problem.layout();
@@ -337,9 +339,9 @@ fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say(
         row
     };
     let rows: Vec<Vec<f64>> = layout.groups_of(local).map(row).collect();
-    let linearized = Linearized::form(&problem, None, values, held, &pool, &mut go_on).unwrap();
-    let solved = linearized.solve_for(&problem, &rows.concat(), &pool, &mut go_on).unwrap();
-    let found = leverages.of_locals(&problem, &problem.observation_sd, &[local, 0], |_| vec![], &pool);
+    let linearized = Linearized::form(&problem, None, values, held, &threads, &mut go_on).unwrap();
+    let solved = linearized.solve_for(&problem, &rows.concat(), &threads, &mut go_on).unwrap();
+    let found = leverages.of_locals(&problem, &problem.observation_sd, &[local, 0], |_| vec![], &threads);
     let blocks: Vec<Vec<f64>> = found.into_iter().map(|own| own.equations).collect();
     assert_eq!(blocks.len(), 2);
     for (k, value) in blocks[0].iter().enumerate() {

@@ -1,11 +1,10 @@
 //! The observation equations of a problem at given values of the unknowns, in unit weight.
 
-use rayon::ThreadPool;
-
 use super::group_step::GroupStep;
 use super::loss::{Loss, Reweighting};
 use super::problem::{Model, Problem};
 use super::walk::Buffers;
+use crate::Threads;
 use crate::normals::{Contribution, Equations, GroupRows, Prior, TieRows, dot};
 
 /// The equations of a problem at given values of the unknowns: weighted to unit weight, by a loss besides, without fixed unknowns.
@@ -47,10 +46,10 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
         loss: Option<Loss>,
         values: &[f64],
         held: &[usize],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Self {
         let reweighting = loss.map(|loss| Reweighting { loss, curved: false });
-        pool.install(|| Self::prepared(problem, problem.model.prepare(values), held, reweighting))
+        threads.install(|| Self::prepared(problem, problem.model.prepare(values), held, reweighting))
     }
 
     /// Of values that are prepared already.
@@ -86,8 +85,8 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
     }
 
     /// With the columns of fixed unknowns, and without a loss.
-    pub fn of_all(problem: &'a Problem<M>, values: &[f64], pool: &ThreadPool) -> Self {
-        let prepared = pool.install(|| problem.model.prepare(values));
+    pub fn of_all(problem: &'a Problem<M>, values: &[f64], threads: &Threads) -> Self {
+        let prepared = threads.install(|| problem.model.prepare(values));
         let observation_sd = &problem.observation_sd;
         Self { problem, prepared, observation_sd, fixed: None, reweighting: None, contributions: &[] }
     }
@@ -152,9 +151,9 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
     }
 
     /// By how much a step lowers the weighted sum of squares of these equations and the priors: sum of Ax (2 l - Ax).
-    pub fn decrease(&self, pool: &ThreadPool, prior: &Prior, step: &[f64]) -> f64 {
+    pub fn decrease(&self, threads: &Threads, prior: &Prior, step: &[f64]) -> f64 {
         let layout = self.problem.layout();
-        let observed = self.problem.for_locals(pool, |buffers, local| {
+        let observed = self.problem.for_locals(threads, |buffers, local| {
             let mut sum = 0.0;
             for group in layout.groups_of(local) {
                 let mut rows = buffers.rows(layout, group);

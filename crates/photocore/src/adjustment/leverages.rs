@@ -4,7 +4,6 @@
 //! order and symbolic factorisation stay, and cofactors of what is out are inside the pattern too.
 
 use nalgebra::DMatrix;
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::equations::ObservationEquations;
@@ -13,6 +12,7 @@ use super::options::Phase;
 use super::problem::{Model, Problem};
 use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
+use crate::Threads;
 use crate::normals::{
     Cofactors, Equations, FactorOptions, InvertOptions, LocalCofactors, Prior, SelectedInverse, TieRows,
 };
@@ -57,17 +57,18 @@ impl Leverages {
         problem: &Problem<M>,
         values: Vec<f64>,
         held: Vec<usize>,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Self, AdjustError> {
         let mut between = between(watch, Phase::Form, problem.layout().locals());
-        let equations = ObservationEquations::new(problem, None, &values, &held, pool);
+        let equations = ObservationEquations::new(problem, None, &values, &held, threads);
         let forming = FactorOptions::UNCACHED;
-        let formed = Linearized::of(&equations, values, held, &forming, pool, &mut between)?.determined()?;
+        let formed =
+            Linearized::of(&equations, values, held, &forming, threads, &mut between)?.determined()?;
         let inverting = InvertOptions { by_groups: true, ..InvertOptions::default() };
-        let found = formed.invert(&equations, &inverting, pool, &mut between)?;
+        let found = formed.invert(&equations, &inverting, threads, &mut between)?;
         let Inverted { values, held, cofactors, selected, .. } = found;
-        let residuals = problem.residuals(pool, &values);
+        let residuals = problem.residuals(threads, &values);
         Ok(Self { values, held, residuals, cofactors, selected })
     }
 
@@ -91,14 +92,14 @@ impl Leverages {
         observation_sd: &[f64],
         locals: &[usize],
         further: impl Fn(usize) -> Vec<f64> + Sync,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Vec<LocalCofactors> {
-        let (formed, asked, prior) = self.equations(problem, observation_sd, pool);
+        let (formed, asked, prior) = self.equations(problem, observation_sd, threads);
         let of = |&local: &usize| {
             let further = further(local);
             problem.system.local_cofactors(&self.selected, &formed, &prior, &asked, local, &further)
         };
-        pool.install(|| locals.par_iter().map(of).collect())
+        threads.install(|| locals.par_iter().map(of).collect())
     }
 
     /// What all equations of some local blocks, which take no part, have to do with each other if they did: for each two of them the
@@ -118,11 +119,11 @@ impl Leverages {
         (observation_sd, sd): (&[f64], &[f64]),
         locals: &[usize],
         further: impl Fn(usize) -> Vec<f64> + Sync,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Vec<Vec<f64>> {
         let layout = problem.layout();
         let unknowns = || locals.iter().flat_map(|&local| layout.local_range(local));
-        let (_, asked, mut prior) = self.equations(problem, observation_sd, pool);
+        let (_, asked, mut prior) = self.equations(problem, observation_sd, threads);
         let asked = asked.with_unknowns(unknowns(), sd);
         for unknown in unknowns() {
             let own = sd[unknown];
@@ -137,7 +138,7 @@ impl Leverages {
             let factor = (DMatrix::identity(rows, rows) + all - &alone).cholesky();
             factor.map_or(vec![], |factor| (factor.inverse() - alone).as_slice().to_vec())
         };
-        pool.install(|| locals.par_iter().map(of).collect())
+        threads.install(|| locals.par_iter().map(of).collect())
     }
 
     /// Cofactors of the equations of some ties, with the given standard deviations.
@@ -146,12 +147,12 @@ impl Leverages {
         problem: &Problem<M>,
         observation_sd: &[f64],
         ties: &[usize],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Vec<TieCofactors> {
         if ties.is_empty() {
             return vec![];
         }
-        let (_, asked, _) = self.equations(problem, observation_sd, pool);
+        let (_, asked, _) = self.equations(problem, observation_sd, threads);
         ties.iter().map(|&tie| self.of_tie(problem, &asked, tie)).collect()
     }
 
@@ -204,9 +205,9 @@ impl Leverages {
         &self,
         problem: &'a Problem<M>,
         observation_sd: &'a [f64],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> (ObservationEquations<'a, M>, ObservationEquations<'a, M>, Prior) {
-        let at = || ObservationEquations::new(problem, None, &self.values, &self.held, pool);
+        let at = || ObservationEquations::new(problem, None, &self.values, &self.held, threads);
         (at(), at().with_deviations(observation_sd), problem.prior_equations(&self.values, &self.held))
     }
 }

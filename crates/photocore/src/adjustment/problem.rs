@@ -8,7 +8,7 @@ pub trait Model: Sync {
     /// What several observations share, computed once for each set of values of the unknowns.
     type Prepared: Send + Sync;
 
-    /// Prepares for the given unknowns (in the order of the layout). Called on a thread of the pool, as is [`Model::relocate`].
+    /// Prepares for the given unknowns (in the order of the layout). Called on a thread of the threads, as is [`Model::relocate`].
     fn prepare(&self, unknowns: &[f64]) -> Self::Prepared;
 
     /// Writes observed minus computed, and the partials of the computed values, of one group of observations of a local

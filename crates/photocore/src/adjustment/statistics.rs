@@ -3,10 +3,9 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use rayon::ThreadPool;
-
 use super::problem::{Model, Problem};
 use super::terms::weighted_among;
+use crate::Threads;
 use crate::normals::{Cofactors, dot};
 
 /// What an adjustment counts.
@@ -112,15 +111,15 @@ impl<M> Problem<M> {
 
 impl<M: Model> Problem<M> {
     /// Observed minus computed of every observation at the given values of the unknowns.
-    pub(super) fn residuals(&self, pool: &ThreadPool, values: &[f64]) -> Vec<f64> {
-        self.residuals_at(pool, &pool.install(|| self.model.prepare(values)))
+    pub(super) fn residuals(&self, threads: &Threads, values: &[f64]) -> Vec<f64> {
+        self.residuals_at(threads, &threads.install(|| self.model.prepare(values)))
     }
 
     /// The same at values that are prepared already.
-    pub(super) fn residuals_at(&self, pool: &ThreadPool, prepared: &M::Prepared) -> Vec<f64> {
+    pub(super) fn residuals_at(&self, threads: &Threads, prepared: &M::Prepared) -> Vec<f64> {
         let layout = self.layout();
         let rows = layout.rows();
-        let by_stretch = self.for_stretches(pool, |buffers, locals| {
+        let by_stretch = self.for_stretches(threads, |buffers, locals| {
             let groups = layout.groups_of(locals.start).start..layout.groups_of(locals.end - 1).end;
             let mut residuals = vec![0.0; groups.len() * rows];
             let mut own = residuals.chunks_exact_mut(rows.max(1));

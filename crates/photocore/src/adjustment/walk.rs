@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::problem::Problem;
+use crate::Threads;
 use crate::normals::{GroupRows, Layout, TieRows};
 
 /// Room for the rows of one group.
@@ -43,24 +43,24 @@ impl<M: Sync> Problem<M> {
     /// What `each` makes of every local block, in their order.
     pub(super) fn for_locals<T: Send>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         each: impl Fn(&mut Buffers, usize) -> T + Send + Sync,
     ) -> Vec<T> {
         let locals = (0..self.layout().locals()).into_par_iter().with_min_len(AT_LEAST);
-        pool.install(|| locals.map_init(Buffers::default, each).collect())
+        threads.install(|| locals.map_init(Buffers::default, each).collect())
     }
 
     /// What `each` makes of stretches of local blocks, in their order.
     pub(super) fn for_stretches<T: Send>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         each: impl Fn(&mut Buffers, Range<usize>) -> T + Send + Sync,
     ) -> Vec<T> {
         let count = self.layout().locals();
         let stretches = (0..count.div_ceil(AT_LEAST)).into_par_iter();
         let stretch = |index: usize| index * AT_LEAST..count.min((index + 1) * AT_LEAST);
         let each = |buffers: &mut Buffers, index: usize| each(buffers, stretch(index));
-        pool.install(|| stretches.map_init(Buffers::default, each).collect())
+        threads.install(|| stretches.map_init(Buffers::default, each).collect())
     }
 
     /// What `each` makes of every tie, in their order: there are few.

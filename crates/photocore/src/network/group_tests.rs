@@ -1,12 +1,12 @@
 //! Tests of all groups of observations of a network that is tried.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::NetworkError;
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
+use crate::Threads;
 use crate::adjustment::{Few, GroupTest, Leverages, Terms};
 use crate::normals::GroupCofactors;
 
@@ -124,7 +124,7 @@ impl Trial {
     ///
     /// # Errors
     /// Nothing was adjusted before.
-    pub fn tests(&self, pool: &ThreadPool) -> Result<Tests, NetworkError> {
+    pub fn tests(&self, threads: &Threads) -> Result<Tests, NetworkError> {
         let found = self.found()?;
         let groups = found.cofactors.groups.as_ref().ok_or(NetworkError::State)?;
         let terms = self.terms(&self.assembled.problem.sd, &found.values);
@@ -136,7 +136,7 @@ impl Trial {
                 part.put(size, self.test(suspect, found, groups, &terms));
             }
         };
-        pool.install(|| self.suspects.par_chunks(TOGETHER).zip(parts).for_each(fill));
+        threads.install(|| self.suspects.par_chunks(TOGETHER).zip(parts).for_each(fill));
         Ok(all)
     }
 

@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
-use rayon::ThreadPool;
 
 use super::NetworkError;
 use super::group_tests::{in_units, sub};
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
+use crate::Threads;
 use crate::adjustment::{Leverages, Terms, TieCofactors};
 use crate::normals::{LocalCofactors, dot};
 
@@ -51,11 +51,11 @@ impl Trial {
     pub fn predictions(
         &self,
         suspects: &[usize],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Vec<Option<Prediction>>, NetworkError> {
         let found = self.found()?;
         let problem = &self.assembled.problem;
-        let around = self.around(suspects, &self.observation_sd, found, pool);
+        let around = self.around(suspects, &self.observation_sd, found, threads);
         let terms = self.terms(&self.sd, &found.values);
         let predict = |&index: &usize| {
             let suspect = &self.suspects[index];
@@ -89,7 +89,7 @@ impl Trial {
         suspects: &[usize],
         observation_sd: &[f64],
         found: &Leverages,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Around {
         let problem = &self.assembled.problem;
         let (mut places, mut ties) = (vec![], vec![]);
@@ -102,8 +102,8 @@ impl Trial {
         }
         places.sort_unstable();
         places.dedup();
-        let of_points = found.of_locals(problem, observation_sd, &places, |_| vec![], pool);
-        let of_ties = found.of_ties(problem, observation_sd, &ties, pool);
+        let of_points = found.of_locals(problem, observation_sd, &places, |_| vec![], threads);
+        let of_ties = found.of_ties(problem, observation_sd, &ties, threads);
         Around {
             points: places.into_iter().zip(of_points).collect(),
             ties: ties.into_iter().zip(of_ties).collect(),
@@ -153,13 +153,13 @@ impl Trial {
     ///
     /// # Errors
     /// Nothing was adjusted before.
-    pub fn on_points(&self, points: &[usize], pool: &ThreadPool) -> Result<Vec<OnPoint>, NetworkError> {
+    pub fn on_points(&self, points: &[usize], threads: &Threads) -> Result<Vec<OnPoint>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let (observation_sd, sd) = (&problem.observation_sd[..], &problem.sd[..]);
         let terms = self.terms(sd, &found.values);
         let further = |place: usize| self.further(place, &terms);
         let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
-        let cofactors = found.of_locals(problem, observation_sd, &places, further, pool);
+        let cofactors = found.of_locals(problem, observation_sd, &places, further, threads);
         let mut found_at = places.iter().zip(cofactors);
         let of = |&point: &usize| {
             let known = self.local(point).and_then(|_| found_at.next());
@@ -179,13 +179,13 @@ impl Trial {
     ///
     /// # Errors
     /// Nothing was adjusted before.
-    pub fn on_gone_points(&self, points: &[usize], pool: &ThreadPool) -> Result<Vec<OnPoint>, NetworkError> {
+    pub fn on_gone_points(&self, points: &[usize], threads: &Threads) -> Result<Vec<OnPoint>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let given = (&self.observation_sd[..], &self.sd[..]);
         let terms = self.terms(&self.sd, &found.values);
         let further = |place: usize| self.further(place, &terms);
         let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
-        let cofactors = found.of_gone(problem, given, &places, further, pool);
+        let cofactors = found.of_gone(problem, given, &places, further, threads);
         let mut found_at = places.iter().zip(cofactors);
         let of = |&point: &usize| {
             let known = self.local(point).and_then(|_| found_at.next()).filter(|(_, own)| !own.is_empty());

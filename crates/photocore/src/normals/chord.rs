@@ -2,7 +2,6 @@
 
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::eliminated::Reduced;
@@ -11,7 +10,8 @@ use super::factor::Factor;
 use super::stack::Gathered;
 use super::system::System;
 use super::vectorised::dot;
-use super::watch::{Between, Control, Stopped, watched};
+use super::watch::{Between, Control, watched};
+use crate::{Stopped, Threads};
 
 impl System {
     /// About N^-1 A^T l over all unknowns, in the order of the layout, A and l of equations and priors at other values of the unknowns than those
@@ -23,14 +23,14 @@ impl System {
     /// a larger one have left is not in it.
     pub fn chord<E: Equations>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         factor: &Factor,
         equations: &E,
         prior: &Prior,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, (Vec<f64>, f64)> {
         let equations: &dyn Gathered = equations;
-        watched(pool, between, |control| {
+        watched(threads, between, |control| {
             let mut others = control.allocated(self.of_others(&prior.right))?;
             self.add_rights_of_ties(equations, &mut others);
             let homes = (0..factor.eliminated.len()).into_par_iter();

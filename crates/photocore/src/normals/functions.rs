@@ -10,7 +10,6 @@
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::eliminated::{Batch, Coupled, Reduced as OfLocal};
@@ -22,8 +21,9 @@ use super::stack::{Gathered, Stack};
 use super::symbolic::Symbolic;
 use super::system::System;
 use super::vectorised::dot;
-use super::watch::{Between, Control, Stopped, watched};
+use super::watch::{Between, Control, watched};
 use super::workspace::zeros;
+use crate::{Stopped, Threads};
 
 /// A linear function of the unknowns: unknowns that it takes, with their coefficients.
 pub type Function = Vec<(usize, f64)>;
@@ -58,7 +58,7 @@ impl System {
     /// comes from; what is held must not be taken.
     pub fn reduce<E: Equations>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         equations: &E,
         prior: &Prior,
         rows: &[Function],
@@ -66,7 +66,7 @@ impl System {
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Functions> {
         let equations: &dyn Gathered = equations;
-        watched(pool, between, |control| {
+        watched(threads, between, |control| {
             let places = self.symbolic.places(&self.layout);
             let work = Reduction { system: self, equations, prior, places: &places, control };
             let rows = work.reduced(rows);
@@ -88,12 +88,12 @@ impl System {
     /// The cofactors f^T N^-1 g of functions: a matrix row by row; the same bits for any number of threads.
     pub fn cofactors_of(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         factor: &Factor,
         functions: &Functions,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Vec<f64>> {
-        watched(pool, between, |control| {
+        watched(threads, between, |control| {
             let rows = &functions.rows;
             let columns = functions.columns.as_ref().unwrap_or(rows);
             let mut matrix = control.allocated(zeros(rows.len() * columns.len()))?;

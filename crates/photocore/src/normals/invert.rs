@@ -6,7 +6,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use faer::{MatMut, MatRef};
-use rayon::ThreadPool;
 
 use super::cofactors::{AtHome, Cofactors, GroupCofactors};
 use super::contribution::unpack;
@@ -19,7 +18,8 @@ use super::selected::SelectedInverse;
 use super::stack::Gathered;
 use super::symbolic::Symbolic;
 use super::system::System;
-use super::watch::{Between, Control, Stopped, watched};
+use super::watch::{Between, Control, watched};
+use crate::{Stopped, Threads};
 
 /// Cofactors with the selected inverse that they come from.
 #[derive(Debug)]
@@ -38,7 +38,7 @@ impl System {
     /// `equations` and `prior` must be those that the factor comes from, and its damping zero.
     pub fn invert<E: Equations>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         mut factor: Factor,
         equations: &E,
         prior: &Prior,
@@ -48,7 +48,7 @@ impl System {
         let equations: &dyn Gathered = equations;
         factor.forget();
         let Factor { mut panels, diagonal, .. } = factor;
-        watched(pool, between, |control| {
+        watched(threads, between, |control| {
             let information = self.information(&diagonal);
             panels.reopen();
             Walk { system: self, equations, prior, options, control }.invert(panels, information)

@@ -20,6 +20,7 @@
 //! ```
 //! use std::ops::ControlFlow;
 //!
+//! use photocore::Threads;
 //! use photocore::normals::{Equations, FactorOptions, GroupRows, Layout, Ordering, Prior, SolveOptions, System};
 //!
 //! /// x_local - y_kept = 1 for every pair.
@@ -35,11 +36,11 @@
 //! let layout = Layout::new(1, 1, &[1, 1], vec![0, 2, 4, 6], vec![0, 1, 0, 1, 0, 1])?;
 //! let system = System::new(layout, Ordering::Auto)?;
 //! let prior = Prior { weight: vec![1.0, 0.0, 0.0, 0.0, 0.0], right: vec![0.0; 5], between: vec![] };
-//! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+//! let threads = Threads::new(1)?;
 //! let mut go_on = |_| ControlFlow::Continue(());
 //! let (factoring, solving) = (FactorOptions::default(), SolveOptions::default());
-//! let factor = system.factor(&pool, &Differences, &prior, &factoring, &mut go_on).continue_value().expect("not stopped");
-//! let x = system.solve(&pool, &factor, &Differences, &prior, &solving, &mut go_on).continue_value().expect("not stopped");
+//! let factor = system.factor(&threads, &Differences, &prior, &factoring, &mut go_on).continue_value().expect("not stopped");
+//! let x = system.solve(&threads, &factor, &Differences, &prior, &solving, &mut go_on).continue_value().expect("not stopped");
 //! assert!(x.iter().zip([0.0, 0.0, 0.0, -1.0, -1.0]).all(|(x, expected)| (x - expected).abs() < 1e-12));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -100,4 +101,4 @@ pub use selected::SelectedInverse;
 pub use symbolic::{Operations, Symbolic};
 pub use system::System;
 pub(crate) use vectorised::dot;
-pub use watch::{Between, Stopped};
+pub use watch::Between;

@@ -2,7 +2,6 @@
 
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::eliminated::Elimination;
@@ -12,8 +11,9 @@ use super::options::SolveOptions;
 use super::stack::Gathered;
 use super::system::System;
 use super::vectorised::LANES;
-use super::watch::{Between, Control, Stopped, watched};
+use super::watch::{Between, Control, watched};
 use super::workspace::{reserved, zeros};
+use crate::{Stopped, Threads};
 
 /// Right-hand sides that go through the factor together.
 const TOGETHER: usize = 16;
@@ -26,7 +26,7 @@ impl System {
     /// what the elimination of the local blocks has left; those of local blocks whose right-hand sides are all zero once only.
     pub fn solve<E: Equations>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         factor: &Factor,
         equations: &E,
         prior: &Prior,
@@ -34,7 +34,7 @@ impl System {
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Vec<f64>> {
         let equations: &dyn Gathered = equations;
-        watched(pool, between, |control| {
+        watched(threads, between, |control| {
             let elimination = self.elimination(factor, equations, prior, control);
             match options.rights {
                 None => {

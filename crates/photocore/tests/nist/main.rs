@@ -8,9 +8,9 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use num_complex::Complex64;
+use photocore::Threads;
 use photocore::adjustment::{AdjustError, Adjustment, Method, Model, Options, Problem, Status, Stop, adjust};
 use photocore::normals::{GroupRows, Layout, Ordering, System};
-use rayon::ThreadPoolBuilder;
 
 use problems::{Certified, PROBLEMS};
 
@@ -82,9 +82,9 @@ fn run(certified: &Certified, start: &[f64], method: Method) -> Result<Adjustmen
         sd: [vec![0.0], vec![f64::INFINITY; start.len()]].concat(),
         initial,
     };
-    let options = Options { method, max_iterations: 5000, covariance: true, loss: None };
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    adjust(&problem, &options, &pool, &mut |_| ControlFlow::Continue(()))
+    let options = Options { method, max_iterations: 5000, covariance: true, loss: None, threads: 0 };
+    let threads = Threads::new(1).unwrap();
+    adjust(&problem, &options, &threads, &mut |_| ControlFlow::Continue(()))
 }
 
 /// Digits that agree, of the value that agrees worst.
