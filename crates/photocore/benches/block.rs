@@ -147,7 +147,7 @@ impl Equations for Linear {
                 rows.local[3 * row + k] = projection.point[row][k] / IMAGE_SD;
             }
             for k in 0..6 {
-                rows.kept[6 * row + k] = projection.photo[row][k] / IMAGE_SD;
+                rows.retained[6 * row + k] = projection.photo[row][k] / IMAGE_SD;
             }
         }
     }

@@ -27,14 +27,14 @@ impl Equations for Anything {
         let value = |k: usize| (1.3 * k as f64 + 0.7 * local as f64 + 0.11 * (group % 1009) as f64).sin();
         rows.constant.iter_mut().enumerate().for_each(|(k, v)| *v = value(k));
         rows.local.iter_mut().enumerate().for_each(|(k, v)| *v = value(3 * k + 1));
-        rows.kept.iter_mut().enumerate().for_each(|(k, v)| *v = value(7 * k + 2));
+        rows.retained.iter_mut().enumerate().for_each(|(k, v)| *v = value(7 * k + 2));
     }
 }
 
 fn system(photos: usize) -> (System, Prior) {
-    let kept = (0..POINTS * photos).map(|group| (group % photos) as u32).collect();
+    let retained = (0..POINTS * photos).map(|group| (group % photos) as u32).collect();
     let pointers = (0..=POINTS).map(|point| point * photos).collect();
-    let layout = Layout::new(2, 3, &vec![DIM; photos], pointers, kept).expect("a layout");
+    let layout = Layout::new(2, 3, &vec![DIM; photos], pointers, retained).expect("a layout");
     let unknowns = layout.unknowns();
     (
         System::new(layout, Ordering::Auto).expect("a system"),

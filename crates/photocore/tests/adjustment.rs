@@ -1,6 +1,6 @@
 //! Adjustment of a small problem that knows no photograph.
 //!
-//! Points of a plane (local blocks of two) are measured in frames (kept blocks: shift and rotation) with a common scale
+//! Points of a plane (local blocks of two) are measured in frames (retained blocks: shift and rotation) with a common scale
 //! and a common radial distortion (a block that all share).
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -61,8 +61,8 @@ impl Model for Frames {
         for row in 0..2 {
             rows.constant[row] = self.measured[group][row] - computed[row];
             rows.local[2 * row..][..2].copy_from_slice(&partials[row][..2]);
-            rows.kept[3 * row..][..3].copy_from_slice(&partials[row][2..5]);
-            rows.common[2 * row..][..2].copy_from_slice(&partials[row][5..]);
+            rows.retained[3 * row..][..3].copy_from_slice(&partials[row][2..5]);
+            rows.shared[2 * row..][..2].copy_from_slice(&partials[row][5..]);
         }
     }
 }
@@ -92,10 +92,10 @@ fn problem() -> Problem<Frames> {
         }
     }
     let pointers = (0..=POINTS).map(|point| point * FRAMES).collect();
-    let kept = frame_of.iter().map(|&frame| frame as u32).collect();
-    let layout = Layout::new(2, 2, &[[3; FRAMES].as_slice(), &[2]].concat(), pointers, kept).unwrap();
+    let retained = frame_of.iter().map(|&frame| frame as u32).collect();
+    let layout = Layout::new(2, 2, &[[3; FRAMES].as_slice(), &[2]].concat(), pointers, retained).unwrap();
     let shared = vec![FRAMES as u32; measured.len()];
-    let layout = layout.with_further((0..=measured.len()).collect(), shared).unwrap();
+    let layout = layout.with_shared((0..=measured.len()).collect(), shared).unwrap();
     let initial: Vec<f64> = truth.iter().enumerate().map(|(i, value)| value + 0.02 * noise(i + 70)).collect();
     Problem {
         observation_sd: vec![1e-3; 2 * measured.len()],
@@ -160,7 +160,7 @@ fn weights_lead_from_fixed_to_free() {
         hold(&mut problem, &DATUM, 0.0);
         hold(&mut problem, &[SCALE + 1], sd);
         let adjusted = run(&problem, &STRICT).unwrap();
-        (adjusted.unknowns[SCALE + 1], adjusted.cofactors.unwrap().kept.last().unwrap().sqrt())
+        (adjusted.unknowns[SCALE + 1], adjusted.cofactors.unwrap().retained.last().unwrap().sqrt())
     };
     let ((fixed, fixed_sd), (free, free_sd)) = (distortion_with(0.0), distortion_with(f64::INFINITY));
     assert_eq!((fixed, fixed_sd), (truth()[SCALE + 1], 0.0));

@@ -12,7 +12,7 @@ use photocore::adjustment::{
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
 
-/// Points in the plane; distances from kept points to local ones are groups, those between kept points ties.
+/// Points in the plane; distances from retained points to local ones are groups, those between retained points ties.
 struct Trilateration {
     layout: Layout,
     lengths: Vec<f64>,
@@ -36,17 +36,19 @@ impl Model for Trilateration {
     }
 
     fn observe(&self, values: &Vec<f64>, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let (point, station) =
-            (self.layout.local_range(local).start, self.layout.kept_range(self.layout.kept_of(group)).start);
+        let (point, station) = (
+            self.layout.local_range(local).start,
+            self.layout.retained_range(self.layout.retained_of(group)).start,
+        );
         let (left, partials) = self.distance(values, group, point, station);
         rows.constant[0] = left;
         rows.local.copy_from_slice(&partials);
-        rows.kept.copy_from_slice(&partials.map(|value| -value));
+        rows.retained.copy_from_slice(&partials.map(|value| -value));
     }
 
     fn observe_tie(&self, values: &Vec<f64>, tie: usize, rows: &mut TieRows<'_>) {
-        let kept = &self.layout.ties()[tie].kept;
-        let [from, to] = [0, 1].map(|end| self.layout.kept_range(kept[end] as usize).start);
+        let retained = &self.layout.ties()[tie].retained;
+        let [from, to] = [0, 1].map(|end| self.layout.retained_range(retained[end] as usize).start);
         let (left, partials) = self.distance(values, self.layout.groups() + tie, from, to);
         rows.constant[0] = left;
         rows.coefficients[..2].copy_from_slice(&partials);
@@ -74,9 +76,9 @@ fn noise(index: usize) -> f64 {
     ((index as f64 * 12.9898).sin() * 43758.5453).fract()
 }
 
-/// A grid of 4 x 3 kept points and 8 local ones among them, each local one seen from four kept points.
+/// A grid of 4 x 3 retained points and 8 local ones among them, each local one seen from four retained points.
 fn network(held: Vec<usize>) -> Problem<Trilateration> {
-    let kept: Vec<[f64; 2]> = (0..12).map(|k| [100.0 * (k % 4) as f64, 120.0 * (k / 4) as f64]).collect();
+    let retained: Vec<[f64; 2]> = (0..12).map(|k| [100.0 * (k % 4) as f64, 120.0 * (k / 4) as f64]).collect();
     let local: Vec<[f64; 2]> =
         (0..8).map(|k| [40.0 + 33.0 * k as f64, 60.0 + 70.0 * noise(k).abs()]).collect();
     let (mut ptr, mut seen) = (vec![0], Vec::new());
@@ -86,9 +88,9 @@ fn network(held: Vec<usize>) -> Problem<Trilateration> {
     }
     let pairs: Vec<[u32; 2]> =
         (0..12).flat_map(|k| [[k, (k + 1) % 12], [k, (k + 4) % 12], [(k + 5) % 12, k]]).collect();
-    let ties = pairs.iter().map(|pair| Tie { rows: 1, kept: pair.to_vec() }).collect();
+    let ties = pairs.iter().map(|pair| Tie { rows: 1, retained: pair.to_vec() }).collect();
     let layout = Layout::new(1, 2, &[2; 12], ptr.clone(), seen.clone()).unwrap().with_ties(ties).unwrap();
-    let truth: Vec<f64> = local.iter().chain(&kept).flatten().copied().collect();
+    let truth: Vec<f64> = local.iter().chain(&retained).flatten().copied().collect();
     let distance = |a: usize, b: usize| (truth[a] - truth[b]).hypot(truth[a + 1] - truth[b + 1]);
     let of_groups = (0..seen.len()).map(|g| distance(g / 4 * 2, 16 + 2 * seen[g] as usize));
     let of_ties = pairs.iter().map(|pair| distance(16 + 2 * pair[0] as usize, 16 + 2 * pair[1] as usize));
@@ -129,9 +131,11 @@ fn design(problem: &Problem<Trilateration>, values: &[f64]) -> Mat<f64> {
     let layout = problem.layout();
     let mut a = Mat::zeros(layout.equations(), layout.unknowns());
     let ends = (0..layout.groups())
-        .map(|g| [layout.local_range(g / 4).start, layout.kept_range(layout.kept_of(g)).start]);
-    let tied =
-        layout.ties().iter().map(|tie| [0, 1].map(|end| layout.kept_range(tie.kept[end] as usize).start));
+        .map(|g| [layout.local_range(g / 4).start, layout.retained_range(layout.retained_of(g)).start]);
+    let tied = layout
+        .ties()
+        .iter()
+        .map(|tie| [0, 1].map(|end| layout.retained_range(tie.retained[end] as usize).start));
     for (row, [from, to]) in ends.chain(tied).enumerate() {
         let (_, partials) = problem.model.distance(values, row, from, to);
         for k in 0..2 {
@@ -161,11 +165,11 @@ fn pseudo_inverse(a: &Mat<f64>) -> Mat<f64> {
     scaled * vectors.transpose()
 }
 
-fn kept_block(problem: &Problem<Trilateration>, cofactors: &[f64], kept: usize, q: &Mat<f64>) -> f64 {
-    let range = problem.layout().kept_range(kept);
+fn kept_block(problem: &Problem<Trilateration>, cofactors: &[f64], retained: usize, q: &Mat<f64>) -> f64 {
+    let range = problem.layout().retained_range(retained);
     let scale = q[(range.start, range.start)].max(q[(range.start + 1, range.start + 1)]);
     (0..4)
-        .map(|k| (cofactors[4 * kept + k] - q[(range.start + k / 2, range.start + k % 2)]).abs() / scale)
+        .map(|k| (cofactors[4 * retained + k] - q[(range.start + k / 2, range.start + k % 2)]).abs() / scale)
         .fold(0.0, f64::max)
 }
 
@@ -184,8 +188,8 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
     let (free, cofactors) = (&found, found.cofactors.as_ref().unwrap());
     let a = design(&problem, &free.unknowns);
     let q = pseudo_inverse(&a);
-    for kept in 0..12 {
-        assert!(kept_block(&problem, &cofactors.kept, kept, &q) < 1e-9);
+    for retained in 0..12 {
+        assert!(kept_block(&problem, &cofactors.retained, retained, &q) < 1e-9);
     }
     for local in 0..8 {
         for k in 0..4 {
@@ -233,7 +237,7 @@ fn a_datum_does_not_depend_on_where_the_network_comes_from() {
     let in_datum_of = |held: Vec<usize>| {
         let problem = network(held);
         let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
-        // Carried by three kept points only.
+        // Carried by three retained points only.
         let datum = Datum {
             carriers: (20..26).map(|unknown| (unknown, 1.0)).collect(),
             left: vec![],
@@ -244,7 +248,7 @@ fn a_datum_does_not_depend_on_where_the_network_comes_from() {
     };
     let one = in_datum_of(vec![16, 17, 19]);
     let other = in_datum_of(vec![38, 39, 30]);
-    for (a, b) in one.kept.iter().zip(&other.kept) {
+    for (a, b) in one.retained.iter().zip(&other.retained) {
         assert!((a - b).abs() < 1e-7 * SD * SD, "{a} {b}");
     }
     assert_eq!(one.equations.len(), 32 + 36);
@@ -329,7 +333,7 @@ fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say(
     // The rows of the point, over all unknowns, in unit weight; what is held has no column.
     let row = |group: usize| {
         let mut row = vec![0.0; layout.unknowns()];
-        let (point, station) = (layout.local_range(local), layout.kept_range(layout.kept_of(group)));
+        let (point, station) = (layout.local_range(local), layout.retained_range(layout.retained_of(group)));
         let (_, partials) = problem.model.distance(&adjusted.unknowns, group, point.start, station.start);
         for k in 0..2 {
             row[point.start + k] = partials[k] / SD;

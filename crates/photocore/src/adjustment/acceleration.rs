@@ -42,17 +42,17 @@ impl<M: Model> ObservationEquations<'_, M> {
                     let mut rows = buffers.rows(layout, group);
                     self.write(local, group, &mut rows);
                     let of_group = GroupStep::of(step, layout, local, group);
-                    let kept = layout.kept_range(layout.kept_of(group)).start - first;
+                    let retained = layout.retained_range(layout.retained_of(group)).start - first;
                     for row in 0..layout.rows() {
                         let observation = group * layout.rows() + row;
                         let difference =
                             ahead[observation] / self.deviation(observation) - rows.constant[row];
                         let bend = 2.0 / PART * (difference / PART + of_group.change(&rows, row));
                         add_row(&mut own[begin..], rows.local, row, of_group.local.len(), bend);
-                        add_row(&mut others[kept..], rows.kept, row, of_group.kept.len(), bend);
-                        let common = &rows.common[row * of_group.common.len()..];
-                        let columns = layout.common_columns(group);
-                        columns.zip(common).for_each(|(k, a)| others[k - first] += a * bend);
+                        add_row(&mut others[retained..], rows.retained, row, of_group.retained.len(), bend);
+                        let shared = &rows.shared[row * of_group.shared.len()..];
+                        let columns = layout.shared_columns(group);
+                        columns.zip(shared).for_each(|(k, a)| others[k - first] += a * bend);
                     }
                 }
             }

@@ -155,12 +155,13 @@ pub(super) fn moved<M: Model>(
     // What was found to leave all motions open leaves them open wherever it is moved to.
     let mut all_open = datum.relative;
     for _ in 0..MOST_MOVES {
-        let (motions, kept) = motions_of(problem, &unknowns, datum, threads).ok_or(DatumError::NotFree)?;
+        let (motions, retained) =
+            motions_of(problem, &unknowns, datum, threads).ok_or(DatumError::NotFree)?;
         let count = motions.vectors.len();
         if count == 0 {
             return Err(DatumError::NotCarried);
         }
-        all_open |= adjusted.held.len() == kept.1;
+        all_open |= adjusted.held.len() == retained.1;
         let combinations = match all_open {
             true => None,
             false => {
@@ -176,8 +177,8 @@ pub(super) fn moved<M: Model>(
             return Ok((unknowns, basis));
         }
         least = least.min(carried.length);
-        let mut along = vec![0.0; kept.1];
-        for (&motion, amount) in kept.0.iter().zip(carried.along()) {
+        let mut along = vec![0.0; retained.1];
+        for (&motion, amount) in retained.0.iter().zip(carried.along()) {
             along[motion] = amount;
         }
         problem.model.move_along(&mut unknowns, &along);
@@ -196,9 +197,9 @@ fn motions_of<M: Model>(
     let motions = || if datum.relative { model.all_motions(unknowns) } else { model.motions(unknowns) };
     let Motions { mut vectors, preferred } = threads.install(motions)?;
     let all = vectors.len();
-    let kept: Vec<usize> = (0..all).filter(|number| !datum.left.contains(number)).collect();
-    let vectors = kept.iter().map(|&number| std::mem::take(&mut vectors[number])).collect();
-    Some((Motions { vectors, preferred }, (kept, all)))
+    let retained: Vec<usize> = (0..all).filter(|number| !datum.left.contains(number)).collect();
+    let vectors = retained.iter().map(|&number| std::mem::take(&mut vectors[number])).collect();
+    Some((Motions { vectors, preferred }, (retained, all)))
 }
 
 /// How carriers would come nearer to their references.

@@ -119,13 +119,13 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
         for group in layout.groups_of(local) {
             columns.clear();
             columns.extend(layout.local_range(local));
-            columns.extend(layout.kept_range(layout.kept_of(group)));
-            columns.extend(layout.common_columns(group));
+            columns.extend(layout.retained_range(layout.retained_of(group)));
+            columns.extend(layout.shared_columns(group));
             let mut rows = buffers.rows(layout, group);
             self.write(local, group, &mut rows);
-            let GroupRows { constant, local: own, kept, common } = rows;
+            let GroupRows { constant, local: own, retained, shared } = rows;
             for (row, &constant) in constant.iter().enumerate() {
-                let coefficients = [&*own, &*kept, &*common].map(|part| {
+                let coefficients = [&*own, &*retained, &*shared].map(|part| {
                     let width = part.len() / layout.rows();
                     &part[row * width..][..width]
                 });
@@ -234,16 +234,16 @@ impl<M: Model> ObservationEquations<'_, M> {
     /// Takes weight off equations of unit weight where a loss says so, and leaves out the columns of fixed unknowns.
     #[inline(always)]
     fn adapt(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let GroupRows { constant, local: own, kept, common } = rows;
+        let GroupRows { constant, local: own, retained, shared } = rows;
         if let Some(reweighting) = self.reweighting {
-            reweighting.apply(constant, &mut [&mut **own, &mut **kept, &mut **common]);
+            reweighting.apply(constant, &mut [&mut **own, &mut **retained, &mut **shared]);
         }
         if let Some(fixed) = &self.fixed {
             let (layout, count) = (self.problem.layout(), constant.len());
             let of = |unknown: usize| fixed[unknown];
             leave_out(own, count, layout.local_range(local).map(of));
-            leave_out(kept, count, layout.kept_range(layout.kept_of(group)).map(of));
-            leave_out(common, count, layout.common_columns(group).map(of));
+            leave_out(retained, count, layout.retained_range(layout.retained_of(group)).map(of));
+            leave_out(shared, count, layout.shared_columns(group).map(of));
         }
     }
 }
@@ -252,7 +252,7 @@ impl GroupRows<'_> {
     /// Gives the equations of a group unit weight.
     #[inline(always)]
     fn weigh(&mut self, sd: &[f64]) {
-        weigh(sd, self.constant, [&mut *self.local, &mut *self.kept, &mut *self.common]);
+        weigh(sd, self.constant, [&mut *self.local, &mut *self.retained, &mut *self.shared]);
     }
 }
 

@@ -36,7 +36,7 @@ pub struct Leverages {
 pub struct TieCofactors {
     /// a Q a^T: square, row by row.
     pub equations: Vec<f64>,
-    /// Q a^T of each kept block that the tie touches: its unknowns, those of each equation together.
+    /// Q a^T of each retained block that the tie touches: its unknowns, those of each equation together.
     pub blocks: Vec<(usize, Vec<f64>)>,
 }
 
@@ -85,19 +85,19 @@ impl Leverages {
     }
 
     /// Cofactors of all equations of some local blocks, with the given standard deviations; with those of their weighted unknowns, where
-    /// `further` gives these (see [`crate::normals::System::local_cofactors`]).
+    /// `terms` gives these (see [`crate::normals::System::local_cofactors`]).
     pub fn of_locals<M: Model>(
         &self,
         problem: &Problem<M>,
         observation_sd: &[f64],
         locals: &[usize],
-        further: impl Fn(usize) -> Vec<f64> + Sync,
+        terms: impl Fn(usize) -> Vec<f64> + Sync,
         threads: &Threads,
     ) -> Vec<LocalCofactors> {
         let (formed, asked, prior) = self.equations(problem, observation_sd, threads);
         let of = |&local: &usize| {
-            let further = further(local);
-            problem.system.local_cofactors(&self.selected, &formed, &prior, &asked, local, &further)
+            let own_terms = terms(local);
+            problem.system.local_cofactors(&self.selected, &formed, &prior, &asked, local, &own_terms)
         };
         threads.install(|| locals.par_iter().map(of).collect())
     }
@@ -110,7 +110,7 @@ impl Leverages {
     /// (I + a' Q a'^T - H)^-1 - H, H the share of the local block alone in its equations and Q that of the others.
     ///
     /// * `observation_sd`, `sd`: as they would take part;
-    /// * `further`: the equations of the weighted unknowns of each, of unit weight.
+    /// * `terms`: the equations of the weighted unknowns of each, of unit weight.
     ///
     /// Empty where the local block would not be determined.
     pub fn of_gone<M: Model>(
@@ -118,7 +118,7 @@ impl Leverages {
         problem: &Problem<M>,
         (observation_sd, sd): (&[f64], &[f64]),
         locals: &[usize],
-        further: impl Fn(usize) -> Vec<f64> + Sync,
+        terms: impl Fn(usize) -> Vec<f64> + Sync,
         threads: &Threads,
     ) -> Vec<Vec<f64>> {
         let layout = problem.layout();
@@ -130,8 +130,9 @@ impl Leverages {
             prior.weight[unknown] = if own == 0.0 { 1.0 } else { (own * own).recip() };
         }
         let of = |&local: &usize| {
-            let further = further(local);
-            let own = problem.system.local_cofactors(&self.selected, &asked, &prior, &asked, local, &further);
+            let own_terms = terms(local);
+            let own =
+                problem.system.local_cofactors(&self.selected, &asked, &prior, &asked, local, &own_terms);
             let rows = own.rows();
             let alone = DMatrix::from_row_slice(rows, rows, &own.by_local);
             let all = DMatrix::from_row_slice(rows, rows, &own.equations);
@@ -168,11 +169,11 @@ impl Leverages {
         asked.write_tie(tie, &mut TieRows { constant: &mut constant, coefficients: &mut coefficients });
         let mut first = 0;
         let place = |&block: &u32| {
-            let own = (block as usize, first, layout.kept_dim(block as usize));
+            let own = (block as usize, first, layout.retained_dim(block as usize));
             first += own.2;
             own
         };
-        let blocks: Vec<(usize, usize, usize)> = each.kept.iter().map(place).collect();
+        let blocks: Vec<(usize, usize, usize)> = each.retained.iter().map(place).collect();
         let mut along = vec![0.0; each.rows * width];
         for &(row_block, to, height) in &blocks {
             for &(column_block, from, count) in &blocks {

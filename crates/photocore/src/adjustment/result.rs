@@ -162,7 +162,7 @@ pub enum AdjustError {
     /// Local blocks that their observations do not determine.
     #[error("{} local blocks are not determined by their observations", .0.len())]
     UndeterminedLocals(Vec<usize>),
-    /// Combinations of kept unknowns that the observations do not determine: for each the kept blocks it moves.
+    /// Combinations of retained unknowns that the observations do not determine: for each the retained blocks it moves.
     #[error("{} combinations of unknowns are not determined by the observations", .0.len())]
     Undetermined(Vec<Vec<usize>>),
     /// The initial values give observations that are not finite.

@@ -99,10 +99,10 @@ impl<M> Problem<M> {
         for (local, block) in cofactors.local.chunks_exact_mut(l * l).enumerate() {
             finish(block, layout.local_range(local));
         }
-        let mut rest = &mut cofactors.kept[..];
-        for kept in 0..layout.kept() {
-            let (block, behind) = rest.split_at_mut(layout.kept_dim(kept).pow(2));
-            finish(block, layout.kept_range(kept));
+        let mut rest = &mut cofactors.retained[..];
+        for retained in 0..layout.retained() {
+            let (block, behind) = rest.split_at_mut(layout.retained_dim(retained).pow(2));
+            finish(block, layout.retained_range(retained));
             rest = behind;
         }
         redundancy

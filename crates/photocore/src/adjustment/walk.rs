@@ -13,8 +13,8 @@ use crate::normals::{GroupRows, Layout, TieRows};
 pub(super) struct Buffers {
     constant: Vec<f64>,
     local: Vec<f64>,
-    kept: Vec<f64>,
-    common: Vec<f64>,
+    retained: Vec<f64>,
+    shared: Vec<f64>,
     /// Room for the unknowns of these rows.
     pub columns: Vec<usize>,
 }
@@ -25,13 +25,13 @@ impl Buffers {
         let rows = layout.rows();
         self.constant.resize(rows, 0.0);
         self.local.resize(rows * layout.local_dim(), 0.0);
-        self.kept.resize(rows * layout.kept_dim(layout.kept_of(group)), 0.0);
-        self.common.resize(rows * layout.common_width(group), 0.0);
+        self.retained.resize(rows * layout.retained_dim(layout.retained_of(group)), 0.0);
+        self.shared.resize(rows * layout.shared_width(group), 0.0);
         GroupRows {
             constant: &mut self.constant,
             local: &mut self.local,
-            kept: &mut self.kept,
-            common: &mut self.common,
+            retained: &mut self.retained,
+            shared: &mut self.shared,
         }
     }
 }

@@ -175,7 +175,7 @@ impl Network {
         let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
         let minimal = datum.is_none() && assembled.is_minimal(&ended.unknowns, threads);
         let (mut solution, found) =
-            threads.install(|| Solution::with_tried(self, options, &assembled, ended, collapsed));
+            threads.install(|| Solution::with_leverages(self, options, &assembled, ended, collapsed));
         let undetermined = solution.undetermined.take();
         solution.undetermined =
             undetermined.map(|error| self.name(error, &assembled, &solution.state.unknowns, threads));

@@ -159,8 +159,8 @@ pub(super) fn adjusted_points(
         let first = model.of_point(i).start;
         let own = cofactors.map(|all| match i.checked_sub(model.locals) {
             None => &all.local[9 * i..],
-            // The last kept blocks.
-            Some(tied) => &all.kept[all.kept.len() - 9 * (points.len() - model.locals - tied)..],
+            // The last retained blocks.
+            Some(tied) => &all.retained[all.retained.len() - 9 * (points.len() - model.locals - tied)..],
         });
         AdjustedPoint {
             coordinates: std::array::from_fn(absolute),
@@ -190,9 +190,11 @@ pub(super) fn in_order<T: Send>(
 /// The correction of each unknown in the last iteration; zero where there was none.
 fn last_corrections(adjustment: &Adjustment) -> impl Fn(usize) -> f64 {
     let local = &adjustment.last_local_corrections;
-    let kept = adjustment.history.last_chunk::<2>();
+    let retained = adjustment.history.last_chunk::<2>();
     move |unknown| match unknown.checked_sub(local.len()) {
         None => local[unknown],
-        Some(kept_unknown) => kept.map_or(0.0, |[before, after]| after[kept_unknown] - before[kept_unknown]),
+        Some(retained_unknown) => {
+            retained.map_or(0.0, |[before, after]| after[retained_unknown] - before[retained_unknown])
+        }
     }
 }

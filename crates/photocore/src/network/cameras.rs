@@ -133,14 +133,14 @@ impl AdjustedCamera {
     /// Takes the diagonal of the normal equations of its unknowns; a held one has none.
     fn inform(&mut self, problem: &Problem<Bundle>, unknowns: Range<usize>, adjustment: &Adjustment) {
         let Some(all) = &adjustment.cofactors else { return };
-        let first = problem.layout().all_kept().start;
+        let first = problem.layout().all_retained().start;
         let of = |unknown: usize| {
             if problem.sd[unknown] == 0.0 { 0.0 } else { all.information[unknown - first] }
         };
         self.information = unknowns.map(of).collect();
     }
 
-    /// Takes what was found of a kept block of its own.
+    /// Takes what was found of a retained block of its own.
     fn take_block(&mut self, model: &Bundle, block: usize, adjustment: &Adjustment, unknowns: &[f64]) {
         let own = model.of_block(block);
         self.parameters = unknowns[own.clone()].to_vec();

@@ -192,9 +192,9 @@ impl Bundle {
     ) {
         let others = (0..self.commons.len()).filter(|&common| parts.of_common[common] != Some(part));
         let ranges = others.filter_map(|common| Some(self.of_block(self.common_block[common]?)));
-        let kept: Vec<_> = ranges.map(|range| (range.clone(), unknowns[range].to_vec())).collect();
+        let retained: Vec<_> = ranges.map(|range| (range.clone(), unknowns[range].to_vec())).collect();
         moved(unknowns);
-        kept.into_iter().for_each(|(range, values)| unknowns[range].copy_from_slice(&values));
+        retained.into_iter().for_each(|(range, values)| unknowns[range].copy_from_slice(&values));
     }
 
     /// Moves each part as a whole, exactly: along the motion that e, w and s are the rates of, for the time of one. A turn about any place so

@@ -30,7 +30,7 @@ impl NetworkError {
         }
     }
 
-    /// Combinations of kept blocks: those that move photos and cameras by these, else the points that they move.
+    /// Combinations of retained blocks: those that move photos and cameras by these, else the points that they move.
     fn undetermined(combinations: Vec<Vec<usize>>, assembled: &Assembled) -> Self {
         let model = &assembled.problem.model;
         let stations = model.stations();

@@ -185,7 +185,7 @@ impl Node {
         let handed = packed(outer) + self.below.iter().map(|own| packed(own.len())).sum::<usize>();
         NodePrediction {
             points: layout.all_locals().len(),
-            interior: layout.all_kept().len() - outer,
+            interior: layout.all_retained().len() - outer,
             outer,
             images: self.assembled.problem.model.images.len(),
             observations: layout.equations(),
@@ -230,8 +230,8 @@ impl Node {
         self.check(&[state])?;
         let (model, mut moved) = (&self.assembled.problem.model, state.to_vec());
         if threads.install(|| model.relocate(&mut moved)) {
-            let kept = 3 * model.locals;
-            moved[kept..].copy_from_slice(&state[kept..]);
+            let retained = 3 * model.locals;
+            moved[retained..].copy_from_slice(&state[retained..]);
         }
         Ok(moved)
     }
@@ -308,7 +308,7 @@ impl Node {
         let problem = &self.assembled.problem;
         let found = formed.part.invert_part(problem, outer, state.to_vec(), threads, watch);
         let (adjustment, below) = found.map_err(|error| self.named(error))?;
-        Ok((self.told(adjustment, threads), below))
+        Ok((self.solution_of(adjustment, threads), below))
     }
 
     /// What is adjusted here, without cofactors; `before` is the state before the last step.
@@ -324,10 +324,10 @@ impl Node {
         self.check(&[state, before])?;
         let problem = &self.assembled.problem;
         let adjustment = Adjustment::between(problem, &self.held, before, state.to_vec(), threads);
-        Ok(self.told(adjustment, threads))
+        Ok(self.solution_of(adjustment, threads))
     }
 
-    fn told(&self, adjustment: Adjustment, threads: &Threads) -> Solution {
+    fn solution_of(&self, adjustment: Adjustment, threads: &Threads) -> Solution {
         let make = || Solution::new(&self.network, &self.options, &self.assembled, adjustment, vec![]);
         threads.install(make)
     }

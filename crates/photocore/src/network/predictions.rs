@@ -64,7 +64,7 @@ impl Trial {
             if out.is_empty() || self.is_gone(suspect) {
                 return None;
             }
-            let shares = match suspect.home {
+            let leverages = match suspect.home {
                 Home::Group { group, point } => {
                     let own = around.points.get(&point)?;
                     let first = 2 * (group - problem.layout().groups_of(point).start);
@@ -74,11 +74,11 @@ impl Trial {
                 Home::Tie(tie) => sub(&around.ties.get(&tie)?.equations, suspect.rows.len(), &out),
                 Home::Point(_) | Home::Block(_) => {
                     let rows = self.term_rows(suspect, &out, &terms);
-                    let shares = &rows * self.cofactors_at(found, suspect.home) * rows.transpose();
-                    shares.transpose().as_slice().to_vec()
+                    let leverages = &rows * self.cofactors_at(found, suspect.home) * rows.transpose();
+                    leverages.transpose().as_slice().to_vec()
                 }
             };
-            self.prediction(suspect, &out, &shares, found, &terms)
+            self.prediction(suspect, &out, &leverages, found, &terms)
         };
         Ok(suspects.iter().map(predict).collect())
     }
@@ -114,12 +114,12 @@ impl Trial {
         &self,
         suspect: &Suspect,
         out: &[usize],
-        shares: &[f64],
+        leverages: &[f64],
         found: &Leverages,
         terms: &Terms<'_>,
     ) -> Option<Prediction> {
         let count = out.len();
-        let c = DMatrix::identity(count, count) + DMatrix::from_row_slice(count, count, shares);
+        let c = DMatrix::identity(count, count) + DMatrix::from_row_slice(count, count, leverages);
         let residual = |&k: &usize| match suspect.rows[k].0 {
             Row::Equation(equation) => found.residuals[equation] / self.observation_sd[equation],
             Row::Unknown(unknown) => terms.row(unknown).1,
@@ -165,9 +165,10 @@ impl Trial {
             let known = self.local(point).and_then(|_| found_at.next());
             known.map_or_else(OnPoint::default, |(&place, own)| {
                 let (rows, residual) = self.rows_at(place, observation_sd, found, &terms);
-                let (count, shares) = (rows.len(), sub(&own.equations, own.rows(), &rows));
+                let (count, leverages) = (rows.len(), sub(&own.equations, own.rows(), &rows));
                 let identity = |k: usize| f64::from(u8::from(k / count == k % count));
-                let cofactors = shares.iter().enumerate().map(|(k, share)| identity(k) - share).collect();
+                let cofactors =
+                    leverages.iter().enumerate().map(|(k, leverage)| identity(k) - leverage).collect();
                 OnPoint { suspects: self.on_place[place].clone(), residual, cofactors }
             })
         };

@@ -1,5 +1,5 @@
-//! The least-squares problem of a network: points are local blocks of three, photos kept blocks of six and their own cameras', cameras
-//! that several photos share and common unknowns blocks of their own; points that observations touch are kept blocks of three.
+//! The least-squares problem of a network: points are local blocks of three, photos retained blocks of six and their own cameras', cameras
+//! that several photos share and common unknowns blocks of their own; points that observations touch are retained blocks of three.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;

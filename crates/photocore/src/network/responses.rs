@@ -183,14 +183,14 @@ impl Trial {
     fn unknown(&self, unknown: usize) -> (UnknownOf, usize) {
         let (model, points) = (&self.assembled.problem.model, &self.assembled.points);
         let stations = model.of_stations();
-        if let Some(kept) = stations.contains(&unknown).then(|| unknown - stations.start) {
-            let block = model.first.partition_point(|&start| start <= kept) - 1;
+        if let Some(retained) = stations.contains(&unknown).then(|| unknown - stations.start) {
+            let block = model.first.partition_point(|&start| start <= retained) - 1;
             let of = match model.owner(block) {
                 Owner::Photo(photo) => UnknownOf::Photo(photo),
                 Owner::Camera(camera) => UnknownOf::Camera(camera),
                 Owner::Common(common) => UnknownOf::Common(common),
             };
-            return (of, kept - model.first[block]);
+            return (of, retained - model.first[block]);
         }
         let among = if unknown < stations.start { unknown } else { unknown - stations.len() };
         (UnknownOf::Point(points[among / 3]), among % 3)

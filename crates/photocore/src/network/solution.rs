@@ -144,11 +144,11 @@ impl Solution {
         adjustment: Adjustment,
         collapsed: Vec<usize>,
     ) -> Self {
-        Self::with_tried(network, options, assembled, adjustment, collapsed).0
+        Self::with_leverages(network, options, assembled, adjustment, collapsed).0
     }
 
     /// The same, with what tests of groups need where the adjustment has kept that.
-    pub(super) fn with_tried(
+    pub(super) fn with_leverages(
         network: &Network,
         options: &Options,
         assembled: &Assembled,
@@ -252,9 +252,9 @@ fn of_common(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)
 /// What an unknown belongs to, and its number there; None for unknowns of points.
 fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(Owner, usize)> {
     let all = model.of_stations();
-    let kept = all.contains(&unknown).then(|| unknown - all.start)?;
-    let block = model.first.partition_point(|&start| start <= kept) - 1;
-    Some((model.owner(block), kept - model.first[block]))
+    let retained = all.contains(&unknown).then(|| unknown - all.start)?;
+    let block = model.first.partition_point(|&start| start <= retained) - 1;
+    Some((model.owner(block), retained - model.first[block]))
 }
 
 /// The observations beside images.

@@ -8,13 +8,13 @@ use std::time::Instant;
 use faer::MatMut;
 
 use super::assembly::{Formation, Sums};
+use super::batch::Gathered;
 use super::dense::{Pivots, factor_front};
 use super::equations::{Equations, Prior};
 use super::front::Front;
 use super::layout::Layout;
 use super::options::FactorOptions;
 use super::panels::{Handover, Panels, lock};
-use super::stack::Gathered;
 use super::symbolic::Supernode;
 use super::system::System;
 use super::watch::{Between, Control, watched};
@@ -151,7 +151,7 @@ impl Formation<'_> {
         };
         let (mut formation, mut factorisation) = (0.0, 0.0);
         let none = Front::new(0, 0, &mut [], Vec::new());
-        let homeless = self.assemble(&mut { none }, symbolic.supernode_count(), &cached)?;
+        let unplaced = self.assemble(&mut { none }, symbolic.supernode_count(), &cached)?;
         for (index, visited) in visited.into_values().flatten().enumerate() {
             factor.add(visited.sums, self.caches);
             if symbolic.open() != Some(index) {
@@ -164,7 +164,7 @@ impl Formation<'_> {
             formation += visited.formation;
             factorisation += visited.factorisation;
         }
-        factor.add(homeless, self.caches);
+        factor.add(unplaced, self.caches);
         if formation + factorisation > 0.0 {
             factor.formation_share = formation / (formation + factorisation);
         }

@@ -14,7 +14,7 @@ use photocore::normals::{GroupRows, Layout, Ordering, System};
 
 use problems::{Certified, PROBLEMS};
 
-/// A curve y(x) with parameters: the kept block. The local block is one unknown that is fixed and measured by nothing.
+/// A curve y(x) with parameters: the retained block. The local block is one unknown that is fixed and measured by nothing.
 struct Curve<'a> {
     name: &'a str,
     x: &'a [f64],
@@ -64,7 +64,7 @@ impl Model for Curve<'_> {
         for k in 0..at.len() {
             let mut beside = at.clone();
             beside[k].im = STEP;
-            rows.kept[k] = curve(self.name, &beside, self.x[group]).im / STEP;
+            rows.retained[k] = curve(self.name, &beside, self.x[group]).im / STEP;
         }
     }
 }
@@ -100,7 +100,7 @@ fn agreement(certified: &Certified, adjusted: &Adjustment) -> [f64; 3] {
     let count = certified.parameters.len();
     let sigma = (squares / (certified.x.len() - count) as f64).sqrt() / certified.residual_sd;
     let cofactors = adjusted.cofactors.as_ref().unwrap();
-    let sd: Vec<f64> = (0..count).map(|k| sigma * cofactors.kept[k * count + k].sqrt()).collect();
+    let sd: Vec<f64> = (0..count).map(|k| sigma * cofactors.retained[k * count + k].sqrt()).collect();
     [
         digits(&adjusted.unknowns[FIRST..], certified.parameters),
         digits(&sd, certified.parameter_sd),

@@ -211,7 +211,7 @@ impl Calibration {
         }
     }
 
-    /// The least-squares problem: grid points are local blocks of two, cases kept blocks of three, the comparator one that all share.
+    /// The least-squares problem: grid points are local blocks of two, cases retained blocks of three, the comparator one that all share.
     fn problem(&self) -> Result<Problem<Comparison>, CalibrationError> {
         let mut order: Vec<usize> = (0..self.measurements.len()).collect();
         order.sort_by_key(|&i| self.measurements[i].point);
@@ -223,7 +223,7 @@ impl Calibration {
         let case_of = measurements.iter().map(|m| m.case as u32).collect();
         let shared = vec![self.cases.len() as u32; measurements.len()];
         let layout = Layout::new(2, 2, &dims, start, case_of)?
-            .with_further((0..=measurements.len()).collect(), shared)?;
+            .with_shared((0..=measurements.len()).collect(), shared)?;
         let points = self.points.iter().flat_map(|point| point.xy);
         let cases = self.cases.iter().flat_map(|case| {
             let Placement { rotation, translation: [x, y] } = case.placement;
@@ -260,10 +260,10 @@ impl Solution {
             problem.sum_of_squares(&residuals) + problem.terms(&unknowns).sum_of_squares(0..unknowns.len());
         let cases = problem.model.left_handed.len();
         let (placements, comparator) =
-            (layout.all_kept().start..layout.kept_range(cases).start, layout.kept_range(cases));
+            (layout.all_retained().start..layout.retained_range(cases).start, layout.retained_range(cases));
         let missing = || vec![f64::NAN; comparator.len().pow(2)];
         let (case_cofactors, comparator_cofactors) = match &cofactors {
-            Some(all) => (Some(&all.kept[..9 * cases]), all.kept[9 * cases..].to_vec()),
+            Some(all) => (Some(&all.retained[..9 * cases]), all.retained[9 * cases..].to_vec()),
             None => (None, missing()),
         };
         Self {

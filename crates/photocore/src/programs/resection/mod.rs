@@ -180,7 +180,7 @@ struct Solved {
 
 impl Solved {
     fn pose(&self) -> Pose {
-        absolute(&self.adjustment.unknowns[self.problem.layout().all_kept()], self.origin)
+        absolute(&self.adjustment.unknowns[self.problem.layout().all_retained()], self.origin)
     }
 
     /// Weighted sum of squares at the end.
@@ -297,7 +297,7 @@ impl Resection {
         }
     }
 
-    /// The least-squares problem: points are local blocks of three, the photo is the kept block of six.
+    /// The least-squares problem: points are local blocks of three, the photo is the retained block of six.
     fn problem(&self, start: &Pose, origin: [f64; 3]) -> Result<Problem<SinglePhoto>, LayoutError> {
         let count = self.points.len();
         let shifted = |point: &ControlPoint| ControlPoint {

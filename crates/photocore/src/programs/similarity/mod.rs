@@ -265,7 +265,7 @@ fn adjust(
     if scale.is_nan() || scale <= 0.0 { Err(SimilarityError::Scale(scale)) } else { Ok(solution) }
 }
 
-/// The least-squares problem: the control coordinates are local blocks of three, the seven parameters one kept block.
+/// The least-squares problem: the control coordinates are local blocks of three, the seven parameters one retained block.
 fn problem(
     stations: &[Station],
     start: &Similarity,

@@ -1,7 +1,7 @@
 //! Calibration of a camera by stars (NOAA TR NOS 55): directions of stars, attitudes of the camera and its interior parameters
 //! adjusted together.
 //!
-//! Stars are the local unknowns, two each; attitudes are a kept block each, and the interior parameters and coefficients of refraction
+//! Stars are the local unknowns, two each; attitudes are a retained block each, and the interior parameters and coefficients of refraction
 //! one that all images share. A direction of the axis and weights of parameters are ties. A star that is held ties no attitudes to each other: each
 //! of its images has a local block of its own.
 //!
@@ -361,11 +361,11 @@ impl Calibration {
     }
 
     fn layout(&self, model: &StarImages<'_>) -> Result<Layout, LayoutError> {
-        let kept = model.images.iter().map(|&image| self.images[image].pointing as u32).collect();
+        let retained = model.images.iter().map(|&image| self.images[image].pointing as u32).collect();
         let (count, common) = (model.images.len(), self.pointings.len() as u32);
         let dims: Vec<usize> = self.pointings.iter().map(|_| 3).chain([COMMON]).collect();
-        Layout::new(2, 2, &dims, model.start.clone(), kept)?
-            .with_further((0..=count).collect(), vec![common; count])?
+        Layout::new(2, 2, &dims, model.start.clone(), retained)?
+            .with_shared((0..=count).collect(), vec![common; count])?
             .with_ties(model.ties.iter().map(|(_, tie)| tie.clone()).collect())?
             .with_pairs((0..common).map(|pointing| [pointing, common]).collect())
     }
