@@ -109,7 +109,9 @@ pub(super) fn add_products<S: Simd, const N: usize>(
         while j < width {
             let target = &mut target[j * stride..];
             // Eight columns are one where their sums have room in registers, or twice four, not six and two that wait for each other.
+            // Unrolled lane by lane, without vectors, several columns would be a large part of the library.
             j += match width - j {
+                _ if const { S::F64_LANES == 1 } => add_columns::<S, N, 1>(simd, target, stride, &products, i, j),
                 LANES if S::F64_LANES == LANES => {
                     add_columns::<S, N, LANES>(simd, target, stride, &products, i, j)
                 }
@@ -235,7 +237,7 @@ pub(super) fn add_difference<S: Simd>(
     for i in (0..a.width).step_by(LANES) {
         let target = &mut target[i..];
         let mut j = 0;
-        while j + TOGETHER <= a.width {
+        while const { S::F64_LANES > 1 } && j + TOGETHER <= a.width {
             add_difference_columns::<S, TOGETHER>(simd, &mut target[j * stride..], stride, a, v, parts, i, j);
             j += TOGETHER;
         }

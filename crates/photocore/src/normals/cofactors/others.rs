@@ -167,6 +167,7 @@ impl Others {
         while first < vectors {
             // Five vectors are three and two, not four and one whose sums wait for each other.
             first += match vectors - first {
+                _ if const { S::F64_LANES == 1 } => self.multiply_vectors::<S, L, 1>(simd, first),
                 1 => self.multiply_vectors::<S, L, 1>(simd, first),
                 2 => self.multiply_vectors::<S, L, 2>(simd, first),
                 3 | 5 | 6 => self.multiply_vectors::<S, L, 3>(simd, first),
