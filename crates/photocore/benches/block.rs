@@ -17,10 +17,9 @@ use photocore::adjustment;
 use photocore::geometry::{self, Bal, ObjectSpace, Orientation, Perspective, PoseNumbers, RotationSense};
 use photocore::network::{Camera, Image, Network, Options, Photo, Point, Screens, Start, UnitVariance};
 use photocore::normals::{
-    Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, Ordering, Prior, SolveOptions,
-    Stopped, System,
+    Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, Ordering, Prior, SolveOptions, System,
 };
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use photocore::{Stopped, Threads};
 
 /// Rows and columns of the dense product.
 const DENSE: usize = 1024;
@@ -63,14 +62,11 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
     let mut block = Network {
         space,
         poses: PoseNumbers::Angles(sense),
-        refraction: None,
         cameras: vec![Camera::held(Perspective { principal_distance: PRINCIPAL_DISTANCE }.into())],
         photos: vec![],
         points: vec![],
         images: vec![],
-        observations: vec![],
-        commons: vec![],
-        mounts: vec![],
+        ..Network::new()
     };
     for (photo, (position, attitude)) in true_photos.iter().enumerate() {
         let off = |k: usize| (photo as f64 * (1.3 + 0.2 * k as f64)).cos();
@@ -78,7 +74,7 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
             0..3 => position[k] + 15.0 * off(k),
             _ => attitude[k - 3] + 0.005 * off(k),
         });
-        block.photos.push(Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: 0 });
+        block.photos.push(Photo::free(pose, 0));
     }
     let cameras: Vec<geometry::Photo> = true_photos
         .iter()
@@ -151,7 +147,7 @@ impl Equations for Linear {
                 rows.local[3 * row + k] = projection.point[row][k] / IMAGE_SD;
             }
             for k in 0..6 {
-                rows.kept[6 * row + k] = projection.photo[row][k] / IMAGE_SD;
+                rows.retained[6 * row + k] = projection.photo[row][k] / IMAGE_SD;
             }
         }
     }
@@ -159,7 +155,7 @@ impl Equations for Linear {
 
 /// The normal equations of a block.
 struct Phases {
-    pool: ThreadPool,
+    threads: Threads,
     system: System,
     equations: Linear,
     prior: Prior,
@@ -182,7 +178,7 @@ impl Phases {
         let prior = Prior { right: vec![0.0; weight.len()], weight, between: vec![] };
         let equations = Linear::new(block);
         Self {
-            pool: pool(),
+            threads: threads(),
             system: System::new(layout, Ordering::Auto).expect("a system"),
             equations,
             prior,
@@ -190,7 +186,13 @@ impl Phases {
     }
 
     fn factor(&self) -> Factor {
-        done(self.system.factor(&self.pool, &self.equations, &self.prior, &FactorOptions::default(), &mut go))
+        done(self.system.factor(
+            &self.threads,
+            &self.equations,
+            &self.prior,
+            &FactorOptions::default(),
+            &mut go,
+        ))
     }
 
     /// Multiply-adds of the formation with its reduction, and of the cofactors of points and image points, from the numbers of
@@ -206,8 +208,8 @@ impl Phases {
     }
 }
 
-fn pool() -> ThreadPool {
-    ThreadPoolBuilder::new().build().expect("threads")
+fn threads() -> Threads {
+    Threads::new(0).expect("threads")
 }
 
 fn go(_: usize) -> ControlFlow<()> {
@@ -243,13 +245,14 @@ fn product(criterion: &mut Criterion) {
 /// their partials alone, on one thread.
 fn adjust(criterion: &mut Criterion) {
     let (block, size) = block();
-    let pool = pool();
+    let threads = threads();
     let options = Options {
         adjustment: adjustment::Options {
             method: adjustment::Method::Damped(adjustment::Stop::Fraction(1e-5)),
             max_iterations: 50,
             covariance: true,
             loss: None,
+            threads: 0,
         },
         ordering: Ordering::Auto,
         unit_variance: UnitVariance::Constrained,
@@ -260,9 +263,7 @@ fn adjust(criterion: &mut Criterion) {
         minimum: None,
         screens: Screens::default(),
     };
-    let adjust = |block: &Network| {
-        block.adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).expect("a determined block")
-    };
+    let adjust = |block: &Network| block.adjustment(&options).on(&threads).run().expect("a determined block");
     let shared = with_shared_camera(&block);
     let mut group = criterion.benchmark_group(format!("block/{size}"));
     group.throughput(Throughput::Elements(block.photos.len() as u64));
@@ -279,7 +280,7 @@ fn adjust(criterion: &mut Criterion) {
 fn phases(criterion: &mut Criterion) {
     let (block, size) = block();
     let phases = Phases::new(&block);
-    let Phases { pool, system, equations, prior } = &phases;
+    let Phases { threads, system, equations, prior } = &phases;
     let predicted = system.symbolic().operations(system.layout());
     let (formation, cofactors) = phases.operations();
     let mut group = criterion.benchmark_group(format!("normals/{size}"));
@@ -293,8 +294,9 @@ fn phases(criterion: &mut Criterion) {
     });
     let factor = phases.factor();
     group.bench_function("solve", |bencher| {
-        bencher
-            .iter(|| done(system.solve(pool, &factor, equations, prior, &SolveOptions::default(), &mut go)));
+        bencher.iter(|| {
+            done(system.solve(threads, &factor, equations, prior, &SolveOptions::default(), &mut go))
+        });
     });
     // Formation, reduction and factorisation go together, front by front; so do the selected inverse and the cofactors.
     group.throughput(elements(formation + predicted.factor));
@@ -302,7 +304,7 @@ fn phases(criterion: &mut Criterion) {
     group.throughput(elements(predicted.inverse + cofactors));
     group.bench_function("invert", |bencher| {
         let invert = |factor: Factor| {
-            done(system.invert(pool, factor, equations, prior, &InvertOptions::default(), &mut go))
+            done(system.invert(threads, factor, equations, prior, &InvertOptions::default(), &mut go))
         };
         bencher.iter_batched(|| phases.factor(), invert, BatchSize::PerIteration);
     });

@@ -11,8 +11,8 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::{Mat, Par};
+use photocore::Threads;
 use photocore::normals::{Equations, FactorOptions, GroupRows, Layout, Ordering, Prior, System};
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Unknowns of a photograph.
 const DIM: usize = 9;
@@ -27,14 +27,14 @@ impl Equations for Anything {
         let value = |k: usize| (1.3 * k as f64 + 0.7 * local as f64 + 0.11 * (group % 1009) as f64).sin();
         rows.constant.iter_mut().enumerate().for_each(|(k, v)| *v = value(k));
         rows.local.iter_mut().enumerate().for_each(|(k, v)| *v = value(3 * k + 1));
-        rows.kept.iter_mut().enumerate().for_each(|(k, v)| *v = value(7 * k + 2));
+        rows.retained.iter_mut().enumerate().for_each(|(k, v)| *v = value(7 * k + 2));
     }
 }
 
 fn system(photos: usize) -> (System, Prior) {
-    let kept = (0..POINTS * photos).map(|group| (group % photos) as u32).collect();
+    let retained = (0..POINTS * photos).map(|group| (group % photos) as u32).collect();
     let pointers = (0..=POINTS).map(|point| point * photos).collect();
-    let layout = Layout::new(2, 3, &vec![DIM; photos], pointers, kept).expect("a layout");
+    let layout = Layout::new(2, 3, &vec![DIM; photos], pointers, retained).expect("a layout");
     let unknowns = layout.unknowns();
     (
         System::new(layout, Ordering::Auto).expect("a system"),
@@ -43,10 +43,10 @@ fn system(photos: usize) -> (System, Prior) {
 }
 
 /// Time of the factorisation alone.
-fn factor(pool: &ThreadPool, system: &System, prior: &Prior) -> Duration {
+fn factor(threads: &Threads, system: &System, prior: &Prior) -> Duration {
     let start = Instant::now();
-    let done =
-        system.factor(pool, &Anything, prior, &FactorOptions::default(), &mut |_| ControlFlow::Continue(()));
+    let done = system
+        .factor(threads, &Anything, prior, &FactorOptions::default(), &mut |_| ControlFlow::Continue(()));
     let elapsed = start.elapsed();
     match done {
         ControlFlow::Continue(factor) => elapsed.mul_f64(1.0 - factor.formation_share),
@@ -54,8 +54,8 @@ fn factor(pool: &ThreadPool, system: &System, prior: &Prior) -> Duration {
     }
 }
 
-fn dense(pool: &ThreadPool, mut matrix: Mat<f64>) -> Mat<f64> {
-    pool.install(|| {
+fn dense(threads: &Threads, mut matrix: Mat<f64>) -> Mat<f64> {
+    threads.install(|| {
         let (par, dim) = (Par::rayon(0), matrix.nrows());
         let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(dim, par, Default::default()));
         let stack = MemStack::new(&mut memory);
@@ -66,18 +66,22 @@ fn dense(pool: &ThreadPool, mut matrix: Mat<f64>) -> Mat<f64> {
 }
 
 fn full(criterion: &mut Criterion) {
-    let pool = ThreadPoolBuilder::new().build().expect("a pool");
+    let threads = Threads::new(0).expect("a threads");
     for photos in [160, 500] {
         let dim = DIM * photos;
         let mut group = criterion.benchmark_group(format!("full/{dim}"));
         let (system, prior) = system(photos);
         group.bench_function("factor", |bencher| {
-            bencher.iter_custom(|times| (0..times).map(|_| factor(&pool, &system, &prior)).sum());
+            bencher.iter_custom(|times| (0..times).map(|_| factor(&threads, &system, &prior)).sum());
         });
         let matrix =
             Mat::from_fn(dim, dim, |i, j| if i == j { 10.0 * dim as f64 } else { ((i + j) as f64).sin() });
         group.bench_function("faer", |bencher| {
-            bencher.iter_batched(|| matrix.clone(), |matrix| dense(&pool, matrix), BatchSize::PerIteration);
+            bencher.iter_batched(
+                || matrix.clone(),
+                |matrix| dense(&threads, matrix),
+                BatchSize::PerIteration,
+            );
         });
         group.finish();
     }

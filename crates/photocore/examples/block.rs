@@ -2,7 +2,6 @@
 
 use std::error::Error;
 
-use photocore::adjustment::on_all_processors;
 use photocore::geometry::{self, ObjectSpace, Perspective, PoseNumbers, RotationSense};
 use photocore::network::{Camera, Image, Network, Options, Photo, Point, Solution};
 
@@ -39,7 +38,7 @@ fn block() -> Network {
     let photo = |i: usize| {
         let [x, y, z] = station(i);
         let pose = [x + 20.0, y - 15.0, z + 10.0, 0.01, -0.01, 0.12];
-        Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: 0 }
+        Photo::free(pose, 0)
     };
     let point = |i: usize| {
         if corner(i) {
@@ -65,7 +64,7 @@ fn block() -> Network {
 /// Adjusts the block.
 pub fn adjusted() -> Result<Solution, Box<dyn Error>> {
     let network = block();
-    Ok(on_all_processors(|pool, watch| network.adjust(&Options::default(), pool, watch))??)
+    Ok(network.adjust(&Options::default())?)
 }
 
 /// Prints the stations.

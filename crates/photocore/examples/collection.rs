@@ -6,8 +6,8 @@
 use std::error::Error;
 use std::{env, fs};
 
-use photocore::adjustment::{self, Method, Stop, on_all_processors};
-use photocore::geometry::{Bal, CameraModel, ObjectSpace, PoseNumbers};
+use photocore::adjustment::{self, Method, Stop};
+use photocore::geometry::{Bal, CameraModel, PoseNumbers};
 use photocore::network::{Camera, Image, Network, Options, Photo, Point, Solution, Start};
 
 /// Reads numbers of photos, points and images, the images (photo, point, x, y), nine numbers of each photo and three of each point.
@@ -27,16 +27,14 @@ pub fn read(text: &str) -> Result<Network, Box<dyn Error>> {
     };
     let photo = |(camera, &[a, b, c, d, e, f, ..]): (usize, &[f64; 9])| {
         let pose = [a, b, c, d, e, f];
-        Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera }
+        Photo::free(pose, camera)
     };
     let camera = |&[.., f, k1, k2]: &[f64; 9]| {
         Camera::new(Bal::with_parameters([f, k1, k2]).into(), vec![f64::INFINITY; 3])
     };
     let photos = photos.as_chunks().0;
     Ok(Network {
-        space: ObjectSpace::Rectangular,
         poses: PoseNumbers::Vectors,
-        refraction: None,
         cameras: photos.iter().map(camera).collect(),
         photos: photos.iter().enumerate().map(photo).collect(),
         points: points
@@ -46,9 +44,7 @@ pub fn read(text: &str) -> Result<Network, Box<dyn Error>> {
             .map(|&coordinates| Point { coordinates, sd: [f64::INFINITY; 3] })
             .collect(),
         images: seen.as_chunks().0.iter().map(image).collect(),
-        observations: vec![],
-        commons: vec![],
-        mounts: vec![],
+        ..Network::new()
     })
 }
 
@@ -57,7 +53,7 @@ pub fn adjusted(network: &Network) -> Result<Solution, Box<dyn Error>> {
     let adjustment =
         adjustment::Options { method: Method::TrustRegion(Stop::Decrease(1e-9)), ..Default::default() };
     let options = Options { adjustment, start: Start::Given, hold_unused: true, ..Options::default() };
-    Ok(on_all_processors(|pool, watch| network.adjust(&options, pool, watch))??)
+    Ok(network.adjust(&options)?)
 }
 
 /// Prints the focal lengths.

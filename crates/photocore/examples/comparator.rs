@@ -4,7 +4,7 @@
 use std::error::Error;
 use std::f64::consts::FRAC_PI_2;
 
-use photocore::adjustment::{Options, on_all_processors};
+use photocore::adjustment::Options;
 use photocore::programs::comparator::{
     Basis, Calibration, Case, Comparator, GridPoint, Measurement, Placement, Solution,
 };
@@ -40,7 +40,7 @@ fn calibration() -> Calibration {
 /// Adjusts the calibration.
 pub fn adjusted() -> Result<Solution, Box<dyn Error>> {
     let calibration = calibration();
-    Ok(on_all_processors(|pool, watch| calibration.adjust(&Options::default(), pool, watch))??)
+    Ok(calibration.adjust(&Options::default())?)
 }
 
 /// Prints what the comparator is like.

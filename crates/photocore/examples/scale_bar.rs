@@ -2,7 +2,6 @@
 
 use std::error::Error;
 
-use photocore::adjustment::on_all_processors;
 use photocore::geometry::{self, ObjectSpace, Perspective, PoseNumbers, RotationSense};
 use photocore::network::observations::Distance;
 use photocore::network::{Camera, Image, Network, Options, Photo, Point, Solution};
@@ -60,7 +59,7 @@ fn network() -> Network {
 /// Adjusts the network.
 pub fn adjusted() -> Result<Solution, Box<dyn Error>> {
     let network = network();
-    Ok(on_all_processors(|pool, watch| network.adjust(&Options::default(), pool, watch))??)
+    Ok(network.adjust(&Options::default())?)
 }
 
 /// Prints the points.
@@ -68,7 +67,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let solution = adjusted()?;
     for (index, point) in solution.points.iter().flatten().enumerate() {
         let [x, y, z] = point.coordinates;
-        let sd = [0, 1, 2].map(|k| 1e6 * point.cofactors[k][k].sqrt());
+        let sd = [0, 1, 2].map(|k| 1e6 * point.cofactors[(k, k)].sqrt());
         println!("point {index}: {x:8.5} {y:8.5} {z:8.5} m, sd {:.0} {:.0} {:.0} um", sd[0], sd[1], sd[2]);
     }
     Ok(())

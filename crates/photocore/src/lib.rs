@@ -14,8 +14,10 @@ pub mod geometry;
 pub mod network;
 pub mod normals;
 pub mod programs;
+mod threads;
 
 pub use nalgebra;
+pub use threads::{Stopped, Threads};
 
 /// What the README shows is compiled and run.
 #[cfg(doctest)]

@@ -1,6 +1,6 @@
 //! Adjustment of a small problem that knows no photograph.
 //!
-//! Points of a plane (local blocks of two) are measured in frames (kept blocks: shift and rotation) with a common scale
+//! Points of a plane (local blocks of two) are measured in frames (retained blocks: shift and rotation) with a common scale
 //! and a common radial distortion (a block that all share).
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -14,7 +14,7 @@ use photocore::adjustment::{
     AdjustError, Adjustment, Event, Method, Model, Options, Phase, Problem, Published, Status, Stop, adjust,
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System};
-use rayon::ThreadPoolBuilder;
+use photocore::{Stopped, Threads};
 
 const FRAMES: usize = 4;
 const POINTS: usize = 9;
@@ -61,8 +61,8 @@ impl Model for Frames {
         for row in 0..2 {
             rows.constant[row] = self.measured[group][row] - computed[row];
             rows.local[2 * row..][..2].copy_from_slice(&partials[row][..2]);
-            rows.kept[3 * row..][..3].copy_from_slice(&partials[row][2..5]);
-            rows.common[2 * row..][..2].copy_from_slice(&partials[row][5..]);
+            rows.retained[3 * row..][..3].copy_from_slice(&partials[row][2..5]);
+            rows.shared[2 * row..][..2].copy_from_slice(&partials[row][5..]);
         }
     }
 }
@@ -92,10 +92,10 @@ fn problem() -> Problem<Frames> {
         }
     }
     let pointers = (0..=POINTS).map(|point| point * FRAMES).collect();
-    let kept = frame_of.iter().map(|&frame| frame as u32).collect();
-    let layout = Layout::new(2, 2, &[[3; FRAMES].as_slice(), &[2]].concat(), pointers, kept).unwrap();
+    let retained = frame_of.iter().map(|&frame| frame as u32).collect();
+    let layout = Layout::new(2, 2, &[[3; FRAMES].as_slice(), &[2]].concat(), pointers, retained).unwrap();
     let shared = vec![FRAMES as u32; measured.len()];
-    let layout = layout.with_further((0..=measured.len()).collect(), shared).unwrap();
+    let layout = layout.with_shared((0..=measured.len()).collect(), shared).unwrap();
     let initial: Vec<f64> = truth.iter().enumerate().map(|(i, value)| value + 0.02 * noise(i + 70)).collect();
     Problem {
         observation_sd: vec![1e-3; 2 * measured.len()],
@@ -121,11 +121,12 @@ const STRICT: Options = Options {
     max_iterations: 50,
     covariance: true,
     loss: None,
+    threads: 0,
 };
 
 fn run(problem: &Problem<Frames>, options: &Options) -> Result<Adjustment, AdjustError> {
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    adjust(problem, options, &pool, &mut |_| ControlFlow::Continue(()))
+    let threads = Threads::new(1).unwrap();
+    adjust(problem, options, &threads, &mut |_| ControlFlow::Continue(()))
 }
 
 /// Two points with both coordinates: the datum of the plane, and its scale.
@@ -159,7 +160,7 @@ fn weights_lead_from_fixed_to_free() {
         hold(&mut problem, &DATUM, 0.0);
         hold(&mut problem, &[SCALE + 1], sd);
         let adjusted = run(&problem, &STRICT).unwrap();
-        (adjusted.unknowns[SCALE + 1], adjusted.cofactors.unwrap().kept.last().unwrap().sqrt())
+        (adjusted.unknowns[SCALE + 1], adjusted.cofactors.unwrap().retained.last().unwrap().sqrt())
     };
     let ((fixed, fixed_sd), (free, free_sd)) = (distortion_with(0.0), distortion_with(f64::INFINITY));
     assert_eq!((fixed, fixed_sd), (truth()[SCALE + 1], 0.0));
@@ -249,9 +250,9 @@ fn what_cannot_be_computed_is_refused() {
 fn the_watch_hears_of_every_phase_and_stops_any() {
     let mut problem = problem();
     hold(&mut problem, &DATUM, 0.0);
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let threads = Threads::new(1).unwrap();
     let (mut events, mut phases, mut iterations) = (0, Vec::new(), 0);
-    let whole = adjust(&problem, &STRICT, &pool, &mut |event| {
+    let whole = adjust(&problem, &STRICT, &threads, &mut |event| {
         events += 1;
         match event {
             Event::Progress { phase, done, total } => {
@@ -271,11 +272,11 @@ fn the_watch_hears_of_every_phase_and_stops_any() {
     }
     for last in 0..events {
         let mut count = 0;
-        let stopped = adjust(&problem, &STRICT, &pool, &mut |_| {
+        let stopped = adjust(&problem, &STRICT, &threads, &mut |_| {
             count += 1;
             if count > last { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
-        assert_eq!(stopped.unwrap_err(), AdjustError::Interrupted);
+        assert_eq!(stopped.unwrap_err(), AdjustError::Stopped(Stopped::Interrupted));
         assert_eq!(count, last + 1);
     }
 }
@@ -313,16 +314,18 @@ impl Model for Witness {
 #[test]
 fn a_thread_of_another_pool_watches_and_leaves_the_work_to_the_pool_that_it_is_given() {
     let of_pools = thread::spawn(|| {
-        let own = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build().unwrap();
-        let other = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        [&own, &other].map(|pool| {
+        let own = Threads::from(
+            rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build().unwrap(),
+        );
+        let other = Threads::new(1).unwrap();
+        [&own, &other].map(|threads| {
             let mut held = problem();
             hold(&mut held, &DATUM, 0.0);
             let Problem { model, system, observation_sd, initial, prior, sd } = held;
             let model = Witness { frames: model, seen: Mutex::default() };
             let problem = Problem { model, system, observation_sd, initial, prior, sd };
             let mut watch = |_: Event| ControlFlow::Continue(());
-            adjust(&problem, &STRICT, pool, &mut watch).unwrap();
+            adjust(&problem, &STRICT, threads, &mut watch).unwrap();
             problem.model.seen.into_inner().unwrap().contains(&thread::current().id())
         })
     });

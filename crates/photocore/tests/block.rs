@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use std::ops::ControlFlow;
-
+use photocore::Threads;
 use photocore::adjustment::{self, Method, Status, Stop};
 use photocore::geometry::{ObjectSpace, Orientation, Perspective, Point as At, PoseNumbers, RotationSense};
 use photocore::network::{Camera, Coarse, Image, Network, NetworkError, Options, Photo, Point, Solution};
-use rayon::ThreadPoolBuilder;
 
 const FREE: [f64; 3] = [f64::INFINITY; 3];
 const CAMERA: Perspective = Perspective { principal_distance: -150.0 };
@@ -23,7 +21,7 @@ fn noise(index: usize) -> f64 {
 fn photo(position: [f64; 3], attitude: [f64; 3]) -> Photo {
     let [[x, y, z], [omega, phi, kappa]] = [position, attitude];
     let pose = [x, y, z, omega, phi, kappa];
-    Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: 0 }
+    Photo::free(pose, 0)
 }
 
 /// A block of photos and points where they are, every point on every photo, with errors of the image coordinates.
@@ -43,14 +41,11 @@ fn block(photos: Vec<Photo>, places: &[[f64; 3]]) -> Network {
     Network {
         space,
         poses: POSES,
-        refraction: None,
         cameras: vec![Camera::held(CAMERA.into())],
         photos,
         points: places.iter().map(|&coordinates| Point { coordinates, sd: FREE }).collect(),
         images,
-        observations: vec![],
-        commons: vec![],
-        mounts: vec![],
+        ..Network::new()
     }
 }
 
@@ -84,10 +79,11 @@ fn adjust(block: &Network) -> Result<Solution, NetworkError> {
         max_iterations: 100,
         covariance: true,
         loss: None,
+        threads: 0,
     };
     let options = Options { adjustment, ..Options::default() };
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    block.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))
+    let threads = Threads::new(1).unwrap();
+    block.adjustment(&options).on(&threads).run()
 }
 
 /// A core that is called from Rust needs no room for what an interpreter loads; a caller that does says so.
@@ -95,8 +91,8 @@ fn adjust(block: &Network) -> Result<Solution, NetworkError> {
 fn memory_is_that_of_the_adjustment_and_what_the_caller_takes() {
     let room = |memory, reserved| {
         let options = Options { memory: Some(memory), reserved, ..Options::default() };
-        let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        sound().adjust(&options, &pool, &mut |_| ControlFlow::Continue(())).map(drop)
+        let threads = Threads::new(1).unwrap();
+        sound().adjustment(&options).on(&threads).run().map(drop)
     };
     assert_eq!(room(16 << 20, 0), Ok(()));
     match room(16 << 20, 12 << 20) {

@@ -3,15 +3,14 @@
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::FRAC_PI_2;
-use std::ops::ControlFlow;
 
+use photocore::Threads;
 use photocore::adjustment::{Method, Published, Status};
 use photocore::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Orientation, Perspective, Point as At, PoseNumbers, RotationSense,
     Vector3, angle_axis_rotation,
 };
 use photocore::network::{Camera, Image, Network, NetworkError, Options, Photo, Point, Solution};
-use rayon::ThreadPoolBuilder;
 
 const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
 const SD: f64 = 0.002;
@@ -56,7 +55,7 @@ fn around(sense: RotationSense, turned: &Matrix3, image_error: f64, error: f64) 
         let start = station + attitude * off(0);
         let [omega, phi, kappa] = numbers.numbers(&(attitude * angle_axis_rotation(&off(3))));
         let pose = [start.x, start.y, start.z, omega, phi, kappa];
-        photos.push(Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: 0 });
+        photos.push(Photo::free(pose, 0));
     }
     let point = |(index, place): (usize, &Vector3)| {
         let sd = if index < 4 { [1e-4; 3] } else { [f64::INFINITY; 3] };
@@ -67,20 +66,17 @@ fn around(sense: RotationSense, turned: &Matrix3, image_error: f64, error: f64) 
     Network {
         space,
         poses,
-        refraction: None,
         cameras: vec![Camera::held(CAMERA.into())],
         photos,
         points,
         images,
-        observations: vec![],
-        commons: vec![],
-        mounts: vec![],
+        ..Network::new()
     }
 }
 
 fn adjust(network: &Network) -> Result<Solution, NetworkError> {
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    network.adjust(&Options::default(), &pool, &mut |_| ControlFlow::Continue(()))
+    let threads = Threads::new(1).unwrap();
+    network.adjustment(&Options::default()).on(&threads).run()
 }
 
 fn block(cofactors: &[f64], first: usize) -> Matrix3 {
@@ -110,7 +106,7 @@ fn a_block_around_an_object_does_not_depend_on_its_axes() {
         for (a, b) in singular.points.iter().zip(&regular.points) {
             let (a, b) = (a.unwrap(), b.unwrap());
             assert!((quarter * Vector3::from(a.coordinates) - Vector3::from(b.coordinates)).amax() < 1e-9);
-            let [a, b] = [a.cofactors, b.cofactors].map(|rows| Matrix3::from_fn(|i, j| rows[i][j]));
+            let [a, b] = [a.cofactors, b.cofactors];
             assert_near(&(quarter * a * quarter.transpose()), &b, 1e-7);
         }
         for (a, b) in singular.photos.iter().zip(&regular.photos) {
@@ -120,12 +116,12 @@ fn a_block_around_an_object_does_not_depend_on_its_axes() {
             });
             assert!((quarter * at.0 - turned.0).amax() < 1e-9);
             assert!((quarter * numbers.attitude(at.1) - numbers.attitude(turned.1)).amax() < 1e-9);
-            let [p, q] = [a, b].map(|photo| block(&photo.cofactors, 0));
+            let [p, q] = [a, b].map(|photo| block(photo.cofactors.as_slice(), 0));
             assert_near(&(quarter * p * quarter.transpose()), &q, 1e-7);
             // The angles' cofactors are large where phi is near 90 degrees, and those of the rotation step are the same.
             let [p, q] = [(a, at.1), (b, turned.1)].map(|(photo, angles)| {
                 let rates = numbers.rates(angles);
-                rates * block(&photo.cofactors, 3) * rates.transpose()
+                rates * block(photo.cofactors.as_slice(), 3) * rates.transpose()
             });
             let condition = numbers.rates(at.1).determinant().abs().recip();
             assert_near(&p, &q, 1e-7 + 1e-14 * condition * condition);
@@ -176,8 +172,8 @@ fn weighted_angles_are_observations_of_the_angles() {
         let mut published = Options::default();
         published.adjustment.method = Method::Full(Published::Percent(1e-10));
         published.adjustment.max_iterations = 30;
-        let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-        let expected = network.adjust(&published, &pool, &mut |_| ControlFlow::Continue(())).unwrap();
+        let threads = Threads::new(2).unwrap();
+        let expected = network.adjustment(&published).on(&threads).run().unwrap();
         let found = adjust(&network).unwrap();
         assert_eq!(found.adjustment.status, Status::Converged);
         assert_eq!(found.degrees_of_freedom, expected.degrees_of_freedom);

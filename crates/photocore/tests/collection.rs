@@ -2,9 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use std::ops::ControlFlow;
-
 use num_complex::Complex64 as C;
+use photocore::Threads;
 use photocore::adjustment::{self, Loss, Method, Status, Stop};
 use photocore::geometry::{
     self, Bal, ObjectSpace, Orientation, Perspective, Point as GroundPoint, PoseNumbers, angle_axis_rotation,
@@ -16,7 +15,6 @@ use photocore::network::{
 };
 use photocore::normals::Ordering;
 use proptest::prelude::*;
-use rayon::ThreadPoolBuilder;
 
 /// The rotated vector by the exponential series of the cross product: no closed form to share a mistake with.
 fn turned(w: [C; 3], v: [C; 3]) -> [C; 3] {
@@ -137,7 +135,7 @@ fn collection(photos: usize, points: usize, coarseness: f64) -> Network {
     };
     let coarse_photo = |i: usize| {
         let pose = std::array::from_fn(|k| coarse(i, k));
-        Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: i }
+        Photo::free(pose, i)
     };
     let coarse_camera = |i: usize| {
         let [focal_length, k1, k2] = [6, 7, 8].map(|k| coarse(i, k));
@@ -172,12 +170,13 @@ fn adjusted_from(
     threads: usize,
     start: Start,
 ) -> Result<Solution, NetworkError> {
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let threads = Threads::new(threads).unwrap();
     let adjustment = adjustment::Options {
         method: Method::TrustRegion(Stop::Decrease(1e-10)),
         max_iterations: 200,
         covariance: true,
         loss,
+        threads: 0,
     };
     let options = Options {
         adjustment,
@@ -190,7 +189,7 @@ fn adjusted_from(
         minimum: None,
         screens: Screens::default(),
     };
-    collection.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))
+    collection.adjustment(&options).on(&threads).run()
 }
 
 fn sum(solution: &Solution) -> f64 {
@@ -252,8 +251,11 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
         let values = |solution: &Solution| -> Vec<f64> {
             let photos =
                 solution.photos.iter().flat_map(|photo| photo.pose.into_iter().chain(photo.camera.clone()));
-            let cofactors =
-                solution.points.iter().flatten().flat_map(|point| point.cofactors.into_iter().flatten());
+            let cofactors = solution
+                .points
+                .iter()
+                .flatten()
+                .flat_map(|point| point.cofactors.data.0.into_iter().flatten());
             photos.chain(cofactors).chain(redundancy(solution)).collect()
         };
         assert_eq!(values(&one), values(&three));

@@ -5,12 +5,12 @@
 use std::ops::ControlFlow;
 
 use num_complex::Complex64 as C;
+use photocore::Threads;
 use photocore::adjustment::{Method, Options, Status, Stop};
 use photocore::programs::comparator::{
     Basis, Calibration, CalibrationError, Case, Comparator, GridPoint, Measurement, Placement, Solution,
 };
 use proptest::prelude::*;
-use rayon::ThreadPoolBuilder;
 
 const BASIS: Basis = Basis { degree: 4, centre: [125e3, 130e3], half_range: [120e3, 110e3] };
 const OPTIONS: Options = Options {
@@ -18,6 +18,7 @@ const OPTIONS: Options = Options {
     max_iterations: 30,
     covariance: true,
     loss: None,
+    threads: 0,
 };
 
 fn comparator() -> Comparator {
@@ -117,8 +118,8 @@ fn calibration(left_handed: bool) -> Calibration {
 }
 
 fn adjust(calibration: &Calibration) -> Result<Solution, CalibrationError> {
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    calibration.adjust(&OPTIONS, &pool, &mut |_| ControlFlow::Continue(()))
+    let threads = Threads::new(1).unwrap();
+    calibration.adjust_on(&OPTIONS, &threads, &mut |_| ControlFlow::Continue(()))
 }
 
 #[test]

@@ -4,6 +4,7 @@
 
 use std::ops::ControlFlow;
 
+use photocore::Threads;
 use photocore::geometry::{Matrix3, Pose, Vector3};
 use photocore::programs::first_values::{
     FirstValues, Found, Frame, KnownPhoto, KnownPoint, Missing, Sighting, Source,
@@ -57,8 +58,8 @@ fn given(seed: u32, photos: usize, control: usize, wrong: f64) -> (FirstValues, 
 }
 
 fn found(given: &FirstValues) -> Found {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    given.find(&pool, &mut |_| ControlFlow::Continue(())).unwrap()
+    let threads = Threads::new(1).unwrap();
+    given.find(&threads, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
 fn farthest(found: &Found, truth: &[Pose]) -> f64 {

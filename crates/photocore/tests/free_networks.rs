@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 use faer::{Mat, Side};
+use photocore::Threads;
 use photocore::adjustment::{self, DatumError, Method, Published, Status, Stop};
 use photocore::geometry::{
     AttitudeNumbers, CameraModel, Ellipsoid, Matrix3, ObjectSpace, Orientation, Perspective, Point as At,
@@ -15,7 +16,6 @@ use photocore::network::{
     Camera, Image, InnerConstraints, Network, NetworkDatum, NetworkError, Of, Options, Photo, Point,
     Solution, Start,
 };
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
 const SD: f64 = 0.002;
@@ -56,7 +56,7 @@ fn around() -> Network {
         let [omega, phi, kappa] =
             NUMBERS.numbers(&(attitude * angle_axis_rotation(&(0.02 * noises(80 + index)))));
         let pose = [start.x, start.y, start.z, omega, phi, kappa];
-        photos.push(Photo { pose, observed: pose, sd: [FREE; 6], camera: 0 });
+        photos.push(Photo::known(pose, [FREE; 6], 0));
     }
     let point = |place: &Vector3| Point { coordinates: (*place).into(), sd: [FREE; 3] };
     let poses = PoseNumbers::Angles(RotationSense::GroundToPhoto);
@@ -64,19 +64,16 @@ fn around() -> Network {
     Network {
         space,
         poses,
-        refraction: None,
         cameras: vec![Camera::held(CAMERA.into())],
         photos,
         points,
         images,
-        observations: vec![],
-        commons: vec![],
-        mounts: vec![],
+        ..Network::new()
     }
 }
 
-fn pool() -> ThreadPool {
-    ThreadPoolBuilder::new().num_threads(2).build().unwrap()
+fn threads() -> Threads {
+    Threads::new(2).unwrap()
 }
 
 fn options(method: Method) -> Options {
@@ -87,11 +84,11 @@ fn options(method: Method) -> Options {
 const FINE: Method = Method::Damped(Stop::Fraction(1e-9));
 
 fn adjust(network: &Network, method: Method) -> Result<Solution, NetworkError> {
-    network.adjust(&options(method), &pool(), &mut |_| ControlFlow::Continue(()))
+    network.adjustment(&options(method)).on(&threads()).run()
 }
 
 fn in_datum(network: &Network, inner: &InnerConstraints) -> Result<Solution, NetworkError> {
-    network.adjust_in_datum(&options(FINE), inner, &pool(), &mut |_| ControlFlow::Continue(()))
+    network.adjustment(&options(FINE)).in_datum(inner).on(&threads()).run()
 }
 
 /// The design matrix at the adjusted values, to unit weight: points, then positions and rotation steps of the photos.
@@ -136,7 +133,7 @@ fn apart(solution: &Solution, q: &Mat<f64>) -> f64 {
         let each = (0..9).map(|at| (found(at / 3, at % 3) - q[(first + at / 3, first + at % 3)]).abs());
         each.fold(0.0, f64::max) / largest
     };
-    let points = (0..POINTS).map(|i| block(3 * i, &|k, m| solution.points[i].unwrap().cofactors[k][m]));
+    let points = (0..POINTS).map(|i| block(3 * i, &|k, m| solution.points[i].unwrap().cofactors[(k, m)]));
     let photos =
         (0..PHOTOS).map(|i| block(3 * POINTS + 6 * i, &|k, m| solution.photos[i].cofactors[6 * k + m]));
     points.chain(photos).fold(0.0, f64::max)
@@ -230,11 +227,11 @@ fn inner_constraints_are_those_of_the_pseudo_inverse() {
 
 /// Cofactors of every two of photos (position and rotation step) and points, in the order of [`design`].
 fn whole(network: &Network, solution: &Solution, datum: Option<&NetworkDatum>) -> Mat<f64> {
-    let (options, pool) = (options(FINE), pool());
+    let (options, threads) = (options(FINE), threads());
     let mut go = |_| ControlFlow::Continue(());
-    let covariances = network.covariances(&options, &solution.state, datum, &pool, &mut go).unwrap();
+    let covariances = network.covariances(&options, &solution.state, datum, &threads, &mut go).unwrap();
     let of: Vec<Of> = (0..POINTS).map(Of::Point).chain((0..PHOTOS).map(Of::PhotoStep)).collect();
-    let found = covariances.cofactors(&of, None, &pool, &mut go).unwrap();
+    let found = covariances.cofactors(&of, None, &threads, &mut go).unwrap();
     let count = 3 * POINTS + 6 * PHOTOS;
     Mat::from_fn(count, count, |i, j| found[i * count + j])
 }
@@ -275,13 +272,13 @@ fn cofactors_of_everything_go_over_to_any_datum() {
 
     // Without adjusting again, from the minimum datum and from yet another one.
     let mut go = |_| ControlFlow::Continue(());
-    let (options, pool) = (options(FINE), pool());
+    let (options, threads) = (options(FINE), threads());
     let datum = NetworkDatum::Inner(inner);
     let two =
         NetworkDatum::Inner(InnerConstraints { points: vec![3, 7, 9], scale: true, ..Default::default() });
-    let by_two = network.in_datum(&options, &minimal.state, &two, &pool, &mut go).unwrap();
+    let by_two = network.in_datum(&options, &minimal.state, &two, &threads, &mut go).unwrap();
     for from in [&minimal, &by_two] {
-        let there = network.in_datum(&options, &from.state, &datum, &pool, &mut go).unwrap();
+        let there = network.in_datum(&options, &from.state, &datum, &threads, &mut go).unwrap();
         for (photo, expected) in there.photos.iter().zip(&found.photos) {
             let position = Vector3::from_column_slice(&photo.pose[..3]);
             assert!((position - Vector3::from_column_slice(&expected.pose[..3])).amax() < 1e-9);
@@ -440,12 +437,13 @@ fn geographic_networks_are_free_to_move_too() {
     };
     let mut given = options(Method::default());
     given.start = Start::Given;
-    let found = network.adjust_in_datum(&given, &inner, &pool(), &mut |_| ControlFlow::Continue(())).unwrap();
+    let found = network.adjustment(&given).in_datum(&inner).on(&threads()).run().unwrap();
     for (r, expected) in redundancies(&found).iter().zip(redundancies(&minimal)) {
         assert!((r - expected).abs() < 1e-6);
     }
     // Its points are better known than when one photo is held.
-    let height =
-        |solution: &Solution| solution.points.iter().map(|point| point.unwrap().cofactors[2][2]).sum::<f64>();
+    let height = |solution: &Solution| {
+        solution.points.iter().map(|point| point.unwrap().cofactors[(2, 2)]).sum::<f64>()
+    };
     assert!(height(&found) < height(&minimal));
 }

@@ -5,10 +5,9 @@
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
+use photocore::Threads;
 use photocore::adjustment::{self, Method, Status, Stop};
-use photocore::geometry::{
-    AttitudeNumbers, Matrix3, ObjectSpace, Perspective, Pose, PoseNumbers, RotationSense, Vector3, rotation,
-};
+use photocore::geometry::{AttitudeNumbers, Matrix3, Perspective, Pose, RotationSense, Vector3, rotation};
 use photocore::network::observations::{
     Attitude, Base, Distance, OnLevel, OnLine, OnPlane, OnPlumbLine, Position, Quantity, Relative,
 };
@@ -16,7 +15,6 @@ use photocore::network::{
     Camera, Combination, Common, CommonKind, Image, InnerConstraints, Mount, Network, NetworkDatum,
     NetworkError, Observation, Options, Photo, Point, Precision, Solution,
 };
-use rayon::ThreadPoolBuilder;
 
 const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
 const SD: f64 = 0.002;
@@ -50,16 +48,11 @@ fn network(poses: &[Pose], places: &[Vector3], errors: f64) -> Network {
         photos.push(Photo { pose: numbers, observed: numbers, sd: [FREE; 6], camera: 0 });
     }
     Network {
-        space: ObjectSpace::Rectangular,
-        poses: PoseNumbers::Angles(RotationSense::GroundToPhoto),
-        refraction: None,
         cameras: vec![Camera::held(CAMERA.into())],
         photos,
         points: places.iter().map(|_| Point { coordinates: [f64::NAN; 3], sd: [FREE; 3] }).collect(),
         images,
-        observations: vec![],
-        commons: vec![],
-        mounts: vec![],
+        ..Network::new()
     }
 }
 
@@ -148,8 +141,8 @@ fn options() -> Options {
 }
 
 fn adjust(network: &Network) -> Result<Solution, NetworkError> {
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    network.adjust(&options(), &pool, &mut |_| ControlFlow::Continue(()))
+    let threads = Threads::new(1).unwrap();
+    network.adjustment(&options()).on(&threads).run()
 }
 
 #[test]
@@ -157,7 +150,7 @@ fn common_unknowns_move_with_a_free_network() {
     let mut network = free(1.0);
     // Points off a plane by so many metres would rather be nearer to each other: something must give the scale.
     network.observations.push(base());
-    let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let threads = Threads::new(2).unwrap();
     let mut go = |_| ControlFlow::Continue(());
     let minimal = adjust(&network).unwrap();
     assert_eq!(minimal.adjustment.status, Status::Converged);
@@ -168,9 +161,9 @@ fn common_unknowns_move_with_a_free_network() {
         NetworkDatum::Inner(InnerConstraints { points: points.collect(), ..Default::default() })
     };
     let (first, second) = (datum(0..7), datum(7..14));
-    let by_first = network.in_datum(&options(), &minimal.state, &first, &pool, &mut go).unwrap();
-    let direct = network.in_datum(&options(), &minimal.state, &second, &pool, &mut go).unwrap();
-    let by_way = network.in_datum(&options(), &by_first.state, &second, &pool, &mut go).unwrap();
+    let by_first = network.in_datum(&options(), &minimal.state, &first, &threads, &mut go).unwrap();
+    let direct = network.in_datum(&options(), &minimal.state, &second, &threads, &mut go).unwrap();
+    let by_way = network.in_datum(&options(), &by_first.state, &second, &threads, &mut go).unwrap();
     for (k, (a, b)) in direct.commons.iter().zip(&by_way.commons).enumerate() {
         let sd = |i: usize| b.cofactors[i * (b.change.len() + 1)].sqrt();
         for i in 0..a.change.len() {

@@ -8,10 +8,9 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 
 use nalgebra::Matrix6;
+use photocore::Threads;
 use photocore::adjustment::{self, Method, Stop};
-use photocore::geometry::{
-    self, AttitudeNumbers, Matrix3, ObjectSpace, Perspective, PoseNumbers, RotationSense,
-};
+use photocore::geometry::{self, AttitudeNumbers, Matrix3, Perspective, PoseNumbers, RotationSense};
 use photocore::network::observations::{Distance, Observation};
 use photocore::network::{
     AdjustedPhoto, Camera, Image, InnerConstraints, Network, Options, Photo, Point, Solution,
@@ -36,7 +35,7 @@ fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
         let numbers = [list(&block["position"]), NUMBERS.numbers(&attitude).to_vec()].concat();
         let pose: [f64; 6] = numbers.try_into().unwrap();
         index.insert(name, photos.len());
-        photos.push(Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: 0 });
+        photos.push(Photo::free(pose, 0));
     }
     for (name, block) in named("point") {
         index.insert(name, points.len());
@@ -89,16 +88,13 @@ fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
         }
     };
     let network = Network {
-        space: ObjectSpace::Rectangular,
         poses: PoseNumbers::Angles(SENSE),
-        refraction: None,
         cameras: vec![camera],
         photos,
         points,
         images,
         observations: if bars { lengths().map(bar).collect() } else { vec![] },
-        commons: vec![],
-        mounts: vec![],
+        ..Network::new()
     };
     (network, index)
 }
@@ -108,7 +104,7 @@ fn by_step(photo: &AdjustedPhoto) -> Matrix6<f64> {
     let [.., omega, phi, kappa] = photo.pose;
     let mut rates = Matrix6::identity();
     rates.fixed_view_mut::<3, 3>(3, 3).copy_from(&NUMBERS.rates([omega, phi, kappa]));
-    rates * Matrix6::from_row_slice(&photo.cofactors) * rates.transpose()
+    rates * Matrix6::from_row_slice(photo.cofactors.as_slice()) * rates.transpose()
 }
 
 fn assert_cofactors(own: &[f64], golden: &Value, what: &str) {
@@ -124,14 +120,16 @@ fn assert_cofactors(own: &[f64], golden: &Value, what: &str) {
 }
 
 fn adjust(network: &Network, datum: Option<&InnerConstraints>) -> Solution {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let threads = Threads::new(2).unwrap();
     let method = Method::Damped(Stop::Fraction(1e-9));
     let adjustment = adjustment::Options { method, ..adjustment::Options::default() };
     let options = Options { adjustment, ..Options::default() };
     let watch = &mut |_| ControlFlow::Continue(());
     match datum {
-        Some(datum) => network.adjust_in_datum(&options, datum, &pool, watch).unwrap(),
-        None => network.adjust(&options, &pool, watch).unwrap(),
+        Some(datum) => {
+            network.adjustment(&options).in_datum(datum).on(&threads).watched(watch).run().unwrap()
+        }
+        None => network.adjustment(&options).on(&threads).watched(watch).run().unwrap(),
     }
 }
 
@@ -180,11 +178,11 @@ fn assert_solution(solution: &Solution, golden: &Value, index: &HashMap<String, 
             let all = &solution.cameras[0].cofactors;
             let width = solution.cameras[0].parameters.len();
             let own: Vec<f64> =
-                all.chunks(width).take(count).flat_map(|row| &row[..count]).copied().collect();
+                all.as_slice().chunks(width).take(count).flat_map(|row| &row[..count]).copied().collect();
             assert_cofactors(&own, cofactors, name);
         } else {
             let own = solution.points[index[name]].as_ref().unwrap().cofactors;
-            assert_cofactors(own.as_flattened(), cofactors, name);
+            assert_cofactors(own.as_slice(), cofactors, name);
         }
     }
 }

@@ -8,10 +8,9 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 
 use nalgebra::{DMatrix, Matrix6};
+use photocore::Threads;
 use photocore::adjustment::{self, Method, Status, Stop};
-use photocore::geometry::{
-    self, AttitudeNumbers, Matrix3, ObjectSpace, Perspective, PoseNumbers, RotationSense,
-};
+use photocore::geometry::{self, AttitudeNumbers, Matrix3, Perspective, PoseNumbers, RotationSense};
 use photocore::network::observations::{Attitude, Control, Position, Quantity};
 use photocore::network::{
     AdjustedObservation, AdjustedPhoto, Camera, Common, CommonKind, Image, Mount, Network, Observation, Of,
@@ -45,23 +44,19 @@ impl<'a> File<'a> {
             let numbers = NUMBERS.numbers(&matrix(&block["matrix_photo_to_object"]));
             let pose = [list(&block["position"]), numbers.to_vec()].concat().try_into().unwrap();
             index.insert(name.clone(), photos.len());
-            photos.push(Photo { pose, observed: pose, sd: [FREE; 6], camera: 0 });
+            photos.push(Photo::known(pose, [FREE; 6], 0));
         }
         for (name, block) in blocks.iter().filter(|(name, _)| name.starts_with("point")) {
             index.insert(name.clone(), points.len());
             points.push(Point { coordinates: list(&block["value"]).try_into().unwrap(), sd: [FREE; 3] });
         }
         let network = Network {
-            space: ObjectSpace::Rectangular,
             poses: PoseNumbers::Angles(SENSE),
-            refraction: None,
             cameras,
             photos,
             points,
             images: vec![],
-            observations: vec![],
-            commons: vec![],
-            mounts: vec![],
+            ..Network::new()
         };
         Self { file, network, index }
     }
@@ -124,8 +119,8 @@ fn options() -> Options {
 }
 
 fn adjusted(network: &Network) -> Solution {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    let solution = network.adjust(&options(), &pool, &mut |_| ControlFlow::Continue(())).unwrap();
+    let threads = Threads::new(2).unwrap();
+    let solution = network.adjustment(&options()).on(&threads).run().unwrap();
     assert_eq!(solution.adjustment.status, Status::Converged);
     assert!(solution.adjustment.iterations.len() <= 10, "{}", solution.adjustment.iterations.len());
     solution
@@ -135,7 +130,7 @@ fn by_step(photo: &AdjustedPhoto) -> Matrix6<f64> {
     let [.., omega, phi, kappa] = photo.pose;
     let mut rates = Matrix6::identity();
     rates.fixed_view_mut::<3, 3>(3, 3).copy_from(&NUMBERS.rates([omega, phi, kappa]));
-    rates * Matrix6::from_row_slice(&photo.cofactors) * rates.transpose()
+    rates * Matrix6::from_row_slice(photo.cofactors.as_slice()) * rates.transpose()
 }
 
 fn assert_cofactors(own: &[f64], golden: &Value, what: &str) {
@@ -182,7 +177,7 @@ fn assert_solution(file: &File<'_>, solution: &Solution) {
         } else if name.starts_with("point") {
             let point = solution.points[file.index[name]].unwrap();
             assert_position(&point.coordinates, block, name);
-            point.cofactors.as_flattened().to_vec()
+            point.cofactors.as_slice().to_vec()
         } else {
             let common = &solution.commons[file.index[name]];
             match file.network.commons[file.index[name]].kind {
@@ -193,7 +188,7 @@ fn assert_solution(file: &File<'_>, solution: &Solution) {
                 }
                 _ => assert_position(&common.position, block, name),
             }
-            common.cofactors.clone()
+            common.cofactors.as_slice().to_vec()
         };
         if !cofactors.is_null() {
             assert_cofactors(&own, cofactors, name);
@@ -203,7 +198,7 @@ fn assert_solution(file: &File<'_>, solution: &Solution) {
 
 /// Cofactors of two blocks of unknowns with each other.
 fn assert_cross_cofactors(file: &File<'_>, solution: &Solution) {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let threads = Threads::new(2).unwrap();
     let mut go = |_| ControlFlow::Continue(());
     let of = |name: &str| {
         let index = file.index[name];
@@ -214,16 +209,15 @@ fn assert_cross_cofactors(file: &File<'_>, solution: &Solution) {
         }
     };
     let options = options();
-    let found = file.network.covariances(&options, &solution.state, None, &pool, &mut go).unwrap();
+    let found = file.network.covariances(&options, &solution.state, None, &threads, &mut go).unwrap();
     let golden = &file.file["solution"]["cross_cofactors"];
     for (name, expected) in golden.as_object().unwrap() {
         let (a, b) = name.split_once(" | ").unwrap();
-        let own = found.cofactors(&[of(a), of(b)], None, &pool, &mut go).unwrap();
-        let [rows_of, columns_of] = [a, b].map(|name| found.width(of(name)).unwrap());
-        let width = rows_of + columns_of;
+        let own = found.cofactors(&[of(a), of(b)], None, &threads, &mut go).unwrap();
+        let rows_of = found.width(of(a)).unwrap();
         for (i, row) in rows(expected).iter().enumerate() {
             for (j, expected) in row.iter().enumerate() {
-                let at = |i: usize, j: usize| own[i * width + j];
+                let at = |i: usize, j: usize| own[(i, j)];
                 let (i, j) = (i, rows_of + j);
                 let scale = (at(i, i) * at(j, j)).sqrt();
                 assert!((at(i, j) - expected).abs() <= 1e-8 * scale, "{name}: {} {expected}", at(i, j));
@@ -363,13 +357,13 @@ fn a_rig_with_an_unknown_sensor() {
     assert_cofactors(by_step(own).as_slice(), &derived["cofactors"], "derived");
 
     // The same by further right-hand sides.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let threads = Threads::new(2).unwrap();
     let mut go = |_| ControlFlow::Continue(());
     let photo = frames + file.index["frame3"];
-    let all = file.network.covariances(&options(), &solution.state, None, &pool, &mut go).unwrap();
-    let by_steps = all.cofactors(&[Of::PhotoStep(photo)], None, &pool, &mut go).unwrap();
-    assert_cofactors(&by_steps, &derived["cofactors"], "derived, by steps");
-    let in_angles = all.cofactors(&[Of::Photo(photo)], None, &pool, &mut go).unwrap();
+    let all = file.network.covariances(&options(), &solution.state, None, &threads, &mut go).unwrap();
+    let by_steps = all.cofactors(&[Of::PhotoStep(photo)], None, &threads, &mut go).unwrap();
+    assert_cofactors(by_steps.as_slice(), &derived["cofactors"], "derived, by steps");
+    let in_angles = all.cofactors(&[Of::Photo(photo)], None, &threads, &mut go).unwrap();
     for (k, (a, b)) in in_angles.iter().zip(&own.cofactors).enumerate() {
         let scale = (own.cofactors[k / 6 * 7] * own.cofactors[k % 6 * 7]).sqrt();
         assert!((a - b).abs() < 1e-8 * scale);

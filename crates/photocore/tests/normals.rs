@@ -9,10 +9,10 @@ use faer::Mat;
 use faer::linalg::solvers::Solve;
 use photocore::normals::{
     Equations, Factor, FactorOptions, Function, GroupRows, InvertOptions, Layout, LayoutError, Ordering,
-    Prior, SelectedInverse, SolveOptions, Stopped, System, Tie, TieRows,
+    Prior, SelectedInverse, SolveOptions, System, Tie, TieRows,
 };
+use photocore::{Stopped, Threads};
 use proptest::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// A system of given equations, dense.
 #[derive(Debug)]
@@ -29,8 +29,8 @@ impl Equations for Dense {
         let layout = &self.layout;
         let places: [(&mut [f64], Vec<usize>); 3] = [
             (rows.local, layout.local_range(local).collect()),
-            (rows.kept, layout.kept_range(layout.kept_of(group)).collect()),
-            (rows.common, layout.common_columns(group).collect()),
+            (rows.retained, layout.retained_range(layout.retained_of(group)).collect()),
+            (rows.shared, layout.shared_columns(group).collect()),
         ];
         for row in 0..layout.rows() {
             rows.constant[row] = self.right[group * layout.rows() + row];
@@ -70,8 +70,8 @@ impl Dense {
             for group in layout.groups_of(local) {
                 let columns = layout
                     .local_range(local)
-                    .chain(layout.kept_range(layout.kept_of(group)))
-                    .chain(layout.common_columns(group));
+                    .chain(layout.retained_range(layout.retained_of(group)))
+                    .chain(layout.shared_columns(group));
                 for column in columns {
                     for row in 0..layout.rows() {
                         matrix[(group * layout.rows() + row, column)] = number();
@@ -107,8 +107,8 @@ impl Dense {
     }
 }
 
-fn pool(threads: usize) -> ThreadPool {
-    ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
+fn threads(count: usize) -> Threads {
+    Threads::new(count).unwrap()
 }
 
 fn go(_: usize) -> ControlFlow<()> {
@@ -135,59 +135,67 @@ const ALL: [Ordering; 6] = [
     Ordering::DissectionByGraph,
 ];
 
-/// Random systems: local blocks of 1 to 3 unknowns, kept blocks of 1 to 7, with and without one that most groups share, several groups of
-/// a local block on the same kept block, up to two further blocks of a group besides, ties among up to three kept blocks and the shared one.
+/// Random systems: local blocks of 1 to 3 unknowns, retained blocks of 1 to 7, with and without one that most groups share, several groups of
+/// a local block on the same retained block, up to two further blocks of a group besides, ties among up to three retained blocks and the shared one.
 fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
     let blocks = (prop::collection::vec(1..8usize, 1..12), 0..4usize);
     let shape = (1..4usize, 1..3usize, blocks, 0..5usize);
     shape
-        .prop_flat_map(|(l, rows, (kept, common), shared)| {
+        .prop_flat_map(|(l, rows, (retained, common), shared)| {
             // Main blocks stand before the common ones, or after them.
-            let common = common.min(kept.len() - 1) as u32;
-            let main = if l == 2 { 0..kept.len() as u32 - common } else { common..kept.len() as u32 };
+            let common = common.min(retained.len() - 1) as u32;
+            let main = if l == 2 { 0..retained.len() as u32 - common } else { common..retained.len() as u32 };
             let start = if l == 2 { main.end } else { 0 };
             let further = prop::collection::btree_set(start..start + common.max(1), 0..3);
             let further = further.prop_map(move |further| if common > 0 { further } else { BTreeSet::new() });
             let groups = prop::collection::vec(prop::collection::vec((main, further), 0..5), 1..25);
-            let tied = prop::collection::btree_set(0..kept.len() as u32, 0..4);
+            let tied = prop::collection::btree_set(0..retained.len() as u32, 0..4);
             let ties = prop::collection::vec((1..4usize, tied, any::<bool>()), 0..6);
-            (Just((l, rows, kept, shared)), groups, ties, any::<u64>(), prop::sample::select(ALL.to_vec()))
+            (
+                Just((l, rows, retained, shared)),
+                groups,
+                ties,
+                any::<u64>(),
+                prop::sample::select(ALL.to_vec()),
+            )
         })
-        .prop_map(|((l, rows, mut kept, shared), locals, ties, seed, ordering)| {
-            let last = kept.len() as u32;
-            kept.extend((shared > 0).then_some(shared));
+        .prop_map(|((l, rows, mut retained, shared), locals, ties, seed, ordering)| {
+            let last = retained.len() as u32;
+            retained.extend((shared > 0).then_some(shared));
             // Not in the order of the blocks: ties and groups have an order of their own.
             let blocks = |own: BTreeSet<u32>, too: bool| -> Vec<u32> {
                 own.into_iter().rev().chain((shared > 0 && too).then_some(last)).collect()
             };
-            let tie = |(rows, own, too): (usize, BTreeSet<u32>, bool)| Tie { rows, kept: blocks(own, too) };
-            let ties = ties.into_iter().map(tie).filter(|tie| !tie.kept.is_empty()).collect();
+            let tie =
+                |(rows, own, too): (usize, BTreeSet<u32>, bool)| Tie { rows, retained: blocks(own, too) };
+            let ties = ties.into_iter().map(tie).filter(|tie| !tie.retained.is_empty()).collect();
             let mut ptr = vec![0];
             for groups in &locals {
                 ptr.push(ptr[ptr.len() - 1] + groups.len());
             }
-            let (group_kept, further): (Vec<u32>, Vec<BTreeSet<u32>>) = locals.into_iter().flatten().unzip();
-            let (mut further_ptr, mut all) = (vec![0], vec![]);
+            let (group_retained, further): (Vec<u32>, Vec<BTreeSet<u32>>) =
+                locals.into_iter().flatten().unzip();
+            let (mut shared_ptr, mut all) = (vec![0], vec![]);
             for (g, own) in further.into_iter().enumerate() {
                 all.extend(blocks(own, g % 4 > 0));
-                further_ptr.push(all.len());
+                shared_ptr.push(all.len());
             }
-            let layout = Layout::new(rows, l, &kept, ptr, group_kept).unwrap();
-            let layout = layout.with_further(further_ptr, all).unwrap();
+            let layout = Layout::new(rows, l, &retained, ptr, group_retained).unwrap();
+            let layout = layout.with_shared(shared_ptr, all).unwrap();
             (Dense::new(layout.with_ties(ties).unwrap(), seed), ordering)
         })
 }
 
 /// A strip or a block, large enough for several supernodes, subtrees and tiles; every group shares a last block of so many unknowns.
 fn block(strips: usize, length: usize, shared: usize) -> Dense {
-    let (mut ptr, mut kept) = (vec![0], Vec::new());
+    let (mut ptr, mut retained) = (vec![0], Vec::new());
     for strip in 0..strips {
         for photo in 0..length {
             for reach in [2, 3] {
                 for s in strip..strips.min(strip + 2) {
-                    kept.extend((photo..length.min(photo + reach)).map(|p| (s * length + p) as u32));
+                    retained.extend((photo..length.min(photo + reach)).map(|p| (s * length + p) as u32));
                 }
-                ptr.push(kept.len());
+                ptr.push(retained.len());
             }
         }
     }
@@ -195,12 +203,12 @@ fn block(strips: usize, length: usize, shared: usize) -> Dense {
     let mut places: Vec<[f64; 3]> =
         (0..photos).map(|k| [(k % length) as f64, (k / length) as f64 * 1.7, 0.0]).collect();
     if shared == 0 {
-        let layout = Layout::new(2, 3, &vec![6; photos], ptr, kept).unwrap();
+        let layout = Layout::new(2, 3, &vec![6; photos], ptr, retained).unwrap();
         return Dense::new(layout.with_places(places).unwrap(), 7);
     }
-    let further = vec![photos as u32; kept.len()];
-    let layout = Layout::new(2, 3, &[vec![6; photos], vec![shared]].concat(), ptr, kept).unwrap();
-    let layout = layout.with_further((0..=further.len()).collect(), further).unwrap();
+    let further = vec![photos as u32; retained.len()];
+    let layout = Layout::new(2, 3, &[vec![6; photos], vec![shared]].concat(), ptr, retained).unwrap();
+    let layout = layout.with_shared((0..=further.len()).collect(), further).unwrap();
     places.push([0.0; 3]);
     Dense::new(layout.with_places(places).unwrap(), 7)
 }
@@ -211,16 +219,18 @@ fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
 
 /// Solution, every selected block, local cofactors and adjusted equations against the dense inverse.
 fn compare_with_dense(dense: &Dense, ordering: Ordering) {
-    let pool = pool(2);
+    let threads = threads(2);
     let system = System::new(dense.layout.clone(), ordering).unwrap();
     let layout = system.layout();
-    let factor = done(system.factor(&pool, dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads, dense, &dense.prior, &FactorOptions::default(), &mut go));
     assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
-    let solution = done(system.solve(&pool, &factor, dense, &dense.prior, &SolveOptions::default(), &mut go));
+    let solution =
+        done(system.solve(&threads, &factor, dense, &dense.prior, &SolveOptions::default(), &mut go));
     let rights = vec![1.0; 11 * layout.unknowns()];
-    let alone = done(system.factor(&pool, dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
-    let written = done(system.solve(&pool, &alone, dense, &dense.prior, &SolveOptions::default(), &mut go));
-    let further = done(system.solve(&pool, &alone, dense, &dense.prior, &solved_for(&rights), &mut go));
+    let alone = done(system.factor(&threads, dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
+    let written =
+        done(system.solve(&threads, &alone, dense, &dense.prior, &SolveOptions::default(), &mut go));
+    let further = done(system.solve(&threads, &alone, dense, &dense.prior, &solved_for(&rights), &mut go));
     let cholesky = dense.normal_matrix().llt(faer::Side::Lower).unwrap();
     let ones = cholesky.solve(Mat::<f64>::full(layout.unknowns(), 1, 1.0));
     for (i, value) in further.iter().enumerate() {
@@ -234,12 +244,12 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
         assert_close(written[i], *value, 1e-12 * expected.norm_max(), "solution from the equations");
     }
     let right: Vec<f64> = dense.normal_right().col(0).iter().copied().collect();
-    let again = done(system.solve(&pool, &factor, dense, &dense.prior, &solved_for(&right), &mut go));
+    let again = done(system.solve(&threads, &factor, dense, &dense.prior, &solved_for(&right), &mut go));
     for (value, other) in again.iter().zip(&solution) {
         assert_close(*value, *other, 1e-11 * expected.norm_max(), "solution for its right-hand side");
     }
     if factor.has_cached() {
-        let (chord, decrease) = done(system.chord(&pool, &factor, dense, &dense.prior, &mut go));
+        let (chord, decrease) = done(system.chord(&threads, &factor, dense, &dense.prior, &mut go));
         assert_close(decrease, factor.decrease, 1e-11 * factor.decrease, "decrease");
         for (value, other) in chord.iter().zip(&solution) {
             assert_close(*value, *other, 1e-11 * expected.norm_max(), "chord from the same values");
@@ -249,7 +259,8 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
     compare_columns(dense, &system, &factor, &inverse);
     compare_functions(dense, &system, &factor, &inverse);
-    let found = done(system.invert(&pool, factor, dense, &dense.prior, &InvertOptions::default(), &mut go));
+    let found =
+        done(system.invert(&threads, factor, dense, &dense.prior, &InvertOptions::default(), &mut go));
     let (cofactors, selected) = (found.cofactors, found.selected);
     compare_blocks(layout, &selected, &inverse);
     let l = layout.local_dim();
@@ -275,7 +286,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
 /// factor does all else.
 fn compare_chord(dense: &Dense, system: &System, factor: &Factor) {
     let there = Dense::new(dense.layout.clone(), 97);
-    let (chord, _) = done(system.chord(&pool(2), factor, &there, &there.prior, &mut go));
+    let (chord, _) = done(system.chord(&threads(2), factor, &there, &there.prior, &mut go));
     let count = dense.layout.locals() * dense.layout.local_dim();
     let (before, after, right) = (dense.normal_matrix(), there.normal_matrix(), there.normal_right());
     let (right, others) = right.split_at_row(count);
@@ -330,8 +341,8 @@ fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Ma
         rights[k * unknowns + column] = 1.0;
         rights[columns.len() * unknowns + column] = 1.0;
     }
-    let pool = pool(2);
-    let solved = done(system.solve(&pool, factor, dense, &dense.prior, &solved_for(&rights), &mut go));
+    let threads = threads(2);
+    let solved = done(system.solve(&threads, factor, dense, &dense.prior, &solved_for(&rights), &mut go));
     let largest = inverse.norm_max();
     for i in 0..unknowns {
         let mut sum = 0.0;
@@ -347,7 +358,7 @@ fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Ma
 
 /// Cofactors of unknowns and of sums of them, every two of them and one kind with the other.
 fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &Mat<f64>) {
-    let (unknowns, pool) = (system.layout().unknowns(), pool(2));
+    let (unknowns, threads) = (system.layout().unknowns(), threads(2));
     let several: Vec<Function> =
         (0..unknowns).rev().step_by(unknowns.div_ceil(40)).map(|unknown| vec![(unknown, 1.0)]).collect();
     // One of them takes an unknown twice, and one takes all.
@@ -364,9 +375,9 @@ fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &
         (&several, Some(&vec![])),
     ] {
         let reduced =
-            done(system.reduce(&pool, dense, &dense.prior, rows, columns.map(Vec::as_slice), &mut go));
+            done(system.reduce(&threads, dense, &dense.prior, rows, columns.map(Vec::as_slice), &mut go));
         assert!(system.memory_of(&reduced) >= 8 * rows.len() * columns.map_or(rows.len(), Vec::len));
-        let found = done(system.cofactors_of(&pool, factor, &reduced, &mut go));
+        let found = done(system.cofactors_of(&threads, factor, &reduced, &mut go));
         let others = columns.unwrap_or(rows);
         assert_eq!(found.len(), rows.len() * others.len());
         let along = |functions: &[Function]| {
@@ -392,7 +403,7 @@ fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &
 }
 
 fn compare_blocks(layout: &Layout, selected: &SelectedInverse, inverse: &Mat<f64>) {
-    let (blocks, range) = (layout.kept(), |block: usize| layout.kept_range(block));
+    let (blocks, range) = (layout.retained(), |block: usize| layout.retained_range(block));
     for row in 0..blocks {
         assert!(selected.block(row, row).is_some());
         for column in 0..blocks {
@@ -436,10 +447,10 @@ fn cameras_in_turn_agree_with_dense_algebra() {
     let plain = block(5, 10, 0).layout;
     let mut ptr = vec![0];
     ptr.extend((0..plain.locals()).map(|local| plain.groups_of(local).end));
-    let kept: Vec<u32> = (0..plain.groups()).map(|group| plain.kept_of(group) as u32).collect();
-    let cameras = kept.iter().map(|photo| 50 + photo % 30).collect();
-    let layout = Layout::new(2, 3, &[[6; 50].as_slice(), &[10; 30]].concat(), ptr, kept).unwrap();
-    let layout = layout.with_further((0..=plain.groups()).collect(), cameras).unwrap();
+    let retained: Vec<u32> = (0..plain.groups()).map(|group| plain.retained_of(group) as u32).collect();
+    let cameras = retained.iter().map(|photo| 50 + photo % 30).collect();
+    let layout = Layout::new(2, 3, &[[6; 50].as_slice(), &[10; 30]].concat(), ptr, retained).unwrap();
+    let layout = layout.with_shared((0..=plain.groups()).collect(), cameras).unwrap();
     for ordering in [Ordering::ReverseCuthillMckee, Ordering::DissectionByPlace] {
         compare_with_dense(&Dense::new(layout.clone(), 11), ordering);
     }
@@ -451,7 +462,7 @@ fn with_cameras(strips: usize, length: usize, first: bool) -> Layout {
     let (plain, photos) = (block(strips, length, 0).layout, strips * length);
     let shift = if first { strips + 1 } else { 0 };
     let camera = |index: usize| (if first { index } else { photos + index }) as u32;
-    let group = |group: usize| plain.kept_of(group);
+    let group = |group: usize| plain.retained_of(group);
     let dims = if first {
         [vec![3; strips], vec![10], vec![6; photos]].concat()
     } else {
@@ -459,10 +470,10 @@ fn with_cameras(strips: usize, length: usize, first: bool) -> Layout {
     };
     let mut ptr = vec![0];
     ptr.extend((0..plain.locals()).map(|local| plain.groups_of(local).end));
-    let kept = (0..plain.groups()).map(|g| (group(g) + shift) as u32).collect();
+    let retained = (0..plain.groups()).map(|g| (group(g) + shift) as u32).collect();
     let further = (0..plain.groups()).flat_map(|g| [camera(strips), camera(group(g) / length)]).collect();
-    let layout = Layout::new(2, 3, &dims, ptr, kept).unwrap();
-    let layout = layout.with_further((0..=plain.groups()).map(|g| 2 * g).collect(), further).unwrap();
+    let layout = Layout::new(2, 3, &dims, ptr, retained).unwrap();
+    let layout = layout.with_shared((0..=plain.groups()).map(|g| 2 * g).collect(), further).unwrap();
     let of_photos = plain.places().unwrap();
     let of_cameras: Vec<[f64; 3]> =
         (0..=strips).map(|strip| of_photos[strip.min(strips - 1) * length + length / 2]).collect();
@@ -503,15 +514,15 @@ fn what_a_shared_camera_and_photos_leave_open_is_named() {
     let mut dense = Dense::new(with_cameras(3, 8, false), 17);
     let layout = dense.layout.clone();
     let camera = 24 + 3;
-    dense.prior.weight[layout.kept_range(camera)].fill(0.0);
-    dense.prior.weight[layout.kept_range(5)].fill(0.0);
+    dense.prior.weight[layout.retained_range(camera)].fill(0.0);
+    dense.prior.weight[layout.retained_range(5)].fill(0.0);
     // What the second unknown of the shared camera does, the first of photo 5 undoes: their sum alone is determined.
-    let (photo, own) = (layout.kept_range(5).start, layout.kept_range(camera).start + 1);
+    let (photo, own) = (layout.retained_range(5).start, layout.retained_range(camera).start + 1);
     for row in 0..dense.right.len() {
         dense.matrix[(row, own)] = dense.matrix[(row, photo)];
     }
     let system = System::new(layout, Ordering::Auto).unwrap();
-    let factor = done(system.factor(&pool(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.blocks(), vec![vec![5, camera]]);
     assert_eq!(deficiency.unknowns(system.layout()), vec![vec![photo, own]]);
@@ -524,27 +535,28 @@ fn bits_do_not_depend_on_the_number_of_threads() {
 }
 
 fn same_bits(plain: Layout) {
-    let tie = |k: u32| Tie { rows: 2, kept: vec![k, k + 40, 7] };
+    let tie = |k: u32| Tie { rows: 2, retained: vec![k, k + 40, 7] };
     let dense = Dense::new(plain.with_ties((10..30).map(tie).collect()).unwrap(), 3);
     let rights: Vec<f64> = (0..20 * dense.layout.unknowns()).map(|k| (k % 17) as f64 - 8.0).collect();
-    let run = |threads: usize| {
-        let pool = pool(threads);
+    let run = |count: usize| {
+        let threads = threads(count);
         let system = System::new(dense.layout.clone(), Ordering::Auto).unwrap();
-        let factor = done(system.factor(&pool, &dense, &dense.prior, &FactorOptions::default(), &mut go));
+        let factor = done(system.factor(&threads, &dense, &dense.prior, &FactorOptions::default(), &mut go));
         let solution =
-            done(system.solve(&pool, &factor, &dense, &dense.prior, &SolveOptions::default(), &mut go));
-        let more = done(system.solve(&pool, &factor, &dense, &dense.prior, &solved_for(&rights), &mut go));
-        let alone = done(system.factor(&pool, &dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
-        let written = done(system.solve(&pool, &alone, &dense, &dense.prior, &solved_for(&rights), &mut go));
+            done(system.solve(&threads, &factor, &dense, &dense.prior, &SolveOptions::default(), &mut go));
+        let more = done(system.solve(&threads, &factor, &dense, &dense.prior, &solved_for(&rights), &mut go));
+        let alone = done(system.factor(&threads, &dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
+        let written =
+            done(system.solve(&threads, &alone, &dense, &dense.prior, &solved_for(&rights), &mut go));
         let functions: Vec<Function> =
             (0..dense.layout.unknowns()).step_by(3).map(|unknown| vec![(unknown, 1.0)]).collect();
-        let reduced = done(system.reduce(&pool, &dense, &dense.prior, &functions, None, &mut go));
-        let of_functions = done(system.cofactors_of(&pool, &factor, &reduced, &mut go));
+        let reduced = done(system.reduce(&threads, &dense, &dense.prior, &functions, None, &mut go));
+        let of_functions = done(system.cofactors_of(&threads, &factor, &reduced, &mut go));
         let cofactors =
-            done(system.invert(&pool, factor, &dense, &dense.prior, &InvertOptions::default(), &mut go))
+            done(system.invert(&threads, factor, &dense, &dense.prior, &InvertOptions::default(), &mut go))
                 .cofactors;
         let numbers =
-            [solution, more, written, of_functions, cofactors.local, cofactors.kept, cofactors.equations];
+            [solution, more, written, of_functions, cofactors.local, cofactors.retained, cofactors.equations];
         numbers.concat().into_iter().map(f64::to_bits).collect::<Vec<u64>>()
     };
     let one = run(1);
@@ -556,14 +568,14 @@ fn same_bits(plain: Layout) {
 fn what_the_equations_do_not_determine_is_named() {
     let mut dense = block(1, 12, 0);
     let layout = dense.layout.clone();
-    dense.prior.weight[layout.kept_range(3)].fill(0.0);
+    dense.prior.weight[layout.retained_range(3)].fill(0.0);
     // Photo 3 turns about one unknown as about another: only their sum is determined.
-    let range = layout.kept_range(3);
+    let range = layout.retained_range(3);
     for row in 0..dense.right.len() {
         dense.matrix[(row, range.start + 4)] = dense.matrix[(row, range.start + 1)];
     }
     let system = System::new(layout, Ordering::ReverseCuthillMckee).unwrap();
-    let factor = done(system.factor(&pool(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.defect(), 1);
     assert_eq!(deficiency.blocks(), vec![vec![3]]);
@@ -575,16 +587,16 @@ fn local_block_without_equations_is_named() {
     let mut dense = Dense::new(layout.clone(), 5);
     dense.prior.weight[layout.local_range(1)].fill(0.0);
     let system = System::new(layout, Ordering::Auto).unwrap();
-    let factor = done(system.factor(&pool(1), &dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads(1), &dense, &dense.prior, &FactorOptions::default(), &mut go));
     assert_eq!(factor.deficient_locals, vec![1]);
 }
 
 #[test]
 fn more_than_can_be_numbered_is_refused() {
     let many = u32::MAX as usize;
-    for kept in [[many, 1], [usize::MAX, usize::MAX]] {
-        let found = Layout::new(2, 3, &kept, vec![0, 1], vec![0]);
-        assert!(matches!(found, Err(LayoutError::TooMany(_))), "{kept:?}");
+    for retained in [[many, 1], [usize::MAX, usize::MAX]] {
+        let found = Layout::new(2, 3, &retained, vec![0, 1], vec![0]);
+        assert!(matches!(found, Err(LayoutError::TooMany(_))), "{retained:?}");
     }
 }
 
@@ -597,7 +609,7 @@ fn layouts_that_contradict_themselves_are_refused() {
     let layout = Layout::new(2, 3, &[6], vec![0, 1], vec![0]).unwrap();
     assert!(layout.clone().with_places(vec![]).is_err());
     let two = Layout::new(2, 3, &[6, 6, 3], vec![0, 2], vec![0, 0]).unwrap();
-    assert!(two.clone().with_further(vec![0, 1, 3], vec![2, 1, 2]).is_ok());
+    assert!(two.clone().with_shared(vec![0, 1, 3], vec![2, 1, 2]).is_ok());
     for (ptr, blocks) in [
         (vec![0, 1], vec![2]),
         (vec![0, 2, 1], vec![2]),
@@ -606,10 +618,11 @@ fn layouts_that_contradict_themselves_are_refused() {
         (vec![0, 1, 1], vec![3]),
         (vec![0, 2, 2], vec![2, 2]),
     ] {
-        assert!(two.clone().with_further(ptr, blocks).is_err());
+        assert!(two.clone().with_shared(ptr, blocks).is_err());
     }
-    let refused =
-        |rows, kept: &[u32]| layout.clone().with_ties(vec![Tie { rows, kept: kept.to_vec() }]).is_err();
+    let refused = |rows, retained: &[u32]| {
+        layout.clone().with_ties(vec![Tie { rows, retained: retained.to_vec() }]).is_err()
+    };
     assert!(refused(1, &[1]));
     assert!(refused(1, &[0, 0]));
     assert!(refused(1, &[]));
@@ -621,7 +634,7 @@ fn layouts_that_contradict_themselves_are_refused() {
 #[test]
 fn ties_alone_are_a_system() {
     let layout = Layout::new(1, 1, &[1; 6], vec![0], vec![]).unwrap();
-    let tie = |k: u32| Tie { rows: 1, kept: vec![k, (k + 1) % 6] };
+    let tie = |k: u32| Tie { rows: 1, retained: vec![k, (k + 1) % 6] };
     let dense = Dense::new(layout.with_ties((0..6).map(tie).collect()).unwrap(), 9);
     for ordering in ALL {
         compare_with_dense(&dense, ordering);

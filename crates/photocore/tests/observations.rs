@@ -6,6 +6,7 @@ use faer::linalg::solvers::DenseSolveCore;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 use num_complex::Complex64 as C;
+use photocore::Threads;
 use photocore::adjustment::{self, Loss, Method, Status, Stop};
 use photocore::geometry::{
     self, AttitudeNumbers, Matrix3, ObjectSpace, Perspective, Pose, PoseNumbers, RotationSense, Vector3,
@@ -19,7 +20,6 @@ use photocore::network::{
     Camera, Common, CommonKind, Dropped, Image, Mount, Network, NetworkError, Observation, Options, Photo,
     Point, Precision, Reason, Solution,
 };
-use rayon::ThreadPoolBuilder;
 
 const SENSE: RotationSense = RotationSense::GroundToPhoto;
 const PRINCIPAL_DISTANCE: f64 = -50.0;
@@ -359,13 +359,13 @@ fn of_commons() -> Vec<Observation> {
 }
 
 fn options(method: Method, loss: Option<Loss>) -> Options {
-    let adjustment = adjustment::Options { method, max_iterations: 50, covariance: true, loss };
+    let adjustment = adjustment::Options { method, max_iterations: 50, covariance: true, loss, threads: 0 };
     Options { adjustment, ..Options::default() }
 }
 
 fn adjust_with(network: &Network, options: &Options, threads: usize) -> Result<Solution, NetworkError> {
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    network.adjust(options, &pool, &mut |_| std::ops::ControlFlow::Continue(()))
+    let threads = Threads::new(threads).unwrap();
+    network.adjustment(options).on(&threads).run()
 }
 
 fn adjusted(network: &Network) -> Solution {
@@ -695,11 +695,11 @@ fn every_kind_agrees_with_dense_algebra() {
         }
     };
     for (i, point) in solution.points.iter().enumerate() {
-        block(3 * i, point.unwrap().cofactors.as_flattened(), 3);
+        block(3 * i, point.unwrap().cofactors.as_slice(), 3);
         assert_eq!(point.unwrap().rays, PHOTOS + MOUNTED.len());
     }
     for (i, photo) in solution.photos.iter().enumerate().filter(|(i, _)| !MOUNTED.contains(i)) {
-        block(3 * POINTS + 6 * i, &photo.cofactors, 6);
+        block(3 * POINTS + 6 * i, photo.cofactors.as_slice(), 6);
     }
     // Of common unknowns rotations are those about the own axes; of photos on frames they are in angles.
     let compare = |by_unknowns: &nalgebra::DMatrix<f64>, found: &nalgebra::DMatrix<f64>| {
@@ -733,8 +733,7 @@ fn every_kind_agrees_with_dense_algebra() {
                 steps[(row, dense.first(i) + column)] = step;
             }
         }
-        let width = common.change.len();
-        compare(&steps, &nalgebra::DMatrix::from_row_slice(width, width, &common.cofactors));
+        compare(&steps, &common.cofactors);
     }
     for photo in MOUNTED {
         let own = &solution.photos[photo];
@@ -756,7 +755,7 @@ fn every_kind_agrees_with_dense_algebra() {
         let mut rates = nalgebra::DMatrix::identity(6, 6);
         let angles = [own.pose[3], own.pose[4], own.pose[5]];
         rates.view_mut((3, 3), (3, 3)).copy_from(&AttitudeNumbers::OmegaPhiKappa(SENSE).rates(angles));
-        let found = nalgebra::DMatrix::from_row_slice(6, 6, &own.cofactors);
+        let found = own.cofactors.clone();
         compare(&steps, &(&rates * found * rates.transpose()));
         let (centre, a) = dense.photo(&at, photo);
         for i in 0..3 {
@@ -914,7 +913,7 @@ fn points_that_nothing_else_holds_are_named() {
     network.observations = vec![distance(1, 2)];
     let found = adjust_with(&network, &Options::default(), 1).unwrap();
     assert_eq!(found.dropped, [Dropped { point: 0, reason: Reason::NotDetermined }], "a local point");
-    assert!(found.points[0].is_none() && found.points[5].unwrap().cofactors[0][0] > 0.0);
+    assert!(found.points[0].is_none() && found.points[5].unwrap().cofactors[0] > 0.0);
     network.observations = vec![EqualHeight { points: [3, 4], difference: 0.0, sd: 1.0 }.into()];
     network.observations.push(EqualHeight { points: [0, 0], difference: 0.0, sd: 1.0 }.into());
     let refused = adjust_with(&network, &Options::default(), 1).err();

@@ -1,9 +1,10 @@
-//! Work is done by the threads of the pool that it is given: none of those that the process has in common is ever started.
+//! Work is done by the threads of the threads that it is given: none of those that the process has in common is ever started.
 
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::ops::ControlFlow;
 
+use photocore::Threads;
 use photocore::adjustment::Event;
 use photocore::geometry::{
     self, Air, ObjectSpace, Perspective, PoseNumbers, RotationSense, Station as Site, Vector3,
@@ -15,7 +16,6 @@ use photocore::programs::comparator::{
 use photocore::programs::resection::{ControlPoint, Known, Partials, Resection};
 use photocore::programs::similarity::{self, Station};
 use photocore::programs::stellar::{self, COMMON, Decentering, Form, Kind, Star, Tolerances, Weights};
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 const SPACE: ObjectSpace = ObjectSpace::Rectangular;
 const SENSE: RotationSense = RotationSense::GroundToPhoto;
@@ -73,21 +73,21 @@ fn block(strips: usize, points: usize) -> Network {
     }
 }
 
-fn adjust_block(network: &Network, pool: &ThreadPool) {
+fn adjust_block(network: &Network, threads: &Threads) {
     let options = Options::default();
-    let solution = network.adjust_and_keep(&options, pool, &mut go).unwrap();
-    let covariances = network.covariances(&options, &solution.state, None, pool, &mut go).unwrap();
-    covariances.cofactors(&[Of::Point(0), Of::Photo(0)], None, pool, &mut go).unwrap();
-    network.adjust_again(&options, &solution.state, pool, &mut go).unwrap();
+    let solution = network.adjustment(&options).kept().on(threads).watched(&mut go).run().unwrap();
+    let covariances = network.covariances(&options, &solution.state, None, threads, &mut go).unwrap();
+    covariances.cofactors(&[Of::Point(0), Of::Photo(0)], None, threads, &mut go).unwrap();
+    network.adjustment(&options).from_state(&solution.state).on(threads).watched(&mut go).run().unwrap();
     let mut trial = solution.converged.expect("it converges").trial(network);
-    trial.stand(pool, &mut go).unwrap();
-    trial.tests(pool).unwrap();
-    trial.effects(&[0, 5], pool).unwrap();
-    trial.responses(&[0, 5], pool).unwrap();
-    trial.most_moved(&[0, 5], pool).unwrap();
+    trial.stand(threads, &mut go).unwrap();
+    trial.tests(threads).unwrap();
+    trial.effects(&[0, 5], threads).unwrap();
+    trial.responses(&[0, 5], threads).unwrap();
+    trial.most_moved(&[0, 5], threads).unwrap();
 }
 
-fn resect(pool: &ThreadPool) {
+fn resect(threads: &Threads) {
     let photo = geometry::Photo::new(SPACE, SENSE, [420.0, 310.0, 900.0], [0.05, -0.08, 2.1], -150.0);
     let control = |i: usize| {
         let coordinates = [8.0 * grid(i)[0], 6.0 * grid(i)[1], 50.0 * noise(i)];
@@ -105,10 +105,10 @@ fn resect(pool: &ThreadPool) {
         start: None,
         partials: Partials::AtComputed,
     };
-    resection.adjust(&Default::default(), pool, &mut go).unwrap();
+    resection.adjust_on(&Default::default(), threads, &mut go).unwrap();
 }
 
-fn orient(pool: &ThreadPool) {
+fn orient(threads: &Threads) {
     let station = |i: usize| {
         let control = Vector3::new(grid(i)[0], grid(i)[1], noise(i));
         let model = 0.5 * control + Vector3::new(1.0 + 1e-3 * noise(7 * i), 2.0, 3.0);
@@ -123,10 +123,10 @@ fn orient(pool: &ThreadPool) {
         trace: false,
         scale: None,
     };
-    similarity::orient(&stations, &options, pool, &mut go).unwrap();
+    similarity::orient_on(&stations, &options, threads, &mut go).unwrap();
 }
 
-fn calibrate_comparator(pool: &ThreadPool) {
+fn calibrate_comparator(threads: &Threads) {
     let basis = Basis { degree: 4, centre: [125e3, 130e3], half_range: [120e3, 110e3] };
     let coefficients = [vec![0.0; 6], vec![0.0; 6]];
     let comparator = Comparator { scale: [1.0; 2], nonorthogonality: 0.0, basis, coefficients };
@@ -146,10 +146,10 @@ fn calibrate_comparator(pool: &ThreadPool) {
         measurements: (0..4 * MANY).map(measurement).collect(),
         comparator: comparator.clone(),
     };
-    calibration.adjust(&Default::default(), pool, &mut go).unwrap();
+    calibration.adjust_on(&Default::default(), threads, &mut go).unwrap();
 }
 
-fn calibrate_on_stars(pool: &ThreadPool) {
+fn calibrate_on_stars(threads: &Threads) {
     let kind =
         Kind { lens: None, form: Form::ScaleFirst, decentering: Decentering::Polar, common_scale: false };
     let mut common = [0.0; COMMON];
@@ -183,19 +183,22 @@ fn calibrate_on_stars(pool: &ThreadPool) {
     }
     calibration.pointings[0][0] += 1e-4;
     let options = stellar::Options { adjustment: Default::default(), unit: 1.0, whole: true };
-    calibration.adjust(&options, pool, &mut go).unwrap();
-    calibration.without_effect(pool).unwrap();
-    calibration.correction(&Tolerances { refraction: 1e-9, distortion: 1e-9, passes: 20 }, pool).unwrap();
+    calibration.adjust_on(&options, threads, &mut go).unwrap();
+    calibration.without_effect(threads).unwrap();
+    calibration.correction(&Tolerances { refraction: 1e-9, distortion: 1e-9, passes: 20 }, threads).unwrap();
 }
 
 #[test]
 fn no_thread_is_started_beside_those_of_the_pools() {
-    let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    adjust_block(&block(2, 400), &pool);
-    adjust_block(&block(20, MANY), &pool);
-    resect(&pool);
-    orient(&pool);
-    calibrate_comparator(&pool);
-    calibrate_on_stars(&pool);
-    assert!(ThreadPoolBuilder::new().num_threads(1).build_global().is_ok(), "rayon's own pool has started");
+    let threads = Threads::new(2).unwrap();
+    adjust_block(&block(2, 400), &threads);
+    adjust_block(&block(20, MANY), &threads);
+    resect(&threads);
+    orient(&threads);
+    calibrate_comparator(&threads);
+    calibrate_on_stars(&threads);
+    assert!(
+        rayon::ThreadPoolBuilder::new().num_threads(1).build_global().is_ok(),
+        "rayon's own threads has started"
+    );
 }

@@ -10,10 +10,10 @@ use std::ops::ControlFlow;
 use cut::{Cut, TREES};
 use photocore::normals::{
     Contribution, Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, LayoutError, Ordering,
-    Prior, SolveOptions, Stopped, System, Tie, TieRows,
+    Prior, SolveOptions, System, Tie, TieRows,
 };
+use photocore::{Stopped, Threads};
 use proptest::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Numbers between -1 and 1 that a seed and two places give.
 fn number(seed: u64, i: usize, j: usize) -> f64 {
@@ -26,14 +26,14 @@ fn number(seed: u64, i: usize, j: usize) -> f64 {
     (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
-/// The equations of a system, or of a node of it: local blocks, groups, ties and kept blocks as the whole system numbers them.
+/// The equations of a system, or of a node of it: local blocks, groups, ties and retained blocks as the whole system numbers them.
 struct Piece<'a> {
     seed: u64,
     layout: Layout,
     locals: Vec<usize>,
     groups: Vec<usize>,
     ties: Vec<usize>,
-    kept: Vec<usize>,
+    retained: Vec<usize>,
     prior: Prior,
     below: Vec<Contribution<'a>>,
 }
@@ -46,7 +46,7 @@ impl Piece<'_> {
     }
 
     fn own(&self, block: usize) -> (usize, usize) {
-        (1 + self.kept[block], self.layout.kept_dim(block))
+        (1 + self.retained[block], self.layout.retained_dim(block))
     }
 }
 
@@ -58,12 +58,12 @@ impl Equations for Piece<'_> {
             rows.constant[k] = number(self.seed, row, 7);
             let l = layout.local_dim();
             self.fill(row, &mut rows.local[l * k..][..l], [(1000, l)].into_iter());
-            let main = layout.kept_of(group);
-            let width = layout.kept_dim(main);
-            self.fill(row, &mut rows.kept[width * k..][..width], [self.own(main)].into_iter());
-            let width = layout.common_width(group);
-            let further = layout.further_of(group).iter().map(|&block| self.own(block as usize));
-            self.fill(row, &mut rows.common[width * k..][..width], further);
+            let main = layout.retained_of(group);
+            let width = layout.retained_dim(main);
+            self.fill(row, &mut rows.retained[width * k..][..width], [self.own(main)].into_iter());
+            let width = layout.shared_width(group);
+            let further = layout.shared_of(group).iter().map(|&block| self.own(block as usize));
+            self.fill(row, &mut rows.shared[width * k..][..width], further);
         }
     }
 
@@ -73,8 +73,8 @@ impl Equations for Piece<'_> {
         for (k, constant) in rows.constant.iter_mut().enumerate() {
             let row = 100_000 + 8 * whole + k;
             *constant = number(self.seed, row, 7);
-            let kept = layout.ties()[tie].kept.iter().map(|&block| self.own(block as usize));
-            self.fill(row, &mut rows.coefficients[width * k..][..width], kept);
+            let retained = layout.ties()[tie].retained.iter().map(|&block| self.own(block as usize));
+            self.fill(row, &mut rows.coefficients[width * k..][..width], retained);
         }
     }
 
@@ -93,56 +93,56 @@ fn whole(layout: Layout, seed: u64) -> Piece<'static> {
         locals: (0..layout.locals()).collect(),
         groups: (0..layout.groups()).collect(),
         ties: (0..layout.ties().len()).collect(),
-        kept: (0..layout.kept()).collect(),
+        retained: (0..layout.retained()).collect(),
         prior: Prior { weight, right, between: vec![] },
         below: vec![],
         layout,
     }
 }
 
-/// The kept blocks that each local block, then each tie, touches.
+/// The retained blocks that each local block, then each tie, touches.
 fn touched(layout: &Layout) -> Vec<Vec<usize>> {
     let of_local = |local| {
         let blocks: BTreeSet<usize> =
             layout.groups_of(local).flat_map(|group| layout.blocks_of(group)).collect();
         blocks.into_iter().collect()
     };
-    let ties = layout.ties().iter().map(|tie| tie.kept.iter().map(|&block| block as usize).collect());
+    let ties = layout.ties().iter().map(|tie| tie.retained.iter().map(|&block| block as usize).collect());
     (0..layout.locals()).map(of_local).chain(ties).collect()
 }
 
 /// Node `p` of a system that is cut.
 fn piece<'a>(all: &Piece<'_>, cut: &Cut, p: usize) -> Piece<'a> {
     let layout = &all.layout;
-    let kept = cut.blocks(p);
-    let place = |block: usize| kept.iter().position(|&own| own == block).unwrap() as u32;
+    let retained = cut.blocks(p);
+    let place = |block: usize| retained.iter().position(|&own| own == block).unwrap() as u32;
     let homes = &cut.homes;
     let locals: Vec<usize> = (0..layout.locals()).filter(|&local| homes[local] == p).collect();
     let ties: Vec<usize> =
         (0..layout.ties().len()).filter(|&tie| homes[layout.locals() + tie] == p).collect();
     let groups: Vec<usize> = locals.iter().flat_map(|&local| layout.groups_of(local)).collect();
-    let (mut ptr, mut further_ptr, mut further) = (vec![0], vec![0], vec![]);
+    let (mut ptr, mut shared_ptr, mut further) = (vec![0], vec![0], vec![]);
     locals.iter().for_each(|&local| ptr.push(ptr[ptr.len() - 1] + layout.groups_of(local).len()));
     for &group in &groups {
-        further.extend(layout.further_of(group).iter().map(|&block| place(block as usize)));
-        further_ptr.push(further.len());
+        further.extend(layout.shared_of(group).iter().map(|&block| place(block as usize)));
+        shared_ptr.push(further.len());
     }
-    let dims: Vec<usize> = kept.iter().map(|&block| layout.kept_dim(block)).collect();
-    let main = groups.iter().map(|&group| place(layout.kept_of(group))).collect();
+    let dims: Vec<usize> = retained.iter().map(|&block| layout.retained_dim(block)).collect();
+    let main = groups.iter().map(|&group| place(layout.retained_of(group))).collect();
     let tie = |&tie: &usize| {
-        let Tie { rows, kept } = layout.ties()[tie].clone();
-        Tie { rows, kept: kept.iter().map(|&block| place(block as usize)).collect() }
+        let Tie { rows, retained } = layout.ties()[tie].clone();
+        Tie { rows, retained: retained.iter().map(|&block| place(block as usize)).collect() }
     };
     let children = cut.children(p);
     let below = children.iter().map(|&child| cut.outer[child].iter().map(|&block| place(block)).collect());
     let own = Layout::new(layout.rows(), layout.local_dim(), &dims, ptr, main).unwrap();
     let own =
-        own.with_further(further_ptr, further).unwrap().with_ties(ties.iter().map(tie).collect()).unwrap();
+        own.with_shared(shared_ptr, further).unwrap().with_ties(ties.iter().map(tie).collect()).unwrap();
     let outer = cut.outer[p].iter().map(|&block| place(block)).collect();
     let own = own.as_part(outer, below.collect()).unwrap();
     let unknowns = locals.iter().flat_map(|&local| layout.local_range(local));
     let unknowns: Vec<usize> =
-        unknowns.chain(kept.iter().flat_map(|&block| layout.kept_range(block))).collect();
+        unknowns.chain(retained.iter().flat_map(|&block| layout.retained_range(block))).collect();
     let mut prior = Prior {
         weight: unknowns.iter().map(|&unknown| all.prior.weight[unknown]).collect(),
         right: unknowns.iter().map(|&unknown| all.prior.right[unknown]).collect(),
@@ -150,11 +150,11 @@ fn piece<'a>(all: &Piece<'_>, cut: &Cut, p: usize) -> Piece<'a> {
     };
     let outer: Vec<usize> = own.unknowns_of(own.outer()).collect();
     outer.iter().for_each(|&unknown| (prior.weight[unknown], prior.right[unknown]) = (0.0, 0.0));
-    Piece { seed: all.seed, layout: own, locals, groups, ties, kept, prior, below: vec![] }
+    Piece { seed: all.seed, layout: own, locals, groups, ties, retained, prior, below: vec![] }
 }
 
-fn pool(threads: usize) -> ThreadPool {
-    ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
+fn threads(count: usize) -> Threads {
+    Threads::new(count).unwrap()
 }
 
 fn go(_: usize) -> ControlFlow<()> {
@@ -173,7 +173,7 @@ fn upward<'a>(
     all: &Piece<'_>,
     cut: &Cut,
     ordering: Ordering,
-    pool: &ThreadPool,
+    threads: &Threads,
 ) -> Vec<(Piece<'a>, System, Factor)> {
     let mut left: Vec<Option<Contribution<'static>>> = vec![];
     let mut nodes = vec![];
@@ -181,7 +181,8 @@ fn upward<'a>(
         let mut piece = piece(all, cut, p);
         piece.below = cut.children(p).iter().map(|&child| left[child].take().unwrap()).collect();
         let system = System::new(piece.layout.clone(), ordering).unwrap();
-        let mut factor = done(system.factor(pool, &piece, &piece.prior, &FactorOptions::default(), &mut go));
+        let mut factor =
+            done(system.factor(threads, &piece, &piece.prior, &FactorOptions::default(), &mut go));
         assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
         let contribution = factor.take_contribution();
         let outer = system.symbolic().outer_unknowns();
@@ -200,15 +201,16 @@ fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
 
 /// Solution, sums and cofactors of a system that is cut against those of one piece.
 fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u64, ordering: Ordering) {
-    let pool = pool(2);
+    let threads = threads(2);
     let cut = Cut::new(tree, &touched(&layout), node_of);
     let all = whole(layout, seed);
     let system = System::new(all.layout.clone(), ordering).unwrap();
-    let factor = done(system.factor(&pool, &all, &all.prior, &FactorOptions::default(), &mut go));
-    let expected = done(system.solve(&pool, &factor, &all, &all.prior, &SolveOptions::default(), &mut go));
+    let factor = done(system.factor(&threads, &all, &all.prior, &FactorOptions::default(), &mut go));
+    let expected = done(system.solve(&threads, &factor, &all, &all.prior, &SolveOptions::default(), &mut go));
     let (sum, decrease) = (factor.sum_of_squares, factor.decrease);
-    let cofactors = done(system.invert(&pool, factor, &all, &all.prior, &InvertOptions::default(), &mut go));
-    let nodes = upward(&all, &cut, ordering, &pool);
+    let cofactors =
+        done(system.invert(&threads, factor, &all, &all.prior, &InvertOptions::default(), &mut go));
+    let nodes = upward(&all, &cut, ordering, &threads);
     let sums = nodes.iter().map(|(.., factor)| factor.sum_of_squares).sum();
     assert_close(sums, sum, 1e-12 * sum, "sum of squares");
     assert_close(
@@ -222,7 +224,7 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
         let (outer_step, outer_cofactors) = std::mem::take(&mut handed[p]);
         let step = done(system.solve(
-            &pool,
+            &threads,
             &factor,
             &piece,
             &piece.prior,
@@ -231,12 +233,13 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
         ));
         let own = system.layout();
         let unknowns = piece.locals.iter().flat_map(|&local| all.layout.local_range(local));
-        let unknowns = unknowns.chain(piece.kept.iter().flat_map(|&block| all.layout.kept_range(block)));
+        let unknowns =
+            unknowns.chain(piece.retained.iter().flat_map(|&block| all.layout.retained_range(block)));
         for (x, unknown) in step.iter().zip(unknowns) {
             assert_close(*x, expected[unknown], 1e-9 * largest, "solution");
         }
         let found = done(system.invert(
-            &pool,
+            &threads,
             factor,
             &piece,
             &piece.prior,
@@ -247,13 +250,13 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
             let outer_step = own.unknowns_of(blocks).map(|unknown| step[unknown]).collect();
             handed[child] = (outer_step, found.selected.triangle(own, blocks));
         }
-        for (i, &block) in piece.kept.iter().enumerate() {
+        for (i, &block) in piece.retained.iter().enumerate() {
             let pair =
                 [found.selected.block(i, i), cofactors.selected.block(block, block)].map(Option::unwrap);
             pair[0]
                 .iter()
                 .zip(&pair[1])
-                .for_each(|(q, exact)| assert_close(*q, *exact, 1e-9, "kept cofactor"));
+                .for_each(|(q, exact)| assert_close(*q, *exact, 1e-9, "retained cofactor"));
         }
         let squares = own.local_dim() * own.local_dim();
         for (i, &local) in piece.locals.iter().enumerate() {
@@ -278,22 +281,24 @@ const ALL: [Ordering; 4] =
 /// Systems of local blocks on one to three of some main blocks, with common ones and ties.
 fn systems() -> impl Strategy<Value = (Layout, u64)> {
     let shape = (1..4usize, prop::collection::vec(1..8usize, 4..16), 0..3u32);
-    let of_shape = |(l, kept, common): (usize, Vec<usize>, u32)| {
-        let main = common..kept.len() as u32;
+    let of_shape = |(l, retained, common): (usize, Vec<usize>, u32)| {
+        let main = common..retained.len() as u32;
         let further = prop::collection::btree_set(0..common.max(1), 0..=common as usize);
         let groups = prop::collection::vec(prop::collection::vec((main, further), 1..4), 1..40);
-        let tied = prop::collection::btree_set(0..kept.len() as u32, 1..4);
-        (Just((l, kept)), groups, prop::collection::vec((1..4usize, tied), 0..6), any::<u64>())
+        let tied = prop::collection::btree_set(0..retained.len() as u32, 1..4);
+        (Just((l, retained)), groups, prop::collection::vec((1..4usize, tied), 0..6), any::<u64>())
     };
-    shape.prop_flat_map(of_shape).prop_map(|((l, kept), locals, ties, seed)| {
+    shape.prop_flat_map(of_shape).prop_map(|((l, retained), locals, ties, seed)| {
         let mut ptr = vec![0];
         locals.iter().for_each(|groups| ptr.push(ptr[ptr.len() - 1] + groups.len()));
         let (main, further): (Vec<u32>, Vec<BTreeSet<u32>>) = locals.into_iter().flatten().unzip();
-        let mut further_ptr = vec![0];
-        further.iter().for_each(|own| further_ptr.push(further_ptr[further_ptr.len() - 1] + own.len()));
+        let mut shared_ptr = vec![0];
+        further.iter().for_each(|own| shared_ptr.push(shared_ptr[shared_ptr.len() - 1] + own.len()));
         let further = further.into_iter().flatten().collect();
-        let tie = |(rows, kept): (usize, BTreeSet<u32>)| Tie { rows, kept: kept.into_iter().collect() };
-        let layout = Layout::new(2, l, &kept, ptr, main).unwrap().with_further(further_ptr, further).unwrap();
+        let tie =
+            |(rows, retained): (usize, BTreeSet<u32>)| Tie { rows, retained: retained.into_iter().collect() };
+        let layout =
+            Layout::new(2, l, &retained, ptr, main).unwrap().with_shared(shared_ptr, further).unwrap();
         (layout.with_ties(ties.into_iter().map(tie).collect()).unwrap(), seed)
     })
 }
@@ -309,30 +314,30 @@ proptest! {
     ) {
         let tree = TREES[tree];
         let place = |block: usize| (number(seed, block, 17).abs() * tree.len() as f64) as usize;
-        let node_of = (0..layout.kept()).map(place).collect();
+        let node_of = (0..layout.retained()).map(place).collect();
         compare(layout, tree, node_of, seed, ordering);
     }
 }
 
 /// A block of strips, with a camera for every strip.
 fn strips(count: usize, length: usize) -> Layout {
-    let (mut ptr, mut kept, mut further_ptr, mut further) = (vec![0], vec![], vec![0], vec![]);
+    let (mut ptr, mut retained, mut shared_ptr, mut further) = (vec![0], vec![], vec![0], vec![]);
     for strip in 0..count {
         for photo in 0..length {
             for reach in [2, 3] {
                 for s in strip..count.min(strip + 2) {
                     for p in photo..length.min(photo + reach) {
-                        kept.push((s * length + p) as u32);
+                        retained.push((s * length + p) as u32);
                         further.push((count * length + s) as u32);
-                        further_ptr.push(further.len());
+                        shared_ptr.push(further.len());
                     }
                 }
-                ptr.push(kept.len());
+                ptr.push(retained.len());
             }
         }
     }
     let dims = [vec![6; count * length], vec![3; count]].concat();
-    Layout::new(2, 3, &dims, ptr, kept).unwrap().with_further(further_ptr, further).unwrap()
+    Layout::new(2, 3, &dims, ptr, retained).unwrap().with_shared(shared_ptr, further).unwrap()
 }
 
 #[test]
@@ -357,14 +362,14 @@ fn bits_of_a_node_do_not_depend_on_the_number_of_threads() {
     let node_of = (0..120).map(|photo| usize::from(photo % 30 >= 15)).chain([2; 4]).collect();
     let cut = Cut::new(&[Some(2), Some(2), None], &touched(&layout), node_of);
     let all = whole(layout, 5);
-    let left = [1, 3].map(|threads| {
-        let pool = pool(threads);
+    let left = [1, 3].map(|count| {
+        let threads = threads(count);
         let mut numbers = vec![];
         for p in 0..2 {
             let piece = piece(&all, &cut, p);
             let system = System::new(piece.layout.clone(), Ordering::Auto).unwrap();
             let mut factor =
-                done(system.factor(&pool, &piece, &piece.prior, &FactorOptions::default(), &mut go));
+                done(system.factor(&threads, &piece, &piece.prior, &FactorOptions::default(), &mut go));
             let Contribution { matrix, right, diagonal } = factor.take_contribution();
             numbers.extend([matrix, right, diagonal].concat());
             assert!(factor.take_contribution().matrix.is_empty(), "handed out once");

@@ -4,12 +4,12 @@
 
 use std::ops::ControlFlow;
 
+use photocore::Threads;
 use photocore::adjustment::{Method, Options, Published, Status, Stop};
 use photocore::geometry::{ObjectSpace, Photo, Point, RotationSense, Vector3, rotation};
 use photocore::programs::resection::{
     ControlPoint, Degeneracy, Known, Partials, Pose, Resection, ResectionError, Solution, three_points,
 };
-use rayon::ThreadPoolBuilder;
 
 const C: f64 = -150.0;
 const STRICT: Options = Options {
@@ -17,6 +17,7 @@ const STRICT: Options = Options {
     max_iterations: 50,
     covariance: true,
     loss: None,
+    threads: 0,
 };
 
 /// Numbers in [-1, 1) without a generator.
@@ -63,8 +64,8 @@ fn apart(a: &Pose, b: &Pose) -> f64 {
 }
 
 fn adjust(resection: &Resection, options: &Options) -> Result<Solution, ResectionError> {
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    resection.adjust(options, &pool, &mut |_| ControlFlow::Continue(()))
+    let threads = Threads::new(1).unwrap();
+    resection.adjust_on(options, &threads, &mut |_| ControlFlow::Continue(()))
 }
 
 const POSE: Pose = Pose { position: [420.0, 310.0, 900.0], attitude: [0.05, -0.08, 2.1] };

@@ -14,7 +14,7 @@ use photocore::network::observations::Distance;
 use photocore::network::{
     Camera, Combination, Image, Network, NetworkError, Of, Options, Photo, Point, PosePart, Solution,
 };
-use rayon::ThreadPoolBuilder;
+use photocore::{Stopped, Threads};
 
 const FREE: f64 = f64::INFINITY;
 const PHOTOS: usize = 14;
@@ -164,8 +164,8 @@ fn options(method: Method) -> Options {
 }
 
 fn adjust(network: &Network, method: Method) -> Result<Solution, NetworkError> {
-    let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    network.adjust(&options(method), &pool, &mut |_| ControlFlow::Continue(()))
+    let threads = Threads::new(2).unwrap();
+    network.adjustment(&options(method)).on(&threads).run()
 }
 
 /// The same network with full matrices: poses, parameters of all cameras, points; those that are fixed have an equation of their own.
@@ -303,12 +303,12 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
             unknowns.extend(dense.camera(2));
             values.extend(&photo.camera);
         }
-        compare(&values, &photo.cofactors, &unknowns, &x, &q, &format!("photo {i}"));
+        compare(&values, photo.cofactors.as_slice(), &unknowns, &x, &q, &format!("photo {i}"));
         assert_eq!(photo.camera, solution.cameras[CAMERA_OF[i]].parameters);
     }
     for (i, camera) in solution.cameras.iter().enumerate() {
         let unknowns: Vec<usize> = dense.camera(i).collect();
-        compare(&camera.parameters, &camera.cofactors, &unknowns, &x, &q, &format!("camera {i}"));
+        compare(&camera.parameters, camera.cofactors.as_slice(), &unknowns, &x, &q, &format!("camera {i}"));
         for (k, &u) in unknowns.iter().enumerate() {
             let weighted = sd[u] > 0.0 && sd[u] < FREE;
             let expected = if weighted { 1.0 - q[(u, u)] / sd[u].powi(2) } else { 0.0 };
@@ -325,7 +325,7 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
     for (i, point) in solution.points.iter().enumerate() {
         let point = point.unwrap();
         let unknowns: Vec<usize> = dense.point(i).collect();
-        let cofactors = point.cofactors.as_flattened();
+        let cofactors = point.cofactors.as_slice();
         compare(&point.coordinates, cofactors, &unknowns, &x, &q, &format!("point {i}"));
     }
     let (a, left) = dense.equations(&x);
@@ -349,9 +349,9 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
     let network = network();
     let options = options(TIGHT);
     let mut go = |_| ControlFlow::Continue(());
-    let in_threads = |threads: usize| ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let pool = in_threads(2);
-    let solution = network.adjust(&options, &pool, &mut go).unwrap();
+    let in_threads = |threads: usize| Threads::new(threads).unwrap();
+    let threads = in_threads(2);
+    let solution = network.adjustment(&options).on(&threads).watched(&mut go).run().unwrap();
     let dense = Dense::new(&network);
     let (_, q) = dense.adjust();
     let (_, sd) = dense.observed();
@@ -366,12 +366,12 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
         };
         of.iter().flat_map(own).collect()
     };
-    let covariances = network.covariances(&options, &solution.state, None, &pool, &mut go).unwrap();
-    let all = covariances.cofactors(&of, None, &pool, &mut go).unwrap();
-    let compare = |found: &[f64], rows: &[usize], columns: &[usize]| {
-        assert_eq!(found.len(), rows.len() * columns.len());
+    let covariances = network.covariances(&options, &solution.state, None, &threads, &mut go).unwrap();
+    let all = covariances.cofactors(&of, None, &threads, &mut go).unwrap();
+    let compare = |found: &DMatrix<f64>, rows: &[usize], columns: &[usize]| {
+        assert_eq!(found.shape(), (rows.len(), columns.len()));
         for (k, value) in found.iter().enumerate() {
-            let (i, j) = (rows[k / columns.len()], columns[k % columns.len()]);
+            let (i, j) = (rows[k % rows.len()], columns[k / rows.len()]);
             let expected = if sd[i] == 0.0 || sd[j] == 0.0 { 0.0 } else { q[(i, j)] };
             let scale = (q[(i, i)] * q[(j, j)]).sqrt();
             assert!((value - expected).abs() <= 1e-8 * scale, "{i} {j}: {value:e} {expected:e}");
@@ -389,7 +389,7 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
         (of.clone(), vec![Of::Camera(1)]),
         (vec![Of::Point(4), Of::Point(30)], vec![Of::Point(30), Of::Photo(7), Of::Point(5)]),
     ] {
-        let found = covariances.cofactors(&rows, Some(&columns), &pool, &mut go).unwrap();
+        let found = covariances.cofactors(&rows, Some(&columns), &threads, &mut go).unwrap();
         compare(&found, &unknowns(&rows), &unknowns(&columns));
     }
     // A distance, as a function.
@@ -398,7 +398,7 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
     let length = (0..3).map(|k| (r[k] - p[k]).powi(2)).sum::<f64>().sqrt();
     let direction: Vec<f64> = (0..3).map(|k| (r[k] - p[k]) / length).collect();
     let partials: Vec<f64> = direction.iter().map(|d| -d).chain(direction.iter().copied()).collect();
-    let found = covariances.propagate(&partials, &ends, &pool, &mut go).unwrap();
+    let found = covariances.propagate(&partials, &ends, &threads, &mut go).unwrap();
     let places = unknowns(&ends);
     let pairs = (0..6).flat_map(|i| (0..6).map(move |j| (i, j)));
     let expected: f64 = pairs.map(|(i, j)| partials[i] * q[(places[i], places[j])] * partials[j]).sum();
@@ -409,28 +409,28 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
 fn what_has_no_cofactors_is_refused() {
     let network = network();
     let mut go = |_| ControlFlow::Continue(());
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let threads = Threads::new(1).unwrap();
     let options = Options { memory: Some(1 << 30), ..options(TIGHT) };
-    let solution = network.adjust(&options, &pool, &mut go).unwrap();
-    let covariances = network.covariances(&options, &solution.state, None, &pool, &mut go).unwrap();
-    let mut refused = |of: Of| covariances.cofactors(&[of], None, &pool, &mut go).unwrap_err();
+    let solution = network.adjustment(&options).on(&threads).watched(&mut go).run().unwrap();
+    let covariances = network.covariances(&options, &solution.state, None, &threads, &mut go).unwrap();
+    let mut refused = |of: Of| covariances.cofactors(&[of], None, &threads, &mut go).unwrap_err();
     assert_eq!(refused(Of::Photo(PHOTOS)), NetworkError::NoPhoto(PHOTOS));
     assert_eq!(refused(Of::Point(POINTS)), NetworkError::NoPoint(POINTS));
     let cameras = network.cameras.len();
     assert_eq!(refused(Of::Camera(cameras)), NetworkError::CameraIndex(cameras));
-    let partials = covariances.propagate(&[1.0; 4], &[Of::Point(0)], &pool, &mut go).unwrap_err();
+    let partials = covariances.propagate(&[1.0; 4], &[Of::Point(0)], &threads, &mut go).unwrap_err();
     assert_eq!(partials, NetworkError::Partials { unknowns: 3, numbers: 4 });
     let many = vec![Of::Point(0); 4000];
-    let too_many = covariances.cofactors(&many, None, &pool, &mut go).unwrap_err();
+    let too_many = covariances.cofactors(&many, None, &threads, &mut go).unwrap_err();
     let NetworkError::Cofactors(CofactorError::Memory { needed, .. }) = too_many else {
         panic!("{too_many:?}");
     };
     assert!(needed > 8 * 12_000 * 12_000);
-    let stopped = covariances.cofactors(&[Of::Point(0)], None, &pool, &mut |_| ControlFlow::Break(()));
-    assert_eq!(stopped.unwrap_err(), NetworkError::Interrupted);
+    let stopped = covariances.cofactors(&[Of::Point(0)], None, &threads, &mut |_| ControlFlow::Break(()));
+    assert_eq!(stopped.unwrap_err(), NetworkError::Stopped(Stopped::Interrupted));
     let mut other = solution.state;
     other.unknowns.pop();
-    let found = network.covariances(&options, &other, None, &pool, &mut go).err();
+    let found = network.covariances(&options, &other, None, &threads, &mut go).err();
     assert_eq!(found, Some(NetworkError::State));
 }
 
@@ -460,20 +460,16 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
     let places: Vec<[f64; 3]> = (0..9).map(|k| [(k % 3) as f64, (k / 3) as f64, 0.0]).collect();
     let stations = [[-0.5, -1.0], [-1.0, -1.2], [-1.5, -0.8]];
     let mut network = Network {
-        space: ObjectSpace::Rectangular,
         poses: PoseNumbers::Vectors,
-        refraction: None,
         cameras: vec![Camera::held(camera.into()), Camera::new(camera.into(), vec![FREE])],
         photos: vec![],
         points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
         images: vec![],
-        observations: vec![],
-        commons: vec![],
-        mounts: vec![],
+        ..Network::new()
     };
     for (photo, [x, y]) in stations.into_iter().enumerate() {
         let pose = [0.0, 0.0, 0.0, x, y, -10.0];
-        network.photos.push(Photo { pose, observed: pose, sd: [FREE; 6], camera: 1 });
+        network.photos.push(Photo::known(pose, [FREE; 6], 1));
         for (point, place) in places.iter().enumerate() {
             let xy = image(&complex(&pose), &complex(&[-1000.0]), &complex(place)).map(|value| value.re);
             network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
@@ -507,20 +503,16 @@ fn what_is_not_determined_is_named_by_parameters_and_parts_of_poses() {
     let network = |free: &[usize]| {
         let sd = (0..5).map(|k| if free.contains(&k) { FREE } else { 0.0 }).collect();
         let mut network = Network {
-            space: ObjectSpace::Rectangular,
             poses: PoseNumbers::Angles(sense),
-            refraction: None,
             cameras: vec![Camera::new(lens, sd)],
             photos: vec![],
             points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
             images: vec![],
-            observations: vec![],
-            commons: vec![],
-            mounts: vec![],
+            ..Network::new()
         };
         for (photo, [x, y]) in [[0.5, 1.0], [1.0, 1.2], [1.5, 0.8]].into_iter().enumerate() {
             let pose = [x, y, 10.0, 0.0, 0.0, 0.0];
-            network.photos.push(Photo { pose, observed: pose, sd: [FREE; 6], camera: 0 });
+            network.photos.push(Photo::known(pose, [FREE; 6], 0));
             for (point, place) in places.iter().enumerate() {
                 let xy = lens.image(&[place[0] - x, place[1] - y, -10.0].into());
                 network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
@@ -570,7 +562,7 @@ fn parameters_may_be_observed_with_their_covariance() {
         let mut free = network();
         free.cameras[camera].sd = vec![FREE; 3];
         let before = adjust(&free, TIGHT).unwrap().cameras[camera].clone();
-        let q = DMatrix::from_row_slice(3, 3, &before.cofactors);
+        let q = before.cofactors.clone();
         // As good as the images, and correlated otherwise.
         let sd: Vec<f64> = (0..3).map(|k| q[(k, k)].sqrt()).collect();
         let s = DMatrix::from_fn(3, 3, |i, j| {

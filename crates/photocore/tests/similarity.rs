@@ -4,14 +4,14 @@
 
 use std::ops::ControlFlow;
 
+use photocore::Threads;
 use photocore::adjustment::Status;
 use photocore::geometry::{Vector3, rotation};
 use photocore::programs::similarity::{
     Cause, Method, Options, Parameters, SimilarityError, Solution, Start, Started, Station, gauss_crout,
-    orient,
+    orient_on,
 };
 use proptest::prelude::*;
-use rayon::ThreadPoolBuilder;
 
 const NAN: f64 = f64::NAN;
 const PLAIN: Options = Options {
@@ -24,8 +24,8 @@ const PLAIN: Options = Options {
 };
 
 fn run(stations: &[Station], options: &Options) -> Result<Solution, SimilarityError> {
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    orient(stations, options, &pool, &mut |_| ControlFlow::Continue(()))
+    let threads = Threads::new(1).unwrap();
+    orient_on(stations, options, &threads, &mut |_| ControlFlow::Continue(()))
 }
 
 /// Places in the unit square with some relief; the first two far apart.
@@ -143,9 +143,9 @@ fn the_start_of_the_report_needs_two_horizontal_stations() {
 #[test]
 fn an_interruption_stops_it() {
     let given = stations(&truth([0.0, 0.0, 0.3], 1.0), mixed);
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let stopped = orient(&given, &PLAIN, &pool, &mut |_| ControlFlow::Break(()));
-    assert_eq!(stopped.unwrap_err(), SimilarityError::Interrupted);
+    let threads = Threads::new(1).unwrap();
+    let stopped = orient_on(&given, &PLAIN, &threads, &mut |_| ControlFlow::Break(()));
+    assert_eq!(stopped.unwrap_err(), SimilarityError::Stopped(photocore::Stopped::Interrupted));
 }
 
 #[test]

@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
+use photocore::Threads;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Status, Stop};
 use photocore::geometry::sky::{ARCSEC, REFRACTION};
 use photocore::geometry::{Air, Station};
@@ -13,7 +14,6 @@ use photocore::programs::stellar::{
     Axis, COMMON, Calibration, Decentering, Form, Image, Kind, Options, Rows, Solution, Star, StellarError,
     Weights,
 };
-use rayon::ThreadPoolBuilder;
 
 const ATTITUDES: usize = 5;
 const STARS: usize = 14;
@@ -93,10 +93,12 @@ fn weighted_night() -> Calibration {
 
 fn adjusted(calibration: &Calibration) -> Result<Solution, StellarError> {
     let method = Method::Damped(Stop::Fraction(1e-9));
-    let adjustment = AdjustmentOptions { method, max_iterations: 50, covariance: true, loss: None };
-    let pool = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    calibration
-        .adjust(&Options { adjustment, unit: 1.0, whole: true }, &pool, &mut |_| ControlFlow::Continue(()))
+    let adjustment =
+        AdjustmentOptions { method, max_iterations: 50, covariance: true, loss: None, threads: 0 };
+    let threads = Threads::new(2).unwrap();
+    calibration.adjust_on(&Options { adjustment, unit: 1.0, whole: true }, &threads, &mut |_| {
+        ControlFlow::Continue(())
+    })
 }
 
 /// Rows of R A and R l, R from the left Cholesky factor of the weights.
@@ -269,13 +271,13 @@ fn parameters_without_effect_and_without_determination_are_named() {
     calibration.fixed[place(5)] = false;
     calibration.fixed[place(6)] = false;
     calibration.fixed[place(7)] = true;
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert_eq!(calibration.without_effect(&pool).unwrap(), [place(5), place(6)]);
+    let threads = Threads::new(1).unwrap();
+    assert_eq!(calibration.without_effect(&threads).unwrap(), [place(5), place(6)]);
     match adjusted(&calibration) {
         Err(StellarError::Undetermined(found)) => assert_eq!(found, [[place(5)], [place(6)]]),
         other => panic!("{other:?}"),
     }
     calibration.stars[3].place[0] += std::f64::consts::PI;
-    assert_eq!(calibration.without_effect(&pool), Err(StellarError::NotFinite(vec![3])));
+    assert_eq!(calibration.without_effect(&threads), Err(StellarError::NotFinite(vec![3])));
     assert!(matches!(adjusted(&calibration), Err(StellarError::NotFinite(stars)) if stars == [3]));
 }

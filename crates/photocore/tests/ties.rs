@@ -5,14 +5,14 @@
 use std::ops::ControlFlow;
 
 use faer::{Mat, Side};
+use photocore::Threads;
 use photocore::adjustment::{
     Datum, DatumError, Leverages, Linearized, Loss, Method, Model, Motions, Options, Problem, Published,
     Status, Stop, adjust,
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Points in the plane; distances from kept points to local ones are groups, those between kept points ties.
+/// Points in the plane; distances from retained points to local ones are groups, those between retained points ties.
 struct Trilateration {
     layout: Layout,
     lengths: Vec<f64>,
@@ -36,17 +36,19 @@ impl Model for Trilateration {
     }
 
     fn observe(&self, values: &Vec<f64>, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let (point, station) =
-            (self.layout.local_range(local).start, self.layout.kept_range(self.layout.kept_of(group)).start);
+        let (point, station) = (
+            self.layout.local_range(local).start,
+            self.layout.retained_range(self.layout.retained_of(group)).start,
+        );
         let (left, partials) = self.distance(values, group, point, station);
         rows.constant[0] = left;
         rows.local.copy_from_slice(&partials);
-        rows.kept.copy_from_slice(&partials.map(|value| -value));
+        rows.retained.copy_from_slice(&partials.map(|value| -value));
     }
 
     fn observe_tie(&self, values: &Vec<f64>, tie: usize, rows: &mut TieRows<'_>) {
-        let kept = &self.layout.ties()[tie].kept;
-        let [from, to] = [0, 1].map(|end| self.layout.kept_range(kept[end] as usize).start);
+        let retained = &self.layout.ties()[tie].retained;
+        let [from, to] = [0, 1].map(|end| self.layout.retained_range(retained[end] as usize).start);
         let (left, partials) = self.distance(values, self.layout.groups() + tie, from, to);
         rows.constant[0] = left;
         rows.coefficients[..2].copy_from_slice(&partials);
@@ -74,9 +76,9 @@ fn noise(index: usize) -> f64 {
     ((index as f64 * 12.9898).sin() * 43758.5453).fract()
 }
 
-/// A grid of 4 x 3 kept points and 8 local ones among them, each local one seen from four kept points.
+/// A grid of 4 x 3 retained points and 8 local ones among them, each local one seen from four retained points.
 fn network(held: Vec<usize>) -> Problem<Trilateration> {
-    let kept: Vec<[f64; 2]> = (0..12).map(|k| [100.0 * (k % 4) as f64, 120.0 * (k / 4) as f64]).collect();
+    let retained: Vec<[f64; 2]> = (0..12).map(|k| [100.0 * (k % 4) as f64, 120.0 * (k / 4) as f64]).collect();
     let local: Vec<[f64; 2]> =
         (0..8).map(|k| [40.0 + 33.0 * k as f64, 60.0 + 70.0 * noise(k).abs()]).collect();
     let (mut ptr, mut seen) = (vec![0], Vec::new());
@@ -86,9 +88,9 @@ fn network(held: Vec<usize>) -> Problem<Trilateration> {
     }
     let pairs: Vec<[u32; 2]> =
         (0..12).flat_map(|k| [[k, (k + 1) % 12], [k, (k + 4) % 12], [(k + 5) % 12, k]]).collect();
-    let ties = pairs.iter().map(|pair| Tie { rows: 1, kept: pair.to_vec() }).collect();
+    let ties = pairs.iter().map(|pair| Tie { rows: 1, retained: pair.to_vec() }).collect();
     let layout = Layout::new(1, 2, &[2; 12], ptr.clone(), seen.clone()).unwrap().with_ties(ties).unwrap();
-    let truth: Vec<f64> = local.iter().chain(&kept).flatten().copied().collect();
+    let truth: Vec<f64> = local.iter().chain(&retained).flatten().copied().collect();
     let distance = |a: usize, b: usize| (truth[a] - truth[b]).hypot(truth[a + 1] - truth[b + 1]);
     let of_groups = (0..seen.len()).map(|g| distance(g / 4 * 2, 16 + 2 * seen[g] as usize));
     let of_ties = pairs.iter().map(|pair| distance(16 + 2 * pair[0] as usize, 16 + 2 * pair[1] as usize));
@@ -106,8 +108,8 @@ fn network(held: Vec<usize>) -> Problem<Trilateration> {
     }
 }
 
-fn pool() -> ThreadPool {
-    ThreadPoolBuilder::new().num_threads(2).build().unwrap()
+fn threads() -> Threads {
+    Threads::new(2).unwrap()
 }
 
 fn options() -> Options {
@@ -116,6 +118,7 @@ fn options() -> Options {
         max_iterations: 100,
         covariance: true,
         loss: None,
+        threads: 0,
     }
 }
 
@@ -128,9 +131,11 @@ fn design(problem: &Problem<Trilateration>, values: &[f64]) -> Mat<f64> {
     let layout = problem.layout();
     let mut a = Mat::zeros(layout.equations(), layout.unknowns());
     let ends = (0..layout.groups())
-        .map(|g| [layout.local_range(g / 4).start, layout.kept_range(layout.kept_of(g)).start]);
-    let tied =
-        layout.ties().iter().map(|tie| [0, 1].map(|end| layout.kept_range(tie.kept[end] as usize).start));
+        .map(|g| [layout.local_range(g / 4).start, layout.retained_range(layout.retained_of(g)).start]);
+    let tied = layout
+        .ties()
+        .iter()
+        .map(|tie| [0, 1].map(|end| layout.retained_range(tie.retained[end] as usize).start));
     for (row, [from, to]) in ends.chain(tied).enumerate() {
         let (_, partials) = problem.model.distance(values, row, from, to);
         for k in 0..2 {
@@ -160,11 +165,11 @@ fn pseudo_inverse(a: &Mat<f64>) -> Mat<f64> {
     scaled * vectors.transpose()
 }
 
-fn kept_block(problem: &Problem<Trilateration>, cofactors: &[f64], kept: usize, q: &Mat<f64>) -> f64 {
-    let range = problem.layout().kept_range(kept);
+fn kept_block(problem: &Problem<Trilateration>, cofactors: &[f64], retained: usize, q: &Mat<f64>) -> f64 {
+    let range = problem.layout().retained_range(retained);
     let scale = q[(range.start, range.start)].max(q[(range.start + 1, range.start + 1)]);
     (0..4)
-        .map(|k| (cofactors[4 * kept + k] - q[(range.start + k / 2, range.start + k % 2)]).abs() / scale)
+        .map(|k| (cofactors[4 * retained + k] - q[(range.start + k / 2, range.start + k % 2)]).abs() / scale)
         .fold(0.0, f64::max)
 }
 
@@ -172,19 +177,19 @@ fn kept_block(problem: &Problem<Trilateration>, cofactors: &[f64], kept: usize, 
 fn inner_constraints_over_everything_are_the_pseudo_inverse() {
     // One point and the direction to another are held.
     let problem = network(vec![16, 17, 19]);
-    let pool = pool();
-    let mut found = adjust(&problem, &options(), &pool, &mut go).unwrap();
+    let threads = threads();
+    let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
     assert_eq!(found.status, Status::Converged);
     let (redundancy, formed) = (found.redundancy.take().unwrap(), found.formations);
     let all = (0..problem.layout().unknowns()).map(|unknown| (unknown, 1.0)).collect();
     let datum = Datum { carriers: all, left: vec![], relative: false };
-    found.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go).unwrap();
+    found.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go).unwrap();
     assert_eq!(found.formations, formed + 1);
     let (free, cofactors) = (&found, found.cofactors.as_ref().unwrap());
     let a = design(&problem, &free.unknowns);
     let q = pseudo_inverse(&a);
-    for kept in 0..12 {
-        assert!(kept_block(&problem, &cofactors.kept, kept, &q) < 1e-9);
+    for retained in 0..12 {
+        assert!(kept_block(&problem, &cofactors.retained, retained, &q) < 1e-9);
     }
     for local in 0..8 {
         for k in 0..4 {
@@ -217,9 +222,9 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
 
     // Without cofactors it is moved all the same, and nothing is factored.
     let bare = Options { covariance: false, ..options() };
-    let mut moved = adjust(&problem, &bare, &pool, &mut go).unwrap();
+    let mut moved = adjust(&problem, &bare, &threads, &mut go).unwrap();
     let formations = moved.formations;
-    moved.take_to(&problem, &bare, &datum, &problem.initial, &pool, &mut go).unwrap();
+    moved.take_to(&problem, &bare, &datum, &problem.initial, &threads, &mut go).unwrap();
     assert!(moved.cofactors.is_none() && moved.redundancy.is_none());
     assert_eq!(moved.formations, formations);
     let apart = moved.unknowns.iter().zip(&free.unknowns).map(|(x, other)| (x - other).abs());
@@ -228,22 +233,22 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
 
 #[test]
 fn a_datum_does_not_depend_on_where_the_network_comes_from() {
-    let pool = pool();
+    let threads = threads();
     let in_datum_of = |held: Vec<usize>| {
         let problem = network(held);
-        let mut found = adjust(&problem, &options(), &pool, &mut go).unwrap();
-        // Carried by three kept points only.
+        let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
+        // Carried by three retained points only.
         let datum = Datum {
             carriers: (20..26).map(|unknown| (unknown, 1.0)).collect(),
             left: vec![],
             relative: false,
         };
-        found.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go).unwrap();
+        found.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go).unwrap();
         found.cofactors.unwrap()
     };
     let one = in_datum_of(vec![16, 17, 19]);
     let other = in_datum_of(vec![38, 39, 30]);
-    for (a, b) in one.kept.iter().zip(&other.kept) {
+    for (a, b) in one.retained.iter().zip(&other.retained) {
         assert!((a - b).abs() < 1e-7 * SD * SD, "{a} {b}");
     }
     assert_eq!(one.equations.len(), 32 + 36);
@@ -252,24 +257,24 @@ fn a_datum_does_not_depend_on_where_the_network_comes_from() {
 #[test]
 fn too_few_carriers_are_refused() {
     let problem = network(vec![16, 17, 19]);
-    let pool = pool();
-    let mut found = adjust(&problem, &options(), &pool, &mut go).unwrap();
+    let threads = threads();
+    let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
     // One point carries shifts, but no rotation about itself; one coordinate of four points no shift along the other.
     for carriers in [vec![16, 17], vec![16, 18, 20, 22]] {
         let carriers = carriers.into_iter().map(|unknown| (unknown, 1.0)).collect();
         let datum = Datum { carriers, left: vec![], relative: false };
-        let refused = found.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go);
+        let refused = found.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go);
         assert_eq!(refused.unwrap_err(), DatumError::NotCarried);
     }
 }
 
 #[test]
 fn what_is_open_is_found_by_trying_and_held() {
-    let pool = pool();
+    let threads = threads();
     let adjusted = |change: &dyn Fn(&mut Problem<Trilateration>), method: Method| {
         let mut problem = network(vec![16, 17, 19]);
         change(&mut problem);
-        (adjust(&problem, &Options { method, ..options() }, &pool, &mut go).unwrap(), problem)
+        (adjust(&problem, &Options { method, ..options() }, &threads, &mut go).unwrap(), problem)
     };
     for method in [
         Method::default(),
@@ -294,7 +299,7 @@ fn what_is_open_is_found_by_trying_and_held() {
             left: vec![],
             relative: false,
         };
-        let refused = placed.take_to(&problem, &options(), &datum, &problem.initial, &pool, &mut go);
+        let refused = placed.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go);
         assert_eq!(refused.unwrap_err(), DatumError::NotFree);
     }
 }
@@ -305,7 +310,7 @@ fn a_loss_takes_the_weight_of_a_wrong_tie() {
     let wrong = problem.layout().groups() + 5;
     problem.model.lengths[wrong] += 3.0;
     let robust = Options { loss: Some(Loss::Huber(1.5)), covariance: false, ..options() };
-    let found = adjust(&problem, &robust, &pool(), &mut go).unwrap();
+    let found = adjust(&problem, &robust, &threads(), &mut go).unwrap();
     let weights = found.weights.unwrap();
     assert_eq!(weights.len(), 32 + 36);
     let least = (0..weights.len()).min_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap();
@@ -315,19 +320,20 @@ fn a_loss_takes_the_weight_of_a_wrong_tie() {
 
 #[test]
 fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say() {
-    let (problem, pool) = (network(vec![]), pool());
+    let (problem, threads) = (network(vec![]), threads());
     let mut go_on = |_| ControlFlow::Continue(());
-    let adjusted = adjust(&problem, &Options::default(), &pool, &mut |_| ControlFlow::Continue(())).unwrap();
+    let adjusted =
+        adjust(&problem, &Options::default(), &threads, &mut |_| ControlFlow::Continue(())).unwrap();
     let (values, held) = (adjusted.unknowns.clone(), adjusted.datum.clone());
     let leverages =
-        Leverages::at(&problem, values.clone(), held.clone(), &pool, &mut |_| ControlFlow::Continue(()))
+        Leverages::at(&problem, values.clone(), held.clone(), &threads, &mut |_| ControlFlow::Continue(()))
             .unwrap();
     let local = 3;
     let layout = problem.layout();
     // The rows of the point, over all unknowns, in unit weight; what is held has no column.
     let row = |group: usize| {
         let mut row = vec![0.0; layout.unknowns()];
-        let (point, station) = (layout.local_range(local), layout.kept_range(layout.kept_of(group)));
+        let (point, station) = (layout.local_range(local), layout.retained_range(layout.retained_of(group)));
         let (_, partials) = problem.model.distance(&adjusted.unknowns, group, point.start, station.start);
         for k in 0..2 {
             row[point.start + k] = partials[k] / SD;
@@ -337,9 +343,9 @@ fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say(
         row
     };
     let rows: Vec<Vec<f64>> = layout.groups_of(local).map(row).collect();
-    let linearized = Linearized::form(&problem, None, values, held, &pool, &mut go_on).unwrap();
-    let solved = linearized.solve_for(&problem, &rows.concat(), &pool, &mut go_on).unwrap();
-    let found = leverages.of_locals(&problem, &problem.observation_sd, &[local, 0], |_| vec![], &pool);
+    let linearized = Linearized::form(&problem, None, values, held, &threads, &mut go_on).unwrap();
+    let solved = linearized.solve_for(&problem, &rows.concat(), &threads, &mut go_on).unwrap();
+    let found = leverages.of_locals(&problem, &problem.observation_sd, &[local, 0], |_| vec![], &threads);
     let blocks: Vec<Vec<f64>> = found.into_iter().map(|own| own.equations).collect();
     assert_eq!(blocks.len(), 2);
     for (k, value) in blocks[0].iter().enumerate() {

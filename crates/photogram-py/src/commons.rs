@@ -49,5 +49,12 @@ pub type AdjustedRow = (Vec<f64>, [f64; 3], Vec<f64>, Vec<f64>, Vec<f64>, usize)
 /// What has become of a common unknown, for Python.
 pub fn adjusted_row(common: &AdjustedCommon) -> AdjustedRow {
     let AdjustedCommon { change, position, attitude, cofactors, redundancy, observations } = common.clone();
-    (change, position, attitude.transpose().as_slice().to_vec(), cofactors, redundancy, observations)
+    (
+        change,
+        position,
+        attitude.transpose().as_slice().to_vec(),
+        cofactors.data.into(),
+        redundancy,
+        observations,
+    )
 }

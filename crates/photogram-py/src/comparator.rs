@@ -80,9 +80,10 @@ fn adjust_comparator(
         max_iterations,
         covariance: true,
         loss: None,
+        threads: 0,
     };
     let workers = Workers::of(0, calibration.measurements.len());
-    let solution = watched(py, workers, None, |pool, watch| calibration.adjust(&options, pool, watch))?;
+    let solution = watched(py, workers, None, |pool, watch| calibration.adjust_on(&options, pool, watch))?;
     solution.map(|solution| ComparatorSolution { solution }).map_err(|error| failure(&error))
 }
 

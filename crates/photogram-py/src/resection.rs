@@ -76,12 +76,13 @@ fn resect(
         "position" => Method::Full(Published::Length { first: position_unknowns, count: 3, limit }),
         other => return Err(PyValueError::new_err(format!("criterion cannot be {other:?}"))),
     };
-    run(py, &resection, &Options { method, max_iterations, covariance, loss: None })
+    run(py, &resection, &Options { method, max_iterations, covariance, loss: None, threads: 0 })
 }
 
 /// Adjusts on the calling thread: one photo is too little work for another one.
 fn run(py: Python<'_>, resection: &Resection, options: &Options) -> PyResult<ResectionSolution> {
-    let solution = watched(py, Workers::CALLER, None, |pool, watch| resection.adjust(options, pool, watch))?;
+    let solution =
+        watched(py, Workers::CALLER, None, |pool, watch| resection.adjust_on(options, pool, watch))?;
     solution
         .map(|solution| ResectionSolution { solution })
         .map_err(|error| ResectionError::new_err((kind(error), error.to_string())))
@@ -101,7 +102,7 @@ fn kind(error: Failure) -> &'static str {
         Failure::Undetermined(why) => degeneracy(why),
         Failure::NoPlacement => "no placement",
         Failure::NotFinite => "not finite",
-        Failure::Interrupted | Failure::OutOfMemory(_) | Failure::TooManyPoints => "input",
+        Failure::Stopped(_) | Failure::TooManyPoints => "input",
     }
 }
 

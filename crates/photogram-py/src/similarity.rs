@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
 use photocore::programs::similarity::{
     AdjustedStation, Matrix7, Method, Options, Parameters, Similarity, SimilarityError as Failure, Solution,
-    Start, Started, Station, Trace, gauss_crout as crout, orient,
+    Start, Started, Station, Trace, gauss_crout as crout, orient_on,
 };
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
@@ -112,7 +112,7 @@ fn run(
     threads: usize,
 ) -> PyResult<SimilaritySolution> {
     let workers = Workers::of(threads, stations.len());
-    let solution = watched(py, workers, None, |pool, watch| orient(stations, options, pool, watch))?;
+    let solution = watched(py, workers, None, |pool, watch| orient_on(stations, options, pool, watch))?;
     solution.map(|solution| SimilaritySolution { solution }).map_err(|error| failure(&error))
 }
 
@@ -123,7 +123,7 @@ fn failure(error: &Failure) -> PyErr {
         Failure::FirstStations(_) => ("first stations", vec![0, 1]),
         Failure::Scale(_) => ("scale", vec![]),
         Failure::NotFinite => ("not finite", vec![]),
-        Failure::Layout(_) | Failure::Interrupted | Failure::OutOfMemory(_) => ("input", vec![]),
+        Failure::Layout(_) | Failure::Stopped(_) => ("input", vec![]),
     };
     SimilarityError::new_err((kind, error.to_string(), stations))
 }

@@ -1,6 +1,7 @@
 //! Stellar camera calibration; its documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
+use photocore::Threads;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop, Watch};
 use photocore::geometry::{Air, Camera as Lens, Station, pointing, pointing_angles};
 use photocore::programs::stellar::{
@@ -293,12 +294,11 @@ impl StellarProblem {
     ) -> PyResult<Bound<'py, PyDict>> {
         let method = Method::Damped(Stop::Fraction(fraction));
         let options = Options {
-            adjustment: AdjustmentOptions { method, max_iterations, covariance, loss: None },
+            adjustment: AdjustmentOptions { method, max_iterations, covariance, loss: None, threads: 0 },
             unit,
             whole,
         };
-        let work =
-            |pool: &rayon::ThreadPool, watch: Watch<'_>| self.calibration.adjust(&options, pool, watch);
+        let work = |pool: &Threads, watch: Watch<'_>| self.calibration.adjust_on(&options, pool, watch);
         let solution = watched(py, Workers::of(threads, self.calibration.images.len()), progress, work)?
             .map_err(|error| failure(&error))?;
         let found = observations(py, solution.observations)?;
@@ -324,8 +324,7 @@ impl StellarProblem {
     }
 
     fn without_effect(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
-        let work =
-            |pool: &rayon::ThreadPool, _: &mut dyn FnMut(_) -> _| self.calibration.without_effect(pool);
+        let work = |pool: &Threads, _: &mut dyn FnMut(_) -> _| self.calibration.without_effect(pool);
         watched(py, Workers::of(0, 0), None, work)?.map_err(|error| failure(&error))
     }
 
@@ -338,9 +337,7 @@ impl StellarProblem {
         passes: usize,
     ) -> PyResult<Bound<'py, PyDict>> {
         let tolerances = Tolerances { refraction, distortion, passes };
-        let work = |pool: &rayon::ThreadPool, _: &mut dyn FnMut(_) -> _| {
-            self.calibration.correction(&tolerances, pool)
-        };
+        let work = |pool: &Threads, _: &mut dyn FnMut(_) -> _| self.calibration.correction(&tolerances, pool);
         let correction = watched(py, Workers::of(0, 0), None, work)?.map_err(|error| failure(&error))?;
         let found = PyDict::new(py);
         found.set_item("parameters", PyArray1::from_vec(py, correction.parameters))?;
@@ -448,11 +445,7 @@ fn failure(error: &Failure) -> PyErr {
             ("undetermined", parameters)
         }
         Failure::Weight(_) => ("weight", vec![]),
-        Failure::Index(_)
-        | Failure::Lens
-        | Failure::Layout(_)
-        | Failure::Interrupted
-        | Failure::OutOfMemory(_) => ("input", vec![]),
+        Failure::Index(_) | Failure::Lens | Failure::Layout(_) | Failure::Stopped(_) => ("input", vec![]),
     };
     StellarError::new_err((kind, error.to_string(), indices))
 }

@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use photocore::Threads;
 use photocore::adjustment::{Event, Phase, Watch};
 use pyo3::prelude::*;
 use rayon::{ThreadBuilder, ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
@@ -53,7 +54,7 @@ pub fn watched<T: Send, E: Send>(
     py: Python<'_>,
     workers: Workers,
     progress: Option<Py<PyAny>>,
-    work: impl FnOnce(&ThreadPool, Watch<'_>) -> Result<T, E> + Send,
+    work: impl FnOnce(&Threads, Watch<'_>) -> Result<T, E> + Send,
 ) -> PyResult<Result<T, E>> {
     let failures = memory::arm()?;
     let mut raised = None;
@@ -90,6 +91,7 @@ pub fn watched<T: Send, E: Send>(
             py.detach(|| {
                 let room = !workers.multiply
                     || pool.broadcast(|_| memory::take_buffers()).into_iter().all(|has| has);
+                let pool = Threads::from(pool);
                 let done = room.then(|| work(&pool, &mut watch));
                 drop(pool);
                 // Threads keep buffers until they have ended, and the next ones may need the room. A panic has reached the caller.
@@ -119,15 +121,15 @@ fn is_main_thread(py: Python<'_>) -> PyResult<bool> {
 
 /// The main thread, which calls, as a pool of one. A thread can be in one pool only and stays in it: it is made once, and once more by
 /// the thread that is the main one of a process forked from this.
-fn pool_of_main_thread() -> PyResult<&'static ThreadPool> {
+fn pool_of_main_thread() -> PyResult<&'static Threads> {
     thread_local! {
-        static POOL: Cell<Option<&'static ThreadPool>> = const { Cell::new(None) };
+        static POOL: Cell<Option<&'static Threads>> = const { Cell::new(None) };
     }
     if let Some(pool) = POOL.get() {
         return Ok(pool);
     }
     let pool = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
-    let pool = Box::leak(Box::new(pool.map_err(not_started)?));
+    let pool = Box::leak(Box::new(Threads::from(pool.map_err(not_started)?)));
     POOL.set(Some(pool));
     Ok(pool)
 }

@@ -5,13 +5,13 @@
 //! are short. With r the residuals, v the step and r_vv their second derivative along it, (N + damping) a = A^T r_vv, and v + a/2 follows
 //! the valley by one order more. It takes no derivatives besides: r_vv = 2/h ((r(x + h v) - r(x)) / h + A v).
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::equations::ObservationEquations;
 use super::group_step::GroupStep;
 use super::problem::Model;
 use super::walk::Buffers;
+use crate::Threads;
 use crate::normals::Equations;
 
 /// The part h of the step at which residuals are compared with those that the linearized equations predict.
@@ -25,7 +25,7 @@ impl<M: Model> ObservationEquations<'_, M> {
     /// A^T r_vv over all unknowns; ties, which are few, are taken as straight.
     ///
     /// * `ahead`: r(x + h v), in the units of the observations.
-    pub fn bending(&self, pool: &ThreadPool, ahead: &[f64], step: &[f64]) -> Vec<f64> {
+    pub fn bending(&self, threads: &Threads, ahead: &[f64], step: &[f64]) -> Vec<f64> {
         let problem = self.problem();
         let layout = problem.layout();
         let first = layout.all_locals().end;
@@ -42,24 +42,24 @@ impl<M: Model> ObservationEquations<'_, M> {
                     let mut rows = buffers.rows(layout, group);
                     self.write(local, group, &mut rows);
                     let of_group = GroupStep::of(step, layout, local, group);
-                    let kept = layout.kept_range(layout.kept_of(group)).start - first;
+                    let retained = layout.retained_range(layout.retained_of(group)).start - first;
                     for row in 0..layout.rows() {
                         let observation = group * layout.rows() + row;
                         let difference =
                             ahead[observation] / self.deviation(observation) - rows.constant[row];
                         let bend = 2.0 / PART * (difference / PART + of_group.change(&rows, row));
                         add_row(&mut own[begin..], rows.local, row, of_group.local.len(), bend);
-                        add_row(&mut others[kept..], rows.kept, row, of_group.kept.len(), bend);
-                        let common = &rows.common[row * of_group.common.len()..];
-                        let columns = layout.common_columns(group);
-                        columns.zip(common).for_each(|(k, a)| others[k - first] += a * bend);
+                        add_row(&mut others[retained..], rows.retained, row, of_group.retained.len(), bend);
+                        let shared = &rows.shared[row * of_group.shared.len()..];
+                        let columns = layout.shared_columns(group);
+                        columns.zip(shared).for_each(|(k, a)| others[k - first] += a * bend);
                     }
                 }
             }
             (own, others)
         };
         let starts: Vec<usize> = (0..layout.locals()).step_by(each).collect();
-        let found: Vec<(Vec<f64>, Vec<f64>)> = pool.install(|| starts.into_par_iter().map(part).collect());
+        let found: Vec<(Vec<f64>, Vec<f64>)> = threads.install(|| starts.into_par_iter().map(part).collect());
         let mut right = Vec::with_capacity(layout.unknowns());
         found.iter().for_each(|(own, _)| right.extend_from_slice(own));
         right.resize(layout.unknowns(), 0.0);

@@ -37,11 +37,11 @@ impl<'a, M: Model> Run<'a, '_, M> {
             return Ok(values);
         }
         let (problem, start) = (self.problem, Instant::now());
-        let prepared = self.pool.install(|| problem.model.prepare(&values));
+        let prepared = self.threads.install(|| problem.model.prepare(&values));
         let equations = ObservationEquations::prepared(problem, prepared, &self.datum, None);
         let prior = problem.prior_equations(&values, &self.datum);
         let mut between = between(&mut *self.watch, Phase::Solve, problem.layout().locals());
-        let chord = problem.system.chord(self.pool, factor, &equations, &prior, &mut between);
+        let chord = problem.system.chord(self.threads, factor, &equations, &prior, &mut between);
         self.seconds.solve += start.elapsed().as_secs_f64();
         let (chord, decrease) = unless_stopped(chord)?;
         let change = decrease.sqrt();

@@ -324,7 +324,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.
     fn relocated(&self, unknowns: Vec<f64>) -> Vec<f64> {
         let mut other = unknowns.clone();
-        let relocated = self.pool.install(|| self.problem.model.relocate(&mut other));
+        let relocated = self.threads.install(|| self.problem.model.relocate(&mut other));
         let lower = relocated && self.objective(&other) < self.objective(&unknowns);
         if lower { other } else { unknowns }
     }

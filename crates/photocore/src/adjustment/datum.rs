@@ -15,13 +15,13 @@
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, Mat, MatRef, Par, Side};
-use rayon::ThreadPool;
 use thiserror::Error;
 
 use super::loss::Loss;
 use super::problem::{Model, Motions, Problem};
 use super::result::AdjustError;
 use super::transformation::Transformation;
+use crate::Threads;
 
 /// A datum of a network whose observations leave one open.
 #[derive(Debug, Clone, Default)]
@@ -146,7 +146,7 @@ pub(super) fn moved<M: Model>(
     adjusted: Adjusted<'_>,
     datum: &Datum,
     reference: &[f64],
-    pool: &ThreadPool,
+    threads: &Threads,
 ) -> Result<(Vec<f64>, Basis), DatumError> {
     let mut unknowns = adjusted.unknowns.to_vec();
     let (mut least, mut stalls) = (f64::INFINITY, 0);
@@ -155,27 +155,30 @@ pub(super) fn moved<M: Model>(
     // What was found to leave all motions open leaves them open wherever it is moved to.
     let mut all_open = datum.relative;
     for _ in 0..MOST_MOVES {
-        let (motions, kept) = motions_of(problem, &unknowns, datum, pool).ok_or(DatumError::NotFree)?;
+        let (motions, retained) =
+            motions_of(problem, &unknowns, datum, threads).ok_or(DatumError::NotFree)?;
         let count = motions.vectors.len();
         if count == 0 {
             return Err(DatumError::NotCarried);
         }
-        all_open |= adjusted.held.len() == kept.1;
+        all_open |= adjusted.held.len() == retained.1;
         let combinations = match all_open {
             true => None,
-            false => Some(problem.open(&unknowns, &motions, pool).ok_or(DatumError::NotFree)?.combinations),
+            false => {
+                Some(problem.open(&unknowns, &motions, threads).ok_or(DatumError::NotFree)?.combinations)
+            }
         };
         let apart = problem.model.step_between(&unknowns, reference);
-        let carried = pool.install(|| Carried::new(&motions, combinations, datum, &apart));
+        let carried = threads.install(|| Carried::new(&motions, combinations, datum, &apart));
         let carried = carried.ok_or(DatumError::NotCarried)?;
         stalls += usize::from(carried.length >= least);
         if carried.length <= rounding || stalls == STALLS {
-            let basis = pool.install(|| carried.basis(&motions, datum)).ok_or(DatumError::NotCarried)?;
+            let basis = threads.install(|| carried.basis(&motions, datum)).ok_or(DatumError::NotCarried)?;
             return Ok((unknowns, basis));
         }
         least = least.min(carried.length);
-        let mut along = vec![0.0; kept.1];
-        for (&motion, amount) in kept.0.iter().zip(carried.along()) {
+        let mut along = vec![0.0; retained.1];
+        for (&motion, amount) in retained.0.iter().zip(carried.along()) {
             along[motion] = amount;
         }
         problem.model.move_along(&mut unknowns, &along);
@@ -188,15 +191,15 @@ fn motions_of<M: Model>(
     problem: &Problem<M>,
     unknowns: &[f64],
     datum: &Datum,
-    pool: &ThreadPool,
+    threads: &Threads,
 ) -> Option<(Motions, (Vec<usize>, usize))> {
     let model = &problem.model;
     let motions = || if datum.relative { model.all_motions(unknowns) } else { model.motions(unknowns) };
-    let Motions { mut vectors, preferred } = pool.install(motions)?;
+    let Motions { mut vectors, preferred } = threads.install(motions)?;
     let all = vectors.len();
-    let kept: Vec<usize> = (0..all).filter(|number| !datum.left.contains(number)).collect();
-    let vectors = kept.iter().map(|&number| std::mem::take(&mut vectors[number])).collect();
-    Some((Motions { vectors, preferred }, (kept, all)))
+    let retained: Vec<usize> = (0..all).filter(|number| !datum.left.contains(number)).collect();
+    let vectors = retained.iter().map(|&number| std::mem::take(&mut vectors[number])).collect();
+    Some((Motions { vectors, preferred }, (retained, all)))
 }
 
 /// How carriers would come nearer to their references.

@@ -1,12 +1,11 @@
 //! Adjustments put together where they have ended.
 
-use rayon::ThreadPool;
-
 use super::linearized::Inverted;
 use super::loss::Loss;
 use super::options::Status;
 use super::problem::{Model, Problem};
 use super::result::{Adjustment, Seconds};
+use crate::Threads;
 
 impl Adjustment {
     /// At the values that were reached, without iterations and cofactors.
@@ -14,11 +13,11 @@ impl Adjustment {
         problem: &Problem<M>,
         loss: Option<Loss>,
         unknowns: Vec<f64>,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Self {
         let locals = problem.layout().all_locals();
         let symbolic = problem.system.symbolic();
-        let residuals = problem.residuals(pool, &unknowns);
+        let residuals = problem.residuals(threads, &unknowns);
         let weights =
             |loss: Loss| problem.group_squares(&residuals).map(|square| loss.weight(square)).collect();
         Self {
@@ -56,11 +55,11 @@ impl Adjustment {
         held: &[usize],
         before: &[f64],
         reached: Vec<f64>,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Self {
         let locals = problem.layout().all_locals();
         let corrections = before[locals.clone()].iter().zip(&reached).map(|(from, to)| to - from).collect();
-        let after = Self::at(problem, None, reached, pool);
+        let after = Self::at(problem, None, reached, threads);
         let history = [vec![before[locals.end..].to_vec()], after.history].concat();
         let (counts, datum) = (problem.counts(held), held.to_vec());
         Self { history, last_local_corrections: corrections, counts, datum, ..after }
@@ -73,9 +72,9 @@ impl Adjustment {
         problem: &Problem<M>,
         loss: Option<Loss>,
         mut inverted: Inverted,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Self {
-        let mut adjustment = Self::at(problem, loss, std::mem::take(&mut inverted.values), pool);
+        let mut adjustment = Self::at(problem, loss, std::mem::take(&mut inverted.values), threads);
         adjustment.put(problem, inverted);
         adjustment
     }

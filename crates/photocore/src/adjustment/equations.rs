@@ -1,11 +1,10 @@
 //! The observation equations of a problem at given values of the unknowns, in unit weight.
 
-use rayon::ThreadPool;
-
 use super::group_step::GroupStep;
 use super::loss::{Loss, Reweighting};
 use super::problem::{Model, Problem};
 use super::walk::Buffers;
+use crate::Threads;
 use crate::normals::{Contribution, Equations, GroupRows, Prior, TieRows, dot};
 
 /// The equations of a problem at given values of the unknowns: weighted to unit weight, by a loss besides, without fixed unknowns.
@@ -47,10 +46,10 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
         loss: Option<Loss>,
         values: &[f64],
         held: &[usize],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Self {
         let reweighting = loss.map(|loss| Reweighting { loss, curved: false });
-        pool.install(|| Self::prepared(problem, problem.model.prepare(values), held, reweighting))
+        threads.install(|| Self::prepared(problem, problem.model.prepare(values), held, reweighting))
     }
 
     /// Of values that are prepared already.
@@ -86,8 +85,8 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
     }
 
     /// With the columns of fixed unknowns, and without a loss.
-    pub fn of_all(problem: &'a Problem<M>, values: &[f64], pool: &ThreadPool) -> Self {
-        let prepared = pool.install(|| problem.model.prepare(values));
+    pub fn of_all(problem: &'a Problem<M>, values: &[f64], threads: &Threads) -> Self {
+        let prepared = threads.install(|| problem.model.prepare(values));
         let observation_sd = &problem.observation_sd;
         Self { problem, prepared, observation_sd, fixed: None, reweighting: None, contributions: &[] }
     }
@@ -120,13 +119,13 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
         for group in layout.groups_of(local) {
             columns.clear();
             columns.extend(layout.local_range(local));
-            columns.extend(layout.kept_range(layout.kept_of(group)));
-            columns.extend(layout.common_columns(group));
+            columns.extend(layout.retained_range(layout.retained_of(group)));
+            columns.extend(layout.shared_columns(group));
             let mut rows = buffers.rows(layout, group);
             self.write(local, group, &mut rows);
-            let GroupRows { constant, local: own, kept, common } = rows;
+            let GroupRows { constant, local: own, retained, shared } = rows;
             for (row, &constant) in constant.iter().enumerate() {
-                let coefficients = [&*own, &*kept, &*common].map(|part| {
+                let coefficients = [&*own, &*retained, &*shared].map(|part| {
                     let width = part.len() / layout.rows();
                     &part[row * width..][..width]
                 });
@@ -152,9 +151,9 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
     }
 
     /// By how much a step lowers the weighted sum of squares of these equations and the priors: sum of Ax (2 l - Ax).
-    pub fn decrease(&self, pool: &ThreadPool, prior: &Prior, step: &[f64]) -> f64 {
+    pub fn decrease(&self, threads: &Threads, prior: &Prior, step: &[f64]) -> f64 {
         let layout = self.problem.layout();
-        let observed = self.problem.for_locals(pool, |buffers, local| {
+        let observed = self.problem.for_locals(threads, |buffers, local| {
             let mut sum = 0.0;
             for group in layout.groups_of(local) {
                 let mut rows = buffers.rows(layout, group);
@@ -235,16 +234,16 @@ impl<M: Model> ObservationEquations<'_, M> {
     /// Takes weight off equations of unit weight where a loss says so, and leaves out the columns of fixed unknowns.
     #[inline(always)]
     fn adapt(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let GroupRows { constant, local: own, kept, common } = rows;
+        let GroupRows { constant, local: own, retained, shared } = rows;
         if let Some(reweighting) = self.reweighting {
-            reweighting.apply(constant, &mut [&mut **own, &mut **kept, &mut **common]);
+            reweighting.apply(constant, &mut [&mut **own, &mut **retained, &mut **shared]);
         }
         if let Some(fixed) = &self.fixed {
             let (layout, count) = (self.problem.layout(), constant.len());
             let of = |unknown: usize| fixed[unknown];
             leave_out(own, count, layout.local_range(local).map(of));
-            leave_out(kept, count, layout.kept_range(layout.kept_of(group)).map(of));
-            leave_out(common, count, layout.common_columns(group).map(of));
+            leave_out(retained, count, layout.retained_range(layout.retained_of(group)).map(of));
+            leave_out(shared, count, layout.shared_columns(group).map(of));
         }
     }
 }
@@ -253,7 +252,7 @@ impl GroupRows<'_> {
     /// Gives the equations of a group unit weight.
     #[inline(always)]
     fn weigh(&mut self, sd: &[f64]) {
-        weigh(sd, self.constant, [&mut *self.local, &mut *self.kept, &mut *self.common]);
+        weigh(sd, self.constant, [&mut *self.local, &mut *self.retained, &mut *self.shared]);
     }
 }
 

@@ -1,13 +1,12 @@
 //! Adjusted networks in another datum, without adjusting again.
 
-use rayon::ThreadPool;
-
 use super::datum::{Adjusted, Datum, DatumError, moved};
 use super::equations::ObservationEquations;
 use super::linearized::{Inverted, Linearized};
 use super::options::Options;
 use super::problem::{Model, Problem};
 use super::result::Adjustment;
+use crate::Threads;
 use crate::normals::{Between, FactorOptions, InvertOptions};
 
 impl Linearized {
@@ -20,17 +19,17 @@ impl Linearized {
         adjusted: Adjusted<'_>,
         datum: &Datum,
         reference: &[f64],
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<Self, DatumError> {
-        let (unknowns, basis) = moved(problem, adjusted, datum, reference, pool)?;
+        let (unknowns, basis) = moved(problem, adjusted, datum, reference, threads)?;
         let Adjusted { held, loss, .. } = adjusted;
-        let equations = ObservationEquations::new(problem, loss, &unknowns, held, pool);
+        let equations = ObservationEquations::new(problem, loss, &unknowns, held, threads);
         let options = FactorOptions::default();
-        let formed = Self::of(&equations, unknowns, held.to_vec(), &options, pool, between)?;
+        let formed = Self::of(&equations, unknowns, held.to_vec(), &options, threads, between)?;
         let mut linearized = formed.determined()?;
         linearized.basis = Some(basis);
-        linearized.take_to_datum(&equations, pool, between)?;
+        linearized.take_to_datum(&equations, threads, between)?;
         linearized.factor.forget();
         Ok(linearized)
     }
@@ -42,11 +41,11 @@ impl Linearized {
     pub fn inverted<M: Model>(
         self,
         problem: &Problem<M>,
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<Inverted, DatumError> {
-        let equations = self.equations(problem, pool);
-        Ok(self.invert(&equations, &InvertOptions::default(), pool, between)?)
+        let equations = self.equations(problem, threads);
+        Ok(self.invert(&equations, &InvertOptions::default(), threads, between)?)
     }
 }
 
@@ -65,7 +64,7 @@ impl Adjustment {
         options: &Options,
         datum: &Datum,
         reference: &[f64],
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<f64, DatumError> {
         if self.undetermined.is_some() {
@@ -73,11 +72,11 @@ impl Adjustment {
         }
         let adjusted = Adjusted { unknowns: &self.unknowns, held: &self.datum, loss: options.loss };
         if !options.covariance {
-            (self.unknowns, _) = moved(problem, adjusted, datum, reference, pool)?;
+            (self.unknowns, _) = moved(problem, adjusted, datum, reference, threads)?;
             return Ok(0.0);
         }
-        let linearized = Linearized::in_datum(problem, adjusted, datum, reference, pool, between)?;
-        let mut inverted = linearized.inverted(problem, pool, between)?;
+        let linearized = Linearized::in_datum(problem, adjusted, datum, reference, threads, between)?;
+        let mut inverted = linearized.inverted(problem, threads, between)?;
         self.unknowns = std::mem::take(&mut inverted.values);
         self.put(problem, inverted);
         self.redundancy_excess = options.loss.is_none().then(|| self.excess());

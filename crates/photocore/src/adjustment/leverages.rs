@@ -4,7 +4,6 @@
 //! order and symbolic factorisation stay, and cofactors of what is out are inside the pattern too.
 
 use nalgebra::DMatrix;
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::equations::ObservationEquations;
@@ -13,6 +12,7 @@ use super::options::Phase;
 use super::problem::{Model, Problem};
 use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
+use crate::Threads;
 use crate::normals::{
     Cofactors, Equations, FactorOptions, InvertOptions, LocalCofactors, Prior, SelectedInverse, TieRows,
 };
@@ -36,7 +36,7 @@ pub struct Leverages {
 pub struct TieCofactors {
     /// a Q a^T: square, row by row.
     pub equations: Vec<f64>,
-    /// Q a^T of each kept block that the tie touches: its unknowns, those of each equation together.
+    /// Q a^T of each retained block that the tie touches: its unknowns, those of each equation together.
     pub blocks: Vec<(usize, Vec<f64>)>,
 }
 
@@ -57,17 +57,18 @@ impl Leverages {
         problem: &Problem<M>,
         values: Vec<f64>,
         held: Vec<usize>,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Self, AdjustError> {
         let mut between = between(watch, Phase::Form, problem.layout().locals());
-        let equations = ObservationEquations::new(problem, None, &values, &held, pool);
+        let equations = ObservationEquations::new(problem, None, &values, &held, threads);
         let forming = FactorOptions::UNCACHED;
-        let formed = Linearized::of(&equations, values, held, &forming, pool, &mut between)?.determined()?;
+        let formed =
+            Linearized::of(&equations, values, held, &forming, threads, &mut between)?.determined()?;
         let inverting = InvertOptions { by_groups: true, ..InvertOptions::default() };
-        let found = formed.invert(&equations, &inverting, pool, &mut between)?;
+        let found = formed.invert(&equations, &inverting, threads, &mut between)?;
         let Inverted { values, held, cofactors, selected, .. } = found;
-        let residuals = problem.residuals(pool, &values);
+        let residuals = problem.residuals(threads, &values);
         Ok(Self { values, held, residuals, cofactors, selected })
     }
 
@@ -84,21 +85,21 @@ impl Leverages {
     }
 
     /// Cofactors of all equations of some local blocks, with the given standard deviations; with those of their weighted unknowns, where
-    /// `further` gives these (see [`crate::normals::System::local_cofactors`]).
+    /// `terms` gives these (see [`crate::normals::System::local_cofactors`]).
     pub fn of_locals<M: Model>(
         &self,
         problem: &Problem<M>,
         observation_sd: &[f64],
         locals: &[usize],
-        further: impl Fn(usize) -> Vec<f64> + Sync,
-        pool: &ThreadPool,
+        terms: impl Fn(usize) -> Vec<f64> + Sync,
+        threads: &Threads,
     ) -> Vec<LocalCofactors> {
-        let (formed, asked, prior) = self.equations(problem, observation_sd, pool);
+        let (formed, asked, prior) = self.equations(problem, observation_sd, threads);
         let of = |&local: &usize| {
-            let further = further(local);
-            problem.system.local_cofactors(&self.selected, &formed, &prior, &asked, local, &further)
+            let own_terms = terms(local);
+            problem.system.local_cofactors(&self.selected, &formed, &prior, &asked, local, &own_terms)
         };
-        pool.install(|| locals.par_iter().map(of).collect())
+        threads.install(|| locals.par_iter().map(of).collect())
     }
 
     /// What all equations of some local blocks, which take no part, have to do with each other if they did: for each two of them the
@@ -109,7 +110,7 @@ impl Leverages {
     /// (I + a' Q a'^T - H)^-1 - H, H the share of the local block alone in its equations and Q that of the others.
     ///
     /// * `observation_sd`, `sd`: as they would take part;
-    /// * `further`: the equations of the weighted unknowns of each, of unit weight.
+    /// * `terms`: the equations of the weighted unknowns of each, of unit weight.
     ///
     /// Empty where the local block would not be determined.
     pub fn of_gone<M: Model>(
@@ -117,27 +118,28 @@ impl Leverages {
         problem: &Problem<M>,
         (observation_sd, sd): (&[f64], &[f64]),
         locals: &[usize],
-        further: impl Fn(usize) -> Vec<f64> + Sync,
-        pool: &ThreadPool,
+        terms: impl Fn(usize) -> Vec<f64> + Sync,
+        threads: &Threads,
     ) -> Vec<Vec<f64>> {
         let layout = problem.layout();
         let unknowns = || locals.iter().flat_map(|&local| layout.local_range(local));
-        let (_, asked, mut prior) = self.equations(problem, observation_sd, pool);
+        let (_, asked, mut prior) = self.equations(problem, observation_sd, threads);
         let asked = asked.with_unknowns(unknowns(), sd);
         for unknown in unknowns() {
             let own = sd[unknown];
             prior.weight[unknown] = if own == 0.0 { 1.0 } else { (own * own).recip() };
         }
         let of = |&local: &usize| {
-            let further = further(local);
-            let own = problem.system.local_cofactors(&self.selected, &asked, &prior, &asked, local, &further);
+            let own_terms = terms(local);
+            let own =
+                problem.system.local_cofactors(&self.selected, &asked, &prior, &asked, local, &own_terms);
             let rows = own.rows();
             let alone = DMatrix::from_row_slice(rows, rows, &own.by_local);
             let all = DMatrix::from_row_slice(rows, rows, &own.equations);
             let factor = (DMatrix::identity(rows, rows) + all - &alone).cholesky();
             factor.map_or(vec![], |factor| (factor.inverse() - alone).as_slice().to_vec())
         };
-        pool.install(|| locals.par_iter().map(of).collect())
+        threads.install(|| locals.par_iter().map(of).collect())
     }
 
     /// Cofactors of the equations of some ties, with the given standard deviations.
@@ -146,12 +148,12 @@ impl Leverages {
         problem: &Problem<M>,
         observation_sd: &[f64],
         ties: &[usize],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Vec<TieCofactors> {
         if ties.is_empty() {
             return vec![];
         }
-        let (_, asked, _) = self.equations(problem, observation_sd, pool);
+        let (_, asked, _) = self.equations(problem, observation_sd, threads);
         ties.iter().map(|&tie| self.of_tie(problem, &asked, tie)).collect()
     }
 
@@ -167,11 +169,11 @@ impl Leverages {
         asked.write_tie(tie, &mut TieRows { constant: &mut constant, coefficients: &mut coefficients });
         let mut first = 0;
         let place = |&block: &u32| {
-            let own = (block as usize, first, layout.kept_dim(block as usize));
+            let own = (block as usize, first, layout.retained_dim(block as usize));
             first += own.2;
             own
         };
-        let blocks: Vec<(usize, usize, usize)> = each.kept.iter().map(place).collect();
+        let blocks: Vec<(usize, usize, usize)> = each.retained.iter().map(place).collect();
         let mut along = vec![0.0; each.rows * width];
         for &(row_block, to, height) in &blocks {
             for &(column_block, from, count) in &blocks {
@@ -204,9 +206,9 @@ impl Leverages {
         &self,
         problem: &'a Problem<M>,
         observation_sd: &'a [f64],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> (ObservationEquations<'a, M>, ObservationEquations<'a, M>, Prior) {
-        let at = || ObservationEquations::new(problem, None, &self.values, &self.held, pool);
+        let at = || ObservationEquations::new(problem, None, &self.values, &self.held, threads);
         (at(), at().with_deviations(observation_sd), problem.prior_equations(&self.values, &self.held))
     }
 }

@@ -3,7 +3,6 @@
 
 use std::time::Instant;
 
-use rayon::ThreadPool;
 use thiserror::Error;
 
 use super::datum::Basis;
@@ -12,6 +11,7 @@ use super::loss::{Loss, Reweighting};
 use super::problem::{Model, Problem};
 use super::result::{AdjustError, Seconds, gib, unless_stopped};
 use super::transformation::Transformation;
+use crate::Threads;
 use crate::normals::{
     Between, Cofactors, Factor, FactorOptions, Function, Inversion, InvertOptions, Layout, Prior,
     SelectedInverse, SolveOptions,
@@ -80,11 +80,11 @@ impl Linearized {
         loss: Option<Loss>,
         values: Vec<f64>,
         held: Vec<usize>,
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<Self, AdjustError> {
-        let equations = ObservationEquations::new(problem, loss, &values, &held, pool);
-        Self::of(&equations, values, held, &FactorOptions::UNCACHED, pool, between)
+        let equations = ObservationEquations::new(problem, loss, &values, &held, threads);
+        Self::of(&equations, values, held, &FactorOptions::UNCACHED, threads, between)
     }
 
     /// The same of equations that are there already.
@@ -93,12 +93,12 @@ impl Linearized {
         values: Vec<f64>,
         held: Vec<usize>,
         options: &FactorOptions,
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<Self, AdjustError> {
         let (start, problem) = (Instant::now(), equations.problem());
         let prior = problem.prior_equations(&values, &held);
-        let factor = unless_stopped(problem.system.factor(pool, equations, &prior, options, between))?;
+        let factor = unless_stopped(problem.system.factor(threads, equations, &prior, options, between))?;
         let sum_of_squares = factor.sum_of_squares + problem.terms(&values).sum_of_squares(0..values.len());
         let (took, share) = (start.elapsed().as_secs_f64(), factor.formation_share);
         let seconds = Seconds { form: took * share, factor: took * (1.0 - share), ..Seconds::default() };
@@ -216,7 +216,7 @@ impl Linearized {
         rows: &[Function],
         columns: Option<&[Function]>,
         memory: Option<usize>,
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<Vec<f64>, CofactorError> {
         let unmoved = |functions: &[Function]| -> Vec<Function> {
@@ -225,14 +225,21 @@ impl Linearized {
         let (free, others) = (unmoved(rows), columns.map(unmoved));
         let system = &problem.system;
         let reduced = {
-            let equations = self.equations(problem, pool);
-            unless_stopped(system.reduce(pool, &equations, &self.prior, &free, others.as_deref(), between))?
+            let equations = self.equations(problem, threads);
+            unless_stopped(system.reduce(
+                threads,
+                &equations,
+                &self.prior,
+                &free,
+                others.as_deref(),
+                between,
+            ))?
         };
         let needed = system.memory_of(&reduced);
         if let Some(available) = memory.filter(|&available| needed > available) {
             return Err(CofactorError::Memory { needed, available });
         }
-        let mut matrix = unless_stopped(system.cofactors_of(pool, &self.factor, &reduced, between))?;
+        let mut matrix = unless_stopped(system.cofactors_of(threads, &self.factor, &reduced, between))?;
         if let Some(transformation) = &self.transformation {
             transformation.apply_to_functions(rows, columns, &mut matrix);
         }
@@ -254,11 +261,11 @@ impl Linearized {
         &self,
         problem: &Problem<M>,
         rights: &[f64],
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
         let options = SolveOptions { rights: Some(rights), ..SolveOptions::default() };
-        self.solve(&self.equations(problem, pool), &options, pool, between)
+        self.solve(&self.equations(problem, threads), &options, threads, between)
     }
 
     /// The step of all unknowns, or what else the options ask for.
@@ -266,11 +273,11 @@ impl Linearized {
         &self,
         equations: &ObservationEquations<'_, M>,
         options: &SolveOptions<'_>,
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
         let Self { factor, prior, .. } = self;
-        unless_stopped(equations.problem().system.solve(pool, factor, equations, prior, options, between))
+        unless_stopped(equations.problem().system.solve(threads, factor, equations, prior, options, between))
     }
 
     /// The selected inverse, in the datum that it was taken to.
@@ -278,16 +285,16 @@ impl Linearized {
         self,
         equations: &ObservationEquations<'_, M>,
         options: &InvertOptions<'_>,
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<Inverted, AdjustError> {
         let (start, problem) = (Instant::now(), equations.problem());
         let Self { values, held, prior, factor, transformation, mut seconds, .. } = self;
-        let found = problem.system.invert(pool, factor, equations, &prior, options, between);
+        let found = problem.system.invert(threads, factor, equations, &prior, options, between);
         let Inversion { mut cofactors, selected, inversion_share } = unless_stopped(found)?;
         let prior_redundancy = problem.finish_cofactors(&mut cofactors, &held, &values);
         let lost = transformation
-            .map(|transformation| pool.install(|| transformation.apply(problem.layout(), &mut cofactors)));
+            .map(|transformation| threads.install(|| transformation.apply(problem.layout(), &mut cofactors)));
         let took = start.elapsed().as_secs_f64();
         (seconds.invert, seconds.cofactors) = (took * inversion_share, took * (1.0 - inversion_share));
         Ok(Inverted { values, held, cofactors, prior_redundancy, selected, lost, seconds })
@@ -297,14 +304,14 @@ impl Linearized {
     pub(super) fn take_to_datum<M: Model>(
         &mut self,
         equations: &ObservationEquations<'_, M>,
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<(), AdjustError> {
         let Some(basis) = self.basis.take() else { return Ok(()) };
         let start = Instant::now();
         let rights = basis.rights(equations.problem(), &self.held);
         let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
-        let columns = self.solve(equations, &options, pool, between)?;
+        let columns = self.solve(equations, &options, threads, between)?;
         self.transformation = Some(basis.transformation(&columns));
         self.seconds.solve += start.elapsed().as_secs_f64();
         Ok(())
@@ -314,10 +321,10 @@ impl Linearized {
     pub(super) fn equations<'a, M: Model>(
         &self,
         problem: &'a Problem<M>,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> ObservationEquations<'a, M> {
         let loss = self.reweighting.map(|reweighting| reweighting.loss);
-        ObservationEquations::new(problem, loss, &self.values, &self.held, pool)
+        ObservationEquations::new(problem, loss, &self.values, &self.held, threads)
     }
 
     /// Gives its memory back for the next ones; its values.

@@ -4,7 +4,7 @@
 //! deviation of every observation and of every unknown, from free (infinite) to fixed (zero). [`Problem::adjust`] iterates to the
 //! least-squares solution and computes the cofactors of all unknowns and the redundancy numbers of all observations.
 //!
-//! A levelling net: heights of points (local blocks of one unknown) above those of two instruments (kept blocks of one); the first
+//! A levelling net: heights of points (local blocks of one unknown) above those of two instruments (retained blocks of one); the first
 //! point is a fixed bench mark.
 //!
 //! ```
@@ -27,7 +27,7 @@
 //!         let (value, instrument) = self.readings[reading];
 //!         rows.constant[0] = value - (heights[point] - heights[3 + instrument]);
 //!         rows.local[0] = 1.0;
-//!         rows.kept[0] = -1.0;
+//!         rows.retained[0] = -1.0;
 //!     }
 //! }
 //!
@@ -105,7 +105,8 @@ pub use problem::{Model, Motions, Problem};
 pub use resistance::Classes;
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};
-pub use run::{Watch, adjust, adjust_by_groups, adjust_in_datum, on_all_processors};
+pub(crate) use run::go_on;
+pub use run::{Watch, adjust, adjust_by_groups, adjust_in_datum};
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
 pub use terms::{Term, Terms};
 pub use traces::{EquationGroups, GroupSquares, Probing};

@@ -5,12 +5,12 @@
 //! normal matrix of the candidates, (A G)^T (A G), which takes one pass over the observations and no factorisation.
 
 use faer::{Mat, Side};
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::equations::{ObservationEquations, Row};
 use super::problem::{Model, Motions, Problem};
 use super::walk::Buffers;
+use crate::Threads;
 use crate::normals::{Equations, TieRows};
 
 /// The combinations of motions that are open at some values of the unknowns.
@@ -174,15 +174,15 @@ fn add_square(sum: &mut [f64], weight: f64, b: &[[f64; LANES]]) {
 
 impl<M: Model> Problem<M> {
     /// Which of some motions observations and weights leave open at given values; None where it is none.
-    pub(super) fn open(&self, values: &[f64], motions: &Motions, pool: &ThreadPool) -> Option<Open> {
-        self.open_without(values, motions, &[], pool)
+    pub(super) fn open(&self, values: &[f64], motions: &Motions, threads: &Threads) -> Option<Open> {
+        self.open_without(values, motions, &[], threads)
     }
 
     /// How many motions would be open at given values if what is known of some unknowns themselves (ascending) were not: with as many
     /// of these, and a network that is determined, they give a datum and nothing more.
-    pub fn open_if_free(&self, values: &[f64], released: &[usize], pool: &ThreadPool) -> usize {
-        let motions = pool.install(|| self.model.all_motions(values));
-        let open = motions.and_then(|motions| self.open_without(values, &motions, released, pool));
+    pub fn open_if_free(&self, values: &[f64], released: &[usize], threads: &Threads) -> usize {
+        let motions = threads.install(|| self.model.all_motions(values));
+        let open = motions.and_then(|motions| self.open_without(values, &motions, released, threads));
         open.map_or(0, |open| open.combinations.ncols())
     }
 
@@ -191,9 +191,9 @@ impl<M: Model> Problem<M> {
         values: &[f64],
         motions: &Motions,
         released: &[usize],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Option<Open> {
-        let sums = self.sums(values, motions, released, pool);
+        let sums = self.sums(values, motions, released, threads);
         let count = motions.vectors.len();
         let stride = sums.apart.len() * LANES;
         let scale: Vec<f64> = sums.apart.as_flattened()[..count]
@@ -204,7 +204,7 @@ impl<M: Model> Problem<M> {
             // What moves nothing that is observed is no motion of this network.
             if k == m && scale[k] == 0.0 { 1.0 } else { sums.together[k * stride + m] * scale[k] * scale[m] }
         });
-        let eigen = pool.install(|| scaled.self_adjoint_eigen(Side::Lower)).ok()?;
+        let eigen = threads.install(|| scaled.self_adjoint_eigen(Side::Lower)).ok()?;
         let open: Vec<usize> = (0..count).filter(|&k| eigen.S()[k] < NULL).collect();
         let combinations =
             Mat::from_fn(count, open.len(), |k, column| scale[k] * eigen.U()[(k, open[column])]);
@@ -218,19 +218,19 @@ impl<M: Model> Problem<M> {
     }
 
     /// The unknowns to hold at given values; none where there is a datum.
-    pub(crate) fn to_hold(&self, values: &[f64], pool: &ThreadPool) -> Vec<usize> {
-        let motions = pool.install(|| self.model.motions(values));
-        let open = motions.and_then(|motions| self.open(values, &motions, pool));
+    pub(crate) fn to_hold(&self, values: &[f64], threads: &Threads) -> Vec<usize> {
+        let motions = threads.install(|| self.model.motions(values));
+        let open = motions.and_then(|motions| self.open(values, &motions, threads));
         open.map_or(vec![], |open| open.hold)
     }
 
-    fn sums(&self, values: &[f64], motions: &Motions, released: &[usize], pool: &ThreadPool) -> Sums {
+    fn sums(&self, values: &[f64], motions: &Motions, released: &[usize], threads: &Threads) -> Sums {
         let layout = self.layout();
         let by_unknown = Candidates::by_unknown(motions, values.len());
         let stays = |unknown: &usize| released.binary_search(unknown).is_err();
         let fixed: Vec<bool> = (0..values.len()).map(|i| self.sd[i] == 0.0 && stays(&i)).collect();
         let candidates = Candidates::new(motions, &by_unknown, &fixed);
-        let equations = ObservationEquations::of_all(self, values, pool);
+        let equations = ObservationEquations::of_all(self, values, threads);
         let known = self.model.groups_leave_open() && !candidates.move_fixed();
         // One of so many local blocks is taken for them all.
         let stride = if known { (layout.locals() / SAMPLE).max(1) } else { 1 };
@@ -245,7 +245,7 @@ impl<M: Model> Problem<M> {
         };
         let chunks = (0..sample.div_ceil(AT_ONCE)).into_par_iter();
         let mut sums = candidates.sums();
-        pool.install(|| chunks.map(chunk).collect::<Vec<Sums>>()).iter().for_each(|part| sums.add(part));
+        threads.install(|| chunks.map(chunk).collect::<Vec<Sums>>()).iter().for_each(|part| sums.add(part));
         sums.multiply(stride as f64);
         self.for_ties(|tie, rows| {
             candidates.add_tie(&mut sums, &equations, tie, rows);

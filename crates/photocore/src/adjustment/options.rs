@@ -14,11 +14,13 @@ pub struct Options {
     pub covariance: bool,
     /// What takes the place of the squares of the observations; None for least squares.
     pub loss: Option<Loss>,
+    /// Threads that are started for it; 0 for one on each processor. Without meaning where the caller gives its own.
+    pub threads: usize,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { method: Method::default(), max_iterations: 100, covariance: true, loss: None }
+        Self { method: Method::default(), max_iterations: 100, covariance: true, loss: None, threads: 0 }
     }
 }
 

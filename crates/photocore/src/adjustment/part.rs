@@ -5,7 +5,6 @@
 //! part above ([`Contribution`]); from the step of the outer unknowns follow those of its own, and from the cofactors of the outer
 //! unknowns its own. The part of a problem without outer unknowns is the last one.
 
-use rayon::ThreadPool;
 use thiserror::Error;
 
 use super::equations::ObservationEquations;
@@ -14,6 +13,7 @@ use super::options::Phase;
 use super::problem::{Model, Problem};
 use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
+use crate::Threads;
 use crate::normals::{Contribution, FactorOptions, InvertOptions, SolveOptions, packed};
 
 /// Why a part is not formed, solved or inverted.
@@ -42,7 +42,7 @@ impl Linearized {
         held: Vec<usize>,
         contributions: &[Contribution<'_>],
         damping: f64,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Self, PartError> {
         let layout = problem.layout();
@@ -53,11 +53,11 @@ impl Linearized {
         if contributions.len() != blocks.len() || !contributions.iter().zip(blocks).all(fit) {
             return Err(PartError::Foreign);
         }
-        let equations =
-            ObservationEquations::new(problem, None, &values, &held, pool).with_contributions(contributions);
+        let equations = ObservationEquations::new(problem, None, &values, &held, threads)
+            .with_contributions(contributions);
         let options = FactorOptions { damping, ..FactorOptions::default() };
         let mut between = between(watch, Phase::Form, layout.locals());
-        let formed = Self::of(&equations, values, held, &options, pool, &mut between)?;
+        let formed = Self::of(&equations, values, held, &options, threads, &mut between)?;
         // The factor waits for the way down, perhaps with those of many others.
         problem.system.release();
         Ok(formed)
@@ -76,7 +76,7 @@ impl Linearized {
         &self,
         problem: &Problem<M>,
         outer: &[f64],
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Vec<f64>, PartError> {
         if outer.len() != problem.system.symbolic().outer_unknowns() {
@@ -84,7 +84,7 @@ impl Linearized {
         }
         let mut between = between(watch, Phase::Solve, problem.layout().locals());
         let options = SolveOptions { outer, ..SolveOptions::default() };
-        Ok(self.solve(&self.equations(problem, pool), &options, pool, &mut between)?)
+        Ok(self.solve(&self.equations(problem, threads), &options, threads, &mut between)?)
     }
 
     /// The adjustment of what is at home in a part, and the cofactors of the unknowns of each part below: lower triangles, column by column.
@@ -99,7 +99,7 @@ impl Linearized {
         problem: &Problem<M>,
         outer: &[f64],
         reached: Vec<f64>,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<(Adjustment, Vec<Vec<f64>>), PartError> {
         let (layout, part) = (problem.layout(), self.determined()?);
@@ -107,15 +107,15 @@ impl Linearized {
             return Err(PartError::Foreign);
         }
         let inverted = {
-            let equations = part.equations(problem, pool);
+            let equations = part.equations(problem, threads);
             let mut between = between(watch, Phase::Invert, layout.locals());
             let options = InvertOptions { outer, ..InvertOptions::default() };
-            part.invert(&equations, &options, pool, &mut between)?
+            part.invert(&equations, &options, threads, &mut between)?
         };
         problem.system.release();
         let below = layout.contributions().iter().map(|blocks| inverted.selected.triangle(layout, blocks));
         let below = below.collect();
-        let mut adjustment = Adjustment::between(problem, &inverted.held, &inverted.values, reached, pool);
+        let mut adjustment = Adjustment::between(problem, &inverted.held, &inverted.values, reached, threads);
         adjustment.put(problem, inverted);
         Ok((adjustment, below))
     }

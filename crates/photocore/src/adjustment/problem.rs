@@ -8,7 +8,7 @@ pub trait Model: Sync {
     /// What several observations share, computed once for each set of values of the unknowns.
     type Prepared: Send + Sync;
 
-    /// Prepares for the given unknowns (in the order of the layout). Called on a thread of the pool, as is [`Model::relocate`].
+    /// Prepares for the given unknowns (in the order of the layout). Called on a thread of the threads, as is [`Model::relocate`].
     fn prepare(&self, unknowns: &[f64]) -> Self::Prepared;
 
     /// Writes observed minus computed, and the partials of the computed values, of one group of observations of a local
@@ -73,7 +73,7 @@ pub trait Model: Sync {
         false
     }
 
-    /// Local blocks that the iterations have led to where they harm all others: what they say of one kept block is so much more than
+    /// Local blocks that the iterations have led to where they harm all others: what they say of one retained block is so much more than
     /// all others say together that rounding takes what these say; and those that are on their way there. Asked after every damped
     /// step, with the unknowns before and after it.
     fn collapsed(&self, _before: &[f64], _after: &Self::Prepared) -> Vec<usize> {

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::equations::ObservationEquations;
@@ -10,6 +9,7 @@ use super::linearized::Linearized;
 use super::problem::{Model, Problem};
 use super::result::AdjustError;
 use super::walk::Buffers;
+use crate::Threads;
 use crate::normals::{Between, SolveOptions};
 
 /// Parts that the walk over the local blocks is made of, whatever the number of threads: so sums have the same bits.
@@ -36,15 +36,15 @@ impl Linearized {
         &self,
         problem: &Problem<M>,
         mut columns: Vec<f64>,
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
-        let rows = Rows::new(self, problem, pool);
-        let rights = pool.install(|| rows.transposed(&columns));
+        let rows = Rows::new(self, problem, threads);
+        let rights = threads.install(|| rows.transposed(&columns));
         let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
-        let solutions = self.solve(&rows.equations, &options, pool, between)?;
+        let solutions = self.solve(&rows.equations, &options, threads, between)?;
         drop(rights);
-        pool.install(|| rows.subtract(&solutions, &mut columns));
+        threads.install(|| rows.subtract(&solutions, &mut columns));
         Ok(columns)
     }
 
@@ -66,11 +66,11 @@ struct Rows<'a, M: Model> {
 }
 
 impl<'a, M: Model> Rows<'a, M> {
-    fn new(linearized: &'a Linearized, problem: &'a Problem<M>, pool: &ThreadPool) -> Self {
+    fn new(linearized: &'a Linearized, problem: &'a Problem<M>, threads: &Threads) -> Self {
         let Linearized { values, held, .. } = linearized;
         let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
         held.iter().for_each(|&unknown| fixed[unknown] = true);
-        Self { problem, equations: linearized.equations(problem, pool), values, fixed }
+        Self { problem, equations: linearized.equations(problem, threads), values, fixed }
     }
 
     /// The local blocks of a part.

@@ -1,11 +1,10 @@
 //! What keeps a network from moving as a whole, kind by kind.
 
-use rayon::ThreadPool;
-
 use super::equations::ObservationEquations;
 use super::motions::{Candidates, Sums};
 use super::problem::{Model, Problem};
 use super::walk::Buffers;
+use crate::Threads;
 
 /// Kinds of observations, by their numbers: groups are of the first.
 #[derive(Debug, Clone, Copy)]
@@ -21,14 +20,14 @@ pub struct Classes<'a> {
 impl<M: Model> Problem<M> {
     /// For each kind of observation the share of what a motion changes in it that remains when all unknowns move together, the greatest
     /// of all motions: one for what is fixed, and rounding where the kind leaves all of them open.
-    pub fn resistance(&self, values: &[f64], classes: &Classes<'_>, pool: &ThreadPool) -> Vec<f64> {
+    pub fn resistance(&self, values: &[f64], classes: &Classes<'_>, threads: &Threads) -> Vec<f64> {
         let none = vec![0.0; classes.count];
-        let Some(motions) = pool.install(|| self.model.all_motions(values)) else { return none };
+        let Some(motions) = threads.install(|| self.model.all_motions(values)) else { return none };
         let (layout, count) = (self.layout(), motions.vectors.len());
         let moved = Candidates::by_unknown(&motions, values.len());
         let free = vec![false; values.len()];
         let candidates = Candidates::new(&motions, &moved, &free);
-        let equations = ObservationEquations::of_all(self, values, pool);
+        let equations = ObservationEquations::of_all(self, values, threads);
         let mut sums: Vec<Sums> = (0..classes.count).map(|_| candidates.sums()).collect();
         let mut buffers = Buffers::default();
         if let Some(groups) = sums.first_mut() {

@@ -7,7 +7,8 @@ use thiserror::Error;
 use super::method::NEGLIGIBLE;
 use super::options::{Iteration, Status};
 use super::statistics::{Counts, Observed, standardized};
-use crate::normals::{Cofactors, Operations, Ordering, SelectedInverse, Stopped};
+use crate::Stopped;
+use crate::normals::{Cofactors, Operations, Ordering, SelectedInverse};
 
 /// Time spent in each phase, in seconds, over all iterations.
 #[derive(Debug, Clone, Copy, Default)]
@@ -161,27 +162,15 @@ pub enum AdjustError {
     /// Local blocks that their observations do not determine.
     #[error("{} local blocks are not determined by their observations", .0.len())]
     UndeterminedLocals(Vec<usize>),
-    /// Combinations of kept unknowns that the observations do not determine: for each the kept blocks it moves.
+    /// Combinations of retained unknowns that the observations do not determine: for each the retained blocks it moves.
     #[error("{} combinations of unknowns are not determined by the observations", .0.len())]
     Undetermined(Vec<Vec<usize>>),
     /// The initial values give observations that are not finite.
     #[error("the initial values give computed observations that are not finite")]
     NotFinite,
-    /// The caller asked to stop.
-    #[error("interrupted")]
-    Interrupted,
-    /// An allocation of so many bytes failed.
-    #[error("there is no memory for an array of {0} bytes")]
-    OutOfMemory(usize),
-}
-
-impl From<Stopped> for AdjustError {
-    fn from(stopped: Stopped) -> Self {
-        match stopped {
-            Stopped::Interrupted => Self::Interrupted,
-            Stopped::OutOfMemory(bytes) => Self::OutOfMemory(bytes),
-        }
-    }
+    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// A number of bytes for a message.

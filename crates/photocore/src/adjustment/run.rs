@@ -3,8 +3,6 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
-
 use super::datum::{Adjusted, Basis, Datum, Target, moved};
 use super::equations::ObservationEquations;
 use super::linearized::Linearized;
@@ -14,29 +12,23 @@ use super::options::{Event, Iteration, Options, Phase, Status};
 use super::problem::{Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
 use crate::normals::{FactorOptions, InvertOptions, SolveOptions};
+use crate::{Stopped, Threads};
 
 /// Called with what is going on, on the calling thread; breaking stops the work.
 pub type Watch<'a> = &'a mut dyn FnMut(Event) -> ControlFlow<()>;
 
-/// Bytes that the stack of a thread takes: none is started where there is no memory for it.
-const STACK: usize = 2 << 20;
-
-/// Does work on all processors with nobody watching it: for callers without threads of their own.
-///
-/// # Errors
-/// Threads that cannot be started, as [`AdjustError::OutOfMemory`].
-pub fn on_all_processors<T>(work: impl FnOnce(&ThreadPool, Watch<'_>) -> T) -> Result<T, AdjustError> {
-    let pool = ThreadPoolBuilder::new().build().map_err(|_| AdjustError::OutOfMemory(STACK))?;
-    Ok(work(&pool, &mut |_| ControlFlow::Continue(())))
+/// Nobody watches.
+pub(crate) fn go_on(_: Event) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 impl<M: Model> Problem<M> {
-    /// Adjusts by least squares on all processors; [`adjust`] takes threads of its caller and tells what is going on.
+    /// Adjusts by least squares, on threads of its own; [`adjust`] takes those of its caller and tells what is going on.
     ///
     /// # Errors
     /// Unknowns that are not determined, or observations that cannot be computed; threads that cannot be started.
     pub fn adjust(&self, options: &Options) -> Result<Adjustment, AdjustError> {
-        on_all_processors(|pool, watch| adjust(self, options, pool, watch))?
+        adjust(self, options, &Threads::new(options.threads)?, &mut go_on)
     }
 }
 
@@ -49,10 +41,10 @@ impl<M: Model> Problem<M> {
 pub fn adjust<M: Model>(
     problem: &Problem<M>,
     options: &Options,
-    pool: &ThreadPool,
+    threads: &Threads,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, None, pool, watch, false)
+    adjusted(problem, options, None, threads, watch, false)
 }
 
 /// Adjusts a network that is free, to end in a datum: it is moved there before the last formation, so that this one serves the cofactors
@@ -67,10 +59,10 @@ pub fn adjust_in_datum<M: Model>(
     options: &Options,
     datum: &Datum,
     reference: &[f64],
-    pool: &ThreadPool,
+    threads: &Threads,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, Some(Target { datum, reference }), pool, watch, false)
+    adjusted(problem, options, Some(Target { datum, reference }), threads, watch, false)
 }
 
 /// Adjusts, and keeps what tests of groups of observations need: [`Leverages::of`] takes it over.
@@ -82,17 +74,17 @@ pub fn adjust_in_datum<M: Model>(
 pub fn adjust_by_groups<M: Model>(
     problem: &Problem<M>,
     options: &Options,
-    pool: &ThreadPool,
+    threads: &Threads,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, None, pool, watch, true)
+    adjusted(problem, options, None, threads, watch, true)
 }
 
 fn adjusted<M: Model>(
     problem: &Problem<M>,
     options: &Options,
     target: Option<Target<'_>>,
-    pool: &ThreadPool,
+    threads: &Threads,
     watch: Watch<'_>,
     by_groups: bool,
 ) -> Result<Adjustment, AdjustError> {
@@ -103,7 +95,7 @@ fn adjusted<M: Model>(
         target,
         is_near: false,
         has_moved: false,
-        pool,
+        threads,
         watch,
         seconds: Seconds::default(),
         formations: 0,
@@ -119,7 +111,7 @@ fn adjusted<M: Model>(
     let damping = match options.method {
         Method::TrustRegion(_) => FIRST_DAMPING,
         Method::Full(_) | Method::Damped(_) => {
-            run.datum = problem.to_hold(&problem.initial, pool);
+            run.datum = problem.to_hold(&problem.initial, threads);
             0.0
         }
     };
@@ -210,7 +202,7 @@ pub(super) struct Run<'a, 'w, M: Model> {
     is_near: bool,
     /// Whether the network was moved on its way.
     has_moved: bool,
-    pub pool: &'a ThreadPool,
+    pub threads: &'a Threads,
     pub(super) watch: &'w mut dyn FnMut(Event) -> ControlFlow<()>,
     pub(super) seconds: Seconds,
     formations: usize,
@@ -252,7 +244,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
         let step =
-            state.linearized.solve(&state.equations, &SolveOptions::default(), self.pool, &mut between)?;
+            state.linearized.solve(&state.equations, &SolveOptions::default(), self.threads, &mut between)?;
         self.seconds.solve += start.elapsed().as_secs_f64();
         Ok(Some(step))
     }
@@ -266,19 +258,19 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
         let options = SolveOptions { rights: Some(right), ..SolveOptions::default() };
-        let found = state.linearized.solve(&state.equations, &options, self.pool, &mut between)?;
+        let found = state.linearized.solve(&state.equations, &options, self.threads, &mut between)?;
         self.seconds.solve += start.elapsed().as_secs_f64();
         Ok(found)
     }
 
     /// The weighted sum of squares, of losses where the options ask for a loss, at the given values.
     pub(super) fn objective(&self, unknowns: &[f64]) -> f64 {
-        self.objective_at(unknowns, &self.pool.install(|| self.problem.model.prepare(unknowns)))
+        self.objective_at(unknowns, &self.threads.install(|| self.problem.model.prepare(unknowns)))
     }
 
     /// The same of values that are prepared already.
     pub(super) fn objective_at(&self, unknowns: &[f64], prepared: &M::Prepared) -> f64 {
-        let residuals = self.problem.residuals_at(self.pool, prepared);
+        let residuals = self.problem.residuals_at(self.threads, prepared);
         self.observed_sum(&residuals) + self.problem.terms(unknowns).sum_of_squares(0..unknowns.len())
     }
 
@@ -296,7 +288,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             true => self.at_its_target(unknowns),
             false => (unknowns, None, None),
         };
-        let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
+        let prepared = self.threads.install(|| self.problem.model.prepare(&unknowns));
         let mut state = self.formed(unknowns, prepared, damping)?;
         state.linearized.basis = basis;
         Ok(State { before, ..state })
@@ -315,7 +307,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     fn at_its_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<Basis>, Option<Vec<f64>>) {
         let Some(Target { datum, reference }) = self.target else { return (unknowns, None, None) };
         let adjusted = Adjusted { unknowns: &unknowns, held: &self.datum, loss: None };
-        match moved(self.problem, adjusted, datum, reference, self.pool) {
+        match moved(self.problem, adjusted, datum, reference, self.threads) {
             Ok((there, basis)) => {
                 self.has_moved = true;
                 (there, Some(basis), Some(unknowns))
@@ -337,7 +329,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         let mut linearized = {
             let mut between = between(&mut *self.watch, Phase::Form, self.problem.layout().locals());
             let options = FactorOptions { damping, ..FactorOptions::default() };
-            Linearized::of(&equations, unknowns, held, &options, self.pool, &mut between)?
+            Linearized::of(&equations, unknowns, held, &options, self.threads, &mut between)?
         };
         self.seconds.add(&std::mem::take(&mut linearized.seconds));
         self.formations += 1;
@@ -356,7 +348,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
             basis.into_iter().for_each(|basis| basis.take(step));
             problem.model.advance(&mut unknowns, step);
         }
-        let mut adjustment = Adjustment::at(problem, options.loss, unknowns, self.pool);
+        let mut adjustment = Adjustment::at(problem, options.loss, unknowns, self.threads);
         if let Some((last, _)) = end.last {
             let reached = &adjustment.unknowns;
             let sum_of_squares = self.observed_sum(&adjustment.residuals)
@@ -369,11 +361,11 @@ impl<'a, M: Model> Run<'a, '_, M> {
             let locals = problem.layout().locals();
             {
                 let mut between = between(&mut *self.watch, Phase::Solve, locals);
-                linearized.take_to_datum(&equations, self.pool, &mut between)?;
+                linearized.take_to_datum(&equations, self.threads, &mut between)?;
             }
             let what = InvertOptions { by_groups: self.by_groups, ..InvertOptions::default() };
             let mut between = between(&mut *self.watch, Phase::Invert, locals);
-            adjustment.put(problem, linearized.invert(&equations, &what, self.pool, &mut between)?);
+            adjustment.put(problem, linearized.invert(&equations, &what, self.threads, &mut between)?);
             adjustment.redundancy_excess = options.loss.is_none().then(|| adjustment.excess());
         }
         self.seconds.add(&adjustment.seconds);
@@ -396,13 +388,13 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     /// Whether a step has led local blocks to where they harm all others; keeps them.
     pub(super) fn has_collapsed(&mut self, before: &[f64], after: &M::Prepared) -> bool {
-        self.collapsed = self.pool.install(|| self.problem.model.collapsed(before, after));
+        self.collapsed = self.threads.install(|| self.problem.model.collapsed(before, after));
         !self.collapsed.is_empty()
     }
 
     /// Whether a step has led local blocks out of the whole; keeps them.
     pub(super) fn has_run_off(&mut self, before: &[f64], after: &M::Prepared) -> bool {
-        self.collapsed = self.pool.install(|| self.problem.model.run_off(before, after));
+        self.collapsed = self.threads.install(|| self.problem.model.run_off(before, after));
         !self.collapsed.is_empty()
     }
 
@@ -435,7 +427,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
 fn stopped(flow: ControlFlow<()>) -> Result<(), AdjustError> {
     match flow {
         ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(AdjustError::Interrupted),
+        ControlFlow::Break(()) => Err(Stopped::Interrupted.into()),
     }
 }
 

@@ -3,10 +3,9 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use rayon::ThreadPool;
-
 use super::problem::{Model, Problem};
 use super::terms::weighted_among;
+use crate::Threads;
 use crate::normals::{Cofactors, dot};
 
 /// What an adjustment counts.
@@ -100,10 +99,10 @@ impl<M> Problem<M> {
         for (local, block) in cofactors.local.chunks_exact_mut(l * l).enumerate() {
             finish(block, layout.local_range(local));
         }
-        let mut rest = &mut cofactors.kept[..];
-        for kept in 0..layout.kept() {
-            let (block, behind) = rest.split_at_mut(layout.kept_dim(kept).pow(2));
-            finish(block, layout.kept_range(kept));
+        let mut rest = &mut cofactors.retained[..];
+        for retained in 0..layout.retained() {
+            let (block, behind) = rest.split_at_mut(layout.retained_dim(retained).pow(2));
+            finish(block, layout.retained_range(retained));
             rest = behind;
         }
         redundancy
@@ -112,15 +111,15 @@ impl<M> Problem<M> {
 
 impl<M: Model> Problem<M> {
     /// Observed minus computed of every observation at the given values of the unknowns.
-    pub(super) fn residuals(&self, pool: &ThreadPool, values: &[f64]) -> Vec<f64> {
-        self.residuals_at(pool, &pool.install(|| self.model.prepare(values)))
+    pub(super) fn residuals(&self, threads: &Threads, values: &[f64]) -> Vec<f64> {
+        self.residuals_at(threads, &threads.install(|| self.model.prepare(values)))
     }
 
     /// The same at values that are prepared already.
-    pub(super) fn residuals_at(&self, pool: &ThreadPool, prepared: &M::Prepared) -> Vec<f64> {
+    pub(super) fn residuals_at(&self, threads: &Threads, prepared: &M::Prepared) -> Vec<f64> {
         let layout = self.layout();
         let rows = layout.rows();
-        let by_stretch = self.for_stretches(pool, |buffers, locals| {
+        let by_stretch = self.for_stretches(threads, |buffers, locals| {
             let groups = layout.groups_of(locals.start).start..layout.groups_of(locals.end - 1).end;
             let mut residuals = vec![0.0; groups.len() * rows];
             let mut own = residuals.chunks_exact_mut(rows.max(1));

@@ -1,11 +1,11 @@
 //! Sums of squares of the elements of R = I - A Q A^T over groups of equations: what tests of sums and variance components need of it.
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::linearized::Linearized;
 use super::problem::{Model, Problem};
 use super::result::AdjustError;
+use crate::Threads;
 use crate::normals::Between;
 
 /// How sums over R are found.
@@ -149,13 +149,13 @@ impl Linearized {
         problem: &Problem<M>,
         groups: &EquationGroups,
         probing: &Probing,
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<GroupSquares, AdjustError> {
         let (numbered, count) = (Numbered::new(groups, &self.is_equation(problem)), groups.count);
         let (columns, exact) = numbered.columns(count, probing);
         let mut squares = vec![0.0; (count + 1) * count];
-        self.probe(problem, &numbered, (&columns, count), pool, between, |column, sums| {
+        self.probe(problem, &numbered, (&columns, count), threads, between, |column, sums| {
             for (group, sum) in sums.iter().enumerate() {
                 squares[group * count + column.class] += column.weight * sum;
             }
@@ -174,14 +174,14 @@ impl Linearized {
         groups: &EquationGroups,
         classes: usize,
         probing: &Probing,
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
         let (numbered, classes) = (Numbered::new(groups, &self.is_equation(problem)), classes.max(1));
         let (columns, _) = numbered.columns(classes.min(groups.count), probing);
         let classes = classes.min(groups.count).max(1);
         let mut squares = vec![0.0; groups.count];
-        self.probe(problem, &numbered, (&columns, classes), pool, between, |column, sums| {
+        self.probe(problem, &numbered, (&columns, classes), threads, between, |column, sums| {
             for (own, sum) in squares.iter_mut().zip(sums).skip(column.class).step_by(classes) {
                 *own += column.weight * sum;
             }
@@ -195,20 +195,20 @@ impl Linearized {
         problem: &Problem<M>,
         numbered: &Numbered<'_>,
         (columns, classes): (&[Column], usize),
-        pool: &ThreadPool,
+        threads: &Threads,
         between: Between<'_>,
         mut tell: impl FnMut(Column, &[f64]),
     ) -> Result<(), AdjustError> {
         let height = problem.equations().max(1);
         for together in columns.chunks((TOGETHER / height).clamp(1, COLUMNS)) {
             let mut z = vec![0.0; together.len() * height];
-            pool.install(|| {
+            threads.install(|| {
                 let pairs = z.par_chunks_mut(height).zip(together);
                 pairs.for_each(|(z, &column)| numbered.write(column, classes, z));
             });
-            let u = self.project(problem, z, pool, between)?;
+            let u = self.project(problem, z, threads, between)?;
             let sums: Vec<Vec<f64>> =
-                pool.install(|| u.par_chunks(height).map(|u| numbered.sums(u)).collect());
+                threads.install(|| u.par_chunks(height).map(|u| numbered.sums(u)).collect());
             together.iter().zip(&sums).for_each(|(&column, sums)| tell(column, sums));
         }
         Ok(())

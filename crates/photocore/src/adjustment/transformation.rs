@@ -56,15 +56,15 @@ impl Transformation {
         let mut cancelled = chunks.map(of_locals).reduce(|| 1.0, f64::max);
         let mut others = Vec::new();
         for &pair in layout.pairs() {
-            let [rows, columns] = pair.map(|block| layout.kept_range(block as usize));
+            let [rows, columns] = pair.map(|block| layout.retained_range(block as usize));
             if let Some(range) = layout.pair(pair) {
                 let values = &mut cofactors.pairs[range];
                 cancelled = cancelled.max(self.blocks(std::iter::once(Block { rows, columns, values })));
             }
         }
-        let mut own = &mut cofactors.kept[..];
-        for kept in 0..layout.kept() {
-            let rows = layout.kept_range(kept);
+        let mut own = &mut cofactors.retained[..];
+        for retained in 0..layout.retained() {
+            let rows = layout.retained_range(retained);
             let (values, rest) = std::mem::take(&mut own).split_at_mut(rows.len().pow(2));
             own = rest;
             others.push(Block { rows: rows.clone(), columns: rows, values });

@@ -150,12 +150,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
         bends: bool,
     ) -> Result<(Vec<f64>, Trial<M::Prepared>), AdjustError> {
         let change = state.linearized.change();
-        let predicted = state.equations.decrease(self.pool, &state.linearized.prior, step);
+        let predicted = state.equations.decrease(self.threads, &state.linearized.prior, step);
         let term = if bends { Some(self.second_order(&state, step)?) } else { None };
         let before = state.recycle();
         let trial = |step: &[f64], bend: Option<f64>| {
             let unknowns = self.problem.advanced(&before, step);
-            let prepared = self.pool.install(|| self.problem.model.prepare(&unknowns));
+            let prepared = self.threads.install(|| self.problem.model.prepare(&unknowns));
             let sum_of_squares = self.objective_at(&unknowns, &prepared);
             Trial { unknowns, prepared, sum_of_squares, predicted, change, bend }
         };
@@ -177,8 +177,8 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// The second-order term a of a step (see [`super::acceleration`]), and a^T (N + damping) a.
     fn second_order(&mut self, state: &State<'a, M>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
         let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
-        let ahead = self.problem.residuals(self.pool, &self.problem.advanced(state.values(), &part));
-        let right = state.equations.bending(self.pool, &ahead, step);
+        let ahead = self.problem.residuals(self.threads, &self.problem.advanced(state.values(), &part));
+        let right = state.equations.bending(self.threads, &ahead, step);
         let term = self.solve_again(state, &right)?;
         let square = right.iter().zip(&term).map(|(right, value)| right * value).sum();
         Ok((term, square))
@@ -242,7 +242,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// Holds a datum, unless one has been held from the beginning.
     fn hold(&mut self, unknowns: &[f64]) {
         if self.datum.is_empty() {
-            self.datum = self.problem.to_hold(unknowns, self.pool);
+            self.datum = self.problem.to_hold(unknowns, self.threads);
         }
     }
 

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::problem::Problem;
+use crate::Threads;
 use crate::normals::{GroupRows, Layout, TieRows};
 
 /// Room for the rows of one group.
@@ -13,8 +13,8 @@ use crate::normals::{GroupRows, Layout, TieRows};
 pub(super) struct Buffers {
     constant: Vec<f64>,
     local: Vec<f64>,
-    kept: Vec<f64>,
-    common: Vec<f64>,
+    retained: Vec<f64>,
+    shared: Vec<f64>,
     /// Room for the unknowns of these rows.
     pub columns: Vec<usize>,
 }
@@ -25,13 +25,13 @@ impl Buffers {
         let rows = layout.rows();
         self.constant.resize(rows, 0.0);
         self.local.resize(rows * layout.local_dim(), 0.0);
-        self.kept.resize(rows * layout.kept_dim(layout.kept_of(group)), 0.0);
-        self.common.resize(rows * layout.common_width(group), 0.0);
+        self.retained.resize(rows * layout.retained_dim(layout.retained_of(group)), 0.0);
+        self.shared.resize(rows * layout.shared_width(group), 0.0);
         GroupRows {
             constant: &mut self.constant,
             local: &mut self.local,
-            kept: &mut self.kept,
-            common: &mut self.common,
+            retained: &mut self.retained,
+            shared: &mut self.shared,
         }
     }
 }
@@ -43,24 +43,24 @@ impl<M: Sync> Problem<M> {
     /// What `each` makes of every local block, in their order.
     pub(super) fn for_locals<T: Send>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         each: impl Fn(&mut Buffers, usize) -> T + Send + Sync,
     ) -> Vec<T> {
         let locals = (0..self.layout().locals()).into_par_iter().with_min_len(AT_LEAST);
-        pool.install(|| locals.map_init(Buffers::default, each).collect())
+        threads.install(|| locals.map_init(Buffers::default, each).collect())
     }
 
     /// What `each` makes of stretches of local blocks, in their order.
     pub(super) fn for_stretches<T: Send>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         each: impl Fn(&mut Buffers, Range<usize>) -> T + Send + Sync,
     ) -> Vec<T> {
         let count = self.layout().locals();
         let stretches = (0..count.div_ceil(AT_LEAST)).into_par_iter();
         let stretch = |index: usize| index * AT_LEAST..count.min((index + 1) * AT_LEAST);
         let each = |buffers: &mut Buffers, index: usize| each(buffers, stretch(index));
-        pool.install(|| stretches.map_init(Buffers::default, each).collect())
+        threads.install(|| stretches.map_init(Buffers::default, each).collect())
     }
 
     /// What `each` makes of every tie, in their order: there are few.

@@ -1,96 +1,138 @@
 //! The adjustment of a network: iterations, and what leaves it between them.
 
-use std::ops::ControlFlow;
-
-use rayon::ThreadPool;
-
 use super::problem::{Assembled, Reached};
 use super::screens::{Begin, Ended, Screening};
 use super::{Converged, InnerConstraints, Network, NetworkDatum, NetworkError, Options, Solution, State};
-use crate::adjustment::{self, AdjustError, Adjustment, Event, Method};
+use crate::Threads;
+use crate::adjustment::{self, AdjustError, Adjustment, Event, Method, Watch};
+
+/// An adjustment of a network to be run: from where, on which threads, watched by whom, and into which datum.
+///
+/// ```no_run
+/// # use photocore::network::{Network, NetworkError, Options, Solution};
+/// # fn again(network: &Network, before: &Solution) -> Result<Solution, NetworkError> {
+/// let options = Options::default();
+/// network.adjustment(&options).from_state(&before.state).run()
+/// # }
+/// ```
+pub struct NetworkAdjustment<'a> {
+    network: &'a Network,
+    options: Options,
+    state: Option<&'a State>,
+    goal: Goal<'a>,
+    threads: Option<&'a Threads>,
+    watch: Option<Watch<'a>>,
+}
+
+/// What an adjustment is to give besides the solution.
+#[derive(Debug, Clone, Copy, Default)]
+struct Goal<'a> {
+    datum: Option<&'a InnerConstraints>,
+    keep: bool,
+}
+
+impl<'a> NetworkAdjustment<'a> {
+    /// From where an adjustment of the network has ended, perhaps with other weights: in the order that was in force, and without the
+    /// points that had run into a station.
+    #[must_use]
+    pub fn from_state(mut self, state: &'a State) -> Self {
+        self.options.ordering = state.ordering;
+        self.state = Some(state);
+        self
+    }
+
+    /// Takes a network that is free to the datum of inner constraints.
+    #[must_use]
+    pub fn in_datum(mut self, datum: &'a InnerConstraints) -> Self {
+        self.goal.datum = Some(datum);
+        self
+    }
+
+    /// Keeps what tests of it need ([`Solution::converged`]) where it converges by least squares and there is memory: it takes about a
+    /// twentieth longer.
+    #[must_use]
+    pub fn kept(mut self) -> Self {
+        self.goal.keep = true;
+        self
+    }
+
+    /// On threads of the caller; otherwise it starts its own.
+    #[must_use]
+    pub fn on(mut self, threads: &'a Threads) -> Self {
+        self.threads = Some(threads);
+        self
+    }
+
+    /// Tells `watch`, on the calling thread, what is going on; when that breaks, the adjustment stops.
+    #[must_use]
+    pub fn watched(mut self, watch: Watch<'a>) -> Self {
+        self.watch = Some(watch);
+        self
+    }
+
+    /// Adjusts.
+    ///
+    /// # Errors
+    /// A network that contradicts itself, has nothing to adjust, or leaves unknowns undetermined; a state that is not of this network; a
+    /// datum for a network that is not free, or that its points and photos do not carry; an interruption; threads that cannot be started.
+    pub fn run(self) -> Result<Solution, NetworkError> {
+        let Self { network, options, state, goal, threads, watch } = self;
+        let own;
+        let threads = match threads {
+            Some(threads) => threads,
+            None => {
+                own = Threads::new(options.adjustment.threads)?;
+                &own
+            }
+        };
+        network.adjusted(&options, goal, state, threads, watch.unwrap_or(&mut adjustment::go_on))
+    }
+}
 
 impl Network {
-    /// Adjusts the network by least squares.
+    /// Adjusts the network by least squares, on threads of its own.
     ///
     /// Points that their image points cannot determine are left out first (see [`super::Dropped`]). So are points that run into the station
-    /// of a photo: the adjustment goes on without them from where it was. `watch` is called on the calling thread; when it breaks, the
-    /// adjustment stops. Observations of points that are left out do not take part.
+    /// of a photo: the adjustment goes on without them from where it was. Observations of points that are left out do not take part.
     ///
     /// # Errors
-    /// A network that contradicts itself, has nothing to adjust, or leaves unknowns undetermined; an interruption.
-    pub fn adjust(
-        &self,
-        options: &Options,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Solution, NetworkError> {
-        self.adjusted(options, (None, false), None, pool, watch)
+    /// Those of [`NetworkAdjustment::run`].
+    pub fn adjust(&self, options: &Options) -> Result<Solution, NetworkError> {
+        self.adjustment(options).run()
     }
 
-    /// The same, and keeps what tests of it need ([`Solution::converged`]) where it converges by least squares and there is memory: it
-    /// takes about a twentieth longer.
-    ///
-    /// # Errors
-    /// Those of [`Network::adjust`].
-    pub fn adjust_and_keep(
-        &self,
-        options: &Options,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Solution, NetworkError> {
-        self.adjusted(options, (None, true), None, pool, watch)
-    }
-
-    /// Adjusts the network from where an adjustment of it has ended, perhaps with other weights: in the order that was in force, and
-    /// without the points that had run into a station.
-    ///
-    /// # Errors
-    /// Those of [`Network::adjust`]; a state that is not of this network.
-    pub fn adjust_again(
-        &self,
-        options: &Options,
-        state: &State,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Solution, NetworkError> {
-        let options = Options { ordering: state.ordering, ..*options };
-        self.adjusted(&options, (None, false), Some(state), pool, watch)
-    }
-
-    /// Adjusts a network that is free, and takes it to the datum of inner constraints.
-    ///
-    /// # Errors
-    /// Those of [`Network::adjust`]; a network that is not free, or points and photos that do not carry its datum.
-    pub fn adjust_in_datum(
-        &self,
-        options: &Options,
-        datum: &InnerConstraints,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Solution, NetworkError> {
-        self.adjusted(options, (Some(datum), false), None, pool, watch)
+    /// The same with more to say: from where, on which threads, watched by whom, in which datum.
+    pub fn adjustment(&self, options: &Options) -> NetworkAdjustment<'_> {
+        NetworkAdjustment {
+            network: self,
+            options: *options,
+            state: None,
+            goal: Goal::default(),
+            threads: None,
+            watch: None,
+        }
     }
 
     fn adjusted(
         &self,
         options: &Options,
-        (datum, keep): (Option<&InnerConstraints>, bool),
+        goal: Goal<'_>,
         mut start: Option<&State>,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        threads: &Threads,
+        watch: Watch<'_>,
     ) -> Result<Solution, NetworkError> {
         self.check()?;
         let mut screening = Screening::new(self.left_out(self.untouched_photos(), start)?);
         let mut before: Option<(Adjustment, Reached)> = None;
         loop {
             let reached = before.as_ref().map(|(_, reached)| reached);
-            let mut assembled = self.assembled(options, &screening.leaving.left_out, reached, pool)?;
+            let mut assembled = self.assembled(options, &screening.leaving.left_out, reached, threads)?;
             if let Some(state) = start.take() {
                 assembled.go_on_from(state)?;
             }
-            datum.map_or(Ok(()), |inner| self.check_carriers(inner, &assembled))?;
+            goal.datum.map_or(Ok(()), |inner| self.check_carriers(inner, &assembled))?;
             let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
-            let ended = iterated(&assembled, options, (datum, keep), done, pool, watch);
+            let ended = iterated(&assembled, options, goal, done, threads, watch);
             let begin = screening.look(&Ended { adjusted: &ended, assembled: &assembled, options });
             match (begin, ended) {
                 (Some(Begin::FromStart), _) => before = None,
@@ -102,11 +144,11 @@ impl Network {
                 }
                 (None, Ok(mut ended)) => {
                     ended.go_on_from(before.map(|(earlier, _)| earlier));
-                    return self.solved(options, datum, assembled, ended, screening, pool, watch);
+                    return self.solved(options, goal.datum, assembled, ended, screening, threads, watch);
                 }
                 (_, Err(error)) => {
                     let error = NetworkError::new(error, &assembled);
-                    return Err(self.name(error, &assembled, &assembled.problem.initial, pool));
+                    return Err(self.name(error, &assembled, &assembled.problem.initial, threads));
                 }
             }
         }
@@ -120,21 +162,23 @@ impl Network {
         assembled: Assembled,
         mut ended: Adjustment,
         Screening { leaving, .. }: Screening,
-        pool: &ThreadPool,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        threads: &Threads,
+        watch: Watch<'_>,
     ) -> Result<Solution, NetworkError> {
         let lost = match (ended.lost, datum) {
-            (None, Some(inner)) => take_to(inner, &options.adjustment, &assembled, &mut ended, pool, watch)?,
+            (None, Some(inner)) => {
+                take_to(inner, &options.adjustment, &assembled, &mut ended, threads, watch)?
+            }
             (lost, _) => lost.unwrap_or(0.0),
         };
         let left_out = &leaving.left_out.points;
         let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
-        let minimal = datum.is_none() && assembled.is_minimal(&ended.unknowns, pool);
+        let minimal = datum.is_none() && assembled.is_minimal(&ended.unknowns, threads);
         let (mut solution, found) =
-            pool.install(|| Solution::with_tried(self, options, &assembled, ended, collapsed));
+            threads.install(|| Solution::with_leverages(self, options, &assembled, ended, collapsed));
         let undetermined = solution.undetermined.take();
         solution.undetermined =
-            undetermined.map(|error| self.name(error, &assembled, &solution.state.unknowns, pool));
+            undetermined.map(|error| self.name(error, &assembled, &solution.state.unknowns, threads));
         solution.minimal_control = minimal;
         solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
         solution.relative_error = lost;
@@ -150,10 +194,10 @@ impl Network {
 fn iterated(
     assembled: &Assembled,
     options: &Options,
-    (datum, keep): (Option<&InnerConstraints>, bool),
+    Goal { datum, keep }: Goal<'_>,
     done: usize,
-    pool: &ThreadPool,
-    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    threads: &Threads,
+    watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
     let (problem, mut own) = (&assembled.problem, options.adjustment);
     own.max_iterations = own.max_iterations.saturating_sub(done);
@@ -162,16 +206,16 @@ fn iterated(
         // Cofactors are those of the datum that is asked for; weights that a loss leaves are known at the end only.
         Some(inner) if plain && matches!(own.method, Method::Damped(_)) => {
             let (datum, reference) = assembled.datum(inner);
-            return adjustment::adjust_in_datum(problem, &own, &datum, &reference, pool, watch);
+            return adjustment::adjust_in_datum(problem, &own, &datum, &reference, threads, watch);
         }
         Some(_) => own.covariance = false,
         None => {}
     }
     let by_groups = keep && datum.is_none() && plain && !matches!(own.method, Method::Full(_));
     if by_groups && assembled.may_keep(options) {
-        adjustment::adjust_by_groups(problem, &own, pool, watch)
+        adjustment::adjust_by_groups(problem, &own, threads, watch)
     } else {
-        adjustment::adjust(problem, &own, pool, watch)
+        adjustment::adjust(problem, &own, threads, watch)
     }
 }
 
@@ -181,12 +225,12 @@ fn take_to(
     options: &adjustment::Options,
     assembled: &Assembled,
     adjusted: &mut Adjustment,
-    pool: &ThreadPool,
-    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    threads: &Threads,
+    watch: Watch<'_>,
 ) -> Result<f64, NetworkError> {
     let (datum, reference) = assembled.datum(inner);
     let total = assembled.points.len();
     let mut between = |done| watch(Event::Progress { phase: adjustment::Phase::Invert, done, total });
     let problem = &assembled.problem;
-    Ok(adjusted.take_to(problem, options, &datum, &reference, pool, &mut between)?)
+    Ok(adjusted.take_to(problem, options, &datum, &reference, threads, &mut between)?)
 }

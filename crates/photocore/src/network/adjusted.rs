@@ -8,7 +8,7 @@ use super::problem::Assembled;
 use super::selection::TOGETHER;
 use super::stations::Placed;
 use super::{Network, Point};
-use crate::adjustment::{Adjustment, Problem, leading_matrix};
+use crate::adjustment::{Adjustment, Problem};
 use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::normals::Cofactors;
 
@@ -19,8 +19,8 @@ pub struct AdjustedPhoto {
     pub pose: [f64; 6],
     /// The parameters of its camera.
     pub camera: Vec<f64>,
-    /// Cofactors (a priori unit weight) of pose and, unless it is held or shared, camera, row by row; NaN where there are none.
-    pub cofactors: Vec<f64>,
+    /// Cofactors (a priori unit weight) of pose and, unless it is held or shared, camera; NaN where there are none.
+    pub cofactors: DMatrix<f64>,
     /// Redundancy numbers of these unknowns as observations of themselves; zero unless weighted, NaN where there are no cofactors.
     pub redundancy: Vec<f64>,
     /// Number of images that took part.
@@ -33,7 +33,7 @@ pub struct AdjustedPoint {
     /// Coordinates in the object space.
     pub coordinates: [f64; 3],
     /// Cofactors (a priori unit weight); NaN where there are none.
-    pub cofactors: [[f64; 3]; 3],
+    pub cofactors: Matrix3,
     /// Redundancy numbers of its components as observations of themselves; zero unless weighted, NaN where there are no cofactors.
     pub redundancy: [f64; 3],
     /// Its correction in the last iteration.
@@ -60,7 +60,6 @@ pub(super) fn adjusted_photos(
         let range = model.of_block(index);
         let (first, end) = (range.start, range.end);
         let values = &unknowns[range];
-        let count = (end - first).pow(2);
         let angles = reported_angles(model, index, values);
         let absolute = |k: usize| {
             let counted = if k < positions { values[k] + origin[k] } else { values[k] };
@@ -89,7 +88,7 @@ pub(super) fn adjusted_photos(
             pose: std::array::from_fn(absolute),
             camera,
             cofactors: cofactors.map_or_else(
-                || vec![f64::NAN; count],
+                || DMatrix::repeat(values.len(), values.len(), f64::NAN),
                 |all| in_angles(model, index, values, model.cofactors_of_block(all, index)),
             ),
             redundancy: redundancy
@@ -107,17 +106,17 @@ fn mounted_pose(
     Placed { photos, mounted, .. }: &Placed,
     photo: usize,
     cofactors: Option<&Cofactors>,
-) -> ([f64; 6], Vec<f64>) {
+) -> ([f64; 6], DMatrix<f64>) {
     let (model, orientation) = (&problem.model, &photos[photo].orientation);
     let (mut pose, taken) = model.reported(orientation);
     let found = cofactors.zip(mounted[photo].as_ref()).zip(taken).map(|((all, own), taken)| {
         let cofactors = model.mounted_cofactors(problem.layout(), photo, own, all);
-        (taken * cofactors * taken.transpose()).as_slice().to_vec()
+        DMatrix::from_column_slice(6, 6, (taken * cofactors * taken.transpose()).as_slice())
     });
     if let PoseNumbers::Angles(_) = network.poses {
         (0..3).for_each(|k| pose[k] += model.origin[k]);
     }
-    (pose, found.unwrap_or_else(|| vec![f64::NAN; 36]))
+    (pose, found.unwrap_or_else(|| DMatrix::repeat(6, 6, f64::NAN)))
 }
 
 /// The angles of a photo that steps by a rotation vector; at a singular attitude kappa is zero and omega takes the sum.
@@ -129,18 +128,18 @@ fn reported_angles(model: &Bundle, photo: usize, values: &[f64]) -> Option<[f64;
 
 /// Cofactors of a photo's unknowns: where its attitude has stepped by a rotation vector rho = K d(angles), taken to the angles by
 /// diag(I, K^-1, I). NaN for angles that are not determined, phi being 90 degrees.
-fn in_angles(model: &Bundle, photo: usize, values: &[f64], cofactors: &[f64]) -> Vec<f64> {
-    let Some(sense) = model.turning_sense(photo) else { return cofactors.to_vec() };
+fn in_angles(model: &Bundle, photo: usize, values: &[f64], cofactors: &[f64]) -> DMatrix<f64> {
+    let width = values.len();
+    let mut found = DMatrix::from_row_slice(width, width, cofactors);
+    let Some(sense) = model.turning_sense(photo) else { return found };
     let (numbers, angles) = (AttitudeNumbers::OmegaPhiKappa(sense), [values[3], values[4], values[5]]);
     let inverse = numbers.rates(angles).try_inverse().filter(|_| !numbers.is_singular(angles));
     let inverse = inverse.unwrap_or_else(|| Matrix3::repeat(f64::NAN));
-    let width = values.len();
-    let mut found = DMatrix::from_row_slice(width, width, cofactors);
     let rows = inverse * found.fixed_rows::<3>(3);
     found.fixed_rows_mut::<3>(3).copy_from(&rows);
     let columns = found.fixed_columns::<3>(3) * inverse.transpose();
     found.fixed_columns_mut::<3>(3).copy_from(&columns);
-    ((&found + found.transpose()) / 2.0).as_slice().to_vec()
+    (&found + found.transpose()) / 2.0
 }
 
 pub(super) fn adjusted_points(
@@ -160,12 +159,13 @@ pub(super) fn adjusted_points(
         let first = model.of_point(i).start;
         let own = cofactors.map(|all| match i.checked_sub(model.locals) {
             None => &all.local[9 * i..],
-            // The last kept blocks.
-            Some(tied) => &all.kept[all.kept.len() - 9 * (points.len() - model.locals - tied)..],
+            // The last retained blocks.
+            Some(tied) => &all.retained[all.retained.len() - 9 * (points.len() - model.locals - tied)..],
         });
         AdjustedPoint {
             coordinates: std::array::from_fn(absolute),
-            cofactors: leading_matrix(own),
+            cofactors: own
+                .map_or_else(|| Matrix3::repeat(f64::NAN), |own| Matrix3::from_row_slice(&own[..9])),
             redundancy: adjustment.prior_redundancy(first),
             last_correction: std::array::from_fn(|k| corrections(first + k)),
             rays: model.images_of(i).len(),
@@ -190,9 +190,11 @@ pub(super) fn in_order<T: Send>(
 /// The correction of each unknown in the last iteration; zero where there was none.
 fn last_corrections(adjustment: &Adjustment) -> impl Fn(usize) -> f64 {
     let local = &adjustment.last_local_corrections;
-    let kept = adjustment.history.last_chunk::<2>();
+    let retained = adjustment.history.last_chunk::<2>();
     move |unknown| match unknown.checked_sub(local.len()) {
         None => local[unknown],
-        Some(kept_unknown) => kept.map_or(0.0, |[before, after]| after[kept_unknown] - before[kept_unknown]),
+        Some(retained_unknown) => {
+            retained.map_or(0.0, |[before, after]| after[retained_unknown] - before[retained_unknown])
+        }
     }
 }

@@ -69,11 +69,9 @@ impl Camera {
     }
 
     /// Redundancy numbers of the parameters as one observation, the diagonal of Qvv S^-1 = I - Q S^-1; None unless it is one.
-    pub(super) fn redundancy(&self, cofactors: &[f64]) -> Option<Vec<f64>> {
+    pub(super) fn redundancy(&self, cofactors: &DMatrix<f64>) -> Option<Vec<f64>> {
         let (root, weighted, count) = (self.whitening()?, self.weighted(), self.sd.len());
-        let q = DMatrix::from_fn(weighted.len(), weighted.len(), |i, j| {
-            cofactors[weighted[i] * count + weighted[j]]
-        });
+        let q = cofactors.select_rows(&weighted).select_columns(&weighted);
         let shares = q * root.transpose() * root;
         let mut redundancy = vec![0.0; count];
         weighted.iter().enumerate().for_each(|(i, &k)| redundancy[k] = 1.0 - shares[(i, i)]);

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use nalgebra::DMatrix;
+
 use super::median::median;
 use super::model::Bundle;
 use super::problem::Assembled;
@@ -14,8 +16,8 @@ use crate::adjustment::{Adjustment, Problem};
 pub struct AdjustedCamera {
     /// Its parameters.
     pub parameters: Vec<f64>,
-    /// Their cofactors (a priori unit weight), row by row: zero for those that are held; NaN where there are none.
-    pub cofactors: Vec<f64>,
+    /// Their cofactors (a priori unit weight): zero for those that are held; NaN where there are none.
+    pub cofactors: DMatrix<f64>,
     /// Redundancy numbers of the parameters as observations of themselves; zero unless weighted, NaN where there are no cofactors.
     pub redundancy: Vec<f64>,
     /// Their diagonal of the normal equations, weights counted: the reciprocal cofactor that each would have if all other unknowns were
@@ -54,7 +56,7 @@ impl Network {
             let missing = if adjustment.cofactors.is_some() && camera.is_held() { 0.0 } else { f64::NAN };
             AdjustedCamera {
                 parameters,
-                cofactors: vec![missing; count * count],
+                cofactors: DMatrix::repeat(count, count, missing),
                 redundancy: vec![missing; count],
                 information: vec![missing; count],
                 photos: 0,
@@ -122,29 +124,29 @@ fn middle(places: &[[f64; 3]]) -> [f64; 3] {
 impl AdjustedCamera {
     /// Takes over what was found of the camera of one photo, the last unknowns of that.
     fn take_over(&mut self, photo: &AdjustedPhoto) {
-        let width = photo.redundancy.len();
+        let own = photo.camera.len();
         self.parameters.clone_from(&photo.camera);
         self.redundancy = photo.redundancy[6..].to_vec();
-        self.cofactors =
-            photo.cofactors.chunks_exact(width).skip(6).flat_map(|row| &row[6..]).copied().collect();
+        self.cofactors = photo.cofactors.view((6, 6), (own, own)).into_owned();
     }
 
     /// Takes the diagonal of the normal equations of its unknowns; a held one has none.
     fn inform(&mut self, problem: &Problem<Bundle>, unknowns: Range<usize>, adjustment: &Adjustment) {
         let Some(all) = &adjustment.cofactors else { return };
-        let first = problem.layout().all_kept().start;
+        let first = problem.layout().all_retained().start;
         let of = |unknown: usize| {
             if problem.sd[unknown] == 0.0 { 0.0 } else { all.information[unknown - first] }
         };
         self.information = unknowns.map(of).collect();
     }
 
-    /// Takes what was found of a kept block of its own.
+    /// Takes what was found of a retained block of its own.
     fn take_block(&mut self, model: &Bundle, block: usize, adjustment: &Adjustment, unknowns: &[f64]) {
         let own = model.of_block(block);
         self.parameters = unknowns[own.clone()].to_vec();
         if let Some(all) = &adjustment.cofactors {
-            self.cofactors = model.cofactors_of_block(all, block).to_vec();
+            self.cofactors =
+                DMatrix::from_row_slice(own.len(), own.len(), model.cofactors_of_block(all, block));
         }
         if let Some(all) = &adjustment.prior_redundancy {
             self.redundancy = all[own].to_vec();

@@ -2,13 +2,13 @@
 
 use std::ops::ControlFlow;
 
-use nalgebra::Matrix6;
-use rayon::ThreadPool;
+use nalgebra::{DMatrix, Matrix6};
 
 use super::model::Owner;
 use super::problem::Assembled;
 use super::state::{InnerConstraints, NetworkDatum, State};
 use super::{Network, NetworkError, Options, Solution};
+use crate::Threads;
 use crate::adjustment::{Adjusted, Adjustment, Classes, CofactorError, Datum, Event, Linearized, Phase};
 use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
 use crate::normals::Function;
@@ -62,14 +62,14 @@ impl Network {
         options: &Options,
         state: &State,
         datum: Option<&NetworkDatum>,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Covariances, NetworkError> {
         if state.released {
             let free = State { released: false, ..state.clone() };
-            return self.without_control().covariances(options, &free, datum, pool, watch);
+            return self.without_control().covariances(options, &free, datum, threads, watch);
         }
-        let assembled = self.assembled_again(options, state, pool)?;
+        let assembled = self.assembled_again(options, state, threads)?;
         let datum = datum.or(state.datum.as_ref());
         let linearized = {
             let mut between = forming(watch, &assembled);
@@ -78,7 +78,7 @@ impl Network {
                 None => {
                     let (problem, values, held) =
                         (&assembled.problem, state.unknowns.clone(), state.held.clone());
-                    Linearized::form(problem, adjusted.loss, values, held, pool, &mut between)
+                    Linearized::form(problem, adjusted.loss, values, held, threads, &mut between)
                         .and_then(Linearized::determined)
                         .map_err(|error| NetworkError::new(error, &assembled))?
                 }
@@ -89,7 +89,7 @@ impl Network {
                         adjusted,
                         &datum,
                         &state.unknowns,
-                        pool,
+                        threads,
                         &mut between,
                     )?
                 }
@@ -123,33 +123,31 @@ impl Network {
         options: &Options,
         state: &State,
         datum: &NetworkDatum,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, NetworkError> {
-        let assembled = self.assembled_again(options, state, pool)?;
+        let assembled = self.assembled_again(options, state, threads)?;
         let is_inner = matches!(datum, NetworkDatum::Inner(_));
-        if state.released || is_inner && assembled.is_minimal(&state.unknowns, pool) {
+        if state.released || is_inner && assembled.is_minimal(&state.unknowns, threads) {
             let free = self.without_control();
-            let state = free.released(options, state, pool)?;
-            let mut solution = free.in_datum(options, &state, datum, pool, watch)?;
+            let state = free.released(options, state, threads)?;
+            let mut solution = free.in_datum(options, &state, datum, threads, watch)?;
             solution.state.released = true;
             return Ok(solution);
         }
         let (carried, reference) = self.datum(&assembled, datum)?;
         let reference = reference.as_ref().unwrap_or(&state.unknowns);
         let (problem, adjusted) = (&assembled.problem, state.adjusted(options));
-        let found = {
-            let mut between = forming(watch, &assembled);
-            Linearized::in_datum(problem, adjusted, &carried, reference, pool, &mut between)?.inverted(
-                problem,
-                pool,
-                &mut between,
-            )?
-        };
-        let adjustment = Adjustment::inverted(problem, adjusted.loss, found, pool);
+        let found =
+            {
+                let mut between = forming(watch, &assembled);
+                Linearized::in_datum(problem, adjusted, &carried, reference, threads, &mut between)?
+                    .inverted(problem, threads, &mut between)?
+            };
+        let adjustment = Adjustment::inverted(problem, adjusted.loss, found, threads);
         let lost = adjustment.lost.unwrap_or(0.0);
         let left_out = state.collapsed.clone();
-        let mut solution = pool.install(|| Solution::new(self, options, &assembled, adjustment, left_out));
+        let mut solution = threads.install(|| Solution::new(self, options, &assembled, adjustment, left_out));
         solution.state.datum = Some(datum.clone());
         solution.relative_error = lost;
         Ok(solution)
@@ -165,9 +163,9 @@ impl Network {
         &self,
         options: &Options,
         state: &State,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Vec<(&'static str, f64)>, NetworkError> {
-        let assembled = self.assembled_again(options, state, pool)?;
+        let assembled = self.assembled_again(options, state, threads)?;
         let model = &assembled.problem.model;
         let mut names =
             vec!["image", "control", "position or attitude of a photo", "camera", "common unknown"];
@@ -189,7 +187,7 @@ impl Network {
             of_unknowns[model.of_block(block)].fill(class);
         }
         let classes = Classes { count: names.len(), of_ties: &of_ties, of_unknowns: &of_unknowns };
-        let shares = assembled.problem.resistance(&state.unknowns, &classes, pool);
+        let shares = assembled.problem.resistance(&state.unknowns, &classes, threads);
         let notable = names.into_iter().zip(shares).filter(|(_, share)| *share > NOTABLE);
         Ok(notable.collect())
     }
@@ -206,13 +204,13 @@ impl Network {
     }
 
     /// The state in which a network that was controlled goes on without control: unknowns are held in its place.
-    fn released(&self, options: &Options, state: &State, pool: &ThreadPool) -> Result<State, NetworkError> {
+    fn released(&self, options: &Options, state: &State, threads: &Threads) -> Result<State, NetworkError> {
         let state = State { released: false, ..state.clone() };
         if !state.held.is_empty() {
             return Ok(state);
         }
-        let assembled = self.assembled_again(options, &state, pool)?;
-        let held = assembled.problem.to_hold(&state.unknowns, pool);
+        let assembled = self.assembled_again(options, &state, threads)?;
+        let held = assembled.problem.to_hold(&state.unknowns, threads);
         Ok(State { held, ..state })
     }
 
@@ -262,8 +260,7 @@ fn forming(
 }
 
 impl Covariances {
-    /// The cofactors (a priori unit weight) of every two unknowns of what `rows` names, or of those with what `columns` names: a matrix
-    /// row by row.
+    /// The cofactors (a priori unit weight) of every two unknowns of what `rows` names, or of those with what `columns` names.
     ///
     /// # Errors
     /// Something that is not there or was left out, more memory than there may be, an interruption.
@@ -271,12 +268,12 @@ impl Covariances {
         &self,
         rows: &[Of],
         columns: Option<&[Of]>,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Vec<f64>, NetworkError> {
+    ) -> Result<DMatrix<f64>, NetworkError> {
         let rows = self.unknowns(rows)?;
         let columns = columns.map(|columns| self.unknowns(columns)).transpose()?;
-        self.of_functions(&rows, columns.as_deref(), pool, watch)
+        self.of_functions(&rows, columns.as_deref(), threads, watch)
     }
 
     /// J Q J^T, for partials J of functions of the unknowns of what is named: a row for each function.
@@ -287,11 +284,11 @@ impl Covariances {
         &self,
         partials: &[f64],
         of: &[Of],
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Vec<f64>, NetworkError> {
+    ) -> Result<DMatrix<f64>, NetworkError> {
         let functions = self.functions(partials, of)?;
-        self.of_functions(&functions, None, pool, watch)
+        self.of_functions(&functions, None, threads, watch)
     }
 
     /// Linear functions of the unknowns of what is named, a row of partials for each.
@@ -316,14 +313,14 @@ impl Covariances {
         &self,
         partials: &[f64],
         of: &[Of],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Vec<Vec<f64>>, NetworkError> {
         let problem = &self.assembled.problem;
         let solve = |function: &Function| {
             let mut right = vec![0.0; problem.layout().unknowns()];
             function.iter().for_each(|&(unknown, value)| right[unknown] += value);
             let go_on = &mut |_| ControlFlow::Continue(());
-            let found = self.linearized.solve_for(problem, &right, pool, go_on);
+            let found = self.linearized.solve_for(problem, &right, threads, go_on);
             found.map_err(|error| NetworkError::new(error, &self.assembled))
         };
         self.functions(partials, of)?.iter().map(solve).collect()
@@ -333,16 +330,21 @@ impl Covariances {
         &self,
         rows: &[Function],
         columns: Option<&[Function]>,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Vec<f64>, NetworkError> {
+    ) -> Result<DMatrix<f64>, NetworkError> {
         let problem = &self.assembled.problem;
         let total = problem.layout().locals();
         let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
-        let found = self.linearized.cofactors(problem, rows, columns, self.memory, pool, &mut between);
-        found.map_err(|error| match error {
+        let found = self.linearized.cofactors(problem, rows, columns, self.memory, threads, &mut between);
+        let found = found.map_err(|error| match error {
             CofactorError::Adjust(error) => NetworkError::new(error, &self.assembled),
             refused => NetworkError::Cofactors(refused),
+        })?;
+        Ok(match columns {
+            Some(columns) => DMatrix::from_row_slice(rows.len(), columns.len(), &found),
+            // Symmetric: it may be large, and is not copied.
+            None => DMatrix::from_vec(rows.len(), rows.len(), found),
         })
     }
 

@@ -3,7 +3,6 @@
 use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::{Matrix4, Vector6};
-use rayon::ThreadPool;
 
 use super::commons::Motion;
 use super::median::median;
@@ -13,6 +12,7 @@ use super::problem::Assembled;
 use super::state::InnerConstraints;
 use super::stations::{Placed, Stations};
 use super::{Network, NetworkError};
+use crate::Threads;
 use crate::adjustment::{Datum, Motions};
 use crate::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Point, PoseNumbers, Vector3, angle_axis::rotation_angle_axis,
@@ -192,9 +192,9 @@ impl Bundle {
     ) {
         let others = (0..self.commons.len()).filter(|&common| parts.of_common[common] != Some(part));
         let ranges = others.filter_map(|common| Some(self.of_block(self.common_block[common]?)));
-        let kept: Vec<_> = ranges.map(|range| (range.clone(), unknowns[range].to_vec())).collect();
+        let retained: Vec<_> = ranges.map(|range| (range.clone(), unknowns[range].to_vec())).collect();
         moved(unknowns);
-        kept.into_iter().for_each(|(range, values)| unknowns[range].copy_from_slice(&values));
+        retained.into_iter().for_each(|(range, values)| unknowns[range].copy_from_slice(&values));
     }
 
     /// Moves each part as a whole, exactly: along the motion that e, w and s are the rates of, for the time of one. A turn about any place so
@@ -337,14 +337,14 @@ impl Assembled {
 
     /// Whether control and weights of poses are exactly what a datum takes: without them as many motions of the whole would be open as
     /// they are numbers. Their redundancy numbers are zero, and the network is free but for the choice that they are.
-    pub(super) fn is_minimal(&self, values: &[f64], pool: &ThreadPool) -> bool {
+    pub(super) fn is_minimal(&self, values: &[f64], threads: &Threads) -> bool {
         let (controlled, model) = (self.controlled(), &self.problem.model);
         let some = !controlled.is_empty() && controlled.len() <= MOTIONS * MOST_PARTS;
         // A point of one image is determined by control alone.
         let seen =
             |point: usize| model.points[point].held() == [false; 3] || model.images_of(point).len() > 1;
         some && (0..model.points.len()).all(seen)
-            && self.problem.open_if_free(values, &controlled, pool) == controlled.len()
+            && self.problem.open_if_free(values, &controlled, threads) == controlled.len()
     }
 
     /// The datum in which cofactors are relative to some unknowns, scale staying as it is.

@@ -1,12 +1,12 @@
 //! What errors of single observations do to their own points and photos, and which of them cannot be told apart.
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::NetworkError;
 use super::predictions::OnPoint;
 use super::suspects::Home;
 use super::trial::Trial;
+use crate::Threads;
 use crate::adjustment::canonical_correlation;
 use crate::geometry::{AttitudeNumbers, Matrix3};
 
@@ -16,10 +16,10 @@ impl Trial {
     ///
     /// # Errors
     /// Nothing was adjusted before.
-    pub fn effects(&self, suspects: &[usize], pool: &ThreadPool) -> Result<Vec<[f64; 9]>, NetworkError> {
+    pub fn effects(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<[f64; 9]>, NetworkError> {
         let found = self.found()?;
         let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
-        let around = self.around(suspects, &problem.observation_sd, found, pool);
+        let around = self.around(suspects, &problem.observation_sd, found, threads);
         let terms = self.terms(&problem.sd, &found.values);
         let mut all = Vec::new();
         for &index in suspects {
@@ -113,11 +113,11 @@ impl Trial {
         &self,
         points: &[usize],
         limit: f64,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Vec<(usize, usize, f64)>, NetworkError> {
-        let on_points = self.on_points(points, pool)?;
+        let on_points = self.on_points(points, threads)?;
         let pairs = |own: &OnPoint| -> Vec<(usize, usize, f64)> { self.pairs_on(own, limit) };
-        Ok(pool.install(|| on_points.par_iter().flat_map_iter(pairs).collect()))
+        Ok(threads.install(|| on_points.par_iter().flat_map_iter(pairs).collect()))
     }
 
     fn pairs_on(&self, own: &OnPoint, limit: f64) -> Vec<(usize, usize, f64)> {

@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use super::observations::Fault;
 use super::surroundings::BlockOf;
+use crate::Stopped;
 use crate::adjustment::{CofactorError, DatumError, gib};
 use crate::normals::LayoutError;
 
@@ -113,12 +114,9 @@ pub enum NetworkError {
     /// More cofactors than there may be.
     #[error(transparent)]
     Cofactors(CofactorError),
-    /// The caller asked to stop.
-    #[error("interrupted")]
-    Interrupted,
-    /// An allocation of so many bytes failed.
-    #[error("there is no memory for an array of {0} bytes")]
-    OutOfMemory(usize),
+    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// It cannot be taken to a datum.
     #[error(transparent)]
     Datum(#[from] DatumError),

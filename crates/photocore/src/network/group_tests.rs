@@ -1,12 +1,12 @@
 //! Tests of all groups of observations of a network that is tried.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::NetworkError;
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
+use crate::Threads;
 use crate::adjustment::{Few, GroupTest, Leverages, Terms};
 use crate::normals::GroupCofactors;
 
@@ -124,7 +124,7 @@ impl Trial {
     ///
     /// # Errors
     /// Nothing was adjusted before.
-    pub fn tests(&self, pool: &ThreadPool) -> Result<Tests, NetworkError> {
+    pub fn tests(&self, threads: &Threads) -> Result<Tests, NetworkError> {
         let found = self.found()?;
         let groups = found.cofactors.groups.as_ref().ok_or(NetworkError::State)?;
         let terms = self.terms(&self.assembled.problem.sd, &found.values);
@@ -136,7 +136,7 @@ impl Trial {
                 part.put(size, self.test(suspect, found, groups, &terms));
             }
         };
-        pool.install(|| self.suspects.par_chunks(TOGETHER).zip(parts).for_each(fill));
+        threads.install(|| self.suspects.par_chunks(TOGETHER).zip(parts).for_each(fill));
         Ok(all)
     }
 
@@ -156,12 +156,12 @@ impl Trial {
         if taking.is_empty() {
             return None;
         }
-        let (residual, shares, by_point) = self.shares(suspect, found, groups, terms, &taking);
-        let left = |shares: &[f64]| -> Vec<f64> {
+        let (residual, leverages, by_point) = self.leverages(suspect, found, groups, terms, &taking);
+        let left = |leverages: &[f64]| -> Vec<f64> {
             let count = taking.len();
-            (0..count * count).map(|k| f64::from(u8::from(k / count == k % count)) - shares[k]).collect()
+            (0..count * count).map(|k| f64::from(u8::from(k / count == k % count)) - leverages[k]).collect()
         };
-        let cofactors = left(&shares);
+        let cofactors = left(&leverages);
         let test = GroupTest::new(&residual, &cofactors, Some(&left(&by_point)));
         let rows: Vec<(Row, usize)> = taking.iter().map(|&k| suspect.rows[k]).collect();
         let units = self.units(suspect, &rows);
@@ -204,8 +204,8 @@ impl Trial {
         let (sd, v) = (&self.observation_sd[rows.clone()], &found.residuals[rows]);
         let residual = [v[0] / sd[0], v[1] / sd[1]];
         let block = 4 * group..4 * group + 4;
-        let left = |shares: &[f64]| [1.0 - shares[0], -shares[1], -shares[2], 1.0 - shares[3]];
-        let cofactors = left(&groups.shares[block.clone()]);
+        let left = |leverages: &[f64]| [1.0 - leverages[0], -leverages[1], -leverages[2], 1.0 - leverages[3]];
+        let cofactors = left(&groups.leverages[block.clone()]);
         let test = GroupTest::new(&residual, &cofactors, Some(&left(&groups.by_local[block])));
         let of = |k: usize| (test.error[k] * sd[k], test.cofactors[3 * k].sqrt() * sd[k]);
         let [first, second] = [of(0), of(1)];
@@ -219,7 +219,7 @@ impl Trial {
     }
 
     /// Residuals of unit weight of some rows of a suspect, a Q a^T of these, and the same with all known but the own point.
-    fn shares(
+    fn leverages(
         &self,
         suspect: &Suspect,
         found: &Leverages,
@@ -234,7 +234,7 @@ impl Trial {
         };
         let residuals = taking.iter().map(residual).collect();
         let count = taking.len();
-        let (shares, by_point) = match suspect.home {
+        let (leverages, by_point) = match suspect.home {
             Home::Tie(tie) => {
                 let block = &found.cofactors.ties[problem.layout().tie_block(tie)];
                 (sub(block, suspect.rows.len(), taking), vec![0.0; count * count])
@@ -249,11 +249,11 @@ impl Trial {
                     }
                     _ => DMatrix::zeros(count, count),
                 };
-                let shares = &rows * q * rows.transpose();
-                (shares.transpose().as_slice().to_vec(), alone.transpose().as_slice().to_vec())
+                let leverages = &rows * q * rows.transpose();
+                (leverages.transpose().as_slice().to_vec(), alone.transpose().as_slice().to_vec())
             }
         };
-        (residuals, shares, by_point)
+        (residuals, leverages, by_point)
     }
 
     /// The equations of some rows of a suspect, of unit weight, by the unknowns of its block.
@@ -280,14 +280,14 @@ impl Trial {
 
     /// The cofactors of the unknowns of a point or block.
     pub(super) fn cofactors_at(&self, found: &Leverages, home: Home) -> DMatrix<f64> {
-        let (model, kept) = (&self.assembled.problem.model, &found.cofactors.kept);
+        let (model, retained) = (&self.assembled.problem.model, &found.cofactors.retained);
         let width = self.unknowns_at(home).len();
         let values = match home {
             Home::Point(place) if place < model.locals => &found.cofactors.local[9 * place..9 * place + 9],
-            // The last kept blocks.
+            // The last retained blocks.
             Home::Point(place) => {
                 let behind = model.points.len() - place;
-                &kept[kept.len() - 9 * behind..][..9]
+                &retained[retained.len() - 9 * behind..][..9]
             }
             Home::Block(block) => model.cofactors_of_block(&found.cofactors, block),
             Home::Group { .. } | Home::Tie(_) => &[],

@@ -2,11 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
-
 use super::NetworkError;
 use super::covariance::Covariances;
 use super::model::Owner;
+use crate::Threads;
 use crate::adjustment::{AdjustError, EquationGroups, Event, GroupSquares, Phase, Probing};
 
 /// Groups of the observations of a network: a number for each, in the order of the network; that many groups or more for none.
@@ -37,14 +36,14 @@ impl Covariances {
         &self,
         groups: &Groups,
         probing: &Probing,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<GroupSquares, NetworkError> {
         let groups = self.equation_groups(groups)?;
         let problem = &self.assembled.problem;
         let total = problem.layout().locals();
         let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
-        let found = self.linearized.group_squares(problem, &groups, probing, pool, &mut between);
+        let found = self.linearized.group_squares(problem, &groups, probing, threads, &mut between);
         found.map_err(|error| self.named(error))
     }
 
@@ -57,14 +56,14 @@ impl Covariances {
         groups: &Groups,
         classes: usize,
         probing: &Probing,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Vec<f64>, NetworkError> {
         let groups = self.equation_groups(groups)?;
         let problem = &self.assembled.problem;
         let total = problem.layout().locals();
         let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
-        let found = self.linearized.own_squares(problem, &groups, classes, probing, pool, &mut between);
+        let found = self.linearized.own_squares(problem, &groups, classes, probing, threads, &mut between);
         found.map_err(|error| self.named(error))
     }
 
@@ -76,7 +75,7 @@ impl Covariances {
     pub fn project_images(
         &self,
         columns: &[f64],
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Vec<f64>, NetworkError> {
         let problem = &self.assembled.problem;
@@ -93,7 +92,8 @@ impl Covariances {
         }
         let total = problem.layout().locals();
         let mut between = |done| watch(Event::Progress { phase: Phase::Solve, done, total });
-        let u = self.linearized.project(problem, z, pool, &mut between).map_err(|error| self.named(error))?;
+        let u =
+            self.linearized.project(problem, z, threads, &mut between).map_err(|error| self.named(error))?;
         let mut found = vec![0.0; columns.len()];
         for (found, u) in found.chunks_exact_mut(width).zip(u.chunks_exact(height)) {
             for (row, &image) in order.iter().enumerate() {

@@ -152,19 +152,19 @@ impl<C: CameraModel> WithSimd for Compute<'_, '_, C> {
             x.put(t, residual[0], &pose.chain(&u, &computed.by_u[0]), by_x.as_ref(), sd[0][t]);
             y.put(t, residual[1], &pose.chain(&u, &computed.by_u[1]), by_y.as_ref(), sd[1][t]);
         }
-        let (width, shared) = (rows.kept.len() / (2 * count), rows.common.len() / (2 * count));
+        let (width, shared) = (rows.retained.len() / (2 * count), rows.shared.len() / (2 * count));
         let parameters = C::PARAMETERS.len();
         for (t, place) in places.enumerate() {
             for (row, own) in [&x, &y].into_iter().enumerate() {
                 let at = 2 * place + row;
                 rows.constant[at] = own.constant[t];
                 put(&mut rows.local[3 * at..][..3], &own.point, t);
-                put(&mut rows.kept[width * at..][..6], &own.photo, t);
+                put(&mut rows.retained[width * at..][..6], &own.photo, t);
                 if width > 6 {
-                    put(&mut rows.kept[width * at + 6..][..parameters], &own.camera, t);
+                    put(&mut rows.retained[width * at + 6..][..parameters], &own.camera, t);
                 }
                 if shared > 0 {
-                    put(&mut rows.common[shared * at..][..parameters], &own.camera, t);
+                    put(&mut rows.shared[shared * at..][..parameters], &own.camera, t);
                 }
             }
         }
@@ -188,8 +188,8 @@ mod tests {
     /// The rows of so many images that have their camera in common with others.
     fn rows_of(count: usize, parameters: usize, fill: impl FnOnce(&mut GroupRows<'_>)) -> Vec<f64> {
         let mut parts = [1, 3, 6, parameters].map(|width| vec![0.0; 2 * count * width]);
-        let [constant, local, kept, common] = &mut parts;
-        fill(&mut GroupRows { constant, local, kept, common });
+        let [constant, local, retained, shared] = &mut parts;
+        fill(&mut GroupRows { constant, local, retained, shared });
         parts.concat()
     }
 
@@ -234,9 +234,9 @@ mod tests {
                     let (at, weight) = (2 * t + row, sd[row].recip());
                     rows.constant[at] = residual[row] * weight;
                     (0..3).for_each(|k| rows.local[3 * at + k] = projection.point[row][k] * weight);
-                    (0..6).for_each(|k| rows.kept[6 * at + k] = projection.photo[row][k] * weight);
+                    (0..6).for_each(|k| rows.retained[6 * at + k] = projection.photo[row][k] * weight);
                     let own = &computed.by_parameters[row];
-                    (0..parameters).for_each(|k| rows.common[parameters * at + k] = own[k] * weight);
+                    (0..parameters).for_each(|k| rows.shared[parameters * at + k] = own[k] * weight);
                 }
             }
         });

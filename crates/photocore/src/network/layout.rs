@@ -14,19 +14,19 @@ pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, Ne
     let photo_of = images.iter().map(|image| model.carrier(image.photo) as u32).collect();
     let mut layout = Layout::new(2, 3, &widths, model.start[..=model.locals].to_vec(), photo_of)?;
     if !(model.shared.is_empty() && model.mounts.is_empty()) {
-        let (mut further_ptr, mut further) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
-        further_ptr.push(0);
+        let (mut shared_ptr, mut further) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
+        shared_ptr.push(0);
         for image in images {
             further.extend(model.further(image).map(|block| block as u32));
-            further_ptr.push(further.len());
+            shared_ptr.push(further.len());
         }
-        layout = layout.with_further(further_ptr, further)?;
+        layout = layout.with_shared(shared_ptr, further)?;
     }
     Ok(layout.with_places(places)?.with_ties(model.ties())?.with_pairs(model.pairs())?)
 }
 
 impl Surroundings {
-    /// The kept blocks of a model of these points that outer ones are, and those that each node below leaves something for.
+    /// The retained blocks of a model of these points that outer ones are, and those that each node below leaves something for.
     ///
     /// # Errors
     /// One that has no unknowns of its own here.

@@ -9,48 +9,35 @@
 //! Two photos over four control points:
 //!
 //! ```
-//! use std::ops::ControlFlow;
-//!
-//! use photocore::geometry::{self, ObjectSpace, Perspective, PoseNumbers, RotationSense};
+//! use photocore::geometry::{self, ObjectSpace, Perspective, RotationSense};
 //! use photocore::network::{Camera, Image, Network, Options, Photo, Point};
 //!
-//! let (space, sense) = (ObjectSpace::Rectangular, RotationSense::GroundToPhoto);
-//! let camera = Perspective { principal_distance: -150.0 };
 //! let corners = [[0.0, 0.0, 0.0], [900.0, 0.0, 40.0], [0.0, 900.0, 70.0], [900.0, 900.0, 10.0]];
 //! let stations = [[200.0, 450.0, 1500.0], [700.0, 450.0, 1500.0]];
-//! let mut images = vec![];
-//! for (point, corner) in corners.into_iter().enumerate() {
-//!     for (photo, station) in stations.into_iter().enumerate() {
-//!         let seen = geometry::Photo::new(space, sense, station, [0.01, -0.02, 0.1], -150.0);
-//!         let xy = seen.project(&geometry::Point::new(space, corner));
-//!         images.push(Image { photo, point, xy, sd: [0.005; 2] });
-//!     }
+//! let mut network = Network::new();
+//! network.cameras.push(Camera::held(Perspective { principal_distance: -150.0 }.into()));
+//! network.points = corners.map(|coordinates| Point::control(coordinates, [0.02; 3])).to_vec();
+//! for (photo, station) in stations.into_iter().enumerate() {
+//!     let space = ObjectSpace::Rectangular;
+//!     let truth = geometry::Photo::new(space, RotationSense::GroundToPhoto, station, [0.01, -0.02, 0.1], -150.0);
+//!     let image = |(point, corner)| Image {
+//!         photo,
+//!         point,
+//!         xy: truth.project(&geometry::Point::new(space, corner)),
+//!         sd: [0.005; 2],
+//!     };
+//!     network.images.extend(corners.into_iter().enumerate().map(image));
+//!     // Poses are known to some metres and degrees.
+//!     let [x, y, z] = station;
+//!     network.photos.push(Photo::free([x + 5.0, y - 4.0, z + 9.0, 0.0, 0.0, 0.0], 0));
 //! }
-//! // Poses are known to some metres and degrees.
-//! let photo = |[x, y, z]: [f64; 3]| {
-//!     let pose = [x + 5.0, y - 4.0, z + 9.0, 0.0, 0.0, 0.0];
-//!     Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: 0 }
-//! };
-//! let network = Network {
-//!     space,
-//!     poses: PoseNumbers::Angles(sense),
-//!     refraction: None,
-//!     cameras: vec![Camera::held(camera.into())],
-//!     photos: stations.map(photo).to_vec(),
-//!     points: corners.map(|coordinates| Point { coordinates, sd: [0.02; 3] }).to_vec(),
-//!     images,
-//!     observations: vec![],
-//!     commons: vec![],
-//!     mounts: vec![],
-//! };
-//! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-//! let solution = network.adjust(&Options::default(), &pool, &mut |_| ControlFlow::Continue(()))?;
+//! let solution = network.adjust(&Options::default())?;
 //! let photo = &solution.photos[1];
 //! assert!((photo.pose[0] - 700.0).abs() < 1e-6 && (photo.pose[5] - 0.1).abs() < 1e-9);
 //! // Four points seen twice, and their coordinates, less twelve unknowns of the photos and twelve of the points.
 //! assert_eq!(solution.degrees_of_freedom, 16 + 12 - 12 - 12);
 //! assert!(photo.cofactors[0].sqrt() < 1.0, "standard deviation of the station's X in metres");
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! # Ok::<(), photocore::network::NetworkError>(())
 //! ```
 
 mod adjust;
@@ -97,9 +84,10 @@ mod weighted_angles;
 use nalgebra::DMatrix;
 
 use crate::adjustment;
-use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction};
+use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction, RotationSense};
 use crate::normals::Ordering;
 
+pub use adjust::NetworkAdjustment;
 pub use adjusted::{AdjustedPhoto, AdjustedPoint};
 pub use cameras::AdjustedCamera;
 pub use commons::{AdjustedCommon, Common, CommonKind};
@@ -133,6 +121,18 @@ pub struct Photo {
     pub sd: [f64; 6],
     /// Index of its camera.
     pub camera: usize,
+}
+
+impl Photo {
+    /// Of which nothing is known: its pose is where to start from.
+    pub fn free(pose: [f64; 6], camera: usize) -> Self {
+        Self::known(pose, [f64::INFINITY; 6], camera)
+    }
+
+    /// Of which the pose was observed, with these standard deviations.
+    pub fn known(pose: [f64; 6], sd: [f64; 6], camera: usize) -> Self {
+        Self { pose, observed: pose, sd, camera }
+    }
 }
 
 /// A camera as it is known beforehand. Photos may share it: then its unknown parameters are a block of their own; those of a camera of
@@ -174,6 +174,16 @@ pub struct Point {
 }
 
 impl Point {
+    /// Of which nothing is known.
+    pub fn free() -> Self {
+        Self { coordinates: [f64::NAN; 3], sd: [f64::INFINITY; 3] }
+    }
+
+    /// Of which the coordinates were determined, with these standard deviations.
+    pub fn control(coordinates: [f64; 3], sd: [f64; 3]) -> Self {
+        Self { coordinates, sd }
+    }
+
     /// Which components are held.
     pub fn held(&self) -> [bool; 3] {
         self.sd.map(f64::is_finite)
@@ -216,6 +226,30 @@ pub struct Network {
     pub commons: Vec<Common>,
     /// Which photos are on a frame with others.
     pub mounts: Vec<Mount>,
+}
+
+impl Network {
+    /// Without anything yet, in rectangular space, poses in angles of the rotation from ground to photo, images free of refraction.
+    pub fn new() -> Self {
+        Self::default()
+    }
+}
+
+impl Default for Network {
+    fn default() -> Self {
+        Self {
+            space: ObjectSpace::Rectangular,
+            poses: PoseNumbers::Angles(RotationSense::GroundToPhoto),
+            refraction: None,
+            cameras: vec![],
+            photos: vec![],
+            points: vec![],
+            images: vec![],
+            observations: vec![],
+            commons: vec![],
+            mounts: vec![],
+        }
+    }
 }
 
 /// What the variance of unit weight is based on (GIANT guide, Appendix E).

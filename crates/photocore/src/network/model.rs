@@ -23,7 +23,7 @@ use crate::geometry::{
 use crate::normals::{Cofactors, GroupRows, Tie, TieRows};
 
 /// Images of points by photos, and other observations of these: the local blocks are the points that no such observation touches, the
-/// kept blocks the photos with their pose and, unless it is held or shared, their camera, then the cameras that several photos share,
+/// retained blocks the photos with their pose and, unless it is held or shared, their camera, then the cameras that several photos share,
 /// then common unknowns, then all other points. The images of these are ties, and so are the observations, in this order.
 #[derive(Debug)]
 pub struct Bundle {
@@ -33,20 +33,20 @@ pub struct Bundle {
     pub refraction: Option<Refraction>,
     /// Of each photo, with the parameters that it starts from.
     pub cameras: Vec<Camera>,
-    /// The unknowns of kept block i are `first[i]..first[i + 1]` of the kept ones: photos (six of the pose, then those of a camera of
+    /// The unknowns of retained block i are `first[i]..first[i + 1]` of the retained ones: photos (six of the pose, then those of a camera of
     /// their own; six that are held where it is mounted), then shared cameras, then common unknowns.
     pub first: Vec<usize>,
-    /// Where the cofactors of each of these blocks start among those of all kept ones.
+    /// Where the cofactors of each of these blocks start among those of all retained ones.
     pub squares: Vec<usize>,
     /// The cameras that several photos share, as the network numbers them.
     pub shared: Vec<usize>,
-    /// The kept block of each photo's camera where that is shared.
+    /// The retained block of each photo's camera where that is shared.
     pub camera_block: Vec<Option<usize>>,
     /// What was observed of cameras with a covariance matrix.
     pub camera_priors: Vec<CameraPrior>,
     /// The common unknowns.
     pub commons: Vec<PlacedCommon>,
-    /// The kept block of each, unless it is known.
+    /// The retained block of each, unless it is known.
     pub common_block: Vec<Option<usize>>,
     /// How many observations and images that take part are of each.
     pub uses_of_commons: Vec<usize>,
@@ -82,7 +82,7 @@ pub struct Bundle {
     pub parts: OnceLock<Parts>,
 }
 
-/// What a kept block belongs to: indices into the network.
+/// What a retained block belongs to: indices into the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Owner {
     Photo(usize),
@@ -97,7 +97,7 @@ impl Bundle {
         start..start + self.first[self.stations()]
     }
 
-    /// Number of photos, shared cameras and common unknowns: the first kept blocks.
+    /// Number of photos, shared cameras and common unknowns: the first retained blocks.
     pub fn stations(&self) -> usize {
         self.first.len() - 1
     }
@@ -137,31 +137,31 @@ impl Bundle {
             let point = self.point_of(self.start[self.locals] + tie);
             let others = self.blocks_of_pose(image.photo).chain(self.camera_block[image.photo]);
             let blocks = std::iter::once(self.block_of_point(point)).chain(others);
-            Tie { rows: 2, kept: blocks.map(|block| block as u32).collect() }
+            Tie { rows: 2, retained: blocks.map(|block| block as u32).collect() }
         });
         let observations = self.observations.iter().map(|tied| Tie {
             rows: tied.root.nrows(),
-            kept: tied.blocks.iter().map(|&block| block as u32).collect(),
+            retained: tied.blocks.iter().map(|&block| block as u32).collect(),
         });
         images.chain(observations).collect()
     }
 
-    /// The kept block of a point that is not local.
+    /// The retained block of a point that is not local.
     fn block_of_point(&self, point: usize) -> usize {
         self.stations() + point - self.locals
     }
 
-    /// How many unknowns a kept block has.
+    /// How many unknowns a retained block has.
     fn width(&self, block: usize) -> usize {
         if block < self.stations() { self.of_block(block).len() } else { 3 }
     }
 
-    /// The further kept blocks of an image: sensor, then camera.
+    /// The shared blocks of an image: sensor, then camera.
     pub fn further(&self, image: &Image) -> impl Iterator<Item = usize> {
         self.blocks_of_pose(image.photo).skip(1).chain(self.camera_block[image.photo])
     }
 
-    /// The kept blocks of what an observation touches, each once; points as the model numbers them.
+    /// The retained blocks of what an observation touches, each once; points as the model numbers them.
     pub fn blocks_of(&self, touches: &Touches) -> Vec<usize> {
         let points = touches.points.iter().map(|&point| self.block_of_point(point));
         let photos = touches.photos.iter().flat_map(|&photo| self.blocks_of_pose(photo));
@@ -187,13 +187,14 @@ impl Bundle {
         let all = rows.coefficients.len() / 2;
         let width = self.of_block(self.carrier(self.images[image].photo)).len();
         let shared = all - 3 - width;
-        let (mut local, mut kept, mut common) = ([0.0; 6], vec![0.0; 2 * width], vec![0.0; 2 * shared]);
+        let (mut local, mut retained, mut common) = ([0.0; 6], vec![0.0; 2 * width], vec![0.0; 2 * shared]);
         let constant = &mut *rows.constant;
-        let mut apart = GroupRows { constant, local: &mut local, kept: &mut kept, common: &mut common };
+        let mut apart =
+            GroupRows { constant, local: &mut local, retained: &mut retained, shared: &mut common };
         self.observe(stations, self.point_of(image), image, &mut apart);
         for (row, together) in rows.coefficients.chunks_exact_mut(all).enumerate() {
             together[..3].copy_from_slice(&local[3 * row..][..3]);
-            together[3..3 + width].copy_from_slice(&kept[width * row..][..width]);
+            together[3..3 + width].copy_from_slice(&retained[width * row..][..width]);
             together[3 + width..].copy_from_slice(&common[shared * row..][..shared]);
         }
     }
@@ -279,7 +280,7 @@ impl Bundle {
 
     /// The cofactors of such a block.
     pub fn cofactors_of_block<'a>(&self, all: &'a Cofactors, block: usize) -> &'a [f64] {
-        &all.kept[self.squares[block]..self.squares[block + 1]]
+        &all.retained[self.squares[block]..self.squares[block + 1]]
     }
 
     /// The orientation of a photo, its pose given, with the columns of its unknowns.

@@ -3,12 +3,11 @@
 
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
-
 use super::error::{Combination, PosePart};
 use super::model::Owner;
 use super::problem::Assembled;
 use super::{Network, NetworkError};
+use crate::Threads;
 use crate::adjustment::{AdjustError, Linearized};
 use crate::geometry::{PoseNumbers, Vector3};
 
@@ -27,12 +26,11 @@ impl NetworkError {
             }
             AdjustError::Undetermined(combinations) => Self::undetermined(combinations, assembled),
             AdjustError::NotFinite => Self::NotFinite,
-            AdjustError::Interrupted => Self::Interrupted,
-            AdjustError::OutOfMemory(bytes) => Self::OutOfMemory(bytes),
+            AdjustError::Stopped(stopped) => Self::Stopped(stopped),
         }
     }
 
-    /// Combinations of kept blocks: those that move photos and cameras by these, else the points that they move.
+    /// Combinations of retained blocks: those that move photos and cameras by these, else the points that they move.
     fn undetermined(combinations: Vec<Vec<usize>>, assembled: &Assembled) -> Self {
         let model = &assembled.problem.model;
         let stations = model.stations();
@@ -67,16 +65,16 @@ impl Network {
         mut error: NetworkError,
         assembled: &Assembled,
         values: &[f64],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> NetworkError {
         let NetworkError::Undetermined(combinations) = &mut error else { return error };
         if self.cameras.iter().all(super::Camera::is_held) || self.poses == PoseNumbers::Vectors {
             return error;
         }
         let problem = &assembled.problem;
-        let held = problem.to_hold(values, pool);
+        let held = problem.to_hold(values, threads);
         let between = &mut |_| ControlFlow::Continue(());
-        let Ok(linearized) = Linearized::form(problem, None, values.to_vec(), held, pool, between) else {
+        let Ok(linearized) = Linearized::form(problem, None, values.to_vec(), held, threads, between) else {
             return error;
         };
         let named = linearized.combinations(problem.layout());

@@ -4,12 +4,11 @@
 //! the order of elimination is at home here, all their images, and the observations at home likewise. See
 //! [`crate::adjustment::Linearized::of_part`] for what is done with it.
 
-use rayon::ThreadPool;
-
 use super::problem::Assembled;
 use super::solution::{observations, of_photo, sums_of_squares};
 use super::surroundings::{BlockOf, Surroundings};
 use super::{Dropped, Image, Network, NetworkError, Options, Point, Solution, SumsOfSquares};
+use crate::Threads;
 use crate::adjustment::{Adjustment, Counts, Linearized, Model, PartError, Watch};
 use crate::normals::{Contribution, Operations, packed};
 
@@ -67,17 +66,17 @@ impl Network {
     pub fn held_for_datum(
         &self,
         options: &Options,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Vec<(usize, usize)>, NetworkError> {
         self.check()?;
         let left_out = self.left_out(self.untouched_photos(), None)?;
-        let selected = pool.install(|| self.select(&left_out, Surroundings::default()));
+        let selected = threads.install(|| self.select(&left_out, Surroundings::default()));
         if self.is_placed(&selected) {
             return Ok(vec![]);
         }
-        let assembled = pool.install(|| self.assemble(options, selected, None))?;
+        let assembled = threads.install(|| self.assemble(options, selected, None))?;
         let problem = &assembled.problem;
-        let held = problem.to_hold(&problem.initial, pool);
+        let held = problem.to_hold(&problem.initial, threads);
         Ok(held.iter().filter_map(|&unknown| of_photo(problem, unknown)).collect())
     }
 
@@ -89,7 +88,7 @@ impl Network {
         &self,
         options: &Options,
         surroundings: Surroundings,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Node, NetworkError> {
         self.check()?;
         self.check_blocks(&surroundings)?;
@@ -100,8 +99,8 @@ impl Network {
         network.release(&surroundings.outer);
         let in_photos = surroundings.held.clone();
         let none = self.left_out(vec![false; self.photos.len()], None)?;
-        let selected = pool.install(|| network.select(&none, surroundings));
-        let assembled = pool.install(|| network.assemble(options, selected, None))?;
+        let selected = threads.install(|| network.select(&none, surroundings));
+        let assembled = threads.install(|| network.assemble(options, selected, None))?;
         assembled.check_memory(options)?;
         let layout = assembled.problem.layout();
         let outer = layout.unknowns_of(layout.outer()).collect();
@@ -186,7 +185,7 @@ impl Node {
         let handed = packed(outer) + self.below.iter().map(|own| packed(own.len())).sum::<usize>();
         NodePrediction {
             points: layout.all_locals().len(),
-            interior: layout.all_kept().len() - outer,
+            interior: layout.all_retained().len() - outer,
             outer,
             images: self.assembled.problem.model.images.len(),
             observations: layout.equations(),
@@ -227,12 +226,12 @@ impl Node {
     ///
     /// # Errors
     /// A state of another length.
-    pub fn relocate(&self, state: &[f64], pool: &ThreadPool) -> Result<Vec<f64>, NetworkError> {
+    pub fn relocate(&self, state: &[f64], threads: &Threads) -> Result<Vec<f64>, NetworkError> {
         self.check(&[state])?;
         let (model, mut moved) = (&self.assembled.problem.model, state.to_vec());
-        if pool.install(|| model.relocate(&mut moved)) {
-            let kept = 3 * model.locals;
-            moved[kept..].copy_from_slice(&state[kept..]);
+        if threads.install(|| model.relocate(&mut moved)) {
+            let retained = 3 * model.locals;
+            moved[retained..].copy_from_slice(&state[retained..]);
         }
         Ok(moved)
     }
@@ -241,10 +240,10 @@ impl Node {
     ///
     /// # Errors
     /// A state of another length.
-    pub fn objective(&self, state: &[f64], pool: &ThreadPool) -> Result<SumsOfSquares, NetworkError> {
+    pub fn objective(&self, state: &[f64], threads: &Threads) -> Result<SumsOfSquares, NetworkError> {
         self.check(&[state])?;
         let problem = &self.assembled.problem;
-        let reached = Adjustment::between(problem, &self.held, state, state.to_vec(), pool);
+        let reached = Adjustment::between(problem, &self.held, state, state.to_vec(), threads);
         let observed = observations(&self.network, problem, &reached);
         Ok(sums_of_squares(problem, &reached, state, &observed))
     }
@@ -258,13 +257,13 @@ impl Node {
         state: &[f64],
         contributions: &[Contribution<'_>],
         damping: f64,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<FormedNode, NetworkError> {
         self.check(&[state])?;
         let problem = &self.assembled.problem;
         let (state, held) = (state.to_vec(), self.held.clone());
-        let part = Linearized::of_part(problem, state, held, contributions, damping, pool, watch);
+        let part = Linearized::of_part(problem, state, held, contributions, damping, threads, watch);
         Ok(FormedNode { part: part.map_err(|error| self.named(error))? })
     }
 
@@ -281,10 +280,13 @@ impl Node {
         &self,
         formed: &FormedNode,
         outer: &[f64],
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
-        formed.part.solve_part(&self.assembled.problem, outer, pool, watch).map_err(|error| self.named(error))
+        formed
+            .part
+            .solve_part(&self.assembled.problem, outer, threads, watch)
+            .map_err(|error| self.named(error))
     }
 
     /// What is adjusted here, with its cofactors, and the cofactors that each node below needs for its own: lower triangles, column by column.
@@ -299,14 +301,14 @@ impl Node {
         formed: FormedNode,
         outer: &[f64],
         state: &[f64],
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<(Solution, Vec<Vec<f64>>), NetworkError> {
         self.check(&[state])?;
         let problem = &self.assembled.problem;
-        let found = formed.part.invert_part(problem, outer, state.to_vec(), pool, watch);
+        let found = formed.part.invert_part(problem, outer, state.to_vec(), threads, watch);
         let (adjustment, below) = found.map_err(|error| self.named(error))?;
-        Ok((self.told(adjustment, pool), below))
+        Ok((self.solution_of(adjustment, threads), below))
     }
 
     /// What is adjusted here, without cofactors; `before` is the state before the last step.
@@ -317,17 +319,17 @@ impl Node {
         &self,
         state: &[f64],
         before: &[f64],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Solution, NetworkError> {
         self.check(&[state, before])?;
         let problem = &self.assembled.problem;
-        let adjustment = Adjustment::between(problem, &self.held, before, state.to_vec(), pool);
-        Ok(self.told(adjustment, pool))
+        let adjustment = Adjustment::between(problem, &self.held, before, state.to_vec(), threads);
+        Ok(self.solution_of(adjustment, threads))
     }
 
-    fn told(&self, adjustment: Adjustment, pool: &ThreadPool) -> Solution {
+    fn solution_of(&self, adjustment: Adjustment, threads: &Threads) -> Solution {
         let make = || Solution::new(&self.network, &self.options, &self.assembled, adjustment, vec![]);
-        pool.install(make)
+        threads.install(make)
     }
 
     fn check(&self, states: &[&[f64]]) -> Result<(), NetworkError> {

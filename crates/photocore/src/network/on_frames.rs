@@ -19,7 +19,7 @@ impl Bundle {
         self.mount(photo).map_or(photo, |mount| mount.frame)
     }
 
-    /// The kept blocks that the pose of a photo is made of: its own, or those of its frame and of its sensor unless that is known.
+    /// The retained blocks that the pose of a photo is made of: its own, or those of its frame and of its sensor unless that is known.
     pub(super) fn blocks_of_pose(&self, photo: usize) -> impl Iterator<Item = usize> {
         let sensor = self.mount(photo).and_then(|mount| self.common_block[mount.sensor]);
         std::iter::once(self.carrier(photo)).chain(sensor)
@@ -42,7 +42,7 @@ impl Bundle {
         (numbers, by_step.map(|by_step| by_step * orientation.step_matrix()))
     }
 
-    /// The pairs of kept blocks whose cofactors those of the poses of mounted photos need.
+    /// The pairs of retained blocks whose cofactors those of the poses of mounted photos need.
     pub(super) fn pairs(&self) -> Vec<[u32; 2]> {
         let pair = |photo: usize| {
             let mut blocks = self.blocks_of_pose(photo).map(|block| block as u32);

@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
-use rayon::ThreadPool;
 
 use super::NetworkError;
 use super::group_tests::{in_units, sub};
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
+use crate::Threads;
 use crate::adjustment::{Leverages, Terms, TieCofactors};
 use crate::normals::{LocalCofactors, dot};
 
@@ -51,11 +51,11 @@ impl Trial {
     pub fn predictions(
         &self,
         suspects: &[usize],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Vec<Option<Prediction>>, NetworkError> {
         let found = self.found()?;
         let problem = &self.assembled.problem;
-        let around = self.around(suspects, &self.observation_sd, found, pool);
+        let around = self.around(suspects, &self.observation_sd, found, threads);
         let terms = self.terms(&self.sd, &found.values);
         let predict = |&index: &usize| {
             let suspect = &self.suspects[index];
@@ -64,7 +64,7 @@ impl Trial {
             if out.is_empty() || self.is_gone(suspect) {
                 return None;
             }
-            let shares = match suspect.home {
+            let leverages = match suspect.home {
                 Home::Group { group, point } => {
                     let own = around.points.get(&point)?;
                     let first = 2 * (group - problem.layout().groups_of(point).start);
@@ -74,11 +74,11 @@ impl Trial {
                 Home::Tie(tie) => sub(&around.ties.get(&tie)?.equations, suspect.rows.len(), &out),
                 Home::Point(_) | Home::Block(_) => {
                     let rows = self.term_rows(suspect, &out, &terms);
-                    let shares = &rows * self.cofactors_at(found, suspect.home) * rows.transpose();
-                    shares.transpose().as_slice().to_vec()
+                    let leverages = &rows * self.cofactors_at(found, suspect.home) * rows.transpose();
+                    leverages.transpose().as_slice().to_vec()
                 }
             };
-            self.prediction(suspect, &out, &shares, found, &terms)
+            self.prediction(suspect, &out, &leverages, found, &terms)
         };
         Ok(suspects.iter().map(predict).collect())
     }
@@ -89,7 +89,7 @@ impl Trial {
         suspects: &[usize],
         observation_sd: &[f64],
         found: &Leverages,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Around {
         let problem = &self.assembled.problem;
         let (mut places, mut ties) = (vec![], vec![]);
@@ -102,8 +102,8 @@ impl Trial {
         }
         places.sort_unstable();
         places.dedup();
-        let of_points = found.of_locals(problem, observation_sd, &places, |_| vec![], pool);
-        let of_ties = found.of_ties(problem, observation_sd, &ties, pool);
+        let of_points = found.of_locals(problem, observation_sd, &places, |_| vec![], threads);
+        let of_ties = found.of_ties(problem, observation_sd, &ties, threads);
         Around {
             points: places.into_iter().zip(of_points).collect(),
             ties: ties.into_iter().zip(of_ties).collect(),
@@ -114,12 +114,12 @@ impl Trial {
         &self,
         suspect: &Suspect,
         out: &[usize],
-        shares: &[f64],
+        leverages: &[f64],
         found: &Leverages,
         terms: &Terms<'_>,
     ) -> Option<Prediction> {
         let count = out.len();
-        let c = DMatrix::identity(count, count) + DMatrix::from_row_slice(count, count, shares);
+        let c = DMatrix::identity(count, count) + DMatrix::from_row_slice(count, count, leverages);
         let residual = |&k: &usize| match suspect.rows[k].0 {
             Row::Equation(equation) => found.residuals[equation] / self.observation_sd[equation],
             Row::Unknown(unknown) => terms.row(unknown).1,
@@ -153,21 +153,22 @@ impl Trial {
     ///
     /// # Errors
     /// Nothing was adjusted before.
-    pub fn on_points(&self, points: &[usize], pool: &ThreadPool) -> Result<Vec<OnPoint>, NetworkError> {
+    pub fn on_points(&self, points: &[usize], threads: &Threads) -> Result<Vec<OnPoint>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let (observation_sd, sd) = (&problem.observation_sd[..], &problem.sd[..]);
         let terms = self.terms(sd, &found.values);
         let further = |place: usize| self.further(place, &terms);
         let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
-        let cofactors = found.of_locals(problem, observation_sd, &places, further, pool);
+        let cofactors = found.of_locals(problem, observation_sd, &places, further, threads);
         let mut found_at = places.iter().zip(cofactors);
         let of = |&point: &usize| {
             let known = self.local(point).and_then(|_| found_at.next());
             known.map_or_else(OnPoint::default, |(&place, own)| {
                 let (rows, residual) = self.rows_at(place, observation_sd, found, &terms);
-                let (count, shares) = (rows.len(), sub(&own.equations, own.rows(), &rows));
+                let (count, leverages) = (rows.len(), sub(&own.equations, own.rows(), &rows));
                 let identity = |k: usize| f64::from(u8::from(k / count == k % count));
-                let cofactors = shares.iter().enumerate().map(|(k, share)| identity(k) - share).collect();
+                let cofactors =
+                    leverages.iter().enumerate().map(|(k, leverage)| identity(k) - leverage).collect();
                 OnPoint { suspects: self.on_place[place].clone(), residual, cofactors }
             })
         };
@@ -179,13 +180,13 @@ impl Trial {
     ///
     /// # Errors
     /// Nothing was adjusted before.
-    pub fn on_gone_points(&self, points: &[usize], pool: &ThreadPool) -> Result<Vec<OnPoint>, NetworkError> {
+    pub fn on_gone_points(&self, points: &[usize], threads: &Threads) -> Result<Vec<OnPoint>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let given = (&self.observation_sd[..], &self.sd[..]);
         let terms = self.terms(&self.sd, &found.values);
         let further = |place: usize| self.further(place, &terms);
         let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
-        let cofactors = found.of_gone(problem, given, &places, further, pool);
+        let cofactors = found.of_gone(problem, given, &places, further, threads);
         let mut found_at = places.iter().zip(cofactors);
         let of = |&point: &usize| {
             let known = self.local(point).and_then(|_| found_at.next()).filter(|(_, own)| !own.is_empty());

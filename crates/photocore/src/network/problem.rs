@@ -1,10 +1,9 @@
-//! The least-squares problem of a network: points are local blocks of three, photos kept blocks of six and their own cameras', cameras
-//! that several photos share and common unknowns blocks of their own; points that observations touch are kept blocks of three.
+//! The least-squares problem of a network: points are local blocks of three, photos retained blocks of six and their own cameras', cameras
+//! that several photos share and common unknowns blocks of their own; points that observations touch are retained blocks of three.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::camera_priors::CameraPrior;
@@ -18,6 +17,7 @@ use super::state::State;
 use super::stations::Station;
 use super::surroundings::Surroundings;
 use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Screens, Start};
+use crate::Threads;
 use crate::adjustment::{Method, Model, Problem};
 use crate::geometry::{Matrix3, ObjectSpace, PoseNumbers, Refraction, local_vertical};
 use crate::normals::{System, TieRows};
@@ -104,13 +104,13 @@ impl Network {
         options: &Options,
         left_out: &LeftOut,
         reached: Option<&Reached>,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Assembled, NetworkError> {
-        let selected = pool.install(|| self.select(left_out, Surroundings::default()));
+        let selected = threads.install(|| self.select(left_out, Surroundings::default()));
         if selected.points.is_empty() {
             return Err(NetworkError::Empty);
         }
-        let assembled = pool.install(|| self.assemble(options, selected, reached))?;
+        let assembled = threads.install(|| self.assemble(options, selected, reached))?;
         assembled.check_memory(options)?;
         Ok(assembled)
     }
@@ -120,7 +120,7 @@ impl Network {
         &self,
         options: &Options,
         state: &State,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Assembled, NetworkError> {
         self.check()?;
         let options = Options { ordering: state.ordering, ..*options };
@@ -128,7 +128,7 @@ impl Network {
             &options,
             &self.left_out(vec![false; self.photos.len()], Some(state))?,
             None,
-            pool,
+            threads,
         )?;
         let count = assembled.problem.layout().unknowns();
         if state.unknowns.len() != count || state.held.iter().any(|&unknown| unknown >= count) {

@@ -4,13 +4,13 @@
 use std::ops::ControlFlow;
 
 use nalgebra::{DMatrix, Vector3};
-use rayon::ThreadPool;
 
 use super::NetworkError;
 use super::covariance::{Covariances, Of};
 use super::model::Owner;
 use super::suspects::{Home, Row};
 use super::trial::Trial;
+use crate::Threads;
 use crate::adjustment::{AdjustError, Linearized, ObservationRows};
 use crate::geometry::{AttitudeNumbers, Matrix3};
 
@@ -49,15 +49,15 @@ impl Trial {
     ///
     /// # Errors
     /// Nothing was adjusted before; an interruption, no memory.
-    pub fn responses(&self, suspects: &[usize], pool: &ThreadPool) -> Result<Vec<f64>, NetworkError> {
+    pub fn responses(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<f64>, NetworkError> {
         let all = self.rows_of(0..self.suspects.len());
         let asked: Vec<usize> =
             suspects.iter().flat_map(|&index| self.row_starts[index]..self.row_starts[index + 1]).collect();
         let mut columns = Vec::with_capacity(all.len() * asked.len());
         let rows: Vec<usize> = asked.iter().map(|&row| all[row]).collect();
-        self.solutions(&rows, pool, |index, solution, equations| {
+        self.solutions(&rows, threads, |index, solution, equations| {
             let first = columns.len();
-            columns.extend(equations.times(&all, solution, pool).into_iter().map(|share| -share));
+            columns.extend(equations.times(&all, solution, threads).into_iter().map(|share| -share));
             columns[first + asked[index]] += 1.0;
         })?;
         Ok(columns)
@@ -67,12 +67,12 @@ impl Trial {
     ///
     /// # Errors
     /// Those of [`Trial::responses`].
-    pub fn most_moved(&self, suspects: &[usize], pool: &ThreadPool) -> Result<Vec<Moved>, NetworkError> {
+    pub fn most_moved(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<Moved>, NetworkError> {
         let rows: Vec<usize> = suspects.iter().flat_map(|&index| self.rows_of(index..index + 1)).collect();
         let turns = self.turns()?;
         let sd = self.unknown_sd(&turns)?;
         let mut found = Vec::with_capacity(rows.len());
-        self.solutions(&rows, pool, |_, solution, _| {
+        self.solutions(&rows, threads, |_, solution, _| {
             let mut moved = solution.to_vec();
             turns.iter().for_each(|(first, turn)| turned(&mut moved[*first..first + 3], turn));
             let ratio = |unknown: usize| {
@@ -98,15 +98,15 @@ impl Trial {
         covariances: &Covariances,
         partials: &[f64],
         of: &[Of],
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Vec<f64>, NetworkError> {
         let found = self.found()?;
         let problem = &self.assembled.problem;
-        let rows = ObservationRows::new(problem, &found.values, &found.held, pool);
+        let rows = ObservationRows::new(problem, &found.values, &found.held, threads);
         let all = self.rows_of(0..self.suspects.len());
         let mut influences = Vec::new();
-        for solution in covariances.solutions(partials, of, pool)? {
-            influences.extend(rows.times(&all, &solution, pool));
+        for solution in covariances.solutions(partials, of, threads)? {
+            influences.extend(rows.times(&all, &solution, threads));
         }
         Ok(influences)
     }
@@ -115,19 +115,19 @@ impl Trial {
     fn solutions(
         &self,
         of: &[usize],
-        pool: &ThreadPool,
+        threads: &Threads,
         mut take: impl FnMut(usize, &[f64], &ObservationRows),
     ) -> Result<(), NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let go_on = &mut |_| ControlFlow::Continue(());
         let failed = |error: AdjustError| NetworkError::new(error, &self.assembled);
         let (values, held) = (found.values.clone(), found.held.clone());
-        let linearized = Linearized::form(problem, None, values, held, pool, go_on).map_err(failed)?;
-        let equations = ObservationRows::new(problem, &found.values, &found.held, pool);
+        let linearized = Linearized::form(problem, None, values, held, threads, go_on).map_err(failed)?;
+        let equations = ObservationRows::new(problem, &found.values, &found.held, threads);
         let unknowns = problem.layout().unknowns();
         for (batch, some) in of.chunks(TOGETHER).enumerate() {
             let rights: Vec<f64> = some.iter().flat_map(|&row| equations.right(row, unknowns)).collect();
-            let solutions = linearized.solve_for(problem, &rights, pool, go_on).map_err(failed)?;
+            let solutions = linearized.solve_for(problem, &rights, threads, go_on).map_err(failed)?;
             for (i, solution) in solutions.chunks_exact(unknowns).enumerate() {
                 take(batch * TOGETHER + i, solution, &equations);
             }
@@ -183,14 +183,14 @@ impl Trial {
     fn unknown(&self, unknown: usize) -> (UnknownOf, usize) {
         let (model, points) = (&self.assembled.problem.model, &self.assembled.points);
         let stations = model.of_stations();
-        if let Some(kept) = stations.contains(&unknown).then(|| unknown - stations.start) {
-            let block = model.first.partition_point(|&start| start <= kept) - 1;
+        if let Some(retained) = stations.contains(&unknown).then(|| unknown - stations.start) {
+            let block = model.first.partition_point(|&start| start <= retained) - 1;
             let of = match model.owner(block) {
                 Owner::Photo(photo) => UnknownOf::Photo(photo),
                 Owner::Camera(camera) => UnknownOf::Camera(camera),
                 Owner::Common(common) => UnknownOf::Common(common),
             };
-            return (of, kept - model.first[block]);
+            return (of, retained - model.first[block]);
         }
         let among = if unknown < stations.start { unknown } else { unknown - stations.len() };
         (UnknownOf::Point(points[among / 3]), among % 3)

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use nalgebra::DMatrix;
+
 use super::adjusted::{adjusted_photos, adjusted_points, in_order};
 use super::model::{Bundle, Owner};
 use super::problem::Assembled;
@@ -10,6 +12,7 @@ use super::{
     KindSums, Network, NetworkError, Options, State, UnitVariance, WeakPoint,
 };
 use crate::adjustment::{Adjustment, Leverages, Observed, Problem};
+use crate::geometry::Matrix3;
 
 /// A redundancy of less is rounding.
 const LEAST_REDUNDANCY: f64 = 1e-9;
@@ -122,7 +125,18 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Puts the pieces of an adjustment back into the order of the network. Called on a thread of the pool.
+    /// The covariance matrix of a point's coordinates: its cofactors times the variance of unit weight. None where it was left out, or where
+    /// there are no degrees of freedom.
+    pub fn covariance_of_point(&self, point: usize) -> Option<Matrix3> {
+        Some(self.points.get(point)?.as_ref()?.cofactors * self.variance_of_unit_weight?)
+    }
+
+    /// The same of the unknowns of a photo: its pose and, unless it is held or shared, its camera.
+    pub fn covariance_of_photo(&self, photo: usize) -> Option<DMatrix<f64>> {
+        Some(&self.photos.get(photo)?.cofactors * self.variance_of_unit_weight?)
+    }
+
+    /// Puts the pieces of an adjustment back into the order of the network. Called on a thread of the threads.
     pub(super) fn new(
         network: &Network,
         options: &Options,
@@ -130,11 +144,11 @@ impl Solution {
         adjustment: Adjustment,
         collapsed: Vec<usize>,
     ) -> Self {
-        Self::with_tried(network, options, assembled, adjustment, collapsed).0
+        Self::with_leverages(network, options, assembled, adjustment, collapsed).0
     }
 
     /// The same, with what tests of groups need where the adjustment has kept that.
-    pub(super) fn with_tried(
+    pub(super) fn with_leverages(
         network: &Network,
         options: &Options,
         assembled: &Assembled,
@@ -238,9 +252,9 @@ fn of_common(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)
 /// What an unknown belongs to, and its number there; None for unknowns of points.
 fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(Owner, usize)> {
     let all = model.of_stations();
-    let kept = all.contains(&unknown).then(|| unknown - all.start)?;
-    let block = model.first.partition_point(|&start| start <= kept) - 1;
-    Some((model.owner(block), kept - model.first[block]))
+    let retained = all.contains(&unknown).then(|| unknown - all.start)?;
+    let block = model.first.partition_point(|&start| start <= retained) - 1;
+    Some((model.owner(block), retained - model.first[block]))
 }
 
 /// The observations beside images.

@@ -92,17 +92,17 @@ impl Mounted {
     /// Writes an image of its photo: `write` does so as if the photo had six unknowns of its own. They are those of the frame, the main
     /// block, and of the sensor, the first of what is common with others where it is as wide as there is room besides the camera.
     fn write(&self, rows: &mut GroupRows<'_>, write: impl FnOnce(&mut GroupRows<'_>)) {
-        let (width, common) = (rows.kept.len() / 2, rows.common.len() / 2);
+        let (width, common) = (rows.retained.len() / 2, rows.shared.len() / 2);
         let sensor = if self.sensor_is_unknown { 6 } else { 0 };
         let (mut pose, mut camera) = ([0.0; 12], vec![0.0; 2 * (common - sensor)]);
         let (constant, local) = (&mut *rows.constant, &mut *rows.local);
-        write(&mut GroupRows { constant, local, kept: &mut pose, common: &mut camera });
+        write(&mut GroupRows { constant, local, retained: &mut pose, shared: &mut camera });
         let pose = Matrix2x6::from_row_slice(&pose);
         let (by_frame, by_sensor) = (pose * self.by_frame, pose * self.by_sensor);
-        rows.kept.fill(0.0);
+        rows.retained.fill(0.0);
         for row in 0..2 {
-            (0..6).for_each(|k| rows.kept[width * row + k] = by_frame[(row, k)]);
-            let own = &mut rows.common[common * row..][..common];
+            (0..6).for_each(|k| rows.retained[width * row + k] = by_frame[(row, k)]);
+            let own = &mut rows.shared[common * row..][..common];
             (0..sensor).for_each(|k| own[k] = by_sensor[(row, k)]);
             own[sensor..].copy_from_slice(&camera[(common - sensor) * row..][..common - sensor]);
         }
@@ -148,18 +148,18 @@ fn write<C: CameraModel>(
     let u = orientation.sight(point);
     let (residual, computed) = camera.compare(&u, image.xy);
     let projection = orientation.projection(&u, &computed, point);
-    let (width, shared) = (rows.kept.len() / 2, rows.common.len() / 2);
+    let (width, shared) = (rows.retained.len() / 2, rows.shared.len() / 2);
     for row in 0..2 {
         rows.constant[row] = residual[row];
         rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
-        rows.kept[width * row..][..6].copy_from_slice(&projection.photo[row]);
+        rows.retained[width * row..][..6].copy_from_slice(&projection.photo[row]);
         // As many as the camera has, which is known where this is compiled.
         let camera = projection.camera[row].as_ref();
         if width > 6 {
-            rows.kept[width * row + 6..][..camera.len()].copy_from_slice(camera);
+            rows.retained[width * row + 6..][..camera.len()].copy_from_slice(camera);
         }
         if shared > 0 {
-            rows.common[shared * row..][..camera.len()].copy_from_slice(camera);
+            rows.shared[shared * row..][..camera.len()].copy_from_slice(camera);
         }
     }
 }

@@ -45,7 +45,7 @@ pub(super) enum Home {
     Tie(usize),
     /// The unknowns of a point, as the model numbers them.
     Point(usize),
-    /// Those of a photo, camera or common unknown: its kept block.
+    /// Those of a photo, camera or common unknown: its retained block.
     Block(usize),
 }
 

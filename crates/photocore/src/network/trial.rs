@@ -1,12 +1,12 @@
 //! A network tried without some of its observations: adjusted again and again, the symbolic analysis done once.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::ThreadPool;
 
 use super::problem::Assembled;
 use super::state::State;
 use super::suspects::{Home, Row, Subject, Suspect};
 use super::{Network, NetworkError, Options};
+use crate::Threads;
 use crate::adjustment::{self, AdjustError, Leverages, Loss, Method, Status, Stop, Terms, Watch};
 use crate::geometry::PoseNumbers;
 
@@ -96,17 +96,17 @@ impl Network {
         &self,
         options: &Options,
         state: Option<&State>,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Trial, NetworkError> {
         let assembled = match state {
             Some(state) => {
-                let mut assembled = self.assembled_again(options, state, pool)?;
+                let mut assembled = self.assembled_again(options, state, threads)?;
                 assembled.problem.initial.clone_from(&state.unknowns);
                 assembled
             }
             None => {
                 self.check()?;
-                self.assembled(options, &self.left_out(self.untouched_photos(), None)?, None, pool)?
+                self.assembled(options, &self.left_out(self.untouched_photos(), None)?, None, threads)?
             }
         };
         let held = state.map_or(vec![], |state| state.held.clone());
@@ -184,13 +184,13 @@ impl Trial {
     ///
     /// # Errors
     /// Values that leave unknowns undetermined; an interruption, no memory.
-    pub fn stand(&mut self, pool: &ThreadPool, watch: Watch<'_>) -> Result<Outcome, NetworkError> {
+    pub fn stand(&mut self, threads: &Threads, watch: Watch<'_>) -> Result<Outcome, NetworkError> {
         let found = match self.found.take_if(|_| self.stands) {
             Some(found) => found,
             None => {
                 self.take_out(Out::default());
                 let problem = &self.assembled.problem;
-                Leverages::at(problem, problem.initial.clone(), self.held.clone(), pool, watch)
+                Leverages::at(problem, problem.initial.clone(), self.held.clone(), threads, watch)
                     .map_err(|error| NetworkError::new(error, &self.assembled))?
             }
         };
@@ -207,7 +207,7 @@ impl Trial {
         &mut self,
         out: Out<'_>,
         tolerance: Option<f64>,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Outcome, NetworkError> {
         self.stands = false;
@@ -215,7 +215,7 @@ impl Trial {
         let method = self.method(tolerance);
         let options = adjustment::Options { method, covariance: true, loss: None, ..self.options };
         let failed = |error| NetworkError::new(error, &self.assembled);
-        let adjusted = adjustment::adjust_by_groups(&self.assembled.problem, &options, pool, watch);
+        let adjusted = adjustment::adjust_by_groups(&self.assembled.problem, &options, threads, watch);
         let mut adjusted = adjusted.map_err(failed)?;
         let values = std::mem::take(&mut adjusted.unknowns);
         let Some(found) = Leverages::of(&mut adjusted, &values) else {
@@ -234,7 +234,7 @@ impl Trial {
         &mut self,
         loss: Loss,
         iterations: usize,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Option<Vec<f64>>, NetworkError> {
         let options = adjustment::Options {
@@ -245,7 +245,7 @@ impl Trial {
         };
         self.stands = false;
         let problem = &self.assembled.problem;
-        let found = adjustment::adjust(problem, &options, pool, watch)
+        let found = adjustment::adjust(problem, &options, threads, watch)
             .map_err(|error| NetworkError::new(error, &self.assembled))?;
         if found.status == Status::Diverged {
             return Ok(None);

@@ -52,7 +52,7 @@ impl Network {
 
     /// The cofactors of a point in the length unit, whatever its coordinates are.
     fn cartesian_cofactors(&self, point: &AdjustedPoint) -> Matrix3 {
-        let own = Matrix3::from(point.cofactors);
+        let own = point.cofactors;
         if self.space == geometry::ObjectSpace::Rectangular {
             return own;
         }

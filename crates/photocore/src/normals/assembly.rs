@@ -1,12 +1,12 @@
-//! What goes into the front of a supernode: the local blocks at home there, ties, what systems below have left, priors.
+//! What goes into the front of a supernode: the local blocks assembled there, ties, what systems below have left, priors.
 
 use rayon::prelude::*;
 
+use super::batch::{Batch, Gathered};
 use super::equations::Prior;
 use super::front::Front;
-use super::incidence::Stacks;
+use super::incidence::Batches;
 use super::panels::Handover;
-use super::stack::{Gathered, Stack};
 use super::system::System;
 use super::tie_equations::TieEquations;
 use super::vectorised::LANES;
@@ -36,11 +36,11 @@ pub(super) struct Sums {
 
 /// Local blocks at one supernode from which on several threads work at them.
 const MANY: usize = 256;
-/// Stacks gathered by several threads before they are added to the front.
+/// Batches gathered by several threads before they are added to the front.
 const WAVE: usize = 64;
 
 impl Formation<'_> {
-    /// Adds what the local blocks at home in a supernode leave, in their order; None without memory.
+    /// Adds what the local blocks assembled in a supernode leave, in their order; None without memory.
     pub(super) fn assemble(
         &self,
         front: &mut Front<'_>,
@@ -49,7 +49,7 @@ impl Formation<'_> {
     ) -> Option<Sums> {
         let Self { system, control, .. } = self;
         let layout = &system.layout;
-        let stacks = system.incidence.stacks_at(index);
+        let batches = system.incidence.batches_at(index);
         let mut sums = Sums::default();
         if self.caches {
             sums.cached = cached.take(index).unwrap_or_default();
@@ -58,60 +58,60 @@ impl Formation<'_> {
                 sums.cached = control.allocated(reserved(numbers))?;
             }
         }
-        if stacks.locals() < MANY || rayon::current_num_threads() == 1 {
-            self.assemble_in_turn(front, stacks, &mut sums);
+        if batches.locals() < MANY || rayon::current_num_threads() == 1 {
+            self.assemble_in_turn(front, batches, &mut sums);
             return Some(sums);
         }
         sums.cached.clear();
-        let mut filled: Vec<Stack> = (0..WAVE).map(|_| system.workspace.stack()).collect();
+        let mut filled: Vec<Batch> = (0..WAVE).map(|_| system.workspace.batch()).collect();
         let starts = self.shares(index);
-        for wave in stacks.parts(WAVE).into_iter().take_while(|_| !control.stopped()) {
+        for wave in batches.parts(WAVE).into_iter().take_while(|_| !control.stopped()) {
             let runs: Vec<&[u32]> = wave.iter().collect();
             let filled = &mut filled[..runs.len()];
-            filled.par_iter_mut().zip(runs).for_each(|(stack, run)| self.fill(stack, run));
+            filled.par_iter_mut().zip(runs).for_each(|(batch, run)| self.fill(batch, run));
             front.parts(&starts).into_par_iter().for_each(|mut columns| {
-                for stack in &*filled {
-                    stack.add_to(&mut columns, layout);
+                for batch in &*filled {
+                    batch.add_to(&mut columns, layout);
                 }
             });
-            for stack in filled {
-                sums.add(stack);
+            for batch in filled {
+                sums.add(batch);
                 if self.caches {
-                    stack.cache(layout, &mut sums.cached);
+                    batch.cache(layout, &mut sums.cached);
                 }
             }
         }
-        filled.into_iter().for_each(|stack| system.workspace.put_back_stack(stack));
+        filled.into_iter().for_each(|batch| system.workspace.put_back_batch(batch));
         // Products read beyond the end.
         sums.cached.resize(sums.cached.len() + LANES, 0.0);
         Some(sums)
     }
 
-    /// The same stack by stack: what is cached of them is written where it stays.
-    fn assemble_in_turn(&self, front: &mut Front<'_>, stacks: Stacks<'_>, sums: &mut Sums) {
+    /// The same batch by batch: what is cached of them is written where it stays.
+    fn assemble_in_turn(&self, front: &mut Front<'_>, batches: Batches<'_>, sums: &mut Sums) {
         let layout = &self.system.layout;
-        let mut stack = self.system.workspace.stack();
+        let mut batch = self.system.workspace.batch();
         if self.caches {
-            std::mem::swap(&mut stack.coupling, &mut sums.cached);
+            std::mem::swap(&mut batch.coupling, &mut sums.cached);
         }
-        for run in stacks.iter().take_while(|_| !self.control.stopped()) {
-            self.fill(&mut stack, run);
-            stack.add_to(&mut front.columns(), layout);
-            sums.add(&mut stack);
+        for run in batches.iter().take_while(|_| !self.control.stopped()) {
+            self.fill(&mut batch, run);
+            batch.add_to(&mut front.columns(), layout);
+            sums.add(&mut batch);
             if self.caches {
-                stack.cache_in_place(layout);
+                batch.cache_in_place(layout);
             }
         }
         if self.caches {
-            std::mem::swap(&mut stack.coupling, &mut sums.cached);
-            stack.start = 0;
+            std::mem::swap(&mut batch.coupling, &mut sums.cached);
+            batch.start = 0;
         }
-        self.system.workspace.put_back_stack(stack);
+        self.system.workspace.put_back_batch(batch);
     }
 
-    fn fill(&self, stack: &mut Stack, run: &[u32]) {
-        self.equations.gather(stack, self.system, run);
-        stack.eliminate(&self.system.layout, self.prior, self.damping);
+    fn fill(&self, batch: &mut Batch, run: &[u32]) {
+        self.equations.gather(batch, self.system, run);
+        batch.eliminate(&self.system.layout, self.prior, self.damping);
         self.control.count(run.len());
     }
 
@@ -126,7 +126,7 @@ impl Formation<'_> {
         starts.into_iter().step_by(few).collect()
     }
 
-    /// Adds the ties at home in a supernode; returns the sum of squares of their right-hand sides.
+    /// Adds the ties assembled in a supernode; returns the sum of squares of their right-hand sides.
     pub(super) fn add_ties(&self, front: &mut Front<'_>, index: usize) -> f64 {
         let mut sum_of_squares = 0.0;
         let mut tie = TieEquations::default();
@@ -171,9 +171,9 @@ impl Formation<'_> {
 }
 
 impl Sums {
-    fn add(&mut self, stack: &mut Stack) {
-        self.sum_of_squares += stack.sum_of_squares;
-        self.decrease += stack.decrease;
-        self.deficient.append(&mut stack.deficient);
+    fn add(&mut self, batch: &mut Batch) {
+        self.sum_of_squares += batch.sum_of_squares;
+        self.decrease += batch.decrease;
+        self.deficient.append(&mut batch.deficient);
     }
 }

@@ -2,16 +2,16 @@
 
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::batch::Gathered;
 use super::eliminated::Reduced;
 use super::equations::{Equations, Prior, TieRows};
 use super::factor::Factor;
-use super::stack::Gathered;
 use super::system::System;
 use super::vectorised::dot;
-use super::watch::{Between, Control, Stopped, watched};
+use super::watch::{Between, Control, watched};
+use crate::{Stopped, Threads};
 
 impl System {
     /// About N^-1 A^T l over all unknowns, in the order of the layout, A and l of equations and priors at other values of the unknowns than those
@@ -23,19 +23,19 @@ impl System {
     /// a larger one have left is not in it.
     pub fn chord<E: Equations>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         factor: &Factor,
         equations: &E,
         prior: &Prior,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, (Vec<f64>, f64)> {
         let equations: &dyn Gathered = equations;
-        watched(pool, between, |control| {
+        watched(threads, between, |control| {
             let mut others = control.allocated(self.of_others(&prior.right))?;
             self.add_rights_of_ties(equations, &mut others);
-            let homes = (0..factor.eliminated.len()).into_par_iter();
+            let nodes = (0..factor.eliminated.len()).into_par_iter();
             let found: Vec<Reduced<1>> =
-                homes.map(|index| self.rights_at_home(equations, prior, index, control)).collect();
+                nodes.map(|index| self.rights_at_node(equations, prior, index, control)).collect();
             // One after the other in a fixed order, whichever thread has found them.
             found.iter().for_each(|found| found.add_to(&mut others, self.symbolic.unknowns()));
             let reduced = others.clone();
@@ -49,26 +49,26 @@ impl System {
         })
     }
 
-    /// What the local blocks at home in a supernode have as right-hand sides, and what they leave to others. Their normal matrices are those of the
+    /// What the local blocks assembled in a supernode have as right-hand sides, and what they leave to others. Their normal matrices are those of the
     /// equations: to form them takes less time than to read what the factor has cached.
-    fn rights_at_home(
+    fn rights_at_node(
         &self,
         equations: &dyn Gathered,
         prior: &Prior,
         index: usize,
         control: &Control,
     ) -> Reduced<1> {
-        let (mut stack, mut found) = (self.workspace.stack(), Reduced::default());
-        for run in self.incidence.stacks_at(index).iter().take_while(|_| !control.stopped()) {
-            equations.gather(&mut stack, self, run);
-            stack.eliminate_from_rights(&self.layout, prior);
-            found.own.extend_from_slice(stack.reduced.as_chunks().0);
+        let (mut batch, mut found) = (self.workspace.batch(), Reduced::default());
+        for run in self.incidence.batches_at(index).iter().take_while(|_| !control.stopped()) {
+            equations.gather(&mut batch, self, run);
+            batch.eliminate_from_rights(&self.layout, prior);
+            found.own.extend_from_slice(batch.reduced.as_chunks().0);
             let start = found.values.len();
-            stack.ranges(&self.symbolic).for_each(|range| found.room(0, range));
-            stack.add_rights_of_others(&self.layout, found.values[start..].as_flattened_mut());
+            batch.ranges(&self.symbolic).for_each(|range| found.room(0, range));
+            batch.add_rights_of_others(&self.layout, found.values[start..].as_flattened_mut());
             control.count(run.len());
         }
-        self.workspace.put_back_stack(stack);
+        self.workspace.put_back_batch(batch);
         found
     }
 
@@ -78,7 +78,7 @@ impl System {
         let (mut constant, mut coefficients) = (Vec::new(), Vec::new());
         for (index, tie) in layout.ties().iter().enumerate() {
             let of_block = |&block: &u32| symbolic.range(symbolic.position(block as usize));
-            let columns: Vec<usize> = tie.kept.iter().flat_map(of_block).collect();
+            let columns: Vec<usize> = tie.retained.iter().flat_map(of_block).collect();
             constant.resize(tie.rows, 0.0);
             coefficients.resize(tie.rows * columns.len(), 0.0);
             equations

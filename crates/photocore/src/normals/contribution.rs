@@ -61,7 +61,7 @@ impl Front<'_> {
 }
 
 impl System {
-    /// The rows of some kept blocks in the front of a supernode; all are in its pattern.
+    /// The rows of some retained blocks in the front of a supernode; all are in its pattern.
     pub(super) fn rows_of(&self, supernode: usize, blocks: &[u32]) -> Vec<usize> {
         let rows = |&block: &u32| {
             let position = self.symbolic.position(block as usize);
@@ -82,19 +82,19 @@ pub(super) fn unpack(order: usize, triangle: &[f64], square: &mut [f64]) {
 }
 
 impl SelectedInverse {
-    /// The inverse over some kept blocks that stand together in its pattern, in their order: a lower triangle, column by column. What is
+    /// The inverse over some retained blocks that stand together in its pattern, in their order: a lower triangle, column by column. What is
     /// not in the pattern is NaN.
     pub fn triangle(&self, layout: &Layout, blocks: &[u32]) -> Vec<f64> {
         let starts = blocks.iter().scan(0, |next, &block| {
             let start = *next;
-            *next += layout.kept_dim(block as usize);
+            *next += layout.retained_dim(block as usize);
             Some(start)
         });
         let starts: Vec<usize> = starts.collect();
         let order = layout.unknowns_of(blocks).count();
         let mut triangle = vec![f64::NAN; packed(order)];
         for (a, (&block, &left)) in blocks.iter().zip(&starts).enumerate() {
-            let width = layout.kept_dim(block as usize);
+            let width = layout.retained_dim(block as usize);
             for (&other, &top) in blocks[a..].iter().zip(&starts[a..]) {
                 let values = self.block(other as usize, block as usize).unwrap_or_default();
                 for (i, row) in values.chunks_exact(width.max(1)).enumerate() {

@@ -23,7 +23,7 @@ impl Deficiency<'_> {
         self.factor.lost.len()
     }
 
-    /// For each of them the kept blocks it moves, ascending: the blocks that take
+    /// For each of them the retained blocks it moves, ascending: the blocks that take
     /// at least a hundredth of the largest share in a null vector, each unknown in units of what its equations alone determine.
     pub fn blocks(&self) -> Vec<Vec<usize>> {
         let symbolic = &*self.factor.panels.symbolic;

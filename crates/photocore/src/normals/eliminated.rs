@@ -7,28 +7,28 @@ use pulp::Simd;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
+use super::batch::{Batch, Gathered, parts_of, united};
 use super::equations::Prior;
-use super::incidence::Stacks;
+use super::incidence::Batches;
 use super::layout::Layout;
 use super::panels::skip_ref;
-use super::stack::{Gathered, Stack, parts_of, united};
 use super::system::System;
 use super::triangle::Triangle;
 use super::vectorised::{Kernel, Rows, dot_by_fours, dot_columns, run, size, subtract_rights};
 use super::watch::Control;
 use super::workspace::Eliminated;
 
-/// Stacks that a thread takes at a time where they are eliminated again.
+/// Batches that a thread takes at a time where they are eliminated again.
 const CHUNK: usize = 64;
 
-impl Stack {
+impl Batch {
     /// Appends what the elimination has left: V, v and L.
     pub fn cache(&mut self, layout: &Layout, cached: &mut Vec<f64>) {
         let end = self.end + self.numbers_beside(layout) - self.start;
         cached.extend_from_slice(&self.eliminated(layout)[..end]);
     }
 
-    /// Leaves it in its buffer; the V of the next stack goes behind it.
+    /// Leaves it in its buffer; the V of the next batch goes behind it.
     pub fn cache_in_place(&mut self, layout: &Layout) {
         self.eliminated(layout);
         self.start = self.end + self.numbers_beside(layout);
@@ -51,19 +51,19 @@ impl Stack {
     }
 }
 
-/// Where the unknowns that stacks are tied to stand in the order of elimination.
+/// Where the unknowns that batches are tied to stand in the order of elimination.
 #[derive(Default)]
 pub(super) struct Coupled {
     ranges: SmallVec<[Range<usize>; 16]>,
     /// How many of them are main blocks, the first.
     main: usize,
-    /// The set of what the groups of the last stack had in common with others, and where that stands.
+    /// The set of what the groups of the last batch had in common with others, and where that stands.
     set: Option<u32>,
-    common: SmallVec<[Range<usize>; 4]>,
+    shared: SmallVec<[Range<usize>; 4]>,
 }
 
 impl Coupled {
-    /// Of the stack that begins with a local block: main blocks, then segments, as [`Stack`] has them.
+    /// Of the batch that begins with a local block: main blocks, then segments, as [`Batch`] has them.
     fn find(&mut self, system: &System, first: u32) {
         let (layout, symbolic) = (&system.layout, &*system.symbolic);
         self.ranges.clear();
@@ -78,7 +78,7 @@ impl Coupled {
         if self.set.replace(set) != Some(set) {
             self.find_common(system, set);
         }
-        self.ranges.extend(self.common.iter().cloned());
+        self.ranges.extend(self.shared.iter().cloned());
     }
 
     /// Of a set of what groups have in common with others.
@@ -92,7 +92,7 @@ impl Coupled {
             let start = symbolic.range(position).start;
             start + unknowns.start..start + unknowns.end
         };
-        self.common = all.map(place).collect();
+        self.shared = all.map(place).collect();
     }
 
     /// Unknowns in a range: D in a main block, where that is known.
@@ -121,9 +121,9 @@ impl Coupled {
     }
 }
 
-/// What the elimination of a stack has left.
+/// What the elimination of a batch has left.
 #[derive(Clone, Copy)]
-pub(super) struct Batch<'a> {
+pub(super) struct EliminatedBatch<'a> {
     coupled: &'a Coupled,
     /// How many local blocks.
     depth: usize,
@@ -131,12 +131,12 @@ pub(super) struct Batch<'a> {
     numbers: &'a [f64],
 }
 
-impl<'a> Batch<'a> {
-    /// Of a stack that is eliminated.
-    pub fn new(system: &System, stack: &'a mut Stack, coupled: &'a mut Coupled) -> Self {
-        let depth = stack.locals.len();
-        stack.locals.iter().take(1).for_each(|&first| coupled.find(system, first));
-        Self { coupled, depth, numbers: stack.eliminated(&system.layout) }
+impl<'a> EliminatedBatch<'a> {
+    /// Of a batch that is eliminated.
+    pub fn new(system: &System, batch: &'a mut Batch, coupled: &'a mut Coupled) -> Self {
+        let depth = batch.locals.len();
+        batch.locals.iter().take(1).for_each(|&first| coupled.find(system, first));
+        Self { coupled, depth, numbers: batch.eliminated(&system.layout) }
     }
 
     /// V, with what follows it, and the triangles L.
@@ -169,7 +169,7 @@ impl<'a> Batch<'a> {
 /// Right-hand sides, C of them at a time, reduced by some local blocks.
 #[derive(Default)]
 pub(super) struct Reduced<const C: usize> {
-    /// Those of the local blocks: stack by stack, of each stack C right-hand sides after the other.
+    /// Those of the local blocks: batch by batch, of each batch C right-hand sides after the other.
     pub own: Vec<[f64; C]>,
     /// What the others lose, range by range.
     pub values: Vec<[f64; C]>,
@@ -214,34 +214,34 @@ pub(super) struct Elimination<'a> {
     pub control: &'a Control,
 }
 
-/// Stacks at home in a supernode that one thread takes.
-type Part<'a> = (usize, Stacks<'a>);
+/// Batches assembled in a supernode that one thread takes.
+type Part<'a> = (usize, Batches<'a>);
 
 impl Elimination<'_> {
-    /// All stacks in the order of the incidence: what is cached at a supernode is read from its start.
+    /// All batches in the order of the incidence: what is cached at a supernode is read from its start.
     pub fn parts(&self) -> Vec<Part<'_>> {
-        let at = |home: usize| self.system.incidence.stacks_at(home);
-        let homes = 0..=self.system.symbolic.supernode_count();
+        let at = |node: usize| self.system.incidence.batches_at(node);
+        let nodes = 0..=self.system.symbolic.supernode_count();
         match self.cached.is_empty() {
-            true => homes
-                .flat_map(|home| at(home).parts(CHUNK).into_iter().map(move |part| (home, part)))
+            true => nodes
+                .flat_map(|node| at(node).parts(CHUNK).into_iter().map(move |part| (node, part)))
                 .collect(),
-            false => homes.map(|home| (home, at(home))).collect(),
+            false => nodes.map(|node| (node, at(node))).collect(),
         }
     }
 
     fn reader(&self) -> Reader<'_> {
-        Reader { elimination: self, cached: None, stack: Stack::default(), coupled: Coupled::default() }
+        Reader { elimination: self, cached: None, batch: Batch::default(), coupled: Coupled::default() }
     }
 
     /// Reduces right-hand sides over all unknowns, one after the other: part by part.
     pub fn reduce<const C: usize>(&self, rights: &[f64]) -> Vec<Reduced<C>> {
         let layout = &self.system.layout;
         let unknowns = layout.unknowns().max(1);
-        let reduce = |reader: &mut Reader<'_>, (home, stacks): Part<'_>| {
+        let reduce = |reader: &mut Reader<'_>, (node, batches): Part<'_>| {
             let mut found = Reduced::default();
-            reader.begin(home);
-            for locals in stacks.iter().take_while(|_| !self.control.stopped()) {
+            reader.begin(node);
+            for locals in batches.iter().take_while(|_| !self.control.stopped()) {
                 let (start, count) = (found.own.len(), locals.len() * layout.local_dim());
                 for rights in rights.chunks(C * unknowns) {
                     let own = locals.iter().flat_map(|&local| layout.local_range(local as usize));
@@ -279,11 +279,11 @@ impl Elimination<'_> {
         let (layout, parts) = (&self.system.layout, self.parts());
         let is_given = own.is_some();
         let own = own.unwrap_or_else(|| vec![Vec::new(); parts.len()]);
-        let solve = |reader: &mut Reader<'_>, ((home, stacks), mut own): (Part<'_>, Vec<[f64; C]>)| {
+        let solve = |reader: &mut Reader<'_>, ((node, batches), mut own): (Part<'_>, Vec<[f64; C]>)| {
             let mut at = 0;
-            reader.begin(home);
-            own.reserve(if is_given { 0 } else { stacks.locals() * layout.local_dim() });
-            for locals in stacks.iter().take_while(|_| !self.control.stopped()) {
+            reader.begin(node);
+            own.reserve(if is_given { 0 } else { batches.locals() * layout.local_dim() });
+            for locals in batches.iter().take_while(|_| !self.control.stopped()) {
                 let (batch, count) = (reader.next(locals), locals.len() * layout.local_dim());
                 for others in others {
                     if !is_given {
@@ -300,22 +300,22 @@ impl Elimination<'_> {
     }
 }
 
-/// What the elimination of stacks has left, one after the other.
+/// What the elimination of batches has left, one after the other.
 struct Reader<'a> {
     elimination: &'a Elimination<'a>,
     cached: Option<&'a [f64]>,
-    stack: Stack,
+    batch: Batch,
     coupled: Coupled,
 }
 
 impl Reader<'_> {
-    /// Begins with the stacks at home in a supernode, or a part of those that are not cached.
-    fn begin(&mut self, home: usize) {
-        self.cached = self.elimination.cached.get(home).map(|cached| &cached[..]);
+    /// Begins with the batches assembled in a supernode, or a part of those that are not cached.
+    fn begin(&mut self, node: usize) {
+        self.cached = self.elimination.cached.get(node).map(|cached| &cached[..]);
     }
 
-    /// The next stack: that of these local blocks.
-    fn next(&mut self, locals: &[u32]) -> Batch<'_> {
+    /// The next batch: that of these local blocks.
+    fn next(&mut self, locals: &[u32]) -> EliminatedBatch<'_> {
         let Elimination { system, equations, prior, damping, .. } = *self.elimination;
         self.coupled.find(system, locals[0]);
         let (coupled, depth) = (&self.coupled, locals.len());
@@ -326,12 +326,12 @@ impl Reader<'_> {
                 here
             }
             None => {
-                equations.gather(&mut self.stack, system, locals);
-                self.stack.eliminate(&system.layout, prior, damping);
-                self.stack.eliminated(&system.layout)
+                equations.gather(&mut self.batch, system, locals);
+                self.batch.eliminate(&system.layout, prior, damping);
+                self.batch.eliminated(&system.layout)
             }
         };
-        Batch { coupled, depth, numbers }
+        EliminatedBatch { coupled, depth, numbers }
     }
 
     /// Passes over it.
@@ -343,7 +343,7 @@ impl Reader<'_> {
 }
 
 struct Reduce<'a, const C: usize> {
-    batch: Batch<'a>,
+    batch: EliminatedBatch<'a>,
     block: usize,
     start: usize,
     found: &'a mut Reduced<C>,
@@ -372,7 +372,7 @@ impl<const C: usize> Kernel for Reduce<'_, C> {
 }
 
 struct Solve<'a, const C: usize> {
-    batch: Batch<'a>,
+    batch: EliminatedBatch<'a>,
     others: &'a [[f64; C]],
     own: &'a mut [[f64; C]],
 }

@@ -26,7 +26,7 @@ pub struct LocalCofactors {
     pub by_local: Vec<f64>,
     /// Q a^T of the unknowns of the local block, those of each equation together.
     pub local: Vec<f64>,
-    /// The same of each kept block that the groups of the local block touch.
+    /// The same of each retained block that the groups of the local block touch.
     pub others: Vec<(usize, Vec<f64>)>,
 }
 
@@ -61,10 +61,10 @@ impl System {
         prior: &Prior,
         asked: &dyn Equations,
         local: usize,
-        further: &[f64],
+        terms: &[f64],
     ) -> LocalCofactors {
         let formed = self.own_equations(equations, local, &[]);
-        let Own { local: a, others: b, blocks } = self.own_equations(asked, local, further);
+        let Own { local: a, others: b, blocks } = self.own_equations(asked, local, terms);
         let (rows, dim) = (a.nrows(), a.ncols());
         let mut normal = formed.local.transpose() * &formed.local;
         self.layout.local_range(local).enumerate().for_each(|(k, i)| normal[(k, k)] += prior.weight[i]);
@@ -78,7 +78,7 @@ impl System {
         for (&row, &first) in &blocks {
             for (&column, &left) in &blocks {
                 let values = selected.block(row, column).unwrap_or_default();
-                let width = self.layout.kept_dim(column);
+                let width = self.layout.retained_dim(column);
                 values.iter().enumerate().for_each(|(k, &v)| q[(first + k / width, left + k % width)] = v);
             }
         }
@@ -87,7 +87,7 @@ impl System {
         let found = &c * &others + &alone;
         let own = by_local - coupling * &others;
         let of_block = |(&block, &first): (&usize, &usize)| {
-            let width = self.layout.kept_dim(block);
+            let width = self.layout.retained_dim(block);
             (block, (0..rows * width).map(|k| others[(first + k % width, k / width)]).collect())
         };
         LocalCofactors {
@@ -98,7 +98,7 @@ impl System {
         }
     }
 
-    fn own_equations(&self, equations: &dyn Equations, local: usize, further: &[f64]) -> Own {
+    fn own_equations(&self, equations: &dyn Equations, local: usize, terms: &[f64]) -> Own {
         let layout = &self.layout;
         let (rows, l, groups) = (layout.rows(), layout.local_dim(), layout.groups_of(local));
         let touched = groups.clone().flat_map(|group| layout.blocks_of(group));
@@ -106,29 +106,29 @@ impl System {
         let (mut width, mut columns) = (0, BTreeMap::new());
         for (&block, first) in &mut blocks {
             *first = width;
-            columns.extend(layout.kept_range(block).zip(width..));
-            width += self.layout.kept_dim(block);
+            columns.extend(layout.retained_range(block).zip(width..));
+            width += self.layout.retained_dim(block);
         }
-        let count = groups.len() * rows + further.len() / l;
+        let count = groups.len() * rows + terms.len() / l;
         let mut own = Own { local: Mat::zeros(count, l), others: Mat::zeros(count, width), blocks };
-        for (k, &value) in further.iter().enumerate() {
+        for (k, &value) in terms.iter().enumerate() {
             own.local[(groups.len() * rows + k / l, k % l)] = value;
         }
         for (index, group) in groups.enumerate() {
-            let main = layout.kept_range(layout.kept_of(group));
-            let mut parts = [l, main.len(), layout.common_width(group)].map(|width| vec![0.0; rows * width]);
+            let main = layout.retained_range(layout.retained_of(group));
+            let mut parts = [l, main.len(), layout.shared_width(group)].map(|width| vec![0.0; rows * width]);
             let mut constant = vec![0.0; rows];
-            let [local_part, kept, common] = &mut parts;
-            let mut written = GroupRows { constant: &mut constant, local: local_part, kept, common };
+            let [local_part, retained, shared] = &mut parts;
+            let mut written = GroupRows { constant: &mut constant, local: local_part, retained, shared };
             equations.write(local, group, &mut written);
             for row in 0..rows {
                 let at = index * rows + row;
                 (0..l).for_each(|k| own.local[(at, k)] = parts[0][row * l + k]);
                 let others = main.clone().zip(&parts[1][row * main.len()..]);
-                let width = layout.common_width(group);
-                let common = layout.common_columns(group).zip(&parts[2][row * width..]);
+                let width = layout.shared_width(group);
+                let shared = layout.shared_columns(group).zip(&parts[2][row * width..]);
                 others
-                    .chain(common)
+                    .chain(shared)
                     .for_each(|(unknown, &value)| own.others[(at, columns[&unknown])] = value);
             }
         }

@@ -36,7 +36,7 @@ pub trait Equations: Sync {
 pub struct TieRows<'a> {
     /// Right-hand sides l (rows).
     pub constant: &'a mut [f64],
-    /// Coefficients, row by row: those of its kept blocks in their order.
+    /// Coefficients, row by row: those of its retained blocks in their order.
     pub coefficients: &'a mut [f64],
 }
 
@@ -47,11 +47,11 @@ pub struct GroupRows<'a> {
     pub constant: &'a mut [f64],
     /// Coefficients of the local block (rows x local unknowns).
     pub local: &'a mut [f64],
-    /// Coefficients of the main kept block (rows x its unknowns).
-    pub kept: &'a mut [f64],
-    /// Coefficients of what the group has in common with others (rows x [`Layout::common_width`]): those of its further kept blocks in
+    /// Coefficients of the main retained block (rows x its unknowns).
+    pub retained: &'a mut [f64],
+    /// Coefficients of what the group has in common with others (rows x [`Layout::shared_width`]): those of its shared blocks in
     /// their order.
-    pub common: &'a mut [f64],
+    pub shared: &'a mut [f64],
 }
 
 impl GroupRows<'_> {
@@ -61,8 +61,8 @@ impl GroupRows<'_> {
         GroupRows {
             constant: part(self.constant, t, count),
             local: part(self.local, t, count),
-            kept: part(self.kept, t, count),
-            common: part(self.common, t, count),
+            retained: part(self.retained, t, count),
+            shared: part(self.shared, t, count),
         }
     }
 }
@@ -82,7 +82,7 @@ pub struct Prior {
     pub weight: Vec<f64>,
     /// Weight times constant, w l.
     pub right: Vec<f64>,
-    /// Weights between unknowns i > j of one kept block: (i, j, w), ascending.
+    /// Weights between unknowns i > j of one retained block: (i, j, w), ascending.
     pub between: Vec<(usize, usize, f64)>,
 }
 

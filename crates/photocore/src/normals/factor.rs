@@ -6,20 +6,20 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use faer::MatMut;
-use rayon::ThreadPool;
 
 use super::assembly::{Formation, Sums};
+use super::batch::Gathered;
 use super::dense::{Pivots, factor_front};
 use super::equations::{Equations, Prior};
 use super::front::Front;
 use super::layout::Layout;
 use super::options::FactorOptions;
 use super::panels::{Handover, Panels, lock};
-use super::stack::Gathered;
 use super::symbolic::Supernode;
 use super::system::System;
-use super::watch::{Between, Control, Stopped, watched};
+use super::watch::{Between, Control, watched};
 use super::workspace::Eliminated;
+use crate::{Stopped, Threads};
 
 /// The Cholesky factor L of the reduced normal equations.
 #[derive(Debug)]
@@ -78,24 +78,24 @@ impl System {
     /// Whether everything is determined is for the caller to ask: see [`Factor::deficient_locals`] and [`Factor::deficiency`].
     pub fn factor<E: Equations>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         equations: &E,
         prior: &Prior,
         options: &FactorOptions,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Factor> {
-        self.factored(pool, equations, prior, *options, between)
+        self.factored(threads, equations, prior, *options, between)
     }
 
     fn factored(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         equations: &dyn Gathered,
         prior: &Prior,
         FactorOptions { damping, cached }: FactorOptions,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Factor> {
-        watched(pool, between, |control| {
+        watched(threads, between, |control| {
             let caches = cached && self.caches;
             let formation = Formation { system: self, equations, prior, damping, caches, control };
             let mut given_up = Vec::new();
@@ -151,7 +151,7 @@ impl Formation<'_> {
         };
         let (mut formation, mut factorisation) = (0.0, 0.0);
         let none = Front::new(0, 0, &mut [], Vec::new());
-        let homeless = self.assemble(&mut { none }, symbolic.supernode_count(), &cached)?;
+        let unplaced = self.assemble(&mut { none }, symbolic.supernode_count(), &cached)?;
         for (index, visited) in visited.into_values().flatten().enumerate() {
             factor.add(visited.sums, self.caches);
             if symbolic.open() != Some(index) {
@@ -164,7 +164,7 @@ impl Formation<'_> {
             formation += visited.formation;
             factorisation += visited.factorisation;
         }
-        factor.add(homeless, self.caches);
+        factor.add(unplaced, self.caches);
         if formation + factorisation > 0.0 {
             factor.formation_share = formation / (formation + factorisation);
         }

@@ -10,20 +10,20 @@
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::eliminated::{Batch, Coupled, Reduced as OfLocal};
+use super::batch::{Batch, Gathered};
+use super::eliminated::{Coupled, EliminatedBatch, Reduced as OfLocal};
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::layout::Layout;
 use super::products::Products;
-use super::stack::{Gathered, Stack};
 use super::symbolic::Symbolic;
 use super::system::System;
 use super::vectorised::dot;
-use super::watch::{Between, Control, Stopped, watched};
+use super::watch::{Between, Control, watched};
 use super::workspace::zeros;
+use crate::{Stopped, Threads};
 
 /// A linear function of the unknowns: unknowns that it takes, with their coefficients.
 pub type Function = Vec<(usize, f64)>;
@@ -58,7 +58,7 @@ impl System {
     /// comes from; what is held must not be taken.
     pub fn reduce<E: Equations>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         equations: &E,
         prior: &Prior,
         rows: &[Function],
@@ -66,7 +66,7 @@ impl System {
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Functions> {
         let equations: &dyn Gathered = equations;
-        watched(pool, between, |control| {
+        watched(threads, between, |control| {
             let places = self.symbolic.places(&self.layout);
             let work = Reduction { system: self, equations, prior, places: &places, control };
             let rows = work.reduced(rows);
@@ -88,12 +88,12 @@ impl System {
     /// The cofactors f^T N^-1 g of functions: a matrix row by row; the same bits for any number of threads.
     pub fn cofactors_of(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         factor: &Factor,
         functions: &Functions,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Vec<f64>> {
-        watched(pool, between, |control| {
+        watched(threads, between, |control| {
             let rows = &functions.rows;
             let columns = functions.columns.as_ref().unwrap_or(rows);
             let mut matrix = control.allocated(zeros(rows.len() * columns.len()))?;
@@ -254,12 +254,12 @@ impl Reduction<'_> {
 
     fn at_locals(&self, taken: &[(usize, Taken)]) -> Vec<(usize, Vec<Found>)> {
         let layout = &self.system.layout;
-        let (mut stack, mut coupled) = (Stack::default(), Coupled::default());
+        let (mut batch, mut coupled) = (Batch::default(), Coupled::default());
         let mut at_local = |(local, taken): &(usize, Taken)| {
-            self.equations.gather(&mut stack, self.system, &[*local as u32]);
-            stack.eliminate(layout, self.prior, 0.0);
+            self.equations.gather(&mut batch, self.system, &[*local as u32]);
+            batch.eliminate(layout, self.prior, 0.0);
             self.control.count(1);
-            let batch = Batch::new(self.system, &mut stack, &mut coupled);
+            let batch = EliminatedBatch::new(self.system, &mut batch, &mut coupled);
             let of_function = |&(index, mut y): &(usize, [f64; 3])| {
                 let (own, mut found) = (&mut y[..layout.local_dim()], OfLocal::<1>::default());
                 found.own.extend_from_slice(own.as_chunks().0);
@@ -276,10 +276,10 @@ impl Reduction<'_> {
 /// Sorts entries by their place and adds up those of the same.
 fn unite(entries: &mut Vec<(usize, f64)>) {
     entries.sort_by_key(|&(place, _)| place);
-    entries.dedup_by(|next, kept| {
-        let same = next.0 == kept.0;
+    entries.dedup_by(|next, retained| {
+        let same = next.0 == retained.0;
         if same {
-            kept.1 += next.1;
+            retained.1 += next.1;
         }
         same
     });

@@ -1,4 +1,4 @@
-//! Which kept blocks share a local block, a tie or what a system below leaves.
+//! Which retained blocks share a local block, a tie or what a system below leaves.
 
 use rayon::prelude::*;
 
@@ -10,7 +10,7 @@ pub(super) const MANY: usize = 500;
 /// The place of a block that is not in a list.
 pub(crate) const NOWHERE: u32 = u32::MAX;
 
-/// Which kept blocks share a local block, a tie or what a system below leaves: an undirected graph in compressed form, neighbours ascending.
+/// Which retained blocks share a local block, a tie or what a system below leaves: an undirected graph in compressed form, neighbours ascending.
 #[derive(Debug, Clone)]
 pub struct Graph {
     ptr: Vec<usize>,
@@ -18,12 +18,12 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Joins every two kept blocks that share one.
+    /// Joins every two retained blocks that share one.
     pub fn new(layout: &Layout) -> Self {
-        let kept = layout.kept();
-        let ties = layout.ties().iter().map(|tie| &tie.kept);
+        let retained = layout.retained();
+        let ties = layout.ties().iter().map(|tie| &tie.retained);
         let ties: Vec<&Vec<u32>> = ties.chain(layout.contributions()).collect();
-        let mut ties_of = vec![Vec::new(); kept];
+        let mut ties_of = vec![Vec::new(); retained];
         for (index, tie) in ties.iter().enumerate() {
             tie.iter().for_each(|&block| ties_of[block as usize].push(index));
         }
@@ -38,7 +38,7 @@ impl Graph {
             };
             for &local in &locals[local_ptr[block]..local_ptr[block + 1]] {
                 layout.main_blocks_of(local as usize).iter().copied().for_each(&mut join);
-                layout.all_further_of(local as usize).iter().copied().for_each(&mut join);
+                layout.all_shared_of(local as usize).iter().copied().for_each(&mut join);
             }
             for &tie in &ties_of[block] {
                 ties[tie].iter().copied().for_each(&mut join);
@@ -46,12 +46,12 @@ impl Graph {
             neighbours.sort_unstable();
             neighbours
         };
-        let unseen = || vec![u32::MAX; kept];
-        let all: Vec<Vec<u32>> = if kept < MANY {
+        let unseen = || vec![u32::MAX; retained];
+        let all: Vec<Vec<u32>> = if retained < MANY {
             let mut seen_by = unseen();
-            (0..kept).map(|block| joined(&mut seen_by, block)).collect()
+            (0..retained).map(|block| joined(&mut seen_by, block)).collect()
         } else {
-            (0..kept).into_par_iter().with_min_len(MANY / 4).map_init(unseen, joined).collect()
+            (0..retained).into_par_iter().with_min_len(MANY / 4).map_init(unseen, joined).collect()
         };
         let mut ptr = vec![0];
         ptr.extend(all.iter().scan(0, |end, own| {
@@ -143,23 +143,23 @@ impl Graph {
     }
 }
 
-/// Where the local blocks of every kept block start, and these, each once.
+/// Where the local blocks of every retained block start, and these, each once.
 fn locals_by_block(layout: &Layout) -> (Vec<usize>, Vec<u32>) {
-    let mut last = vec![u32::MAX; layout.kept()];
+    let mut last = vec![u32::MAX; layout.retained()];
     let mut each = |take: &mut dyn FnMut(usize, u32)| {
         last.fill(u32::MAX);
         for local in 0..layout.locals() {
-            for &block in layout.main_blocks_of(local).iter().chain(layout.all_further_of(local)) {
+            for &block in layout.main_blocks_of(local).iter().chain(layout.all_shared_of(local)) {
                 if std::mem::replace(&mut last[block as usize], local as u32) != local as u32 {
                     take(block as usize, local as u32);
                 }
             }
         }
     };
-    let mut ptr = vec![0; layout.kept() + 1];
+    let mut ptr = vec![0; layout.retained() + 1];
     each(&mut |block, _| ptr[block + 1] += 1);
-    (0..layout.kept()).for_each(|block| ptr[block + 1] += ptr[block]);
-    let (mut next, mut locals) = (ptr.clone(), vec![0; ptr[layout.kept()]]);
+    (0..layout.retained()).for_each(|block| ptr[block + 1] += ptr[block]);
+    let (mut next, mut locals) = (ptr.clone(), vec![0; ptr[layout.retained()]]);
     each(&mut |block, local| {
         locals[next[block]] = local;
         next[block] += 1;

@@ -16,18 +16,18 @@ const TOGETHER: usize = 2048;
 const MOST: usize = 16;
 
 /// The groups of every local block by the position of their main blocks in the order of elimination, and the local blocks by
-/// their *home*: the supernode of the first position of all kept blocks they touch. All of them are in the pattern of
-/// the home, so that what the elimination of the local block leaves goes into one front.
+/// their *assembly node*: the supernode of the first position of all retained blocks they touch. All of them are in the pattern of
+/// the node, so that what the elimination of the local block leaves goes into one front.
 #[derive(Debug)]
 pub(super) struct Incidence {
     groups: Vec<u32>,
     positions: Vec<u32>,
-    /// The local blocks by home, those of the same pattern side by side.
-    by_home: Vec<u32>,
+    /// The local blocks by node, those of the same pattern side by side.
+    by_node: Vec<u32>,
     /// Where those of each supernode start; then those that have no equations.
-    home_ptr: Vec<usize>,
-    /// Where each stack starts: a run of blocks of one home whose equations touch the same unknowns in the same way.
-    stack_ptr: Vec<usize>,
+    node_ptr: Vec<usize>,
+    /// Where each batch starts: a run of blocks of one node whose equations touch the same unknowns in the same way.
+    batch_ptr: Vec<usize>,
     /// What each of the groups has in common with others, as a number; empty where none has anything.
     commons: Vec<u32>,
     /// One group that has it, of each of these.
@@ -54,13 +54,13 @@ impl Incidence {
         let positions: Vec<u32> = sorted().map(|&[position, _]| position).collect();
         let groups: Vec<u32> = sorted().map(|&[_, group]| group).collect();
         let mut keyed: Vec<Keyed> = pieces.iter().flat_map(|(_, keyed)| keyed).copied().collect();
-        let further = |local: u32| {
-            let own = if layout.has_further() { layout.groups_of(local as usize) } else { 0..0 };
-            groups[own].iter().map(|&group| layout.further_of(group as usize))
+        let shared = |local: u32| {
+            let own = if layout.has_shared() { layout.groups_of(local as usize) } else { 0..0 };
+            groups[own].iter().map(|&group| layout.shared_of(group as usize))
         };
         let own = |local: u32| &positions[layout.groups_of(local as usize)];
         let compare = |&(first, a): &Keyed, &(second, b): &Keyed| {
-            let in_full = || own(a).cmp(own(b)).then_with(|| further(a).cmp(further(b)));
+            let in_full = || own(a).cmp(own(b)).then_with(|| shared(a).cmp(shared(b)));
             first.cmp(&second).then_with(in_full).then(a.cmp(&b))
         };
         if is_many {
@@ -68,11 +68,11 @@ impl Incidence {
         } else {
             keyed.sort_unstable_by(compare);
         }
-        let by_home = keyed.iter().map(|&(_, local)| local).collect();
-        let mut home_ptr = vec![0; symbolic.supernode_count() + 2];
-        keyed.iter().for_each(|&(key, _)| home_ptr[(key >> HOME) as usize + 1] += 1);
-        for index in 1..home_ptr.len() {
-            home_ptr[index] += home_ptr[index - 1];
+        let by_node = keyed.iter().map(|&(_, local)| local).collect();
+        let mut node_ptr = vec![0; symbolic.supernode_count() + 2];
+        keyed.iter().for_each(|&(key, _)| node_ptr[(key >> HOME) as usize + 1] += 1);
+        for index in 1..node_ptr.len() {
+            node_ptr[index] += node_ptr[index - 1];
         }
         let (numbers, group_with) = commons(layout);
         let of_group = |&group: &u32| numbers[group as usize];
@@ -81,13 +81,13 @@ impl Incidence {
         } else {
             groups.par_iter().with_min_len(MANY).map(of_group).collect()
         };
-        let (stack_ptr, sets, members) = (vec![0], Vec::new(), vec![Vec::new()]);
+        let (batch_ptr, sets, members) = (vec![0], Vec::new(), vec![Vec::new()]);
         let mut incidence =
-            Self { groups, positions, by_home, home_ptr, stack_ptr, commons, group_with, sets, members };
-        let runs = incidence.by_home.chunk_by(|&a, &b| incidence.alike(layout, a as usize, b as usize));
+            Self { groups, positions, by_node, node_ptr, batch_ptr, commons, group_with, sets, members };
+        let runs = incidence.by_node.chunk_by(|&a, &b| incidence.alike(layout, a as usize, b as usize));
         let lengths: Vec<usize> = runs.flat_map(|run| run.chunks(MOST)).map(<[u32]>::len).collect();
         let mut end = 0;
-        incidence.stack_ptr.extend(lengths.into_iter().map(|length| {
+        incidence.batch_ptr.extend(lengths.into_iter().map(|length| {
             end += length;
             end
         }));
@@ -101,7 +101,7 @@ impl Incidence {
     fn find_sets(&mut self, layout: &Layout) {
         let mut known: HashMap<SmallVec<[u32; 16]>, u32> = HashMap::from([(SmallVec::new(), 0)]);
         let (mut sets, mut members, mut last) = (vec![0; layout.locals()], vec![Vec::new()], 0);
-        for locals in self.stacks().iter() {
+        for locals in self.batches().iter() {
             let mut own = SmallVec::from(self.commons_of(layout, locals[0] as usize));
             own.sort_unstable();
             own.dedup();
@@ -148,59 +148,59 @@ impl Incidence {
     }
 
     /// A group that has in common with others what has this number.
-    pub fn group_with(&self, common: u32) -> usize {
-        self.group_with[common as usize] as usize
+    pub fn group_with(&self, shared: u32) -> usize {
+        self.group_with[shared as usize] as usize
     }
 
-    /// The local blocks whose home is a supernode; after the last supernode those without equations.
+    /// The local blocks whose node is a supernode; after the last supernode those without equations.
     pub fn locals_at(&self, supernode: usize) -> &[u32] {
-        &self.by_home[self.home_ptr[supernode]..self.home_ptr[supernode + 1]]
+        &self.by_node[self.node_ptr[supernode]..self.node_ptr[supernode + 1]]
     }
 
-    /// All stacks, by home.
-    pub fn stacks(&self) -> Stacks<'_> {
-        Stacks { locals: &self.by_home, ptr: &self.stack_ptr }
+    /// All batches, by node.
+    pub fn batches(&self) -> Batches<'_> {
+        Batches { locals: &self.by_node, ptr: &self.batch_ptr }
     }
 
-    /// The stacks of a supernode; after the last supernode those of the local blocks without equations.
-    pub fn stacks_at(&self, supernode: usize) -> Stacks<'_> {
-        let place = |start: usize| self.stack_ptr.partition_point(|&end| end < start);
-        let (first, last) = (place(self.home_ptr[supernode]), place(self.home_ptr[supernode + 1]));
-        Stacks { locals: &self.by_home, ptr: &self.stack_ptr[first..=last] }
+    /// The batches of a supernode; after the last supernode those of the local blocks without equations.
+    pub fn batches_at(&self, supernode: usize) -> Batches<'_> {
+        let place = |start: usize| self.batch_ptr.partition_point(|&end| end < start);
+        let (first, last) = (place(self.node_ptr[supernode]), place(self.node_ptr[supernode + 1]));
+        Batches { locals: &self.by_node, ptr: &self.batch_ptr[first..=last] }
     }
 }
 
 /// Numbers what groups have in common with others: that of each group, none where no group has anything, and a group that has it of each
 /// number. The images of one photo nearly always have the same.
 fn commons(layout: &Layout) -> (Vec<u32>, Vec<u32>) {
-    if !layout.has_further() {
+    if !layout.has_shared() {
         return (Vec::new(), Vec::new());
     }
     let mut group_with: Vec<u32> = Vec::new();
     let mut known: HashMap<&[u32], u32> = HashMap::new();
-    let mut last: Vec<Option<u32>> = vec![None; layout.kept()];
+    let mut last: Vec<Option<u32>> = vec![None; layout.retained()];
     let number = |group: usize| {
-        let own = &mut last[layout.kept_of(group)];
+        let own = &mut last[layout.retained_of(group)];
         let is_same =
-            |common: u32| layout.further_of(group_with[common as usize] as usize) == layout.further_of(group);
-        if let Some(common) = own.filter(|&common| is_same(common)) {
-            return common;
+            |shared: u32| layout.shared_of(group_with[shared as usize] as usize) == layout.shared_of(group);
+        if let Some(shared) = own.filter(|&shared| is_same(shared)) {
+            return shared;
         }
-        let common = *known.entry(layout.further_of(group)).or_insert_with(|| {
+        let shared = *known.entry(layout.shared_of(group)).or_insert_with(|| {
             group_with.push(group as u32);
             group_with.len() as u32 - 1
         });
-        *own = Some(common);
-        common
+        *own = Some(shared);
+        shared
     };
     let numbers = (0..layout.groups()).map(number).collect();
     (numbers, group_with)
 }
 
-/// A local block, and what it is sorted by before all else: its home, and the first three of its positions, zero where there are fewer.
+/// A local block, and what it is sorted by before all else: its node, and the first three of its positions, zero where there are fewer.
 type Keyed = (u128, u32);
 
-/// Bits of a key below the home.
+/// Bits of a key below the node.
 const HOME: u32 = 96;
 
 /// The positions and groups of some local blocks, by position, and the keys of these blocks.
@@ -208,33 +208,33 @@ fn placed(layout: &Layout, symbolic: &Symbolic, locals: Range<usize>) -> (Vec<[u
     let (mut sorted, mut keyed) = (Vec::new(), Vec::with_capacity(locals.len()));
     for local in locals {
         let start = sorted.len();
-        let place = |g: usize| [symbolic.position(layout.kept_of(g)) as u32, g as u32];
+        let place = |g: usize| [symbolic.position(layout.retained_of(g)) as u32, g as u32];
         sorted.extend(layout.groups_of(local).map(place));
         let own = &mut sorted[start..];
         own.sort_unstable();
-        let home = home(layout, symbolic, local, own.first().map(|&[position, _]| position as usize));
+        let node = node(layout, symbolic, local, own.first().map(|&[position, _]| position as usize));
         let first = |key: u128, k: usize| key << 32 | own.get(k).map_or(0, |own| u128::from(own[0]) + 1);
-        keyed.push(((0..3).fold(home as u128, first), local as u32));
+        keyed.push(((0..3).fold(node as u128, first), local as u32));
     }
     (sorted, keyed)
 }
 
-/// The home of a local block, from the first position of its main blocks; after the last supernode where it has no equations.
-fn home(layout: &Layout, symbolic: &Symbolic, local: usize, first: Option<usize>) -> usize {
-    let further = layout.all_further_of(local).iter().map(|&block| symbolic.position(block as usize));
-    let first = further.chain(first).min();
+/// The node of a local block, from the first position of its main blocks; after the last supernode where it has no equations.
+fn node(layout: &Layout, symbolic: &Symbolic, local: usize, first: Option<usize>) -> usize {
+    let shared = layout.all_shared_of(local).iter().map(|&block| symbolic.position(block as usize));
+    let first = shared.chain(first).min();
     first.map_or(symbolic.supernode_count(), |first| symbolic.supernode_of(first))
 }
 
-/// Consecutive stacks.
+/// Consecutive batches.
 #[derive(Clone, Copy)]
-pub(super) struct Stacks<'a> {
+pub(super) struct Batches<'a> {
     locals: &'a [u32],
     ptr: &'a [usize],
 }
 
-impl<'a> Stacks<'a> {
-    /// Their local blocks, stack by stack.
+impl<'a> Batches<'a> {
+    /// Their local blocks, batch by batch.
     pub fn iter(self) -> impl Iterator<Item = &'a [u32]> {
         self.ptr.windows(2).map(move |ends| &self.locals[ends[0]..ends[1]])
     }
@@ -244,7 +244,7 @@ impl<'a> Stacks<'a> {
         self.ptr[self.ptr.len() - 1] - self.ptr[0]
     }
 
-    /// Parts of so many stacks at the most.
+    /// Parts of so many batches at the most.
     pub fn parts(self, most: usize) -> Vec<Self> {
         let starts = (0..self.ptr.len() - 1).step_by(most);
         starts

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use faer::{MatMut, MatRef};
-use rayon::ThreadPool;
 
-use super::cofactors::{AtHome, Cofactors, GroupCofactors};
+use super::batch::Gathered;
+use super::cofactors::{AtNode, Cofactors, GroupCofactors};
 use super::contribution::unpack;
 use super::dense::invert_front;
 use super::equations::{Equations, Prior};
@@ -16,17 +16,17 @@ use super::factor::Factor;
 use super::options::InvertOptions;
 use super::panels::{Handover, Panels, lock};
 use super::selected::SelectedInverse;
-use super::stack::Gathered;
 use super::symbolic::Symbolic;
 use super::system::System;
-use super::watch::{Between, Control, Stopped, watched};
+use super::watch::{Between, Control, watched};
+use crate::{Stopped, Threads};
 
 /// Cofactors with the selected inverse that they come from.
 #[derive(Debug)]
 pub struct Inversion {
     /// Of every unknown and every equation.
     pub cofactors: Cofactors,
-    /// Of every two kept blocks that share a local block.
+    /// Of every two retained blocks that share a local block.
     pub selected: SelectedInverse,
     /// Share of the time of all threads that went into the selected inverse; the rest went into the other cofactors.
     pub inversion_share: f64,
@@ -38,7 +38,7 @@ impl System {
     /// `equations` and `prior` must be those that the factor comes from, and its damping zero.
     pub fn invert<E: Equations>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         mut factor: Factor,
         equations: &E,
         prior: &Prior,
@@ -48,22 +48,22 @@ impl System {
         let equations: &dyn Gathered = equations;
         factor.forget();
         let Factor { mut panels, diagonal, .. } = factor;
-        watched(pool, between, |control| {
+        watched(threads, between, |control| {
             let information = self.information(&diagonal);
             panels.reopen();
             Walk { system: self, equations, prior, options, control }.invert(panels, information)
         })
     }
 
-    /// The diagonal of the normal equations of the unknowns of kept blocks before any elimination, which is given in that order, in the order
+    /// The diagonal of the normal equations of the unknowns of retained blocks before any elimination, which is given in that order, in the order
     /// of the layout.
     fn information(&self, diagonal: &[f64]) -> Vec<f64> {
-        let kept = self.layout.all_kept();
-        let mut information = vec![0.0; kept.len()];
+        let retained = self.layout.all_retained();
+        let mut information = vec![0.0; retained.len()];
         let positions = 0..self.symbolic.blocks();
         let unknowns = positions.flat_map(|position| self.symbolic.unknowns_at(&self.layout, position));
-        let of_kept = unknowns.zip(diagonal).filter(|(unknown, _)| kept.contains(unknown));
-        of_kept.for_each(|(unknown, &n)| information[unknown - kept.start] = n);
+        let of_retained = unknowns.zip(diagonal).filter(|(unknown, _)| retained.contains(unknown));
+        of_retained.for_each(|(unknown, &n)| information[unknown - retained.start] = n);
         information
     }
 }
@@ -86,24 +86,24 @@ impl Walk<'_> {
         let count = symbolic.supernode_count();
         // The front of its parent for each supernode still to be done; a front lives until the last child has taken it.
         let above = Handover::new(count);
-        let at_home = Handover::new(count);
+        let at_node = Handover::new(count);
         let divided = panels.divide();
         self.system.tree.downward(|index| {
             if !self.control.stopped()
                 && let Some(found) = self.visit(index, &mut lock(&divided[index]), &above)
             {
-                at_home.put(index, found);
+                at_node.put(index, found);
             }
         });
         drop(divided);
         let (mut inversion, mut rest) = (0.0, 0.0);
         let mut found = Vec::with_capacity(count + 1);
-        for (at_home, seconds) in at_home.into_values().flatten() {
-            found.push(at_home);
+        for (at_node, seconds) in at_node.into_values().flatten() {
+            found.push(at_node);
             inversion += seconds;
             rest += found[found.len() - 1].seconds;
         }
-        found.push(self.at_home(count, &[], 0));
+        found.push(self.at_node(count, &[], 0));
         let selected = SelectedInverse { panels };
         let mut cofactors = Cofactors::collect(self.system, self.control, &selected, &found, information)?;
         if self.options.by_groups {
@@ -114,8 +114,8 @@ impl Walk<'_> {
     }
 
     /// Inverts one panel, given the front of its parent, and hands its own front to its children. Returns the cofactors of the local
-    /// blocks at home there, and the seconds that the inversion took; None without memory.
-    fn visit(&self, index: usize, panel: &mut [f64], above: &Handover<Front>) -> Option<(AtHome, f64)> {
+    /// blocks assembled there, and the seconds that the inversion took; None without memory.
+    fn visit(&self, index: usize, panel: &mut [f64], above: &Handover<Front>) -> Option<(AtNode, f64)> {
         let symbolic = &*self.system.symbolic;
         let s = &symbolic.supernodes()[index];
         let start = Instant::now();
@@ -140,15 +140,15 @@ impl Walk<'_> {
         }
         let seconds = start.elapsed().as_secs_f64();
         let front = Arc::new(front);
-        let at_home = self.at_home(index, &front, height);
+        let at_node = self.at_node(index, &front, height);
         s.children.iter().for_each(|&child| above.put(child, Arc::clone(&front)));
         Arc::into_inner(front).into_iter().for_each(|last| workspace.put_back(last));
-        Some((at_home, seconds))
+        Some((at_node, seconds))
     }
 
-    fn at_home(&self, index: usize, front: &[f64], height: usize) -> AtHome {
+    fn at_node(&self, index: usize, front: &[f64], height: usize) -> AtNode {
         let Self { system, equations, prior, options, control } = *self;
-        AtHome::new(system, index, equations, prior, control, front, height, options.by_groups)
+        AtNode::new(system, index, equations, prior, control, front, height, options.by_groups)
     }
 }
 

@@ -7,11 +7,11 @@ use thiserror::Error;
 
 /// The unknowns and the equations of a system.
 ///
-/// The vector of unknowns is `[local blocks | kept blocks]`. A group of `rows` equations touches one local block, its main kept block and
-/// what it has in common with others: *further* kept blocks (the camera of several photographs, the comparator of all), possibly none.
-/// The groups of a local block are consecutive. A [`Tie`] touches any kept blocks, but no local block.
+/// The vector of unknowns is `[local blocks | retained blocks]`. A group of `rows` equations touches one local block, its main retained block and
+/// what it has in common with others: *shared* blocks (the camera of several photographs, the comparator of all), possibly none.
+/// The groups of a local block are consecutive. A [`Tie`] touches any retained blocks, but no local block.
 ///
-/// Kernels are made for the main blocks, so what nearly every group touches belongs among the further ones: a block that is further
+/// Kernels are made for the main blocks, so what nearly every group touches belongs among the shared ones: a block that is further
 /// in any group is the main one of none.
 ///
 /// Of blocks, groups, ties and unknowns there are fewer than `u32::MAX` each: it is checked here, and whoever numbers them keeps 32 bits.
@@ -20,21 +20,21 @@ pub struct Layout {
     rows: usize,
     local_dim: usize,
     locals: usize,
-    kept_offset: Vec<usize>,
+    retained_offset: Vec<usize>,
     group_ptr: Vec<usize>,
-    group_kept: Vec<u32>,
-    /// The further blocks of group `g` are `further[further_ptr[g]..further_ptr[g + 1]]`; both are empty where no group has any.
-    further_ptr: Vec<usize>,
-    further: Vec<u32>,
+    group_retained: Vec<u32>,
+    /// The shared blocks of group `g` are `shared[shared_ptr[g]..shared_ptr[g + 1]]`; both are empty where no group has any.
+    shared_ptr: Vec<usize>,
+    shared: Vec<u32>,
     ties: Vec<Tie>,
     /// Where the equations of each tie start among those of all ties; one more at the end.
     tie_ptr: Vec<usize>,
     /// Where the square block of the equations of each tie starts; one more at the end.
     block_ptr: Vec<usize>,
     places: Option<Vec<[f64; 3]>>,
-    /// The unknowns of each kept block that are not held, as ranges; empty where none is held anywhere.
+    /// The unknowns of each retained block that are not held, as ranges; empty where none is held anywhere.
     free: Vec<Vec<Range<usize>>>,
-    /// Pairs of kept blocks, ascending, and where the block of each starts among those of all; one more at the end.
+    /// Pairs of retained blocks, ascending, and where the block of each starts among those of all; one more at the end.
     pairs: Vec<[u32; 2]>,
     pair_ptr: Vec<usize>,
     /// Kept blocks that a system above eliminates, and those that each system below leaves something for.
@@ -42,14 +42,14 @@ pub struct Layout {
     contributions: Vec<Vec<u32>>,
 }
 
-/// Equations among kept blocks: a distance between two points that are kept, a relative pose of two photographs, an observation of
+/// Equations among retained blocks: a distance between two points that are kept, a relative pose of two photographs, an observation of
 /// unknowns of one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tie {
     /// How many equations.
     pub rows: usize,
-    /// The kept blocks that they touch, each once, in any order.
-    pub kept: Vec<u32>,
+    /// The retained blocks that they touch, each once, in any order.
+    pub retained: Vec<u32>,
 }
 
 /// A layout that contradicts itself.
@@ -64,41 +64,41 @@ pub enum LayoutError {
     /// The group pointers do not run from zero to the number of groups without falling.
     #[error("the group pointers must rise from 0 to the number of groups, {0}")]
     GroupPointers(usize),
-    /// A group names a kept block that does not exist.
-    #[error("group {group} touches kept block {kept} of {blocks}")]
-    Kept {
+    /// A group names a retained block that does not exist.
+    #[error("group {group} touches retained block {retained} of {blocks}")]
+    Retained {
         /// The group.
         group: usize,
         /// The block it names.
-        kept: usize,
+        retained: usize,
         /// How many there are.
         blocks: usize,
     },
-    /// There is not one place for each kept block.
-    #[error("{places} places for {blocks} kept blocks")]
+    /// There is not one place for each retained block.
+    #[error("{places} places for {blocks} retained blocks")]
     Places {
         /// How many places were given.
         places: usize,
         /// How many blocks there are.
         blocks: usize,
     },
-    /// The pointers to the further blocks do not run from zero to their number without falling, one for each group and one more.
+    /// The pointers to the shared blocks do not run from zero to their number without falling, one for each group and one more.
     #[error(
-        "the pointers to further blocks must rise from 0 to their number, {0}, one for each group and one more"
+        "the pointers to shared blocks must rise from 0 to their number, {0}, one for each group and one more"
     )]
-    FurtherPointers(usize),
-    /// A group names a further block that does not exist, that it names already, or that is the main block of a group.
+    SharedPointers(usize),
+    /// A group names a shared block that does not exist, that it names already, or that is the main block of a group.
     #[error(
-        "group {group} has kept block {kept} among its further ones, which does not exist, is named twice or is the main one of a group"
+        "group {group} has retained block {retained} among its shared ones, which does not exist, is named twice or is the main one of a group"
     )]
-    Further {
+    Shared {
         /// The group.
         group: usize,
         /// The block it names.
-        kept: usize,
+        retained: usize,
     },
-    /// A pair names a kept block that does not exist.
-    #[error("a pair of kept blocks names one that does not exist: {0:?}")]
+    /// A pair names a retained block that does not exist.
+    #[error("a pair of retained blocks names one that does not exist: {0:?}")]
     Pair([usize; 2]),
     /// A list of outer or contributed blocks with one that does not exist or is there twice.
     #[error("outer or contributed blocks do not exist or are named twice")]
@@ -122,47 +122,49 @@ impl Layout {
     ///
     /// * `rows`: equations in each group (2 for an image point);
     /// * `local_dim`: unknowns of a local block, 1 to 3;
-    /// * `kept_dims`: unknowns of each kept block;
+    /// * `retained_dims`: unknowns of each retained block;
     /// * `group_ptr`: the groups of local block `i` are `group_ptr[i]..group_ptr[i + 1]`;
-    /// * `group_kept`: the kept block of each group.
+    /// * `group_retained`: the retained block of each group.
     pub fn new(
         rows: usize,
         local_dim: usize,
-        kept_dims: &[usize],
+        retained_dims: &[usize],
         group_ptr: Vec<usize>,
-        group_kept: Vec<u32>,
+        group_retained: Vec<u32>,
     ) -> Result<Self, LayoutError> {
         if !(1..=3).contains(&local_dim) {
             return Err(LayoutError::LocalDimension(local_dim));
         }
-        let in_kept = kept_dims.iter().fold(0, |sum: usize, &dim| sum.saturating_add(dim));
-        let unknowns = group_ptr.len().saturating_mul(local_dim).saturating_add(in_kept);
-        [kept_dims.len(), group_kept.len(), unknowns].into_iter().try_for_each(numbered)?;
+        let in_retained = retained_dims.iter().fold(0, |sum: usize, &dim| sum.saturating_add(dim));
+        let unknowns = group_ptr.len().saturating_mul(local_dim).saturating_add(in_retained);
+        [retained_dims.len(), group_retained.len(), unknowns].into_iter().try_for_each(numbered)?;
         let rising = group_ptr.is_sorted() && group_ptr.first() == Some(&0);
-        if !rising || group_ptr.last() != Some(&group_kept.len()) {
-            return Err(LayoutError::GroupPointers(group_kept.len()));
+        if !rising || group_ptr.last() != Some(&group_retained.len()) {
+            return Err(LayoutError::GroupPointers(group_retained.len()));
         }
-        if let Some(group) = group_kept.iter().position(|&kept| kept as usize >= kept_dims.len()) {
-            let kept = group_kept[group] as usize;
-            return Err(LayoutError::Kept { group, kept, blocks: kept_dims.len() });
+        if let Some(group) =
+            group_retained.iter().position(|&retained| retained as usize >= retained_dims.len())
+        {
+            let retained = group_retained[group] as usize;
+            return Err(LayoutError::Retained { group, retained, blocks: retained_dims.len() });
         }
-        let mut kept_offset = Vec::with_capacity(kept_dims.len() + 1);
+        let mut retained_offset = Vec::with_capacity(retained_dims.len() + 1);
         let mut offset = (group_ptr.len() - 1) * local_dim;
-        for dim in kept_dims {
-            kept_offset.push(offset);
+        for dim in retained_dims {
+            retained_offset.push(offset);
             offset += dim;
         }
-        kept_offset.push(offset);
+        retained_offset.push(offset);
         let locals = group_ptr.len() - 1;
         Ok(Self {
             rows,
             local_dim,
             locals,
-            kept_offset,
+            retained_offset,
             group_ptr,
-            group_kept,
-            further_ptr: Vec::new(),
-            further: Vec::new(),
+            group_retained,
+            shared_ptr: Vec::new(),
+            shared: Vec::new(),
             ties: Vec::new(),
             tie_ptr: vec![0],
             block_ptr: vec![0],
@@ -175,34 +177,34 @@ impl Layout {
         })
     }
 
-    /// Adds the place of each kept block in some cartesian space: nested dissection cuts across it.
+    /// Adds the place of each retained block in some cartesian space: nested dissection cuts across it.
     pub fn with_places(mut self, places: Vec<[f64; 3]>) -> Result<Self, LayoutError> {
-        if places.len() != self.kept() {
-            return Err(LayoutError::Places { places: places.len(), blocks: self.kept() });
+        if places.len() != self.retained() {
+            return Err(LayoutError::Places { places: places.len(), blocks: self.retained() });
         }
         self.places = Some(places);
         Ok(self)
     }
 
-    /// Adds further kept blocks: group `g` touches `blocks[ptr[g]..ptr[g + 1]]` besides its main one, in an order of its own, in which
+    /// Adds shared blocks: group `g` touches `blocks[ptr[g]..ptr[g + 1]]` besides its main one, in an order of its own, in which
     /// its coefficients are written.
-    pub fn with_further(mut self, ptr: Vec<usize>, blocks: Vec<u32>) -> Result<Self, LayoutError> {
+    pub fn with_shared(mut self, ptr: Vec<usize>, blocks: Vec<u32>) -> Result<Self, LayoutError> {
         let rising = ptr.is_sorted() && ptr.first() == Some(&0) && ptr.last() == Some(&blocks.len());
         if !rising || ptr.len() != self.groups() + 1 {
-            return Err(LayoutError::FurtherPointers(blocks.len()));
+            return Err(LayoutError::SharedPointers(blocks.len()));
         }
-        let mut possible = vec![true; self.kept()];
-        self.group_kept.iter().for_each(|&main| possible[main as usize] = false);
+        let mut possible = vec![true; self.retained()];
+        self.group_retained.iter().for_each(|&main| possible[main as usize] = false);
         for group in 0..self.groups() {
             let own = &blocks[ptr[group]..ptr[group + 1]];
-            for (k, &kept) in own.iter().enumerate() {
-                if possible.get(kept as usize) != Some(&true) || own[..k].contains(&kept) {
-                    return Err(LayoutError::Further { group, kept: kept as usize });
+            for (k, &retained) in own.iter().enumerate() {
+                if possible.get(retained as usize) != Some(&true) || own[..k].contains(&retained) {
+                    return Err(LayoutError::Shared { group, retained: retained as usize });
                 }
             }
         }
         if !blocks.is_empty() {
-            (self.further_ptr, self.further) = (ptr, blocks);
+            (self.shared_ptr, self.shared) = (ptr, blocks);
         }
         Ok(self)
     }
@@ -211,10 +213,10 @@ impl Layout {
     pub fn with_ties(mut self, ties: Vec<Tie>) -> Result<Self, LayoutError> {
         numbered(ties.len())?;
         let sound = |tie: &Tie| {
-            let mut kept = tie.kept.clone();
-            kept.sort_unstable();
-            let exist = kept.last().is_some_and(|&last| (last as usize) < self.kept());
-            let once = kept.windows(2).all(|pair| pair[0] < pair[1]);
+            let mut retained = tie.retained.clone();
+            retained.sort_unstable();
+            let exist = retained.last().is_some_and(|&last| (last as usize) < self.retained());
+            let once = retained.windows(2).all(|pair| pair[0] < pair[1]);
             tie.rows > 0 && exist && once
         };
         if let Some(tie) = ties.iter().position(|tie| !sound(tie)) {
@@ -233,21 +235,22 @@ impl Layout {
     /// Says which unknowns are held whatever their equations are asked for: `held` of all unknowns. Their coefficients, which must be zero,
     /// are left out of the products of what groups have in common with others.
     pub fn with_held(mut self, held: &[bool]) -> Self {
-        let of_kept = held.get(self.all_kept()).unwrap_or_default();
-        if of_kept.contains(&true) {
-            self.free = (0..self.kept()).map(|block| free_ranges(&held[self.kept_range(block)])).collect();
+        let of_retained = held.get(self.all_retained()).unwrap_or_default();
+        if of_retained.contains(&true) {
+            self.free =
+                (0..self.retained()).map(|block| free_ranges(&held[self.retained_range(block)])).collect();
         }
         self
     }
 
-    /// The unknowns of a kept block that are not held, counted from its first, as ranges.
+    /// The unknowns of a retained block that are not held, counted from its first, as ranges.
     pub(super) fn free_of(&self, block: usize) -> impl Iterator<Item = Range<usize>> + '_ {
         let known = self.free.get(block);
-        let all = known.is_none().then(|| 0..self.kept_dim(block));
+        let all = known.is_none().then(|| 0..self.retained_dim(block));
         known.into_iter().flatten().cloned().chain(all)
     }
 
-    /// Asks for the cofactors of pairs of kept blocks, the first of which have the rows; those are found that some equations touch
+    /// Asks for the cofactors of pairs of retained blocks, the first of which have the rows; those are found that some equations touch
     /// together.
     pub fn with_pairs(mut self, mut pairs: Vec<[u32; 2]>) -> Result<Self, LayoutError> {
         pairs.sort_unstable();
@@ -255,22 +258,22 @@ impl Layout {
         self.pair_ptr.truncate(1);
         for (index, pair) in pairs.iter().enumerate() {
             let [rows, columns] = pair.map(|block| block as usize);
-            if rows.max(columns) >= self.kept() {
+            if rows.max(columns) >= self.retained() {
                 return Err(LayoutError::Pair(pair.map(|block| block as usize)));
             }
-            let size = self.kept_dim(rows) * self.kept_dim(columns);
+            let size = self.retained_dim(rows) * self.retained_dim(columns);
             self.pair_ptr.push(self.pair_ptr[index] + size);
         }
         self.pairs = pairs;
         Ok(self)
     }
 
-    /// The pairs of kept blocks whose cofactors are asked for.
+    /// The pairs of retained blocks whose cofactors are asked for.
     pub fn pairs(&self) -> &[[u32; 2]] {
         &self.pairs
     }
 
-    /// Where the cofactors of a pair of kept blocks stand among those of all pairs; None where they were not asked for.
+    /// Where the cofactors of a pair of retained blocks stand among those of all pairs; None where they were not asked for.
     pub fn pair(&self, pair: [u32; 2]) -> Option<Range<usize>> {
         let index = self.pairs.binary_search(&pair).ok()?;
         Some(self.pair_ptr[index]..self.pair_ptr[index + 1])
@@ -278,12 +281,12 @@ impl Layout {
 
     /// Makes the system a part of a larger one: a node of its elimination tree.
     ///
-    /// * `outer`: kept blocks that stay, in an order of their own: a system above eliminates them;
-    /// * `contributions`: for each system below the kept blocks that it leaves something for, in its order.
+    /// * `outer`: retained blocks that stay, in an order of their own: a system above eliminates them;
+    /// * `contributions`: for each system below the retained blocks that it leaves something for, in its order.
     pub fn as_part(mut self, outer: Vec<u32>, contributions: Vec<Vec<u32>>) -> Result<Self, LayoutError> {
         numbered(contributions.len())?;
         let sound = |blocks: &[u32]| {
-            let mut seen = vec![false; self.kept()];
+            let mut seen = vec![false; self.retained()];
             let fresh = |&block: &u32| {
                 seen.get_mut(block as usize).is_some_and(|seen| !std::mem::replace(seen, true))
             };
@@ -297,19 +300,19 @@ impl Layout {
         Ok(self)
     }
 
-    /// The kept blocks that a system above eliminates.
+    /// The retained blocks that a system above eliminates.
     pub fn outer(&self) -> &[u32] {
         &self.outer
     }
 
-    /// The kept blocks that each system below leaves something for.
+    /// The retained blocks that each system below leaves something for.
     pub fn contributions(&self) -> &[Vec<u32>] {
         &self.contributions
     }
 
-    /// The unknowns of some kept blocks, block by block.
+    /// The unknowns of some retained blocks, block by block.
     pub fn unknowns_of<'a>(&'a self, blocks: &'a [u32]) -> impl Iterator<Item = usize> + 'a {
-        blocks.iter().flat_map(|&block| self.kept_range(block as usize))
+        blocks.iter().flat_map(|&block| self.retained_range(block as usize))
     }
 
     /// Equations in each group.
@@ -327,24 +330,24 @@ impl Layout {
         self.locals
     }
 
-    /// The places of the kept blocks, where they are known.
+    /// The places of the retained blocks, where they are known.
     pub fn places(&self) -> Option<&[[f64; 3]]> {
         self.places.as_deref()
     }
 
-    /// Number of kept blocks.
-    pub fn kept(&self) -> usize {
-        self.kept_offset.len() - 1
+    /// Number of retained blocks.
+    pub fn retained(&self) -> usize {
+        self.retained_offset.len() - 1
     }
 
-    /// Unknowns of kept block `j`.
-    pub fn kept_dim(&self, j: usize) -> usize {
-        self.kept_offset[j + 1] - self.kept_offset[j]
+    /// Unknowns of retained block `j`.
+    pub fn retained_dim(&self, j: usize) -> usize {
+        self.retained_offset[j + 1] - self.retained_offset[j]
     }
 
     /// Number of groups of equations.
     pub fn groups(&self) -> usize {
-        self.group_kept.len()
+        self.group_retained.len()
     }
 
     /// The ties.
@@ -374,12 +377,12 @@ impl Layout {
 
     /// The unknowns that a tie touches, block by block in its order: the columns of its coefficients.
     pub fn tie_columns(&self, tie: usize) -> impl Iterator<Item = usize> + '_ {
-        self.unknowns_of(&self.ties[tie].kept)
+        self.unknowns_of(&self.ties[tie].retained)
     }
 
     /// Number of unknowns.
     pub fn unknowns(&self) -> usize {
-        self.kept_offset[self.kept()]
+        self.retained_offset[self.retained()]
     }
 
     /// The groups of local block `i`.
@@ -387,64 +390,65 @@ impl Layout {
         self.group_ptr[i]..self.group_ptr[i + 1]
     }
 
-    /// The main kept block that a group touches.
-    pub fn kept_of(&self, group: usize) -> usize {
-        self.group_kept[group] as usize
+    /// The main retained block that a group touches.
+    pub fn retained_of(&self, group: usize) -> usize {
+        self.group_retained[group] as usize
     }
 
-    /// The main kept blocks of the groups of local block `i`.
+    /// The main retained blocks of the groups of local block `i`.
     pub(super) fn main_blocks_of(&self, i: usize) -> &[u32] {
-        &self.group_kept[self.groups_of(i)]
+        &self.group_retained[self.groups_of(i)]
     }
 
-    /// The further kept blocks of the groups of local block `i`.
-    pub(super) fn all_further_of(&self, i: usize) -> &[u32] {
-        match self.further_ptr.get(self.group_ptr[i]..=self.group_ptr[i + 1]) {
-            Some(ends) => &self.further[ends[0]..ends[ends.len() - 1]],
+    /// The shared blocks of the groups of local block `i`.
+    pub(super) fn all_shared_of(&self, i: usize) -> &[u32] {
+        match self.shared_ptr.get(self.group_ptr[i]..=self.group_ptr[i + 1]) {
+            Some(ends) => &self.shared[ends[0]..ends[ends.len() - 1]],
             None => &[],
         }
     }
 
-    /// Whether any group touches further kept blocks.
-    pub fn has_further(&self) -> bool {
-        !self.further.is_empty()
+    /// Whether any group touches shared blocks.
+    pub fn has_shared(&self) -> bool {
+        !self.shared.is_empty()
     }
 
-    /// The further kept blocks that a group touches, in its order.
-    pub fn further_of(&self, group: usize) -> &[u32] {
-        match self.further_ptr.get(group..group + 2) {
-            Some(ends) => &self.further[ends[0]..ends[1]],
+    /// The shared blocks that a group touches, in its order.
+    pub fn shared_of(&self, group: usize) -> &[u32] {
+        match self.shared_ptr.get(group..group + 2) {
+            Some(ends) => &self.shared[ends[0]..ends[1]],
             None => &[],
         }
     }
 
-    /// All kept blocks that a group touches, the main one first.
+    /// All retained blocks that a group touches, the main one first.
     pub fn blocks_of(&self, group: usize) -> impl Iterator<Item = usize> + '_ {
-        std::iter::once(self.kept_of(group)).chain(self.further_of(group).iter().map(|&block| block as usize))
+        std::iter::once(self.retained_of(group))
+            .chain(self.shared_of(group).iter().map(|&block| block as usize))
     }
 
-    /// The unknowns that a group touches in its further kept blocks, block by block in its order: the columns of what its equations have in
+    /// The unknowns that a group touches in its shared blocks, block by block in its order: the columns of what its equations have in
     /// common with others.
-    pub fn common_columns(&self, group: usize) -> impl Iterator<Item = usize> + '_ {
-        self.unknowns_of(self.further_of(group))
+    pub fn shared_columns(&self, group: usize) -> impl Iterator<Item = usize> + '_ {
+        self.unknowns_of(self.shared_of(group))
     }
 
     /// How many they are.
-    pub fn common_width(&self, group: usize) -> usize {
-        self.further_of(group).iter().map(|&block| self.kept_dim(block as usize)).sum()
+    pub fn shared_width(&self, group: usize) -> usize {
+        self.shared_of(group).iter().map(|&block| self.retained_dim(block as usize)).sum()
     }
 
-    /// The unknowns of kept blocks, a main one counted for each of its groups, that lose products when local block `i` is reduced out.
+    /// The unknowns of retained blocks, a main one counted for each of its groups, that lose products when local block `i` is reduced out.
     pub(super) fn reduced_width(&self, i: usize) -> usize {
-        let main: usize = self.groups_of(i).map(|group| self.kept_dim(self.kept_of(group))).sum();
-        if !self.has_further() {
+        let main: usize = self.groups_of(i).map(|group| self.retained_dim(self.retained_of(group))).sum();
+        if !self.has_shared() {
             return main;
         }
-        let mut further: SmallVec<[u32; 16]> =
-            self.groups_of(i).flat_map(|group| self.further_of(group)).copied().collect();
-        further.sort_unstable();
-        further.dedup();
-        main + further.into_iter().map(|block| self.kept_dim(block as usize)).sum::<usize>()
+        let mut shared: SmallVec<[u32; 16]> =
+            self.groups_of(i).flat_map(|group| self.shared_of(group)).copied().collect();
+        shared.sort_unstable();
+        shared.dedup();
+        main + shared.into_iter().map(|block| self.retained_dim(block as usize)).sum::<usize>()
     }
 
     /// Where local block `i` stands in the vector of unknowns.
@@ -457,14 +461,14 @@ impl Layout {
         0..self.locals * self.local_dim
     }
 
-    /// Where kept block `j` stands in the vector of unknowns.
-    pub fn kept_range(&self, j: usize) -> Range<usize> {
-        self.kept_offset[j]..self.kept_offset[j + 1]
+    /// Where retained block `j` stands in the vector of unknowns.
+    pub fn retained_range(&self, j: usize) -> Range<usize> {
+        self.retained_offset[j]..self.retained_offset[j + 1]
     }
 
-    /// Where all kept blocks stand in the vector of unknowns.
-    pub fn all_kept(&self) -> Range<usize> {
-        self.kept_offset[0]..self.kept_offset[self.kept()]
+    /// Where all retained blocks stand in the vector of unknowns.
+    pub fn all_retained(&self) -> Range<usize> {
+        self.retained_offset[0]..self.retained_offset[self.retained()]
     }
 }
 

@@ -1,8 +1,8 @@
 //! Block normal equations: formed, reduced, ordered, factored, solved and selectively inverted.
 //!
-//! The unknowns stand in one vector: *local* blocks of equal size (object points, stars), then *kept* blocks of any size (photographs,
-//! cameras, a comparator). Each group of equations touches one local block, one main kept block and any further ones; ties are equations
-//! among any kept blocks. One pass over a system is
+//! The unknowns stand in one vector: *local* blocks of equal size (object points, stars), then *retained* blocks of any size (photographs,
+//! cameras, a comparator). Each group of equations touches one local block, one main retained block and any further ones; ties are equations
+//! among any retained blocks. One pass over a system is
 //!
 //! 1. [`Layout`]: which unknowns there are and which group touches which of them;
 //! 2. [`System`]: the order of elimination and the pattern of the factor ([`Symbolic`]), once for all iterations;
@@ -11,7 +11,7 @@
 //! 4. [`System::solve`], for the right-hand side of the equations or any others;
 //! 5. [`System::invert`]: the selected inverse, and cofactors of everything; [`System::reduce`] those of any linear functions.
 //!
-//! A system may be a part of a larger one ([`Layout::as_part`]): some kept blocks, the outer ones, stay when all others are eliminated. Their
+//! A system may be a part of a larger one ([`Layout::as_part`]): some retained blocks, the outer ones, stay when all others are eliminated. Their
 //! front, ordered last, is assembled and left open, and is what the part leaves for the system above ([`Factor::take_contribution`]), into
 //! whose fronts it goes like what a child leaves for its parent ([`Equations::contribution`]). The step and the inverse that
 //! the system above has found for these blocks are options of the phases that go down. Cut near the top of its elimination tree, a system is
@@ -20,31 +20,33 @@
 //! ```
 //! use std::ops::ControlFlow;
 //!
+//! use photocore::Threads;
 //! use photocore::normals::{Equations, FactorOptions, GroupRows, Layout, Ordering, Prior, SolveOptions, System};
 //!
-//! /// x_local - y_kept = 1 for every pair.
+//! /// x_local - y_retained = 1 for every pair.
 //! struct Differences;
 //!
 //! impl Equations for Differences {
 //!     fn write(&self, _local: usize, _group: usize, rows: &mut GroupRows<'_>) {
-//!         (rows.constant[0], rows.local[0], rows.kept[0]) = (1.0, 1.0, -1.0);
+//!         (rows.constant[0], rows.local[0], rows.retained[0]) = (1.0, 1.0, -1.0);
 //!     }
 //! }
 //!
-//! // Three local and two kept unknowns; the first local one is held at zero by an equation of its own.
+//! // Three local and two retained unknowns; the first local one is held at zero by an equation of its own.
 //! let layout = Layout::new(1, 1, &[1, 1], vec![0, 2, 4, 6], vec![0, 1, 0, 1, 0, 1])?;
 //! let system = System::new(layout, Ordering::Auto)?;
 //! let prior = Prior { weight: vec![1.0, 0.0, 0.0, 0.0, 0.0], right: vec![0.0; 5], between: vec![] };
-//! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+//! let threads = Threads::new(1)?;
 //! let mut go_on = |_| ControlFlow::Continue(());
 //! let (factoring, solving) = (FactorOptions::default(), SolveOptions::default());
-//! let factor = system.factor(&pool, &Differences, &prior, &factoring, &mut go_on).continue_value().expect("not stopped");
-//! let x = system.solve(&pool, &factor, &Differences, &prior, &solving, &mut go_on).continue_value().expect("not stopped");
+//! let factor = system.factor(&threads, &Differences, &prior, &factoring, &mut go_on).continue_value().expect("not stopped");
+//! let x = system.solve(&threads, &factor, &Differences, &prior, &solving, &mut go_on).continue_value().expect("not stopped");
 //! assert!(x.iter().zip([0.0, 0.0, 0.0, -1.0, -1.0]).all(|(x, expected)| (x - expected).abs() < 1e-12));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod assembly;
+mod batch;
 mod chord;
 mod cofactors;
 mod contribution;
@@ -58,12 +60,12 @@ mod factor;
 mod front;
 mod functions;
 mod graph;
-mod homes;
 mod incidence;
 mod invert;
 mod layout;
 mod memory;
 mod minimum_degree;
+mod nodes;
 mod open_front;
 mod options;
 mod ordering;
@@ -73,7 +75,6 @@ mod products;
 mod room;
 mod selected;
 mod solve;
-mod stack;
 mod substitution;
 mod symbolic;
 mod system;
@@ -100,4 +101,4 @@ pub use selected::SelectedInverse;
 pub use symbolic::{Operations, Symbolic};
 pub use system::System;
 pub(crate) use vectorised::dot;
-pub use watch::{Between, Stopped};
+pub use watch::Between;

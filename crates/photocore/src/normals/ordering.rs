@@ -1,11 +1,11 @@
-//! The order in which kept blocks are eliminated.
+//! The order in which retained blocks are eliminated.
 
 use super::dissection::nested_dissection;
 use super::graph::{Graph, NOWHERE};
 use super::layout::Layout;
 use super::minimum_degree::minimum_degree;
 
-/// How the kept blocks are ordered for elimination.
+/// How the retained blocks are ordered for elimination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Ordering {
     /// The cheapest of the others, by predicted operations.
@@ -17,7 +17,7 @@ pub enum Ordering {
     ReverseCuthillMckee,
     /// Approximate minimum degree: for blocks that hang together without any shape.
     MinimumDegree,
-    /// Nested dissection across the places of the kept blocks; by the graph alone where the layout has none.
+    /// Nested dissection across the places of the retained blocks; by the graph alone where the layout has none.
     DissectionByPlace,
     /// Nested dissection by the graph alone.
     DissectionByGraph,
@@ -99,7 +99,7 @@ fn dense_blocks(graph: &Graph, layout: &Layout) -> Vec<usize> {
     let count = graph.len() as f64;
     let most = (10.0 * count.sqrt()).min(0.5 * count);
     let mut main = vec![false; graph.len()];
-    (0..layout.groups()).for_each(|group| main[layout.kept_of(group)] = true);
+    (0..layout.groups()).for_each(|group| main[layout.retained_of(group)] = true);
     let is_dense = |&block: &usize| !main[block] && graph.degree(block) as f64 > most;
     let mut dense: Vec<usize> = (0..graph.len()).filter(is_dense).collect();
     dense.sort_by_key(|&block| graph.degree(block));

@@ -62,7 +62,7 @@ impl<T> Handover<T> {
     }
 }
 
-/// Locks what is never held while anything can panic on purpose: a panic elsewhere is passed on by the pool.
+/// Locks what is never held while anything can panic on purpose: a panic elsewhere is passed on by the threads.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -14,15 +14,15 @@ impl System {
             let have = |blocks: &[u32]| blocks.iter().all(|&block| has(symbolic.position(block as usize)));
             let children =
                 s.children.iter().all(|&child| symbolic.supernodes()[child].rows.iter().all(|&row| has(row)));
-            let ties = self.ties.at(front).iter().all(|&tie| have(&layout.ties()[tie as usize].kept));
+            let ties = self.ties.at(front).iter().all(|&tie| have(&layout.ties()[tie as usize].retained));
             let below = &self.contributions;
             let below = below.at(front).iter().all(|&part| have(&layout.contributions()[part as usize]));
-            // Local blocks of one stack touch the same.
-            let locals = incidence.stacks_at(front).iter().all(|locals| {
+            // Local blocks of one batch touch the same.
+            let locals = incidence.batches_at(front).iter().all(|locals| {
                 let local = locals[0] as usize;
-                let further = |&common: &u32| have(layout.further_of(incidence.group_with(common)));
+                let shared = |&shared: &u32| have(layout.shared_of(incidence.group_with(shared)));
                 incidence.positions_of(layout, local).iter().all(|&position| has(position as usize))
-                    && incidence.members(incidence.set_of(local)).iter().all(further)
+                    && incidence.members(incidence.set_of(local)).iter().all(shared)
             });
             if !(children && ties && below && locals) {
                 return Err(LayoutError::Pattern { front });
@@ -37,17 +37,17 @@ mod tests {
     use super::*;
     use crate::normals::{Layout, Ordering, Symbolic, Tie};
 
-    /// Three local blocks that are each seen from one of three kept blocks; a fourth kept block is nobody's.
+    /// Three local blocks that are each seen from one of three retained blocks; a fourth retained block is nobody's.
     fn apart() -> Layout {
         Layout::new(1, 1, &[1, 1, 1, 1], vec![0, 1, 2, 3], vec![0, 1, 2]).unwrap()
     }
 
     #[test]
     fn a_pattern_that_lacks_what_goes_to_a_front_is_refused() {
-        let tie = Tie { rows: 1, kept: vec![0, 2] };
+        let tie = Tie { rows: 1, retained: vec![0, 2] };
         let together = [
             Layout::new(1, 1, &[1, 1, 1, 1], vec![0, 2, 3], vec![0, 1, 2]).unwrap(),
-            apart().with_further(vec![0, 0, 0, 1], vec![3]).unwrap(),
+            apart().with_shared(vec![0, 0, 0, 1], vec![3]).unwrap(),
             apart().with_ties(vec![tie]).unwrap(),
             apart().as_part(vec![], vec![vec![1, 2]]).unwrap(),
         ];

@@ -28,9 +28,9 @@ fn numbers_of(layout: &Layout, first: usize, count: usize) -> usize {
     count * (l * (layout.reduced_width(first) + 1) + Triangle::numbers(l))
 }
 
-/// The same of all local blocks at home in a supernode.
+/// The same of all local blocks assembled in a supernode.
 pub(super) fn numbers_at(incidence: &Incidence, layout: &Layout, index: usize) -> usize {
-    let of_stack =
+    let of_batch =
         |run: &[u32]| run.first().map_or(0, |&first| numbers_of(layout, first as usize, run.len()));
-    incidence.stacks_at(index).iter().map(of_stack).sum()
+    incidence.batches_at(index).iter().map(of_batch).sum()
 }

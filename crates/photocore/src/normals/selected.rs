@@ -2,7 +2,7 @@
 
 use super::panels::Panels;
 
-/// The blocks of N^-1 inside the pattern of the factor: every kept block's own, and those of every two kept blocks that
+/// The blocks of N^-1 inside the pattern of the factor: every retained block's own, and those of every two retained blocks that
 /// share a local block.
 #[derive(Debug)]
 pub struct SelectedInverse {

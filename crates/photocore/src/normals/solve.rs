@@ -2,31 +2,31 @@
 
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::batch::Gathered;
 use super::eliminated::Elimination;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::options::SolveOptions;
-use super::stack::Gathered;
 use super::system::System;
 use super::vectorised::LANES;
-use super::watch::{Between, Control, Stopped, watched};
+use super::watch::{Between, Control, watched};
 use super::workspace::{reserved, zeros};
+use crate::{Stopped, Threads};
 
 /// Right-hand sides that go through the factor together.
 const TOGETHER: usize = 16;
 
 impl System {
     /// Solves the normal equations for all unknowns, in the order of the layout, for one right-hand side or several, the solutions one after
-    /// the other: the kept blocks from the factor, the local blocks one by one. The same bits for any number of threads.
+    /// the other: the retained blocks from the factor, the local blocks one by one. The same bits for any number of threads.
     ///
     /// `equations` and `prior` must be those that the factor comes from. The equations are written again where the factor has not cached
     /// what the elimination of the local blocks has left; those of local blocks whose right-hand sides are all zero once only.
     pub fn solve<E: Equations>(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         factor: &Factor,
         equations: &E,
         prior: &Prior,
@@ -34,7 +34,7 @@ impl System {
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Vec<f64>> {
         let equations: &dyn Gathered = equations;
-        watched(pool, between, |control| {
+        watched(threads, between, |control| {
             let elimination = self.elimination(factor, equations, prior, control);
             match options.rights {
                 None => {
@@ -123,9 +123,9 @@ impl Elimination<'_> {
             }
         }
         let l = layout.local_dim();
-        for ((_, stacks), found) in self.parts().into_iter().zip(&found) {
+        for ((_, batches), found) in self.parts().into_iter().zip(&found) {
             let mut rows = found.chunks_exact(l);
-            for locals in stacks.iter() {
+            for locals in batches.iter() {
                 for first in (0..columns).step_by(C) {
                     for (&local, own) in locals.iter().zip(&mut rows) {
                         let start = first * unknowns + layout.local_range(local as usize).start;

@@ -75,7 +75,7 @@ pub struct Operations {
 }
 
 impl Symbolic {
-    /// Orders the kept blocks of a layout and finds the pattern of the factor.
+    /// Orders the retained blocks of a layout and finds the pattern of the factor.
     pub fn new(layout: &Layout, ordering: Ordering) -> Self {
         let graph = Graph::new(layout);
         let try_out = |&candidate: &Ordering| {
@@ -101,7 +101,7 @@ impl Symbolic {
         let position_of = places(&block_at);
         let mut offset = vec![0];
         for &block in &block_at {
-            offset.push(offset[offset.len() - 1] + layout.kept_dim(block));
+            offset.push(offset[offset.len() - 1] + layout.retained_dim(block));
         }
         let columns = column_patterns(graph, &block_at, &position_of);
         let mut symbolic = Self {
@@ -226,12 +226,12 @@ impl Symbolic {
         &self.supernodes
     }
 
-    /// Place of a kept block in the order of elimination.
+    /// Place of a retained block in the order of elimination.
     pub(crate) fn position(&self, block: usize) -> usize {
         self.position_of[block]
     }
 
-    /// The kept block at a position.
+    /// The retained block at a position.
     pub(crate) fn block(&self, position: usize) -> usize {
         self.block_at[position]
     }
@@ -252,7 +252,7 @@ impl Symbolic {
 
     /// Where the unknowns of a position stand in the vector of unknowns.
     pub(crate) fn unknowns_at(&self, layout: &Layout, position: usize) -> Range<usize> {
-        layout.kept_range(self.block_at[position])
+        layout.retained_range(self.block_at[position])
     }
 
     pub(crate) fn supernode_of(&self, position: usize) -> usize {
@@ -332,14 +332,14 @@ fn predicted_operations(layout: &Layout, graph: &Graph, order: &[usize]) -> f64 
             let mut i = place[other];
             while seen_by[i] != k {
                 seen_by[i] = k;
-                below[i] += layout.kept_dim(block);
+                below[i] += layout.retained_dim(block);
                 // The walk ends at k itself, the root of the subtree, at the latest.
                 i = parent[i].unwrap_or(k);
             }
         }
     }
     let inner = &order[..order.len() - layout.outer().len()];
-    inner.iter().zip(below).map(|(&block, below)| multiply_adds(layout.kept_dim(block), below)).sum()
+    inner.iter().zip(below).map(|(&block, below)| multiply_adds(layout.retained_dim(block), below)).sum()
 }
 
 /// Multiply-adds of eliminating `width` unknowns that are coupled to `below` others.

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::homes::Homes;
 use super::incidence::Incidence;
 use super::layout::{Layout, LayoutError};
+use super::nodes::Nodes;
 use super::ordering::Ordering;
 use super::room::{made_of_results, numbers_at};
 use super::symbolic::Symbolic;
@@ -17,8 +17,8 @@ pub struct System {
     pub(super) layout: Layout,
     pub(super) symbolic: Arc<Symbolic>,
     pub(super) incidence: Incidence,
-    pub(super) ties: Homes,
-    pub(super) contributions: Homes,
+    pub(super) ties: Nodes,
+    pub(super) contributions: Nodes,
     pub(super) tree: Tree,
     pub(super) workspace: Workspace,
     /// Whether what the elimination of local blocks leaves is cached for the solution.
@@ -40,8 +40,8 @@ impl System {
     pub(super) fn with_pattern(layout: Layout, symbolic: Symbolic) -> Result<Self, LayoutError> {
         let symbolic = Arc::new(symbolic);
         let incidence = Incidence::new(&layout, &symbolic);
-        let ties = Homes::new(layout.ties().iter().map(|tie| &tie.kept), &symbolic);
-        let contributions = Homes::new(layout.contributions().iter(), &symbolic);
+        let ties = Nodes::new(layout.ties().iter().map(|tie| &tie.retained), &symbolic);
+        let contributions = Nodes::new(layout.contributions().iter(), &symbolic);
         let work = |(index, supernode): (usize, &super::symbolic::Supernode)| {
             let factored = if symbolic.open() == Some(index) { 0.0 } else { supernode.operations() };
             factored + formation_work(&incidence, &layout, index)
@@ -83,13 +83,13 @@ impl System {
     }
 }
 
-/// Time for forming and eliminating the local blocks at home in a supernode, in multiply-adds of a factorisation: those of their own,
+/// Time for forming and eliminating the local blocks assembled in a supernode, in multiply-adds of a factorisation: those of their own,
 /// which run at a lower rate, and their equations.
 fn formation_work(incidence: &Incidence, layout: &Layout, index: usize) -> f64 {
-    let of_stack = |run: &[u32]| {
+    let of_batch = |run: &[u32]| {
         let first = run.first().map_or(0, |&first| first as usize);
         let width = layout.reduced_width(first);
         run.len() * (2 * width * width * layout.local_dim() + 500 * layout.groups_of(first).len())
     };
-    incidence.stacks_at(index).iter().map(of_stack).sum::<usize>() as f64
+    incidence.batches_at(index).iter().map(of_batch).sum::<usize>() as f64
 }

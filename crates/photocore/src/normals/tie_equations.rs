@@ -3,7 +3,7 @@
 use super::equations::{Equations, TieRows};
 use super::system::System;
 
-/// The equations of one tie, their columns in the order of the front of its home.
+/// The equations of one tie, their columns in the order of the front of its node.
 #[derive(Debug, Default)]
 pub(super) struct TieEquations {
     constant: Vec<f64>,
@@ -15,10 +15,10 @@ pub(super) struct TieEquations {
 }
 
 impl TieEquations {
-    /// Gathers the equations of a tie whose home is supernode `home`.
-    pub fn gather(&mut self, system: &System, equations: &dyn Equations, home: usize, tie: usize) {
+    /// Gathers the equations of a tie that is assembled in supernode `node`.
+    pub fn gather(&mut self, system: &System, equations: &dyn Equations, node: usize, tie: usize) {
         let layout = &system.layout;
-        self.place(system, home, tie);
+        self.place(system, node, tie);
         let (rows, width) = (layout.ties()[tie].rows, self.columns.len());
         self.constant.resize(rows, 0.0);
         self.written.resize(rows * width, 0.0);
@@ -32,13 +32,13 @@ impl TieEquations {
     }
 
     /// Finds the columns in the front.
-    fn place(&mut self, system: &System, home: usize, tie: usize) {
+    fn place(&mut self, system: &System, node: usize, tie: usize) {
         let (layout, symbolic) = (&system.layout, &*system.symbolic);
         let each = &layout.ties()[tie];
         let mut columns = Vec::new();
-        for &block in &each.kept {
+        for &block in &each.retained {
             let position = symbolic.position(block as usize);
-            let row = symbolic.row_of(home, position);
+            let row = symbolic.row_of(node, position);
             columns.extend(row..row + symbolic.dim(position));
         }
         self.columns.clone_from(&columns);

@@ -61,9 +61,9 @@ impl Triangle {
                     pivot = simd.sub_f64s(pivot, simd.mul_f64s(l[j][k], l[j][k]));
                 }
                 let least = simd.mul_f64s(simd.splat_f64s(PIVOT_TOLERANCE), diagonal);
-                let kept = simd.greater_than_f64s(pivot, least);
-                sound = simd.select_f64s(kept, sound, zero);
-                l[j][j] = simd.div_f64s(one, simd.sqrt_f64s(simd.select_f64s(kept, pivot, one)));
+                let retained = simd.greater_than_f64s(pivot, least);
+                sound = simd.select_f64s(retained, sound, zero);
+                l[j][j] = simd.div_f64s(one, simd.sqrt_f64s(simd.select_f64s(retained, pivot, one)));
                 for i in j + 1..N {
                     let mut value = S::as_simd_f64s(&matrices[i][j]).0[v];
                     for k in 0..j {

@@ -6,7 +6,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::layout::Layout;
 
-/// Work compiled for several sizes: rows R of a group, unknowns L of a local block and D of a kept block. R and D may be zero: then
+/// Work compiled for several sizes: rows R of a group, unknowns L of a local block and D of a retained block. R and D may be zero: then
 /// the size is known at run time only.
 ///
 /// Implementations are `#[inline(always)]`, and so is all that they call, iterators with long closures excepted: what is not inlined
@@ -15,9 +15,9 @@ pub(super) trait Kernel {
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S);
 }
 
-/// Runs a kernel for the sizes of a layout; `kept_dim` is that of all kept blocks concerned, where they have the same.
-pub(super) fn run(layout: &Layout, kept_dim: Option<usize>, kernel: impl Kernel) {
-    Arch::new().dispatch(Sized { layout, kept_dim, kernel });
+/// Runs a kernel for the sizes of a layout; `retained_dim` is that of all retained blocks concerned, where they have the same.
+pub(super) fn run(layout: &Layout, retained_dim: Option<usize>, kernel: impl Kernel) {
+    Arch::new().dispatch(Sized { layout, retained_dim, kernel });
 }
 
 /// Runs a kernel that does not depend on sizes.
@@ -33,7 +33,7 @@ pub(super) fn size<const N: usize>(at_run_time: usize) -> usize {
 
 struct Sized<'a, K> {
     layout: &'a Layout,
-    kept_dim: Option<usize>,
+    retained_dim: Option<usize>,
     kernel: K,
 }
 
@@ -43,7 +43,7 @@ impl<K: Kernel> WithSimd for Sized<'_, K> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         // Machines without vectors do without sizes: unrolled lane by lane, they would be the largest part of the library.
-        match (self.layout.rows(), self.layout.local_dim(), self.kept_dim) {
+        match (self.layout.rows(), self.layout.local_dim(), self.retained_dim) {
             (2, 3, Some(6)) if const { S::F64_LANES > 1 } => self.kernel.run::<S, 2, 3, 6>(simd),
             (2, 3, Some(9)) if const { S::F64_LANES > 1 } => self.kernel.run::<S, 2, 3, 9>(simd),
             (_, 3, _) => self.kernel.run::<S, 0, 3, 0>(simd),
@@ -109,7 +109,9 @@ pub(super) fn add_products<S: Simd, const N: usize>(
         while j < width {
             let target = &mut target[j * stride..];
             // Eight columns are one where their sums have room in registers, or twice four, not six and two that wait for each other.
+            // Unrolled lane by lane, without vectors, several columns would be a large part of the library.
             j += match width - j {
+                _ if const { S::F64_LANES == 1 } => add_columns::<S, N, 1>(simd, target, stride, &products, i, j),
                 LANES if S::F64_LANES == LANES => {
                     add_columns::<S, N, LANES>(simd, target, stride, &products, i, j)
                 }
@@ -235,7 +237,7 @@ pub(super) fn add_difference<S: Simd>(
     for i in (0..a.width).step_by(LANES) {
         let target = &mut target[i..];
         let mut j = 0;
-        while j + TOGETHER <= a.width {
+        while const { S::F64_LANES > 1 } && j + TOGETHER <= a.width {
             add_difference_columns::<S, TOGETHER>(simd, &mut target[j * stride..], stride, a, v, parts, i, j);
             j += TOGETHER;
         }

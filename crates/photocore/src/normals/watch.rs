@@ -5,16 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use rayon::ThreadPool;
-
-/// Why work has ended before its end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stopped {
-    /// Whoever watched it said so.
-    Interrupted,
-    /// An allocation of so many bytes failed.
-    OutOfMemory(usize),
-}
+use crate::{Stopped, Threads};
 
 /// Called on the calling thread before the work and every few hundredths of a second during it, with the number of local
 /// blocks done; breaking stops the work.
@@ -62,9 +53,9 @@ impl Control {
     }
 }
 
-/// Does work on the threads of a pool while the calling thread watches it. The work may end with nothing when it was stopped.
+/// Does work on some threads while the calling thread watches it. The work may end with nothing when it was stopped.
 pub(super) fn watched<T: Send>(
-    pool: &ThreadPool,
+    threads: &Threads,
     between: Between<'_>,
     work: impl FnOnce(&Control) -> Option<T> + Send,
 ) -> ControlFlow<Stopped, T> {
@@ -72,13 +63,13 @@ pub(super) fn watched<T: Send>(
         return ControlFlow::Break(Stopped::Interrupted);
     }
     let control = Control::default();
-    if pool.current_thread_index().is_some() {
-        // A thread of the pool must not wait for another; whoever put it to work watches.
+    if threads.pool().current_thread_index().is_some() {
+        // One of the threads must not wait for another; whoever put it to work watches.
         return control.ended(work(&control));
     }
     let (sender, receiver) = channel();
     let mut flow = ControlFlow::Continue(());
-    let result = pool.in_place_scope(|scope| {
+    let result = threads.pool().in_place_scope(|scope| {
         let control = &control;
         // A receiver that is gone has nothing to hear.
         scope.spawn(move |_| drop(sender.send(work(control))));

@@ -3,10 +3,10 @@
 use std::collections::HashMap;
 use std::sync::Mutex;
 
+use super::batch::Batch;
 use super::panels::lock;
-use super::stack::Stack;
 
-/// For each supernode, and last for the local blocks without equations: V, v and L of every stack at home there, one after
+/// For each supernode, and last for the local blocks without equations: V, v and L of every batch assembled there, one after
 /// the other; nothing where it is not cached.
 pub(super) type Eliminated = Vec<Vec<f64>>;
 
@@ -18,8 +18,8 @@ pub(super) struct Workspace {
     frugal: bool,
     spare: Mutex<HashMap<usize, Vec<Vec<f64>>>>,
     eliminated: Mutex<Eliminated>,
-    /// Room for stacks, which differ little in size.
-    stacks: Mutex<Vec<Stack>>,
+    /// Room for batches, which differ little in size.
+    batches: Mutex<Vec<Batch>>,
 }
 
 impl Workspace {
@@ -79,17 +79,17 @@ impl Workspace {
     pub fn clear(&self) {
         lock(&self.spare).clear();
         drop(self.take_eliminated());
-        lock(&self.stacks).clear();
+        lock(&self.batches).clear();
     }
 
-    /// Room for a stack, of anything.
-    pub fn stack(&self) -> Stack {
-        lock(&self.stacks).pop().unwrap_or_default()
+    /// Room for a batch, of anything.
+    pub fn batch(&self) -> Batch {
+        lock(&self.batches).pop().unwrap_or_default()
     }
 
     /// Takes it back.
-    pub fn put_back_stack(&self, stack: Stack) {
-        lock(&self.stacks).push(stack);
+    pub fn put_back_batch(&self, batch: Batch) {
+        lock(&self.batches).push(batch);
     }
 
     /// Room for what is cached of local blocks, as it was given back; nothing where it was not.

@@ -8,13 +8,13 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use num_complex::Complex64;
+use photocore::Threads;
 use photocore::adjustment::{AdjustError, Adjustment, Method, Model, Options, Problem, Status, Stop, adjust};
 use photocore::normals::{GroupRows, Layout, Ordering, System};
-use rayon::ThreadPoolBuilder;
 
 use problems::{Certified, PROBLEMS};
 
-/// A curve y(x) with parameters: the kept block. The local block is one unknown that is fixed and measured by nothing.
+/// A curve y(x) with parameters: the retained block. The local block is one unknown that is fixed and measured by nothing.
 struct Curve<'a> {
     name: &'a str,
     x: &'a [f64],
@@ -64,7 +64,7 @@ impl Model for Curve<'_> {
         for k in 0..at.len() {
             let mut beside = at.clone();
             beside[k].im = STEP;
-            rows.kept[k] = curve(self.name, &beside, self.x[group]).im / STEP;
+            rows.retained[k] = curve(self.name, &beside, self.x[group]).im / STEP;
         }
     }
 }
@@ -82,9 +82,9 @@ fn run(certified: &Certified, start: &[f64], method: Method) -> Result<Adjustmen
         sd: [vec![0.0], vec![f64::INFINITY; start.len()]].concat(),
         initial,
     };
-    let options = Options { method, max_iterations: 5000, covariance: true, loss: None };
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    adjust(&problem, &options, &pool, &mut |_| ControlFlow::Continue(()))
+    let options = Options { method, max_iterations: 5000, covariance: true, loss: None, threads: 0 };
+    let threads = Threads::new(1).unwrap();
+    adjust(&problem, &options, &threads, &mut |_| ControlFlow::Continue(()))
 }
 
 /// Digits that agree, of the value that agrees worst.
@@ -100,7 +100,7 @@ fn agreement(certified: &Certified, adjusted: &Adjustment) -> [f64; 3] {
     let count = certified.parameters.len();
     let sigma = (squares / (certified.x.len() - count) as f64).sqrt() / certified.residual_sd;
     let cofactors = adjusted.cofactors.as_ref().unwrap();
-    let sd: Vec<f64> = (0..count).map(|k| sigma * cofactors.kept[k * count + k].sqrt()).collect();
+    let sd: Vec<f64> = (0..count).map(|k| sigma * cofactors.retained[k * count + k].sqrt()).collect();
     [
         digits(&adjusted.unknowns[FIRST..], certified.parameters),
         digits(&sd, certified.parameter_sd),

@@ -114,7 +114,13 @@ fn block_network(
         other => return Err(unknown("criterion", other)),
     };
     let options = Options {
-        adjustment: AdjustmentOptions { method, max_iterations, covariance, loss: named_loss(loss)? },
+        adjustment: AdjustmentOptions {
+            method,
+            max_iterations,
+            covariance,
+            loss: named_loss(loss)?,
+            threads: 0,
+        },
         ordering: named_ordering(ordering)?,
         unit_variance: match unit_variance {
             "free" => UnitVariance::Free,

@@ -41,15 +41,14 @@ impl BlockNetwork {
         let inner = datum.map(datum_of).transpose()?;
         let start = start.map(|start| start.state.clone());
         let told = watched(py, workers, progress, |pool, watch| {
-            let solution = match (&inner, &start) {
-                (Some(NetworkDatum::Inner(inner)), _) => {
-                    self.network.adjust_in_datum(&self.options, inner, pool, watch)
-                }
-                (_, Some(start)) => self.network.adjust_again(&self.options, start, pool, watch),
-                _ if keep => self.network.adjust_and_keep(&self.options, pool, watch),
-                _ => self.network.adjust(&self.options, pool, watch),
+            let adjustment = self.network.adjustment(&self.options).on(pool).watched(watch);
+            let adjustment = match (&inner, &start) {
+                (Some(NetworkDatum::Inner(inner)), _) => adjustment.in_datum(inner),
+                (_, Some(start)) => adjustment.from_state(start),
+                _ if keep => adjustment.kept(),
+                _ => adjustment,
             };
-            solution.map(|solution| Told::new(solution, pool))
+            adjustment.run().map(|solution| Told::new(solution, pool))
         })?;
         BlockSolution::new(py, told.map_err(|error| refused(&error))?, 6)
     }

@@ -51,11 +51,12 @@ impl CollectionNetwork {
         let workers = Workers::of(threads, self.network.images.len());
         let start = start.map(|start| start.state.clone());
         let told = watched(py, workers, progress, |pool, watch| {
-            let solution = match &start {
-                None => self.network.adjust(&self.options, pool, watch),
-                Some(start) => self.network.adjust_again(&self.options, start, pool, watch),
+            let adjustment = self.network.adjustment(&self.options).on(pool).watched(watch);
+            let adjustment = match &start {
+                None => adjustment,
+                Some(start) => adjustment.from_state(start),
             };
-            solution.map(|solution| Told::new(solution, pool))
+            adjustment.run().map(|solution| Told::new(solution, pool))
         })?;
         CollectionSolution::new(py, told.map_err(|error| refused(&error))?, self.unknowns)
     }
@@ -164,16 +165,12 @@ fn collection_network(
     let own =
         |((_, camera), sd): (&(_, geometry::Camera), &Vec<f64>)| Camera::new(*camera, sd[POSE..].to_vec());
     let network = Network {
-        space: ObjectSpace::Rectangular,
         poses: PoseNumbers::Vectors,
-        refraction: None,
         cameras: given.iter().zip(&sd).map(own).collect(),
         photos: given.iter().zip(&sd).enumerate().map(photo).collect(),
         points: points(&point_positions, &point_sd)?,
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
-        observations: vec![],
-        commons: vec![],
-        mounts: vec![],
+        ..Network::new()
     };
     let options = Options {
         adjustment: AdjustmentOptions {
@@ -181,6 +178,7 @@ fn collection_network(
             max_iterations,
             covariance,
             loss: named_loss(loss)?,
+            threads: 0,
         },
         ordering: named_ordering(ordering)?,
         unit_variance: UnitVariance::Constrained,

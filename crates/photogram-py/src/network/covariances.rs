@@ -1,5 +1,6 @@
 //! Covariances of an adjusted network.
 
+use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
 use photocore::adjustment::{GroupSquares, Probing};
 use photocore::network::{Covariances, Groups, Network, NetworkError as Failure, Of, Options};
@@ -60,6 +61,13 @@ pub fn refused(error: &Failure) -> PyErr {
     BlockError::new_err(failure(error, "block"))
 }
 
+/// As an array, (rows, columns); what is symmetric may be large, and is not copied.
+fn matrix(py: Python<'_>, found: DMatrix<f64>, symmetric: bool) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let shape = [found.nrows(), found.ncols()];
+    let rows = if symmetric { found } else { found.transpose() };
+    PyArray1::from_vec(py, rows.data.into()).reshape(shape)
+}
+
 #[pymethods]
 impl BlockCovariances {
     #[pyo3(signature = (rows, columns, *, threads, progress))]
@@ -72,12 +80,10 @@ impl BlockCovariances {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (rows, columns) = (of_rows(rows)?, columns.map(of_rows).transpose()?);
-        let height = self.width(&rows)?;
-        let width = columns.as_ref().map_or(Ok(height), |columns| self.width(columns))?;
         let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
             self.covariances.cofactors(&rows, columns.as_deref(), pool, watch)
         })?;
-        PyArray1::from_vec(py, found.map_err(|error| (self.refused)(&error))?).reshape([height, width])
+        matrix(py, found.map_err(|error| (self.refused)(&error))?, columns.is_none())
     }
 
     #[pyo3(signature = (partials, of, *, threads, progress))]
@@ -90,12 +96,11 @@ impl BlockCovariances {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let of = of_rows(of)?;
-        let count = partials.as_array().shape().first().copied().unwrap_or(0);
         let partials: Vec<f64> = partials.as_array().iter().copied().collect();
         let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
             self.covariances.propagate(&partials, &of, pool, watch)
         })?;
-        PyArray1::from_vec(py, found.map_err(|error| (self.refused)(&error))?).reshape([count, count])
+        matrix(py, found.map_err(|error| (self.refused)(&error))?, true)
     }
 
     #[pyo3(signature = (groups, *, classes, exact, vectors, seed, threads, progress))]
@@ -171,11 +176,4 @@ fn groups_of(
         commons: all(commons),
         observations: all(observations),
     })
-}
-
-impl BlockCovariances {
-    fn width(&self, of: &[Of]) -> PyResult<usize> {
-        let widths = of.iter().map(|&each| self.covariances.width(each));
-        widths.sum::<Result<usize, Failure>>().map_err(|error| (self.refused)(&error))
-    }
 }

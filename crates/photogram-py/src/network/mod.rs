@@ -12,6 +12,7 @@ mod tables;
 mod trial;
 
 use numpy::PyReadonlyArrayDyn;
+use photocore::Stopped;
 use photocore::network::{Coarse, Combination, Image, NetworkError as Failure, Point, PosePart};
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
@@ -96,7 +97,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         Failure::Datum(_) => ("datum", vec![], vec![]),
         Failure::LeftOut(point) => ("left out", vec![], vec![*point]),
         Failure::NotFinite => ("not finite", vec![], vec![]),
-        Failure::Memory { .. } | Failure::OutOfMemory(_) | Failure::Cofactors(_) => {
+        Failure::Memory { .. } | Failure::Stopped(Stopped::OutOfMemory(_)) | Failure::Cofactors(_) => {
             ("memory", vec![], vec![])
         }
         Failure::Index(_)
@@ -118,7 +119,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::NoBlock(_)
         | Failure::Node(_)
         | Failure::Layout(_)
-        | Failure::Interrupted => ("input", vec![], vec![]),
+        | Failure::Stopped(_) => ("input", vec![], vec![]),
     };
     (kind, said(error, what), combinations, points)
 }

@@ -33,7 +33,7 @@ fn photo_cofactors<'py>(
         let own = photo.redundancy.len();
         // A block has the unknowns of cameras apart.
         let shown = own.min(unknowns);
-        for (row, values) in photo.cofactors.chunks_exact(own).take(shown).enumerate() {
+        for (row, values) in photo.cofactors.as_slice().chunks_exact(own).take(shown).enumerate() {
             matrix[row * unknowns..][..shown].copy_from_slice(&values[..shown]);
         }
         if photo.cofactors[0].is_nan() {
@@ -71,7 +71,7 @@ type CameraRow = (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, usize, usize);
 
 fn camera_row(camera: &AdjustedCamera) -> CameraRow {
     let AdjustedCamera { parameters, cofactors, redundancy, information, photos, images } = camera.clone();
-    (parameters, cofactors, redundancy, information, photos, images)
+    (parameters, cofactors.data.into(), redundancy, information, photos, images)
 }
 
 /// A class of adjusted networks: what all have, and what the class has besides.

@@ -1,10 +1,10 @@
 //! What an adjustment has found of points and images, in arrays.
 
 use numpy::{PyArray1, PyArray2, PyArray3};
+use photocore::Threads;
 use photocore::adjustment::Observed;
 use photocore::network::{AdjustedPoint, Solution};
 use pyo3::prelude::*;
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::arrays::{squares, table};
@@ -29,7 +29,7 @@ pub struct Told {
 
 impl Told {
     /// Takes the columns out of a solution, which has no points and images any more. What was left out is NaN.
-    pub fn new(solution: Solution, pool: &ThreadPool) -> Self {
+    pub fn new(solution: Solution, pool: &Threads) -> Self {
         pool.install(|| Self::on_pool(solution))
     }
 
@@ -39,7 +39,7 @@ impl Told {
         Self {
             solution,
             point_positions: column(&points, three, |point| point.coordinates),
-            point_cofactors: column(&points, [three; 3], |point| point.cofactors),
+            point_cofactors: column(&points, [three; 3], |point: &AdjustedPoint| point.cofactors.data.0),
             point_redundancy: column(&points, three, |point| point.redundancy),
             point_last_corrections: column(&points, three, |point| point.last_correction),
             point_rays: column(&points, 0, |point: &AdjustedPoint| point.rays as i64),

@@ -18,9 +18,9 @@ pub struct AdjustedCommon {
     pub position: [f64; 3],
     /// Its rotation, as in [`Common`].
     pub attitude: Matrix3,
-    /// Cofactors (a priori unit weight) of its unknowns, rotations being those about its own axes, row by row: zero for those that are
+    /// Cofactors (a priori unit weight) of its unknowns, rotations being those about its own axes: zero for those that are
     /// held; NaN where there are none.
-    pub cofactors: Vec<f64>,
+    pub cofactors: DMatrix<f64>,
     /// Redundancy numbers of its unknowns as observations of themselves; zero unless weighted, NaN where there are no cofactors.
     pub redundancy: Vec<f64>,
     /// How many observations that took part, images of rigs among them, are of it.
@@ -44,7 +44,7 @@ impl Network {
                 change: vec![0.0; width],
                 position: common.position,
                 attitude: common.attitude,
-                cofactors: vec![missing; width * width],
+                cofactors: DMatrix::repeat(width, width, missing),
                 redundancy: vec![missing; width],
                 observations: model.uses_of_commons[index],
             };
@@ -59,7 +59,7 @@ impl Network {
                 let own = model.cofactors_of_block(all, block);
                 let steps = state.about_own_axes();
                 let own = &steps * DMatrix::from_row_slice(width, width, own) * steps.transpose();
-                found.cofactors = ((&own + own.transpose()) / 2.0).as_slice().to_vec();
+                found.cofactors = (&own + own.transpose()) / 2.0;
             }
             if let Some(all) = &adjustment.prior_redundancy {
                 found.redundancy = all[range].to_vec();

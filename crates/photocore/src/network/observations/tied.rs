@@ -14,7 +14,7 @@ pub struct TiedObservation {
     pub observation: Observation,
     /// What it touches, points as the model numbers them.
     pub touches: Touches,
-    /// The kept blocks of these, each once.
+    /// The retained blocks of these, each once.
     pub blocks: Vec<usize>,
     /// L of its covariance matrix S = L L^T.
     pub root: DMatrix<f64>,

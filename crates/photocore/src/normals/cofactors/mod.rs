@@ -7,35 +7,35 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use self::others::Others;
+use super::batch::Gathered;
 use super::equations::Prior;
-use super::incidence::Stacks;
+use super::incidence::Batches;
 use super::selected::SelectedInverse;
-use super::stack::Gathered;
 use super::system::System;
 use super::tie_equations::TieEquations;
 use super::vectorised::dot;
 use super::watch::Control;
 use super::workspace::zeros;
 
-pub(super) use others::AtHome;
+pub(super) use others::AtNode;
 
 /// Cofactors: the inverse normal matrix where it is needed. All blocks are square, row by row.
 #[derive(Debug, Clone)]
 pub struct Cofactors {
     /// Of each local block, one after the other.
     pub local: Vec<f64>,
-    /// Of each kept block, one after the other.
-    pub kept: Vec<f64>,
-    /// a Q a^T of each equation a x = l, in the order of groups and rows, then of ties and rows: the share of the equation that its own
+    /// Of each retained block, one after the other.
+    pub retained: Vec<f64>,
+    /// a Q a^T of each equation a x = l, in the order of groups and rows, then of ties and rows: the leverage of the equation that its own
     /// unknowns take up. One minus it is the redundancy number of an observation.
     pub equations: Vec<f64>,
     /// a Q a^T of the equations a of each tie, a square block row by row, one after the other.
     pub ties: Vec<f64>,
-    /// Of the pairs of kept blocks that were asked for, one after the other; NaN where no equations touch both.
+    /// Of the pairs of retained blocks that were asked for, one after the other; NaN where no equations touch both.
     pub pairs: Vec<f64>,
     /// What the equations of each group have to do with each other, where that was asked for.
     pub groups: Option<GroupCofactors>,
-    /// Diagonal of the normal equations of the unknowns of all kept blocks before any elimination, priors counted: the reciprocal cofactor
+    /// Diagonal of the normal equations of the unknowns of all retained blocks before any elimination, priors counted: the reciprocal cofactor
     /// that each would have if all other unknowns were known.
     pub information: Vec<f64>,
 }
@@ -44,7 +44,7 @@ pub struct Cofactors {
 #[derive(Debug, Clone)]
 pub struct GroupCofactors {
     /// a Q a^T of every two equations of a group. The identity minus it is the cofactor matrix of residuals of unit weight.
-    pub shares: Vec<f64>,
+    pub leverages: Vec<f64>,
     /// The same with all unknowns known but those of the local block.
     pub by_local: Vec<f64>,
     /// Of each local block, all others being known.
@@ -58,7 +58,7 @@ impl Cofactors {
         system: &System,
         control: &Control,
         inverse: &SelectedInverse,
-        found: &[AtHome],
+        found: &[AtNode],
         information: Vec<f64>,
     ) -> Option<Self> {
         let layout = &system.layout;
@@ -67,9 +67,9 @@ impl Cofactors {
         let mut equations = control.allocated(zeros(layout.equations()))?;
         let (of_groups, of_ties) = equations.split_at_mut(layout.groups() * rows);
         let mut ties = control.allocated(zeros(layout.tie_blocks().end))?;
-        for (index, at_home) in found.iter().enumerate() {
-            let mut values = at_home.equations.chunks_exact(rows.max(1));
-            let blocks = at_home.local.chunks_exact(l * l);
+        for (index, at_node) in found.iter().enumerate() {
+            let mut values = at_node.equations.chunks_exact(rows.max(1));
+            let blocks = at_node.local.chunks_exact(l * l);
             for (&block, cofactors) in system.incidence.locals_at(index).iter().zip(blocks) {
                 local[block as usize * l * l..][..l * l].copy_from_slice(cofactors);
                 for (&group, values) in
@@ -78,56 +78,60 @@ impl Cofactors {
                     of_groups[group as usize * rows..][..rows].copy_from_slice(values);
                 }
             }
-            let mut values = &at_home.ties[..];
+            let mut values = &at_node.ties[..];
             for &tie in system.ties.at(index) {
                 let (tie, rows) = (tie as usize, layout.ties()[tie as usize].rows);
                 let (own, rest) = values.split_at(rows * rows);
                 ties[layout.tie_block(tie)].copy_from_slice(own);
                 let diagonal = own.iter().step_by(rows + 1);
-                of_ties[layout.tie_rows(tie)].iter_mut().zip(diagonal).for_each(|(to, &share)| *to = share);
+                of_ties[layout.tie_rows(tie)]
+                    .iter_mut()
+                    .zip(diagonal)
+                    .for_each(|(to, &leverage)| *to = leverage);
                 values = rest;
             }
         }
-        let kept = (0..layout.kept()).filter_map(|block| inverse.block(block, block)).flatten().collect();
+        let retained =
+            (0..layout.retained()).filter_map(|block| inverse.block(block, block)).flatten().collect();
         let pair = |pair: &[u32; 2]| {
             let [row, column] = pair.map(|block| block as usize);
-            let size = layout.kept_dim(row) * layout.kept_dim(column);
+            let size = layout.retained_dim(row) * layout.retained_dim(column);
             inverse.block(row, column).unwrap_or_else(|| vec![f64::NAN; size])
         };
         let pairs = layout.pairs().iter().flat_map(pair).collect();
-        Some(Self { local, kept, equations, ties, pairs, groups: None, information })
+        Some(Self { local, retained, equations, ties, pairs, groups: None, information })
     }
 }
 
 impl GroupCofactors {
     /// Puts together what was found at each supernode, and last for the local blocks without equations; None without memory.
-    pub(super) fn collect(system: &System, control: &Control, found: &[AtHome]) -> Option<Self> {
+    pub(super) fn collect(system: &System, control: &Control, found: &[AtNode]) -> Option<Self> {
         let layout = &system.layout;
         let (size, l) = (layout.rows() * layout.rows(), layout.local_dim());
-        let mut shares = control.allocated(zeros(layout.groups() * size))?;
+        let mut leverages = control.allocated(zeros(layout.groups() * size))?;
         let mut by_local = control.allocated(zeros(layout.groups() * size))?;
         let mut alone = control.allocated(zeros(layout.locals() * l * l))?;
-        for (index, at_home) in found.iter().enumerate() {
-            let blocks = at_home.alone.chunks_exact(l * l);
-            let mut pairs = at_home.shares.chunks_exact(size).zip(at_home.by_local.chunks_exact(size));
+        for (index, at_node) in found.iter().enumerate() {
+            let blocks = at_node.alone.chunks_exact(l * l);
+            let mut pairs = at_node.leverages.chunks_exact(size).zip(at_node.by_local.chunks_exact(size));
             for (&block, own) in system.incidence.locals_at(index).iter().zip(blocks) {
                 alone[block as usize * l * l..][..l * l].copy_from_slice(own);
                 for (&group, (together, own)) in
                     system.incidence.groups_of(layout, block as usize).iter().zip(&mut pairs)
                 {
-                    shares[group as usize * size..][..size].copy_from_slice(together);
+                    leverages[group as usize * size..][..size].copy_from_slice(together);
                     by_local[group as usize * size..][..size].copy_from_slice(own);
                 }
             }
         }
-        Some(Self { shares, by_local, alone })
+        Some(Self { leverages, by_local, alone })
     }
 }
 
 /// Local blocks at one supernode from which on several threads work at them.
 const MANY: usize = 256;
 
-impl AtHome {
+impl AtNode {
     /// `front` is the inverse over the rows of the front of the supernode, full square, of the order `height`.
     pub fn new(
         system: &System,
@@ -141,41 +145,41 @@ impl AtHome {
     ) -> Self {
         let start = Instant::now();
         let layout = &system.layout;
-        let stacks = system.incidence.stacks_at(index);
+        let batches = system.incidence.batches_at(index);
         let others = || Others::new(by_group);
-        let part = |others: &mut Others, stacks: Stacks<'_>| {
-            let (mut stack, mut part) = (system.workspace.stack(), Self::default());
-            for run in stacks.iter().take_while(|_| !control.stopped()) {
-                equations.gather(&mut stack, system, run);
-                stack.eliminate(layout, prior, 0.0);
-                others.gather(&stack, front, height);
-                others.cofactors(&stack, layout, &mut part);
+        let part = |others: &mut Others, batches: Batches<'_>| {
+            let (mut batch, mut part) = (system.workspace.batch(), Self::default());
+            for run in batches.iter().take_while(|_| !control.stopped()) {
+                equations.gather(&mut batch, system, run);
+                batch.eliminate(layout, prior, 0.0);
+                others.gather(&batch, front, height);
+                others.cofactors(&batch, layout, &mut part);
                 control.count(run.len());
             }
-            system.workspace.put_back_stack(stack);
+            system.workspace.put_back_batch(batch);
             part
         };
-        let mut found = if stacks.locals() < MANY {
-            part(&mut others(), stacks)
+        let mut found = if batches.locals() < MANY {
+            part(&mut others(), batches)
         } else {
-            let parts: Vec<Self> = stacks.parts(MANY / 16).into_par_iter().map_init(others, part).collect();
+            let parts: Vec<Self> = batches.parts(MANY / 16).into_par_iter().map_init(others, part).collect();
             parts.into_iter().fold(Self::default(), |mut all, part| {
                 all.local.extend(part.local);
                 all.equations.extend(part.equations);
-                all.shares.extend(part.shares);
+                all.leverages.extend(part.leverages);
                 all.by_local.extend(part.by_local);
                 all.alone.extend(part.alone);
                 all
             })
         };
-        found.ties = ties_at_home(system, index, equations, front, height);
+        found.ties = ties_at_node(system, index, equations, front, height);
         found.seconds = start.elapsed().as_secs_f64();
         found
     }
 }
 
-/// a Q a^T of the equations of the ties at home in a supernode, a square block for each.
-fn ties_at_home(
+/// a Q a^T of the equations of the ties assembled in a supernode, a square block for each.
+fn ties_at_node(
     system: &System,
     index: usize,
     equations: &dyn Gathered,

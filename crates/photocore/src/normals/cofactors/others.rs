@@ -3,26 +3,26 @@
 use pulp::Simd;
 use smallvec::{SmallVec, smallvec};
 
+use crate::normals::batch::{Batch, Part, Slot};
 use crate::normals::layout::Layout;
-use crate::normals::stack::{Part, Slot, Stack};
 use crate::normals::vectorised::{Kernel, LANES, Rows, dot, run, size};
 
-/// The cofactors of the local blocks at home in one supernode, and of their equations, in the order of the incidence.
+/// The cofactors of the local blocks assembled in one supernode, and of their equations, in the order of the incidence.
 #[derive(Default)]
-pub(in crate::normals) struct AtHome {
+pub(in crate::normals) struct AtNode {
     pub local: Vec<f64>,
     pub equations: Vec<f64>,
-    /// Of the equations of the ties at home there, in their order: a square block for each.
+    /// Of the equations of the ties assembled there, in their order: a square block for each.
     pub ties: Vec<f64>,
     /// See [`GroupCofactors`](super::GroupCofactors); in the order of the incidence too, empty where they are not asked for.
-    pub shares: Vec<f64>,
+    pub leverages: Vec<f64>,
     pub by_local: Vec<f64>,
     pub alone: Vec<f64>,
     /// Time that it took.
     pub seconds: f64,
 }
 
-/// Everything that the local blocks of a stack are tied to: main blocks in the order of the slots, then segments.
+/// Everything that the local blocks of a batch are tied to: main blocks in the order of the slots, then segments.
 #[derive(Default)]
 pub(super) struct Others {
     /// The first row in the front, the first row here and the width of each.
@@ -57,7 +57,7 @@ impl<'a, const C: usize> Tied<'a, C> {
     }
 }
 
-/// A group of equations: of a local block of the stack, in a slot that starts there, and in the pattern.
+/// A group of equations: of a local block of the batch, in a slot that starts there, and in the pattern.
 #[derive(Clone, Copy)]
 struct Group<'a> {
     t: usize,
@@ -73,10 +73,10 @@ impl Others {
         Self { by_group, ..Self::default() }
     }
 
-    /// Collects the inverse over everything that a stack is tied to; it stays as it is where the last stack was tied to the same.
-    pub fn gather(&mut self, stack: &Stack, front: &[f64], height: usize) {
-        let slots = stack.slots.iter().map(|slot| (slot.row, slot.dim));
-        let segments = stack.segments.iter().map(|segment| (segment.row, segment.unknowns.len()));
+    /// Collects the inverse over everything that a batch is tied to; it stays as it is where the last batch was tied to the same.
+    pub fn gather(&mut self, batch: &Batch, front: &[f64], height: usize) {
+        let slots = batch.slots.iter().map(|slot| (slot.row, slot.dim));
+        let segments = batch.segments.iter().map(|segment| (segment.row, segment.unknowns.len()));
         let all = slots.chain(segments);
         if self.strips.iter().map(|&(row, _, width)| (row, width)).eq(all.clone()) {
             return;
@@ -106,57 +106,57 @@ impl Others {
 
     /// With H = N_ll^-1 N_lo and Q_oo the inverse over the others o: Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and
     /// a Q a^T for each equation.
-    pub fn cofactors(&mut self, stack: &Stack, layout: &Layout, found: &mut AtHome) {
-        run(layout, stack.kept_dim(), Find { others: self, stack, rows: layout.rows(), found });
+    pub fn cofactors(&mut self, batch: &Batch, layout: &Layout, found: &mut AtNode) {
+        run(layout, batch.retained_dim(), Find { others: self, batch, rows: layout.rows(), found });
     }
 
     #[inline(always)]
     fn cofactors_of<S: Simd, const R: usize, const L: usize, const D: usize>(
         &mut self,
         simd: S,
-        stack: &Stack,
+        batch: &Batch,
         t: usize,
         rows: usize,
-        found: &mut AtHome,
+        found: &mut AtNode,
     ) {
         let rows = size::<R>(rows);
-        self.reduce::<L, D>(stack, t);
+        self.reduce::<L, D>(batch, t);
         self.multiply::<S, L>(simd);
-        let own = self.own::<S, L>(simd, stack, t, found);
-        for (slot, &(_, start, _)) in stack.slots.iter().zip(&self.strips) {
+        let own = self.own::<S, L>(simd, batch, t, found);
+        for (slot, &(_, start, _)) in batch.slots.iter().zip(&self.strips) {
             for (k, p) in slot.groups.clone().enumerate() {
                 let group = Group { t, slot, start, k, p, rows };
                 let diagonal = found.equations.len();
                 for row in (1..rows).step_by(2) {
-                    let shares = self.shares::<S, 2, L, D>(simd, stack, group, [row - 1, row], &own);
-                    found.equations.push(shares[0][0]);
-                    found.equations.push(shares[1][1]);
+                    let leverages = self.leverages::<S, 2, L, D>(simd, batch, group, [row - 1, row], &own);
+                    found.equations.push(leverages[0][0]);
+                    found.equations.push(leverages[1][1]);
                 }
                 if rows % 2 == 1 {
-                    let [[share]] = self.shares::<S, 1, L, D>(simd, stack, group, [rows - 1], &own);
-                    found.equations.push(share);
+                    let [[leverage]] = self.leverages::<S, 1, L, D>(simd, batch, group, [rows - 1], &own);
+                    found.equations.push(leverage);
                 }
                 if self.by_group {
-                    self.group::<S, L, D>(simd, stack, group, &own, diagonal, found);
+                    self.group::<S, L, D>(simd, batch, group, &own, diagonal, found);
                 }
             }
         }
     }
 
-    /// Computes H = L^-T V, for local block `t` of the stack.
+    /// Computes H = L^-T V, for local block `t` of the batch.
     #[inline(always)]
-    fn reduce<const L: usize, const D: usize>(&mut self, stack: &Stack, t: usize) {
+    fn reduce<const L: usize, const D: usize>(&mut self, batch: &Batch, t: usize) {
         let stride = self.stride;
         self.h.resize(L * stride, 0.0);
-        let slots = stack.slots.iter().map(|slot| stack.slot_coupling::<L, D>(slot));
-        let segments = stack.segments.iter().map(|segment| stack.segment_coupling::<L>(segment));
+        let slots = batch.slots.iter().map(|slot| batch.slot_coupling::<L, D>(slot));
+        let segments = batch.segments.iter().map(|segment| batch.segment_coupling::<L>(segment));
         for (v, &(_, start, _)) in slots.chain(segments).zip(&self.strips) {
             for d in 0..L {
                 let row = &v.rows.values[(t * L + d) * v.rows.width..][..v.rows.width];
                 copy_few(row, &mut self.h[d * stride + start..][..row.len()]);
             }
         }
-        stack.triangles[t].backward::<L>(&mut self.h, stride);
+        batch.triangles[t].backward::<L>(&mut self.h, stride);
     }
 
     /// Computes H Q.
@@ -167,6 +167,7 @@ impl Others {
         while first < vectors {
             // Five vectors are three and two, not four and one whose sums wait for each other.
             first += match vectors - first {
+                _ if const { S::F64_LANES == 1 } => self.multiply_vectors::<S, L, 1>(simd, first),
                 1 => self.multiply_vectors::<S, L, 1>(simd, first),
                 2 => self.multiply_vectors::<S, L, 2>(simd, first),
                 3 | 5 | 6 => self.multiply_vectors::<S, L, 3>(simd, first),
@@ -197,21 +198,21 @@ impl Others {
         V
     }
 
-    /// Q_ll of local block `t` of the stack, which is found, and N_ll^-1 besides where that is asked for.
+    /// Q_ll of local block `t` of the batch, which is found, and N_ll^-1 besides where that is asked for.
     #[inline(always)]
     fn own<S: Simd, const L: usize>(
         &self,
         simd: S,
-        stack: &Stack,
+        batch: &Batch,
         t: usize,
-        found: &mut AtHome,
+        found: &mut AtNode,
     ) -> [[f64; L]; L] {
         let mut own = [[0.0; L]; L];
         for a in 0..L {
             let mut unit = [0.0; L];
             unit[a] = 1.0;
-            stack.triangles[t].forward::<L>(&mut unit, 1);
-            stack.triangles[t].backward::<L>(&mut unit, 1);
+            batch.triangles[t].forward::<L>(&mut unit, 1);
+            batch.triangles[t].backward::<L>(&mut unit, 1);
             if self.by_group {
                 found.alone.extend_from_slice(&unit);
             }
@@ -235,32 +236,32 @@ impl Others {
     fn group<S: Simd, const L: usize, const D: usize>(
         &self,
         simd: S,
-        stack: &Stack,
+        batch: &Batch,
         group: Group<'_>,
         own: &[[f64; L]; L],
         diagonal: usize,
-        found: &mut AtHome,
+        found: &mut AtNode,
     ) {
         let Group { t, p, rows, .. } = group;
-        let first = found.shares.len();
-        let along: SmallVec<[[f64; L]; 4]> = stack.local_rows::<L>(t, p, rows)[..rows]
+        let first = found.leverages.len();
+        let along: SmallVec<[[f64; L]; 4]> = batch.local_rows::<L>(t, p, rows)[..rows]
             .iter()
             .map(|&(mut row)| {
-                stack.triangles[t].forward::<L>(&mut row, 1);
+                batch.triangles[t].forward::<L>(&mut row, 1);
                 row
             })
             .collect();
         found.by_local.resize(first + rows * rows, 0.0);
-        found.shares.resize(first + rows * rows, 0.0);
+        found.leverages.resize(first + rows * rows, 0.0);
         for i in 0..rows {
             for j in 0..=i {
-                let share = match i == j {
+                let leverage = match i == j {
                     true => found.equations[diagonal + i],
-                    false => self.shares::<S, 2, L, D>(simd, stack, group, [i, j], own)[0][1],
+                    false => self.leverages::<S, 2, L, D>(simd, batch, group, [i, j], own)[0][1],
                 };
                 for at in [first + i * rows + j, first + j * rows + i] {
                     found.by_local[at] = dot(&along[i], &along[j]);
-                    found.shares[at] = share;
+                    found.leverages[at] = leverage;
                 }
             }
         }
@@ -268,32 +269,32 @@ impl Others {
 
     /// a Q b^T of every two of some rows of a group.
     #[inline(always)]
-    fn shares<S: Simd, const C: usize, const L: usize, const D: usize>(
+    fn leverages<S: Simd, const C: usize, const L: usize, const D: usize>(
         &self,
         simd: S,
-        stack: &Stack,
+        batch: &Batch,
         group: Group<'_>,
         picked: [usize; C],
         own: &[[f64; L]; L],
     ) -> [[f64; C]; C] {
         let Group { t, slot, start, k, p, rows } = group;
         let dim = size::<D>(slot.dim);
-        let local = stack.local_rows::<L>(t, p, rows);
+        let local = batch.local_rows::<L>(t, p, rows);
         let local = picked.map(|row| &local[row]);
         let at = (t * slot.groups.len() + k) * rows;
-        let coefficients = &stack.slot_rows::<D>(slot, rows).rows.values[at * dim..];
-        let kept = Tied { start, width: dim, x: picked.map(|row| &coefficients[row * dim..]) };
+        let coefficients = &batch.slot_rows::<D>(slot, rows).rows.values[at * dim..];
+        let retained = Tied { start, width: dim, x: picked.map(|row| &coefficients[row * dim..]) };
         let mut form = [[simd.splat_f64s(0.0); C]; C];
-        self.tied(simd, &mut form, local, &[], kept);
-        match stack.parts(p) {
+        self.tied(simd, &mut form, local, &[], retained);
+        match batch.parts(p) {
             [] => {}
-            [part] => self.tied(simd, &mut form, local, &[kept], self.common(stack, group, picked, part)),
+            [part] => self.tied(simd, &mut form, local, &[retained], self.shared(batch, group, picked, part)),
             parts => {
-                let mut before: SmallVec<[_; 4]> = smallvec![kept];
+                let mut before: SmallVec<[_; 4]> = smallvec![retained];
                 for part in parts {
-                    let common = self.common(stack, group, picked, part);
-                    self.tied(simd, &mut form, local, &before, common);
-                    before.push(common);
+                    let shared = self.shared(batch, group, picked, part);
+                    self.tied(simd, &mut form, local, &before, shared);
+                    before.push(shared);
                 }
             }
         }
@@ -311,15 +312,15 @@ impl Others {
 
     /// The coefficients of a part of what a group has in common with others, in some of its rows.
     #[inline(always)]
-    fn common<'s, const C: usize>(
+    fn shared<'s, const C: usize>(
         &self,
-        stack: &'s Stack,
+        batch: &'s Batch,
         Group { t, p, rows, .. }: Group<'_>,
         picked: [usize; C],
         part: &Part,
     ) -> Tied<'s, C> {
-        let Rows { values, width, stride, .. } = stack.part_rows(p, part, t * rows..(t + 1) * rows).rows;
-        let start = self.strips[stack.slots.len() + part.segment].1 + part.shift;
+        let Rows { values, width, stride, .. } = batch.part_rows(p, part, t * rows..(t + 1) * rows).rows;
+        let start = self.strips[batch.slots.len() + part.segment].1 + part.shift;
         Tied { start, width, x: picked.map(|row| &values[row * stride..]) }
     }
 
@@ -397,16 +398,16 @@ fn copy_few(from: &[f64], to: &mut [f64]) {
 
 struct Find<'a> {
     others: &'a mut Others,
-    stack: &'a Stack,
+    batch: &'a Batch,
     rows: usize,
-    found: &'a mut AtHome,
+    found: &'a mut AtNode,
 }
 
 impl Kernel for Find<'_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
-        for t in 0..self.stack.locals.len() {
-            self.others.cofactors_of::<S, R, L, D>(simd, self.stack, t, self.rows, self.found);
+        for t in 0..self.batch.locals.len() {
+            self.others.cofactors_of::<S, R, L, D>(simd, self.batch, t, self.rows, self.found);
         }
     }
 }

@@ -7,7 +7,7 @@
 //! Nine points of a plate, measured in two placements by a comparator whose x is too short by ten millionths:
 //!
 //! ```
-//! use photocore::adjustment::{Options, on_all_processors};
+//! use photocore::adjustment::Options;
 //! use photocore::programs::comparator::{
 //!     Basis, Calibration, Case, Comparator, GridPoint, Measurement, Placement,
 //! };
@@ -31,7 +31,7 @@
 //!     points: (0..9).map(|i| GridPoint { xy: xy(i), sd: [0.25; 2] }).collect(),
 //!     measurements: (0..18).map(|i| measured((i / 9, i % 9))).collect(),
 //! };
-//! let solution = on_all_processors(|pool, watch| calibration.adjust(&Options::default(), pool, watch))??;
+//! let solution = calibration.adjust(&Options::default())?;
 //! assert!((solution.comparator[0] - 1.0 - 10e-6).abs() < 1e-9);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -41,11 +41,11 @@ mod model;
 
 use std::ops::{ControlFlow, Range};
 
-use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Problem, leading_matrix};
 use crate::normals::{Layout, LayoutError, Ordering, System};
+use crate::{Stopped, Threads};
 
 pub use measure::{Basis, Comparator, Measured, Placement};
 use model::Comparison;
@@ -120,12 +120,9 @@ pub enum CalibrationError {
     /// The initial values give coordinates that are not finite.
     #[error("the initial values give coordinates that are not finite")]
     NotFinite,
-    /// The caller asked to stop.
-    #[error("interrupted")]
-    Interrupted,
-    /// An allocation of so many bytes failed.
-    #[error("there is no memory for an array of {0} bytes")]
-    OutOfMemory(usize),
+    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),
@@ -161,35 +158,43 @@ pub struct Solution {
 }
 
 impl Calibration {
-    /// Adjusts everything together by least squares. `watch` is called on the calling thread; when it breaks, the adjustment stops.
+    /// Adjusts everything together by least squares. `watch` is called on the calling thread; when it breaks, the adjustment stops, on threads of its own.
+    ///
+    /// # Errors
+    /// Those of [`Calibration::adjust_on`]; threads that cannot be started.
+    pub fn adjust(&self, options: &adjustment::Options) -> Result<Solution, CalibrationError> {
+        self.adjust_on(options, &Threads::new(options.threads)?, &mut adjustment::go_on)
+    }
+
+    /// The same on threads of the caller.
     ///
     /// # Errors
     /// A calibration that contradicts itself or leaves unknowns undetermined; an interruption.
-    pub fn adjust(
+    pub fn adjust_on(
         &self,
         options: &adjustment::Options,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, CalibrationError> {
         self.check()?;
-        let problem = pool.install(|| self.problem())?;
+        let problem = threads.install(|| self.problem())?;
         let cases = self.cases.len();
-        let adjusted = adjustment::adjust(&problem, options, pool, watch).map_err(|error| match error {
-            AdjustError::UndeterminedLocals(points) => CalibrationError::UndeterminedPoints(points),
-            AdjustError::Undetermined(combinations) => CalibrationError::Undetermined(
-                combinations
-                    .into_iter()
-                    .map(|blocks| {
-                        let (cases, comparator): (Vec<_>, Vec<_>) =
-                            blocks.into_iter().partition(|&block| block < cases);
-                        (cases, !comparator.is_empty())
-                    })
-                    .collect(),
-            ),
-            AdjustError::NotFinite => CalibrationError::NotFinite,
-            AdjustError::Interrupted => CalibrationError::Interrupted,
-            AdjustError::OutOfMemory(bytes) => CalibrationError::OutOfMemory(bytes),
-        })?;
+        let adjusted =
+            adjustment::adjust(&problem, options, threads, watch).map_err(|error| match error {
+                AdjustError::UndeterminedLocals(points) => CalibrationError::UndeterminedPoints(points),
+                AdjustError::Undetermined(combinations) => CalibrationError::Undetermined(
+                    combinations
+                        .into_iter()
+                        .map(|blocks| {
+                            let (cases, comparator): (Vec<_>, Vec<_>) =
+                                blocks.into_iter().partition(|&block| block < cases);
+                            (cases, !comparator.is_empty())
+                        })
+                        .collect(),
+                ),
+                AdjustError::NotFinite => CalibrationError::NotFinite,
+                AdjustError::Stopped(stopped) => CalibrationError::Stopped(stopped),
+            })?;
         Ok(Solution::new(&problem, adjusted))
     }
 
@@ -206,7 +211,7 @@ impl Calibration {
         }
     }
 
-    /// The least-squares problem: grid points are local blocks of two, cases kept blocks of three, the comparator one that all share.
+    /// The least-squares problem: grid points are local blocks of two, cases retained blocks of three, the comparator one that all share.
     fn problem(&self) -> Result<Problem<Comparison>, CalibrationError> {
         let mut order: Vec<usize> = (0..self.measurements.len()).collect();
         order.sort_by_key(|&i| self.measurements[i].point);
@@ -218,7 +223,7 @@ impl Calibration {
         let case_of = measurements.iter().map(|m| m.case as u32).collect();
         let shared = vec![self.cases.len() as u32; measurements.len()];
         let layout = Layout::new(2, 2, &dims, start, case_of)?
-            .with_further((0..=measurements.len()).collect(), shared)?;
+            .with_shared((0..=measurements.len()).collect(), shared)?;
         let points = self.points.iter().flat_map(|point| point.xy);
         let cases = self.cases.iter().flat_map(|case| {
             let Placement { rotation, translation: [x, y] } = case.placement;
@@ -255,10 +260,10 @@ impl Solution {
             problem.sum_of_squares(&residuals) + problem.terms(&unknowns).sum_of_squares(0..unknowns.len());
         let cases = problem.model.left_handed.len();
         let (placements, comparator) =
-            (layout.all_kept().start..layout.kept_range(cases).start, layout.kept_range(cases));
+            (layout.all_retained().start..layout.retained_range(cases).start, layout.retained_range(cases));
         let missing = || vec![f64::NAN; comparator.len().pow(2)];
         let (case_cofactors, comparator_cofactors) = match &cofactors {
-            Some(all) => (Some(&all.kept[..9 * cases]), all.kept[9 * cases..].to_vec()),
+            Some(all) => (Some(&all.retained[..9 * cases]), all.retained[9 * cases..].to_vec()),
             None => (None, missing()),
         };
         Self {

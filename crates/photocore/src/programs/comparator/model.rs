@@ -61,8 +61,8 @@ impl Model for Comparison {
             let [by_first, by_second] = measured.point[row];
             let by_point = if swap { [by_second, by_first] } else { [by_first, by_second] };
             rows.local[2 * row..][..2].copy_from_slice(&by_point);
-            rows.kept[3 * row..][..3].copy_from_slice(&measured.case[row]);
-            rows.common[width * row..][..width].copy_from_slice(&measured.comparator[row]);
+            rows.retained[3 * row..][..3].copy_from_slice(&measured.case[row]);
+            rows.shared[width * row..][..width].copy_from_slice(&measured.comparator[row]);
         }
     }
 }

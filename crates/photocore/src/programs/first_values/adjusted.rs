@@ -3,7 +3,7 @@
 use super::model::{MEDIAN_LENGTH, Model};
 use super::{FirstValuesError, Search, Sighting};
 use crate::adjustment::{Loss, Method, Options as AdjustmentOptions, Stop};
-use crate::geometry::{ObjectSpace, Perspective, Pose, PoseNumbers, RotationSense, rotation_angles};
+use crate::geometry::{Perspective, Pose, rotation_angles};
 use crate::network::{Camera, Image, Network, NetworkError, Options, Photo, Point, Solution, Start};
 
 /// Where the loss sets in, in standard deviations that the median of the residuals says.
@@ -97,21 +97,13 @@ impl Search<'_> {
             let there = photo != usize::MAX && point != usize::MAX;
             there.then_some(Image { photo, point, xy: [-u.x / u.z, -u.y / u.z], sd })
         };
-        let photo = |pose: &Pose| {
-            let pose = to_numbers(pose);
-            Photo { pose, observed: pose, sd: [f64::INFINITY; 6], camera: 0 }
-        };
+        let photo = |pose: &Pose| Photo::free(to_numbers(pose), 0);
         Network {
-            space: ObjectSpace::Rectangular,
-            poses: PoseNumbers::Angles(RotationSense::GroundToPhoto),
-            refraction: None,
             cameras: vec![Camera::held(Perspective { principal_distance: PRINCIPAL_DISTANCE }.into())],
             photos: poses.iter().map(photo).collect(),
             points: own,
             images: images.iter().filter_map(|&index| image(&self.given.sightings[index])).collect(),
-            observations: vec![],
-            commons: vec![],
-            mounts: vec![],
+            ..Network::new()
         }
     }
 
@@ -123,19 +115,19 @@ impl Search<'_> {
                 max_iterations: ITERATIONS,
                 covariance: false,
                 loss: Some(Loss::Huber(SETS_IN)),
+                ..AdjustmentOptions::default()
             },
             start: Start::Given,
             hold_unused: true,
             ..Options::default()
         };
-        match network.adjust(&options, self.pool, self.watch) {
+        match network.adjustment(&options).on(self.threads).watched(self.watch).run() {
             Ok(solution) => {
                 let finite =
                     solution.photos.iter().all(|photo| photo.pose.iter().all(|value| value.is_finite()));
                 Ok(finite.then_some(solution))
             }
-            Err(NetworkError::Interrupted) => Err(FirstValuesError::Interrupted),
-            Err(NetworkError::OutOfMemory(bytes)) => Err(FirstValuesError::OutOfMemory(bytes)),
+            Err(NetworkError::Stopped(stopped)) => Err(stopped.into()),
             Err(_) => Ok(None),
         }
     }

@@ -17,12 +17,12 @@ mod resected;
 
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::Event;
 use crate::geometry::{Matrix3, Pose, Vector3};
 use crate::network::median;
+use crate::{Stopped, Threads};
 use model::Model;
 
 /// What is known of a photo.
@@ -136,12 +136,9 @@ pub enum FirstValuesError {
     /// An image names a photo or point that is not there.
     #[error("image {0} names a photo or point that is not there")]
     Index(usize),
-    /// The caller asked to stop.
-    #[error("interrupted")]
-    Interrupted,
-    /// An allocation of so many bytes failed.
-    #[error("there is no memory for an array of {0} bytes")]
-    OutOfMemory(usize),
+    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// Known points that it takes to resect a photo: three, and one to check.
@@ -152,7 +149,7 @@ struct Search<'a> {
     given: &'a FirstValues,
     of_photo: Vec<Vec<usize>>,
     of_point: Vec<Vec<usize>>,
-    pool: &'a ThreadPool,
+    threads: &'a Threads,
     watch: &'a mut dyn FnMut(Event) -> ControlFlow<()>,
 }
 
@@ -165,7 +162,7 @@ impl FirstValues {
     /// Images of what is not there, an interruption, memory that is not to be had.
     pub fn find(
         &self,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Found, FirstValuesError> {
         let (mut of_photo, mut of_point) = (vec![vec![]; self.photos.len()], vec![vec![]; self.points.len()]);
@@ -181,7 +178,7 @@ impl FirstValues {
                 point.push(index);
             }
         }
-        Search { given: self, of_photo, of_point, pool, watch }.run()
+        Search { given: self, of_photo, of_point, threads, watch }.run()
     }
 }
 

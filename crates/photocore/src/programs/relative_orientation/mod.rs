@@ -124,14 +124,14 @@ pub fn relative_orientation(pairs: &[[Vector3; 2]]) -> Vec<Candidate> {
 fn rivals(mut found: Vec<Candidate>) -> Vec<Candidate> {
     found.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
     let Some(best) = found.first().map(|candidate| candidate.misfit) else { return found };
-    let mut kept: Vec<Candidate> = Vec::new();
+    let mut retained: Vec<Candidate> = Vec::new();
     for candidate in found {
-        let another = !kept.iter().any(|other| other.oriented.is_like(&candidate.oriented));
-        if another && kept.len() < MOST && candidate.misfit <= RIVAL * best {
-            kept.push(candidate);
+        let another = !retained.iter().any(|other| other.oriented.is_like(&candidate.oriented));
+        if another && retained.len() < MOST && candidate.misfit <= RIVAL * best {
+            retained.push(candidate);
         }
     }
-    kept
+    retained
 }
 
 /// Of the four poses of an essential matrix, E = [b]x A, the one that has most of the pairs in front of both photos.

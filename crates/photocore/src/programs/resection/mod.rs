@@ -5,7 +5,7 @@
 //! initial values the adjustment starts from poses that three points give directly ([`three_points`]).
 //!
 //! ```
-//! use photocore::adjustment::{Options, on_all_processors};
+//! use photocore::adjustment::Options;
 //! use photocore::geometry::{ObjectSpace, Photo, Point, RotationSense};
 //! use photocore::programs::resection::{ControlPoint, Known, Partials, Resection};
 //!
@@ -27,7 +27,7 @@
 //!     start: None,
 //!     partials: Partials::AtComputed,
 //! };
-//! let solution = on_all_processors(|pool, watch| resection.adjust(&Options::default(), pool, watch))??;
+//! let solution = resection.adjust(&Options::default())?;
 //! assert!((solution.pose.position[2] - 1600.0).abs() < 1e-6);
 //! assert_eq!(solution.degrees_of_freedom, 4);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -41,12 +41,12 @@ mod three_points;
 
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Options, Problem, Status};
 use crate::geometry::{ObjectSpace, RotationSense, rotation, rotation_angles};
 use crate::normals::{Layout, LayoutError, Ordering, System};
+use crate::{Stopped, Threads};
 
 pub use degenerate::Degeneracy;
 use model::SinglePhoto;
@@ -156,12 +156,9 @@ pub enum ResectionError {
     /// The initial values put a point into the plane of the projection centre.
     #[error("the initial values give image coordinates that are not finite")]
     NotFinite,
-    /// The caller asked to stop.
-    #[error("interrupted")]
-    Interrupted,
-    /// An allocation of so many bytes failed.
-    #[error("there is no memory for an array of {0} bytes")]
-    OutOfMemory(usize),
+    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// More than can be numbered.
     #[error("too many points")]
     TooManyPoints,
@@ -183,7 +180,7 @@ struct Solved {
 
 impl Solved {
     fn pose(&self) -> Pose {
-        absolute(&self.adjustment.unknowns[self.problem.layout().all_kept()], self.origin)
+        absolute(&self.adjustment.unknowns[self.problem.layout().all_retained()], self.origin)
     }
 
     /// Weighted sum of squares at the end.
@@ -202,17 +199,25 @@ impl Solved {
 }
 
 impl Resection {
-    /// Adjusts the photo by least squares.
+    /// Adjusts the photo by least squares, on threads of its own.
+    ///
+    /// # Errors
+    /// Those of [`Resection::adjust_on`]; threads that cannot be started.
+    pub fn adjust(&self, options: &Options) -> Result<Solution, ResectionError> {
+        self.adjust_on(options, &Threads::new(options.threads)?, &mut adjustment::go_on)
+    }
+
+    /// The same on threads of the caller.
     ///
     /// Without initial values, every distinct pose that a direct method finds is adjusted. The one with the least sum of squares
     /// is the solution; the others that fit about as well are told too (see [`Alternative`]).
     ///
     /// # Errors
     /// A configuration that determines no pose, or an interruption by `watch`.
-    pub fn adjust(
+    pub fn adjust_on(
         &self,
         options: &Options,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, ResectionError> {
         let starts = match self.start {
@@ -229,16 +234,14 @@ impl Resection {
         let mut failure = ResectionError::NoPlacement;
         let mut undetermined = None;
         for start in starts {
-            let mut adjusted = self.adjust_from(start, options, pool, watch);
+            let mut adjusted = self.adjust_from(start, options, threads, watch);
             if let (None, Some(turned)) = (self.start, adjusted.as_ref().ok().and_then(|a| self.upright(a))) {
-                adjusted = self.adjust_from(turned, options, pool, watch);
+                adjusted = self.adjust_from(turned, options, threads, watch);
             }
             match adjusted {
                 Ok(adjusted) if self.start.is_none() && !adjusted.behind().is_empty() => {}
                 Ok(adjusted) => solved.push(adjusted),
-                Err(stop @ (ResectionError::Interrupted | ResectionError::OutOfMemory(_))) => {
-                    return Err(stop);
-                }
+                Err(stop @ ResectionError::Stopped(_)) => return Err(stop),
                 Err(other) => {
                     if let ResectionError::Undetermined(why) = other {
                         undetermined = Some(why);
@@ -257,15 +260,14 @@ impl Resection {
         &self,
         start: Pose,
         options: &Options,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solved, ResectionError> {
         let origin = self.origin(&start);
-        let problem = pool.install(|| self.problem(&start, origin))?;
-        let adjusted = adjustment::adjust(&problem, options, pool, watch);
+        let problem = threads.install(|| self.problem(&start, origin))?;
+        let adjusted = adjustment::adjust(&problem, options, threads, watch);
         let adjustment = adjusted.map_err(|error| match error {
-            AdjustError::Interrupted => ResectionError::Interrupted,
-            AdjustError::OutOfMemory(bytes) => ResectionError::OutOfMemory(bytes),
+            AdjustError::Stopped(stopped) => ResectionError::Stopped(stopped),
             AdjustError::NotFinite => ResectionError::NotFinite,
             AdjustError::Undetermined(_) | AdjustError::UndeterminedLocals(_) => {
                 ResectionError::Undetermined(self.degeneracy(&start))
@@ -295,7 +297,7 @@ impl Resection {
         }
     }
 
-    /// The least-squares problem: points are local blocks of three, the photo is the kept block of six.
+    /// The least-squares problem: points are local blocks of three, the photo is the retained block of six.
     fn problem(&self, start: &Pose, origin: [f64; 3]) -> Result<Problem<SinglePhoto>, LayoutError> {
         let count = self.points.len();
         let shifted = |point: &ControlPoint| ControlPoint {

@@ -5,7 +5,7 @@ use crate::adjustment::Model;
 use crate::geometry::{ObjectSpace, Photo, Point, Projection, RotationSense};
 use crate::normals::GroupRows;
 
-/// One photo of control points: the collinearity equations. The local blocks are the points, the kept block is the photo.
+/// One photo of control points: the collinearity equations. The local blocks are the points, the retained block is the photo.
 #[derive(Debug)]
 pub struct SinglePhoto {
     pub space: ObjectSpace,
@@ -55,7 +55,7 @@ impl Model for SinglePhoto {
         for row in 0..2 {
             rows.constant[row] = measured[row] - projection.xy[row];
             rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
-            rows.kept[6 * row..][..6].copy_from_slice(&projection.photo[row]);
+            rows.retained[6 * row..][..6].copy_from_slice(&projection.photo[row]);
         }
     }
 }

@@ -116,7 +116,7 @@ impl Solution {
         let cofactors = adjustment.cofactors.take();
         let own = adjustment.prior_redundancy.take();
         let redundancy_of = |unknown: usize| own.as_ref().map_or(f64::NAN, |all| all[unknown]);
-        let first = problem.layout().all_kept().start;
+        let first = problem.layout().all_retained().start;
         let local = cofactors.as_ref().map(|all| &all.local[..]);
         let control = |point: usize| AdjustedControl {
             coordinates: std::array::from_fn(|k| {
@@ -130,7 +130,7 @@ impl Solution {
         let history = adjustment.history.iter().skip(1).map(|values| absolute(values, origin)).collect();
         Self {
             pose,
-            cofactors: leading_matrix(cofactors.as_ref().map(|all| &all.kept[..])),
+            cofactors: leading_matrix(cofactors.as_ref().map(|all| &all.retained[..])),
             redundancy: std::array::from_fn(|k| redundancy_of(first + k)),
             points: (0..resection.points.len()).map(control).collect(),
             images: images(&problem.model, &unknowns, &problem.observation_sd, &mut adjustment),

@@ -6,9 +6,8 @@
 //! u = s X - A^T (x - B) of the known components: the form that is right for any mix of full, horizontal and height control.
 //!
 //! ```
-//! use photocore::adjustment::on_all_processors;
 //! use photocore::geometry::Vector3;
-//! use photocore::programs::similarity::{Method, Options, Start, Station, orient};
+//! use photocore::programs::similarity::{Options, Station, orient};
 //!
 //! // A model at 1:2, shifted; the last station has only its elevation.
 //! let control = [[0.0, 0.0, 10.0], [800.0, 0.0, 30.0], [800.0, 600.0, 0.0], [f64::NAN, f64::NAN, 50.0]];
@@ -20,9 +19,7 @@
 //!     model_sd: [0.01; 3],
 //! };
 //! let stations: Vec<Station> = (0..4).map(station).collect();
-//! let options =
-//!     Options { method: Method::Rigorous, start: Start::Auto, max_iterations: 50, tolerance: 1e-5, trace: false, scale: None };
-//! let solution = on_all_processors(|pool, watch| orient(&stations, &options, pool, watch))??;
+//! let solution = orient(&stations, &Options::default())?;
 //! let parameters = solution.similarity.parameters();
 //! assert!((parameters.scale - 0.5).abs() < 1e-9);
 //! assert!((parameters.translation.x - 7.0).abs() < 1e-6);
@@ -42,12 +39,12 @@ mod weights;
 
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Event, Problem, Status, Stop};
 use crate::geometry::Vector3;
 use crate::normals::{Layout, LayoutError, Ordering, System};
+use crate::{Stopped, Threads};
 
 pub use crout::gauss_crout;
 pub use determinacy::Cause;
@@ -132,6 +129,20 @@ pub struct Options {
     pub scale: Option<f64>,
 }
 
+impl Default for Options {
+    /// The rigorous method from the start that suits the control, to a hundred-thousandth of the standard deviations.
+    fn default() -> Self {
+        Self {
+            method: Method::Rigorous,
+            start: Start::Auto,
+            max_iterations: 50,
+            tolerance: 1e-5,
+            trace: false,
+            scale: None,
+        }
+    }
+}
+
 /// Why there is no orientation. Stations are indices.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SimilarityError {
@@ -161,41 +172,44 @@ pub enum SimilarityError {
     /// The initial values give nothing finite.
     #[error("the initial values give model coordinates that are not finite")]
     NotFinite,
-    /// The caller asked to stop.
-    #[error("interrupted")]
-    Interrupted,
-    /// An allocation of so many bytes failed.
-    #[error("there is no memory for an array of {0} bytes")]
-    OutOfMemory(usize),
+    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),
 }
 
-/// Finds the seven parameters by least squares.
+/// Finds the seven parameters by least squares, on a thread of its own: control is never much work.
 ///
-/// `watch` is called on the calling thread; when it breaks, the adjustment stops.
+/// # Errors
+/// Those of [`orient_on`]; a thread that cannot be started.
+pub fn orient(stations: &[Station], options: &Options) -> Result<Solution, SimilarityError> {
+    orient_on(stations, options, &Threads::new(1)?, &mut adjustment::go_on)
+}
+
+/// The same on threads of the caller. `watch` is called on the calling thread; when it breaks, the adjustment stops.
 ///
 /// # Errors
 /// Control that does not determine the parameters, a start that cannot be had, a mirror image, an interruption.
-pub fn orient(
+pub fn orient_on(
     stations: &[Station],
     options: &Options,
-    pool: &ThreadPool,
+    threads: &Threads,
     watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
 ) -> Result<Solution, SimilarityError> {
     let held = options.scale.is_some();
     determinacy::check_counts(stations, held)?;
-    // The solvers of the library ask how many threads there are: outside of a pool that would start those of the whole process.
-    let chosen = pool.install(|| {
+    // The solvers of the library ask how many threads there are: elsewhere that would start those of the whole process.
+    let chosen = threads.install(|| {
         let chosen = start::choose(stations, options.start, options.scale)?;
         determinacy::check_geometry(stations, &chosen.similarity, held).map(|()| chosen)
     })?;
     match options.method {
-        Method::Rigorous => adjust(stations, options, chosen, None, pool, watch),
+        Method::Rigorous => adjust(stations, options, chosen, None, threads, watch),
         Method::Report | Method::FillIn => {
             let cycles = published::iterate(stations, options, &chosen.similarity)?;
-            adjust(stations, options, chosen, Some(cycles), pool, watch)
+            adjust(stations, options, chosen, Some(cycles), threads, watch)
         }
     }
 }
@@ -215,7 +229,7 @@ fn adjust(
     options: &Options,
     chosen: Chosen,
     cycles: Option<published::Cycles>,
-    pool: &ThreadPool,
+    threads: &Threads,
     watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
 ) -> Result<Solution, SimilarityError> {
     let start = cycles.as_ref().map_or(chosen.similarity, |cycles| cycles.similarity);
@@ -223,34 +237,35 @@ fn adjust(
         return Err(SimilarityError::Scale(start.scale));
     }
     let weighted = Weighted::new(stations, &chosen)?;
-    let problem = pool.install(|| problem(&weighted.stations, &start, options.scale.is_some()))?;
+    let problem = threads.install(|| problem(&weighted.stations, &start, options.scale.is_some()))?;
     let engine = adjustment::Options {
         method: adjustment::Method::Damped(Stop::Fraction(options.tolerance)),
         max_iterations: if cycles.is_some() { 0 } else { options.max_iterations },
         covariance: true,
         loss: None,
+        threads: 0,
     };
-    let mut adjusted = adjustment::adjust(&problem, &engine, pool, watch).map_err(|error| match error {
-        AdjustError::Interrupted => SimilarityError::Interrupted,
-        AdjustError::OutOfMemory(bytes) => SimilarityError::OutOfMemory(bytes),
-        AdjustError::NotFinite => SimilarityError::NotFinite,
-        AdjustError::UndeterminedLocals(stations) => {
-            SimilarityError::Undetermined { cause: Cause::Singular, stations }
-        }
-        AdjustError::Undetermined(_) => {
-            SimilarityError::Undetermined { cause: Cause::Singular, stations: vec![] }
-        }
-    })?;
+    let mut adjusted =
+        adjustment::adjust(&problem, &engine, threads, watch).map_err(|error| match error {
+            AdjustError::Stopped(stopped) => SimilarityError::Stopped(stopped),
+            AdjustError::NotFinite => SimilarityError::NotFinite,
+            AdjustError::UndeterminedLocals(stations) => {
+                SimilarityError::Undetermined { cause: Cause::Singular, stations }
+            }
+            AdjustError::Undetermined(_) => {
+                SimilarityError::Undetermined { cause: Cause::Singular, stations: vec![] }
+            }
+        })?;
     if let Some(cycles) = &cycles {
         adjusted.status = if cycles.converged { Status::Converged } else { Status::NotConverged };
     }
-    let solution = pool
+    let solution = threads
         .install(|| Solution::new(&weighted, &problem, &adjusted, chosen, cycles, options.scale.is_some()))?;
     let scale = solution.similarity.scale;
     if scale.is_nan() || scale <= 0.0 { Err(SimilarityError::Scale(scale)) } else { Ok(solution) }
 }
 
-/// The least-squares problem: the control coordinates are local blocks of three, the seven parameters one kept block.
+/// The least-squares problem: the control coordinates are local blocks of three, the seven parameters one retained block.
 fn problem(
     stations: &[Station],
     start: &Similarity,

@@ -6,7 +6,7 @@ use crate::adjustment::Model;
 use crate::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
 use crate::normals::GroupRows;
 
-/// Unknowns of the kept block: three changes of the rotation (omega, phi, kappa of a rotation after that of the start), s, t.
+/// Unknowns of the retained block: three changes of the rotation (omega, phi, kappa of a rotation after that of the start), s, t.
 pub const CHANGES: usize = 7;
 /// Which of them is s.
 pub const SCALE: usize = 3;
@@ -89,11 +89,11 @@ impl Model for AsControl {
         for row in 0..3 {
             rows.constant[row] = self.observed[local][row] - scale * turned[row] - shift[row];
             (0..3).for_each(|k| rows.local[3 * row + k] = scale * rotation[(row, k)]);
-            let kept = &mut rows.kept[CHANGES * row..][..CHANGES];
-            kept.fill(0.0);
-            (0..3).for_each(|k| kept[k] = scale * by_change[k][row]);
-            kept[3] = turned[row];
-            kept[4 + row] = 1.0;
+            let retained = &mut rows.retained[CHANGES * row..][..CHANGES];
+            retained.fill(0.0);
+            (0..3).for_each(|k| retained[k] = scale * by_change[k][row]);
+            retained[3] = turned[row];
+            retained[4 + row] = 1.0;
         }
     }
 }

@@ -259,10 +259,10 @@ mod tests {
         }
         let axis = Complex64::new(500.0, 500.0);
         let about = Agreement { axis: Some((axis, 150.0)), ..rule };
-        let kept = hypotheses(&images, &stars, &candidates, &about);
+        let retained = hypotheses(&images, &stars, &candidates, &about);
         let near = found.iter().filter(|each| (each.at(axis) - axis).norm() <= 150.0).count();
         assert!(0 < near && near < found.len());
-        assert_eq!(kept.len(), near);
+        assert_eq!(retained.len(), near);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Calibration of a camera by stars (NOAA TR NOS 55): directions of stars, attitudes of the camera and its interior parameters
 //! adjusted together.
 //!
-//! Stars are the local unknowns, two each; attitudes are a kept block each, and the interior parameters and coefficients of refraction
+//! Stars are the local unknowns, two each; attitudes are a retained block each, and the interior parameters and coefficients of refraction
 //! one that all images share. A direction of the axis and weights of parameters are ties. A star that is held ties no attitudes to each other: each
 //! of its images has a local block of its own.
 //!
@@ -10,8 +10,6 @@
 //! A camera of 300 mm whose principal distance and attitude are known to some millimetres and minutes of arc, and nine stars:
 //!
 //! ```
-//! use std::ops::ControlFlow;
-//!
 //! use photocore::adjustment;
 //! use photocore::geometry::{Air, Station, sky::REFRACTION};
 //! use photocore::programs::stellar::{
@@ -53,9 +51,8 @@
 //!     images,
 //!     axis: None,
 //! };
-//! let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
 //! let options = Options { adjustment: adjustment::Options::default(), unit: 1e-6, whole: false };
-//! let solution = calibration.adjust(&options, &pool, &mut |_| ControlFlow::Continue(()))?;
+//! let solution = calibration.adjust(&options)?;
 //! assert!((solution.parameters[3 + 3] - 0.3).abs() < 1e-9);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -69,12 +66,12 @@ mod solution;
 
 use std::ops::ControlFlow;
 
-use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::adjustment::{self, AdjustError, Event, Linearized, Phase, Problem};
 use crate::geometry::Station;
 use crate::normals::{Layout, LayoutError, Ordering, System};
+use crate::{Stopped, Threads};
 
 use model::{Partials, StarImages};
 
@@ -198,40 +195,45 @@ pub enum StellarError {
     /// Stars that the initial values put where they have no image.
     #[error("the initial values put a star below the horizon or behind the camera")]
     NotFinite(Vec<usize>),
-    /// The caller asked to stop.
-    #[error("interrupted")]
-    Interrupted,
-    /// An allocation of so many bytes failed.
-    #[error("there is no memory for an array of {0} bytes")]
-    OutOfMemory(usize),
+    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),
 }
 
 impl Calibration {
-    /// Adjusts by least squares with exact partials.
+    /// Adjusts by least squares with exact partials, on threads of its own.
+    ///
+    /// # Errors
+    /// Those of [`Calibration::adjust_on`]; threads that cannot be started.
+    pub fn adjust(&self, options: &Options) -> Result<Solution, StellarError> {
+        self.adjust_on(options, &Threads::new(options.adjustment.threads)?, &mut adjustment::go_on)
+    }
+
+    /// The same on threads of the caller.
     ///
     /// `watch` is called on the calling thread; when it breaks, the adjustment stops.
     ///
     /// # Errors
     /// A calibration that contradicts itself or leaves unknowns undetermined; an interruption.
-    pub fn adjust(
+    pub fn adjust_on(
         &self,
         options: &Options,
-        pool: &ThreadPool,
+        threads: &Threads,
         watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     ) -> Result<Solution, StellarError> {
-        let problem = pool.install(|| self.problem(options.unit, Partials::Exact))?;
-        let adjusted = adjustment::adjust(&problem, &options.adjustment, pool, watch)
-            .map_err(|error| self.named(&problem, error, pool))?;
+        let problem = threads.install(|| self.problem(options.unit, Partials::Exact))?;
+        let adjusted = adjustment::adjust(&problem, &options.adjustment, threads, watch)
+            .map_err(|error| self.named(&problem, error, threads))?;
         let mut whole = None;
         if options.whole && adjusted.cofactors.is_some() {
             let total = problem.layout().locals();
             let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
             let values = adjusted.unknowns.clone();
-            let normal = Linearized::form(&problem, None, values, vec![], pool, &mut between);
-            whole = of_parameters(&normal.map_err(|error| self.named(&problem, error, pool))?, &problem);
+            let normal = Linearized::form(&problem, None, values, vec![], threads, &mut between);
+            whole = of_parameters(&normal.map_err(|error| self.named(&problem, error, threads))?, &problem);
         }
         Solution::new(self, options, &problem, adjusted, whole)
     }
@@ -241,9 +243,9 @@ impl Calibration {
     ///
     /// # Errors
     /// A calibration that contradicts itself; stars without images at the initial values.
-    pub fn without_effect(&self, pool: &ThreadPool) -> Result<Vec<usize>, StellarError> {
-        let problem = pool.install(|| self.problem(1.0, Partials::Exact))?;
-        let normal = self.formed(&problem, vec![], pool)?;
+    pub fn without_effect(&self, threads: &Threads) -> Result<Vec<usize>, StellarError> {
+        let problem = threads.install(|| self.problem(1.0, Partials::Exact))?;
+        let normal = self.formed(&problem, vec![], threads)?;
         Ok(parameters_of(&problem, normal.without_effect(problem.layout())))
     }
 
@@ -252,10 +254,10 @@ impl Calibration {
         &self,
         problem: &Problem<StarImages<'_>>,
         held: Vec<usize>,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> Result<Linearized, StellarError> {
-        let failed = |error| self.named(problem, error, pool);
-        let normal = Linearized::form(problem, None, problem.initial.clone(), held, pool, &mut go_on)
+        let failed = |error| self.named(problem, error, threads);
+        let normal = Linearized::form(problem, None, problem.initial.clone(), held, threads, &mut go_on)
             .map_err(failed)?;
         if normal.sum_of_squares().is_finite() { Ok(normal) } else { Err(failed(AdjustError::NotFinite)) }
     }
@@ -265,7 +267,7 @@ impl Calibration {
         &self,
         problem: &Problem<StarImages<'_>>,
         error: AdjustError,
-        pool: &ThreadPool,
+        threads: &Threads,
     ) -> StellarError {
         match error {
             AdjustError::UndeterminedLocals(locals) => {
@@ -276,7 +278,7 @@ impl Calibration {
             // The initial values are those that leave parameters undetermined.
             AdjustError::Undetermined(_) => {
                 let initial = problem.initial.clone();
-                let normal = Linearized::form(problem, None, initial, vec![], pool, &mut go_on);
+                let normal = Linearized::form(problem, None, initial, vec![], threads, &mut go_on);
                 let found = normal.map_or(vec![], |normal| normal.undetermined_unknowns(problem.layout()));
                 let named = found.into_iter().map(|unknowns| parameters_of(problem, unknowns));
                 StellarError::Undetermined(named.collect())
@@ -287,8 +289,7 @@ impl Calibration {
                     (0..self.images.len()).map(|image| problem.model.image(&sight, image)).collect();
                 StellarError::NotFinite(self.unseen(&rows))
             }
-            AdjustError::Interrupted => StellarError::Interrupted,
-            AdjustError::OutOfMemory(bytes) => StellarError::OutOfMemory(bytes),
+            AdjustError::Stopped(stopped) => StellarError::Stopped(stopped),
         }
     }
 
@@ -360,11 +361,11 @@ impl Calibration {
     }
 
     fn layout(&self, model: &StarImages<'_>) -> Result<Layout, LayoutError> {
-        let kept = model.images.iter().map(|&image| self.images[image].pointing as u32).collect();
+        let retained = model.images.iter().map(|&image| self.images[image].pointing as u32).collect();
         let (count, common) = (model.images.len(), self.pointings.len() as u32);
         let dims: Vec<usize> = self.pointings.iter().map(|_| 3).chain([COMMON]).collect();
-        Layout::new(2, 2, &dims, model.start.clone(), kept)?
-            .with_further((0..=count).collect(), vec![common; count])?
+        Layout::new(2, 2, &dims, model.start.clone(), retained)?
+            .with_shared((0..=count).collect(), vec![common; count])?
             .with_ties(model.ties.iter().map(|(_, tie)| tie.clone()).collect())?
             .with_pairs((0..common).map(|pointing| [pointing, common]).collect())
     }

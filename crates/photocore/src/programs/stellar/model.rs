@@ -233,19 +233,19 @@ impl Calibration {
         let (mut ties, common) = (Vec::new(), self.pointings.len() as u32);
         if let Some(axis) = self.axis {
             let root = root(axis.weight, || "the axis".into())?;
-            let tie = Tie { rows: 2, kept: vec![axis.pointing as u32, common] };
+            let tie = Tie { rows: 2, retained: vec![axis.pointing as u32, common] };
             ties.push((Tied::Axis(root), tie));
         }
         for row in 0..self.weights.parameters.len() {
             // With the common parameters in any case: their cofactors with every attitude are asked for.
-            let mut kept: Vec<u32> = self
+            let mut retained: Vec<u32> = self
                 .weighted(row)
                 .map(|(parameter, ..)| common.min(parameter as u32 / 3))
                 .chain([common])
                 .collect();
-            kept.sort_unstable();
-            kept.dedup();
-            ties.push((Tied::Parameters(row), Tie { rows: 1, kept }));
+            retained.sort_unstable();
+            retained.dedup();
+            ties.push((Tied::Parameters(row), Tie { rows: 1, retained }));
         }
         Ok(ties)
     }
@@ -303,17 +303,17 @@ impl Model for StarImages<'_> {
             let [ra, dec] = [0, 1].map(|k| mix(found.star[0][k], found.star[1][k]));
             rows.constant[row] = mix(found.constant[0], found.constant[1]);
             rows.local[2 * row..][..2].copy_from_slice(&[ra, dec - shear * ra]);
-            for (k, value) in rows.kept[3 * row..][..3].iter_mut().enumerate() {
+            for (k, value) in rows.retained[3 * row..][..3].iter_mut().enumerate() {
                 *value = mix(found.pointing[0][k], found.pointing[1][k]);
             }
-            for (k, value) in rows.common[COMMON * row..][..COMMON].iter_mut().enumerate() {
+            for (k, value) in rows.shared[COMMON * row..][..COMMON].iter_mut().enumerate() {
                 *value = mix(found.common[0][k], found.common[1][k]);
             }
         }
     }
 
     fn observe_tie(&self, sight: &Sight, tie: usize, rows: &mut TieRows<'_>) {
-        let (tied, Tie { kept, .. }) = &self.ties[tie];
+        let (tied, Tie { retained, .. }) = &self.ties[tie];
         rows.coefficients.fill(0.0);
         match tied {
             Tied::Axis(root) => {
@@ -331,7 +331,7 @@ impl Model for StarImages<'_> {
                 for (parameter, _, element) in self.calibration.weighted(*row) {
                     // Every block but the last has three unknowns.
                     let attitude = (parameter / 3).min(self.calibration.pointings.len());
-                    let before = kept.iter().take_while(|&&block| (block as usize) < attitude).count();
+                    let before = retained.iter().take_while(|&&block| (block as usize) < attitude).count();
                     rows.coefficients[3 * before + parameter - 3 * attitude] = element;
                 }
             }

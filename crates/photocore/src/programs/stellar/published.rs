@@ -3,10 +3,9 @@
 //! Distortion is that of the image undistorted from the measurement, so that discrepancies live on the undistorted plate; the
 //! change of refraction with direction is neglected in the partials.
 
-use rayon::ThreadPool;
-
 use super::model::{Partials, Rows, Sight, Tolerances};
 use super::{Attitude, COMMON, Calibration, Camera, StellarError, of_parameters, parameters_of};
+use crate::Threads;
 use crate::adjustment::AdjustError;
 use crate::geometry::Displacement;
 
@@ -41,13 +40,13 @@ impl Calibration {
     ///
     /// # Errors
     /// Stars or parameters that are not determined, stars without images.
-    pub fn correction(&self, tolerances: &Tolerances, pool: &ThreadPool) -> Result<Correction, StellarError> {
-        let problem = pool.install(|| self.problem(1.0, Partials::Published(*tolerances)))?;
-        let (first, layout) = (self.formed(&problem, vec![], pool)?, problem.layout());
+    pub fn correction(&self, tolerances: &Tolerances, threads: &Threads) -> Result<Correction, StellarError> {
+        let problem = threads.install(|| self.problem(1.0, Partials::Published(*tolerances)))?;
+        let (first, layout) = (self.formed(&problem, vec![], threads)?, problem.layout());
         let idle = first.without_effect(layout);
-        let normal = if idle.is_empty() { first } else { self.formed(&problem, idle.clone(), pool)? };
+        let normal = if idle.is_empty() { first } else { self.formed(&problem, idle.clone(), threads)? };
         if let Some(error @ AdjustError::UndeterminedLocals(_)) = normal.undetermined() {
-            return Err(self.named(&problem, error, pool));
+            return Err(self.named(&problem, error, threads));
         }
         let undetermined = || {
             let combinations = normal.undetermined_unknowns(layout).into_iter();

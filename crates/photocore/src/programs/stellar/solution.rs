@@ -92,12 +92,12 @@ impl Solution {
             parameters: sight.parameters,
             axis_test: Tested::NONE,
             cofactors: cofactors.map(|found| ParameterCofactors {
-                own: scaled(found.kept[..9 * attitudes].to_vec()),
+                own: scaled(found.retained[..9 * attitudes].to_vec()),
                 // An attitude that nothing touches is fixed.
                 cross: scaled(
                     found.pairs.iter().map(|&value| if value.is_nan() { 0.0 } else { value }).collect(),
                 ),
-                common: scaled(found.kept[9 * attitudes..].to_vec()),
+                common: scaled(found.retained[9 * attitudes..].to_vec()),
             }),
             whole: whole
                 .map(|(logarithm, cofactors)| (logarithm + free as f64 * unit.ln(), scaled(cofactors))),

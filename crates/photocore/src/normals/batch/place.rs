@@ -1,10 +1,10 @@
-//! Where the equations of a stack and what they touch stand.
+//! Where the equations of a batch and what they touch stand.
 
 use std::ops::Range;
 
 use smallvec::SmallVec;
 
-use super::{Common, Part, Place, Run, Segment, Slot, Stack};
+use super::{Batch, Common, Part, Place, Run, Segment, Slot};
 use crate::normals::layout::Layout;
 use crate::normals::symbolic::Symbolic;
 use crate::normals::system::System;
@@ -14,7 +14,7 @@ use crate::normals::vectorised::LANES;
 /// Parts that are looked at for one that is the same: the cameras of a flight are few.
 const FEW: usize = 4;
 
-impl Stack {
+impl Batch {
     /// Lays out the buffers for local blocks of one pattern.
     pub(super) fn place(&mut self, system: &System, locals: &[u32]) {
         let (layout, symbolic) = (&system.layout, &*system.symbolic);
@@ -27,13 +27,13 @@ impl Stack {
         let groups = system.incidence.groups_of(layout, first as usize);
         let positions = system.incidence.positions_of(layout, first as usize);
         self.place_slots(symbolic, positions);
-        let common = self.place_commons(system, first as usize);
-        let (mut kept, mut coupling) = (0, self.start);
+        let shared = self.place_commons(system, first as usize);
+        let (mut retained, mut coupling) = (0, self.start);
         for slot in &mut self.slots {
-            slot.row = symbolic.row_of(self.home, slot.position);
+            slot.row = symbolic.row_of(self.node, slot.position);
             slot.constants = slot.groups.start * rows * depth;
-            (slot.kept, slot.coupling) = (kept, coupling);
-            kept += slot.groups.len() * rows * depth * slot.dim;
+            (slot.retained, slot.coupling) = (retained, coupling);
+            retained += slot.groups.len() * rows * depth * slot.dim;
             coupling += l * depth * slot.dim;
         }
         for segment in &mut self.segments {
@@ -45,8 +45,8 @@ impl Stack {
         make_room(&mut self.constants, groups.len() * rows * depth);
         make_room(&mut self.local_rows, groups.len() * rows * depth * l);
         // Products read beyond the end.
-        make_room(&mut self.kept_rows, kept + LANES);
-        make_room(&mut self.common_rows, common + LANES);
+        make_room(&mut self.retained_rows, retained + LANES);
+        make_room(&mut self.shared_rows, shared + LANES);
         let behind = self.numbers_beside(layout).max(LANES);
         make_room(&mut self.coupling, coupling + behind);
         self.reduced.resize(l * depth, 0.0);
@@ -64,15 +64,15 @@ impl Stack {
                     dim: symbolic.dim(position as usize),
                     groups: p..p + 1,
                     constants: 0,
-                    kept: 0,
+                    retained: 0,
                     coupling: 0,
                 }),
             }
         }
     }
 
-    /// Finds what each group has in common with others, and the segments; returns how many coefficients these have. The segments of the stack
-    /// before stay where that was at home in the same front and had the same in common.
+    /// Finds what each group has in common with others, and the segments; returns how many coefficients these have. The segments of the batch
+    /// before stay where that was assembled in the same front and had the same in shared.
     fn place_commons(&mut self, system: &System, local: usize) -> usize {
         let (layout, incidence, symbolic) = (&system.layout, &system.incidence, &*system.symbolic);
         let set = incidence.set_of(local);
@@ -83,19 +83,19 @@ impl Stack {
         }
         let positions = incidence.positions_of(layout, local);
         let main = positions.first().map(|&main| main as usize);
-        let first = self.commons.iter().map(|common| common.first).chain(main).min();
-        let home = first.map_or(0, |first| symbolic.supernode_of(first));
-        if home != std::mem::replace(&mut self.home, home) || are_other {
+        let first = self.commons.iter().map(|shared| shared.first).chain(main).min();
+        let node = first.map_or(0, |first| symbolic.supernode_of(first));
+        if node != std::mem::replace(&mut self.node, node) || are_other {
             self.place_parts(layout, symbolic);
         }
         let of_groups = incidence.commons_of(layout, local);
         let mut end = 0;
         for p in 0..positions.len() {
-            let common = of_groups.get(p).map(|number| {
-                let place = self.commons.partition_point(|common| common.number < *number);
+            let shared = of_groups.get(p).map(|number| {
+                let place = self.commons.partition_point(|shared| shared.number < *number);
                 &self.commons[place]
             });
-            let (parts, width) = common.map_or((0..0, 0), |common| (common.parts.clone(), common.width));
+            let (parts, width) = shared.map_or((0..0, 0), |shared| (shared.parts.clone(), shared.width));
             self.places.push(Place { parts, width, rows: end });
             end += self.locals.len() * layout.rows() * width;
         }
@@ -105,17 +105,17 @@ impl Stack {
     /// Finds the parts of what groups have in common with others, and unites those that overlap or meet in one block.
     fn place_parts(&mut self, layout: &Layout, symbolic: &Symbolic) {
         self.parts.clear();
-        for common in &mut self.commons {
+        for shared in &mut self.commons {
             let start = self.parts.len();
             let part =
                 |(position, unknowns, column)| Part { position, unknowns, segment: 0, shift: 0, column };
-            self.parts.extend(parts_of(layout, symbolic, common.group).map(part));
-            common.parts = start..self.parts.len();
+            self.parts.extend(parts_of(layout, symbolic, shared.group).map(part));
+            shared.parts = start..self.parts.len();
         }
         let all = self.parts.iter().map(|part| (part.position, part.unknowns.clone()));
         let segment = |(position, unknowns): (usize, Range<usize>)| Segment {
             position,
-            row: symbolic.row_of(self.home, position) + unknowns.start,
+            row: symbolic.row_of(self.node, position) + unknowns.start,
             unknowns,
             coupling: 0,
             runs: SmallVec::new(),
@@ -164,10 +164,10 @@ impl Common {
     /// What has a number.
     fn of(system: &System, number: u32) -> Self {
         let (layout, group) = (&system.layout, system.incidence.group_with(number));
-        let further = layout.further_of(group).iter();
-        let first = further.map(|&block| system.symbolic.position(block as usize)).min();
+        let shared = layout.shared_of(group).iter();
+        let first = shared.map(|&block| system.symbolic.position(block as usize)).min();
         let first = first.unwrap_or(usize::MAX);
-        Self { number, group, parts: 0..0, width: layout.common_width(group), first }
+        Self { number, group, parts: 0..0, width: layout.shared_width(group), first }
     }
 }
 
@@ -179,15 +179,15 @@ fn make_room(buffer: &mut Vec<f64>, length: usize) {
 }
 
 /// The parts of what a group has in common with others: the position of a block, some of its unknowns, and the first of their columns
-/// among those that the group has in common.
+/// among those that the group has in shared.
 pub(in crate::normals) fn parts_of<'a>(
     layout: &'a Layout,
     symbolic: &'a Symbolic,
     group: usize,
 ) -> impl Iterator<Item = (usize, Range<usize>, usize)> + 'a {
-    let blocks = layout.further_of(group).iter().scan(0, |width, &block| {
+    let blocks = layout.shared_of(group).iter().scan(0, |width, &block| {
         let block = block as usize;
-        let first = std::mem::replace(width, *width + layout.kept_dim(block));
+        let first = std::mem::replace(width, *width + layout.retained_dim(block));
         Some((block, first))
     });
     blocks.flat_map(move |(block, first)| {
@@ -201,7 +201,7 @@ pub(in crate::normals) fn united(
     parts: impl Iterator<Item = (usize, Range<usize>)>,
 ) -> SmallVec<[(usize, Range<usize>); 4]> {
     let mut sorted: SmallVec<[(usize, Range<usize>); 4]> = SmallVec::new();
-    // Most groups have the same in common as one of the few before.
+    // Most groups have the same in shared as one of the few before.
     parts.for_each(|part| {
         if !sorted.iter().rev().take(FEW).any(|other| *other == part) {
             sorted.push(part);

@@ -1,16 +1,16 @@
-//! What the elimination of a stack leaves, added to a front.
+//! What the elimination of a batch leaves, added to a front.
 
 use pulp::Simd;
 
-use super::{Part, Stack};
+use super::{Batch, Part};
 use crate::normals::front::{Columns, Strip};
 use crate::normals::layout::Layout;
 use crate::normals::vectorised::{Kernel, Rows, run, size};
 
-impl Stack {
-    /// Adds what the elimination leaves to columns of the front of the home.
+impl Batch {
+    /// Adds what the elimination leaves to columns of the front of the node.
     pub fn add_to(&self, columns: &mut Columns<'_>, layout: &Layout) {
-        run(layout, self.kept_dim(), AddTo { stack: self, columns, rows: layout.rows() });
+        run(layout, self.retained_dim(), AddTo { batch: self, columns, rows: layout.rows() });
     }
 
     #[inline(always)]
@@ -37,8 +37,8 @@ impl Stack {
                 let taken = (-1.0, self.segment_coupling::<L>(segment), v);
                 match segment.run_of(slot.groups.start) {
                     Some(run) => {
-                        let common = self.run_rows(segment, run, slot.groups.clone(), rows);
-                        columns.add_products(simd, [(1.0, common, own), taken]);
+                        let shared = self.run_rows(segment, run, slot.groups.clone(), rows);
+                        columns.add_products(simd, [(1.0, shared, own), taken]);
                     }
                     None => columns.add_products(simd, [taken]),
                 }
@@ -71,8 +71,8 @@ impl Stack {
                 }
                 for t in (0..self.locals.len()).step_by(together) {
                     let at = (t * slot.groups.len() + k) * rows;
-                    let values = &self.kept_rows[slot.kept + at * width..];
-                    let kept = Strip { at: slot.row, rows: Rows { values, width, stride: width, count } };
+                    let values = &self.retained_rows[slot.retained + at * width..];
+                    let retained = Strip { at: slot.row, rows: Rows { values, width, stride: width, count } };
                     let constants = &self.constants[slot.constants + at..][..count];
                     for (index, part) in self.parts(p).iter().enumerate() {
                         let equations = t * rows..t * rows + count;
@@ -82,7 +82,7 @@ impl Stack {
                         }
                         let in_run = in_run(part);
                         if !in_run || self.segments[part.segment].row < slot.row {
-                            add_below(simd, columns, own, kept);
+                            add_below(simd, columns, own, retained);
                         }
                         if !in_run && columns.contain(own.at) {
                             columns.add_product(simd, 1.0, own, own);
@@ -141,7 +141,7 @@ fn add_below<S: Simd>(simd: S, columns: &mut Columns<'_>, a: Strip<'_>, b: Strip
 }
 
 struct AddTo<'a, 'b> {
-    stack: &'a Stack,
+    batch: &'a Batch,
     columns: &'a mut Columns<'b>,
     rows: usize,
 }
@@ -149,6 +149,6 @@ struct AddTo<'a, 'b> {
 impl Kernel for AddTo<'_, '_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
-        self.stack.add_sized::<S, L, D>(simd, self.columns, size::<R>(self.rows));
+        self.batch.add_sized::<S, L, D>(simd, self.columns, size::<R>(self.rows));
     }
 }

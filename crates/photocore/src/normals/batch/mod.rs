@@ -18,7 +18,7 @@ use super::vectorised::{Rows, size};
 pub(super) use gather::Gathered;
 pub(super) use place::{parts_of, united};
 
-/// A main kept block that the local blocks are tied to.
+/// A main retained block that the local blocks are tied to.
 #[derive(Debug, Clone)]
 pub(super) struct Slot {
     /// Its place in the order of elimination.
@@ -30,11 +30,11 @@ pub(super) struct Slot {
     /// Its groups, counted in the pattern.
     pub groups: Range<usize>,
     constants: usize,
-    kept: usize,
+    retained: usize,
     coupling: usize,
 }
 
-/// Consecutive unknowns of a further kept block that the local blocks are tied to. They stand in the order of their
+/// Consecutive unknowns of a shared block that the local blocks are tied to. They stand in the order of their
 /// positions, and so of their rows in the front.
 #[derive(Debug, Clone)]
 pub(super) struct Segment {
@@ -76,7 +76,7 @@ impl Segment {
 /// A group of equations in the pattern: what it has in common with others.
 #[derive(Debug, Clone)]
 struct Place {
-    /// Among the parts of the stack.
+    /// Among the parts of the batch.
     parts: Range<usize>,
     /// Of all its parts.
     width: usize,
@@ -89,15 +89,15 @@ struct Common {
     /// Its number, and a group that has it.
     number: u32,
     group: usize,
-    /// Among the parts of the stack.
+    /// Among the parts of the batch.
     parts: Range<usize>,
     /// Of all its parts.
     width: usize,
-    /// The first position of its further blocks; that of none.
+    /// The first position of its shared blocks; that of none.
     first: usize,
 }
 
-/// A part of what a group has in common with others: unknowns of a further kept block that are not held.
+/// A part of what a group has in common with others: unknowns of a shared block that are not held.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     position: usize,
@@ -119,9 +119,9 @@ impl Part {
 /// The equations of some local blocks of one pattern and what their elimination leaves: for each of them, with N = L L^T its
 /// normal matrix, v = L^-1 n and V = L^-1 N_local,other. The normal equations of the others lose V^T V, their right-hand side V^T v.
 ///
-/// What belongs to one kept block stands together, local block by local block.
+/// What belongs to one retained block stands together, local block by local block.
 #[derive(Debug, Default)]
-pub(super) struct Stack {
+pub(super) struct Batch {
     pub locals: Vec<u32>,
     pub slots: Vec<Slot>,
     pub segments: Vec<Segment>,
@@ -133,26 +133,26 @@ pub(super) struct Stack {
     /// Local blocks that their equations do not determine.
     pub deficient: Vec<usize>,
     places: Vec<Place>,
-    /// The supernode that the local blocks are at home in.
-    home: usize,
+    /// The supernode that the local blocks are assembled in.
+    node: usize,
     /// The set of what their groups have in common with others, and what is in it, by number.
     set: Option<u32>,
     commons: Vec<Common>,
     parts: Vec<Part>,
     constants: Vec<f64>,
     local_rows: Vec<f64>,
-    kept_rows: Vec<f64>,
-    common_rows: Vec<f64>,
-    /// V, from `start` to `end`: what is kept of stacks before may stand before it.
+    retained_rows: Vec<f64>,
+    shared_rows: Vec<f64>,
+    /// V, from `start` to `end`: what is kept of batches before may stand before it.
     pub coupling: Vec<f64>,
     pub start: usize,
     pub end: usize,
     pub reduced: Vec<f64>,
 }
 
-impl Stack {
+impl Batch {
     /// Unknowns of every main block that the local blocks are tied to, where all have the same number: kernels are chosen by it.
-    pub fn kept_dim(&self) -> Option<usize> {
+    pub fn retained_dim(&self) -> Option<usize> {
         let dim = self.slots.first()?.dim;
         self.slots.iter().all(|slot| slot.dim == dim).then_some(dim)
     }
@@ -183,11 +183,11 @@ impl Stack {
     #[inline(always)]
     pub fn slot_rows<const D: usize>(&self, slot: &Slot, rows: usize) -> Strip<'_> {
         let (width, count) = (size::<D>(slot.dim), slot.groups.len() * self.locals.len() * rows);
-        let values = &self.kept_rows[slot.kept..];
+        let values = &self.retained_rows[slot.retained..];
         Strip { at: slot.row, rows: Rows { values, width, stride: width, count } }
     }
 
-    /// The coefficients of local block `t` of the stack in group `p` of the pattern.
+    /// The coefficients of local block `t` of the batch in group `p` of the pattern.
     #[inline(always)]
     pub fn local_rows<const L: usize>(&self, t: usize, p: usize, rows: usize) -> &[[f64; L]] {
         self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L].as_chunks().0
@@ -197,7 +197,7 @@ impl Stack {
     #[inline(always)]
     fn run_rows(&self, segment: &Segment, run: &Run, places: Range<usize>, rows: usize) -> Strip<'_> {
         let Place { width: stride, rows: start, .. } = self.places[places.start];
-        let values = &self.common_rows[start + run.column..];
+        let values = &self.shared_rows[start + run.column..];
         let count = places.len() * self.locals.len() * rows;
         Strip { at: segment.row, rows: Rows { values, width: segment.unknowns.len(), stride, count } }
     }
@@ -212,7 +212,7 @@ impl Stack {
     #[inline(always)]
     pub fn part_rows(&self, p: usize, part: &Part, equations: Range<usize>) -> Strip<'_> {
         let Place { width: stride, rows: start, .. } = self.places[p];
-        let values = &self.common_rows[start + equations.start * stride + part.column..];
+        let values = &self.shared_rows[start + equations.start * stride + part.column..];
         let at = self.segments[part.segment].row + part.shift;
         Strip { at, rows: Rows { values, width: part.width(), stride, count: equations.len() } }
     }

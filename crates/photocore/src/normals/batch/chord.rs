@@ -1,23 +1,23 @@
-//! The right-hand sides that a stack leaves, without its coupling.
+//! The right-hand sides that a batch leaves, without its coupling.
 
 use pulp::Simd;
 use smallvec::SmallVec;
 
-use super::Stack;
+use super::Batch;
 use crate::normals::equations::Prior;
 use crate::normals::layout::Layout;
 use crate::normals::vectorised::{Kernel, add_right, dot, run, size};
 
-impl Stack {
+impl Batch {
     /// Eliminates the unknowns of the local blocks from the right-hand sides alone: v, and l - A N^-1 A^T l in the place of l, with what priors
     /// add. Of that, A^T l of the others is what the elimination leaves them.
     pub fn eliminate_from_rights(&mut self, layout: &Layout, prior: &Prior) {
-        run(layout, self.kept_dim(), FromRights { stack: self, layout, prior });
+        run(layout, self.retained_dim(), FromRights { batch: self, layout, prior });
     }
 
     /// Adds A^T l of all that the local blocks are tied to: main blocks before segments.
     pub fn add_rights_of_others(&self, layout: &Layout, rights: &mut [f64]) {
-        run(layout, self.kept_dim(), OfOthers { stack: self, rows: layout.rows(), rights });
+        run(layout, self.retained_dim(), OfOthers { batch: self, rows: layout.rows(), rights });
     }
 
     /// Adds A^T l of what groups have in common with others; the unknowns of each segment start at `starts`.
@@ -42,7 +42,7 @@ impl Stack {
 }
 
 struct FromRights<'a> {
-    stack: &'a mut Stack,
+    batch: &'a mut Batch,
     layout: &'a Layout,
     prior: &'a Prior,
 }
@@ -50,18 +50,18 @@ struct FromRights<'a> {
 impl Kernel for FromRights<'_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
-        let Self { stack, layout, prior } = self;
+        let Self { batch, layout, prior } = self;
         let rows = size::<R>(layout.rows());
-        stack.factor::<S, L>(simd, rows, (layout, prior), 0.0);
-        let depth = stack.locals.len();
-        for (t, triangle) in stack.triangles.iter().enumerate() {
-            let mut x: [f64; L] = std::array::from_fn(|d| stack.reduced[t * L + d]);
+        batch.factor::<S, L>(simd, rows, (layout, prior), 0.0);
+        let depth = batch.locals.len();
+        for (t, triangle) in batch.triangles.iter().enumerate() {
+            let mut x: [f64; L] = std::array::from_fn(|d| batch.reduced[t * L + d]);
             triangle.backward::<L>(&mut x, 1);
-            for slot in &stack.slots {
+            for slot in &batch.slots {
                 for (k, p) in slot.groups.clone().enumerate() {
                     let constants =
-                        &mut stack.constants[slot.constants + (t * slot.groups.len() + k) * rows..];
-                    let own = stack.local_rows[(p * depth + t) * rows * L..][..rows * L].as_chunks::<L>().0;
+                        &mut batch.constants[slot.constants + (t * slot.groups.len() + k) * rows..];
+                    let own = batch.local_rows[(p * depth + t) * rows * L..][..rows * L].as_chunks::<L>().0;
                     constants.iter_mut().zip(own).for_each(|(constant, row)| *constant -= dot(row, &x));
                 }
             }
@@ -70,7 +70,7 @@ impl Kernel for FromRights<'_> {
 }
 
 struct OfOthers<'a> {
-    stack: &'a Stack,
+    batch: &'a Batch,
     rows: usize,
     rights: &'a mut [f64],
 }
@@ -78,19 +78,19 @@ struct OfOthers<'a> {
 impl Kernel for OfOthers<'_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
-        let Self { stack, rights, .. } = self;
+        let Self { batch, rights, .. } = self;
         let rows = size::<R>(self.rows);
         let mut end = 0;
-        for slot in &stack.slots {
-            let own = stack.slot_rows::<D>(slot, rows).rows;
-            add_right(simd, &mut rights[end..], None, 1.0, own, &stack.constants[slot.constants..]);
+        for slot in &batch.slots {
+            let own = batch.slot_rows::<D>(slot, rows).rows;
+            add_right(simd, &mut rights[end..], None, 1.0, own, &batch.constants[slot.constants..]);
             end += own.width;
         }
         let mut starts = SmallVec::<[usize; 4]>::new();
-        for segment in &stack.segments {
+        for segment in &batch.segments {
             starts.push(end);
             end += segment.unknowns.len();
         }
-        stack.add_rights_of_common(simd, rows, &starts, rights);
+        batch.add_rights_of_common(simd, rows, &starts, rights);
     }
 }

@@ -1,20 +1,20 @@
-//! The local blocks of a stack, eliminated.
+//! The local blocks of a batch, eliminated.
 
 use std::ops::Range;
 
 use pulp::Simd;
 use smallvec::SmallVec;
 
-use super::{Place, Stack};
+use super::{Batch, Place};
 use crate::normals::equations::Prior;
 use crate::normals::layout::Layout;
 use crate::normals::triangle::Triangle;
 use crate::normals::vectorised::{Kernel, LANES, copy_vectors, run, size};
 
-impl Stack {
+impl Batch {
     /// Eliminates the unknowns of the local blocks. `damping` is added to the diagonal of each as a fraction of it.
     pub fn eliminate(&mut self, layout: &Layout, prior: &Prior, damping: f64) {
-        run(layout, self.kept_dim(), Eliminate { stack: self, layout, prior, damping });
+        run(layout, self.retained_dim(), Eliminate { batch: self, layout, prior, damping });
     }
 
     /// Factors the normal matrices of the local blocks and reduces their right-hand sides: L and v.
@@ -70,7 +70,7 @@ impl Stack {
         }
     }
 
-    /// Adds the equations of local block `t` of the stack to its normal equations, and to the sum of squares.
+    /// Adds the equations of local block `t` of the batch to its normal equations, and to the sum of squares.
     #[inline(always)]
     fn add_equations<const L: usize>(
         &mut self,
@@ -119,8 +119,8 @@ impl Stack {
                     let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
                     for (k, p) in slot.groups.clone().enumerate() {
                         let own = &self.local_rows[(p * depth + t) * rows * L..][..rows * L];
-                        let at = slot.kept + (t * slot.groups.len() + k) * rows * dim;
-                        add_rows::<S, L>(simd, &mut sums, own, &self.kept_rows[at + first..], dim);
+                        let at = slot.retained + (t * slot.groups.len() + k) * rows * dim;
+                        add_rows::<S, L>(simd, &mut sums, own, &self.retained_rows[at + first..], dim);
                     }
                     triangle.forward_vectors::<S, L>(simd, &mut sums);
                     write_sums::<S, L>(simd, &sums, coupling, dim, first);
@@ -138,7 +138,7 @@ impl Stack {
             let groups = segment.runs.iter().flat_map(|run| {
                 let group = |p: usize| {
                     let Place { width, rows: start, .. } = self.places[p];
-                    Group { local: p * depth * rows * L, common: start + run.column, stride: width }
+                    Group { local: p * depth * rows * L, shared: start + run.column, stride: width }
                 };
                 run.places.clone().map(group)
             });
@@ -147,9 +147,9 @@ impl Stack {
             for (t, (triangle, coupling)) in self.triangles.iter().zip(couplings).enumerate() {
                 for first in (0..width).step_by(LANES) {
                     let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
-                    for &Group { local, common, stride } in &groups {
+                    for &Group { local, shared, stride } in &groups {
                         let own = &self.local_rows[local + t * rows * L..][..rows * L];
-                        let others = &self.common_rows[common + t * rows * stride + first..];
+                        let others = &self.shared_rows[shared + t * rows * stride + first..];
                         add_rows::<S, L>(simd, &mut sums, own, others, stride);
                     }
                     triangle.forward_vectors::<S, L>(simd, &mut sums);
@@ -159,7 +159,7 @@ impl Stack {
         }
     }
 
-    /// Of local block `t` of the stack to the other segments.
+    /// Of local block `t` of the batch to the other segments.
     #[inline(always)]
     fn couple_segments<const L: usize>(&mut self, t: usize, rows: usize) {
         let triangle = self.triangles[t];
@@ -169,7 +169,7 @@ impl Stack {
         }
         for (p, &Place { ref parts, width, rows: start }) in self.places.iter().enumerate() {
             let own = &self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L];
-            let common = &self.common_rows[start + t * rows * width..][..rows * width];
+            let shared = &self.shared_rows[start + t * rows * width..][..rows * width];
             for part in &self.parts[parts.clone()] {
                 let segment = &self.segments[part.segment];
                 if segment.plain {
@@ -178,7 +178,7 @@ impl Stack {
                 let stride = segment.unknowns.len();
                 let coupling = &mut self.coupling[segment.coupling + t * L * stride..][..L * stride];
                 let columns = part.column..part.column + part.width();
-                add_product::<L>(&mut coupling[part.shift..], stride, own, common, width, columns);
+                add_product::<L>(&mut coupling[part.shift..], stride, own, shared, width, columns);
             }
         }
         for segment in self.segments.iter().filter(|segment| !segment.plain) {
@@ -192,12 +192,12 @@ impl Stack {
 /// others lie apart.
 struct Group {
     local: usize,
-    common: usize,
+    shared: usize,
     stride: usize,
 }
 
 struct Eliminate<'a> {
-    stack: &'a mut Stack,
+    batch: &'a mut Batch,
     layout: &'a Layout,
     prior: &'a Prior,
     damping: f64,
@@ -206,10 +206,10 @@ struct Eliminate<'a> {
 impl Kernel for Eliminate<'_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
-        let Self { stack, layout, prior, damping } = self;
+        let Self { batch, layout, prior, damping } = self;
         let rows = size::<R>(layout.rows());
-        stack.factor::<S, L>(simd, rows, (layout, prior), damping);
-        stack.couple::<S, L, D>(simd, rows);
+        batch.factor::<S, L>(simd, rows, (layout, prior), damping);
+        batch.couple::<S, L, D>(simd, rows);
     }
 }
 
