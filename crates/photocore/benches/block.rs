@@ -76,10 +76,10 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
         });
         block.photos.push(Photo::free(pose, 0));
     }
-    let cameras: Vec<geometry::Photo> = true_photos
+    let cameras: Vec<geometry::View> = true_photos
         .iter()
         .map(|&(position, attitude)| {
-            geometry::Photo::new(space, sense, position, attitude, PRINCIPAL_DISTANCE)
+            geometry::View::new(space, sense, position, attitude, PRINCIPAL_DISTANCE)
         })
         .collect();
     let columns = (photos_per_strip as f64 * BASE / SPACING) as usize;
@@ -122,10 +122,10 @@ struct Linear {
 impl Linear {
     /// At the positions and attitudes that the block starts from and the true positions of its points.
     fn new(block: &Network) -> Self {
-        let photos: Vec<geometry::Photo> = block
+        let photos: Vec<geometry::View> = block
             .photos
             .iter()
-            .map(|photo| geometry::Photo {
+            .map(|photo| geometry::View {
                 orientation: Orientation::new(block.poses, block.space, &photo.pose),
                 camera: Perspective { principal_distance: PRINCIPAL_DISTANCE },
             })

@@ -25,7 +25,7 @@ fn block() -> Network {
     let corner = |i: usize| (i % 7).is_multiple_of(6) && (i / 7).is_multiple_of(3);
     let mut images = vec![];
     for photo in 0..8 {
-        let seen = geometry::Photo::new(SPACE, SENSE, station(photo), [0.0, 0.0, 0.1], PRINCIPAL_DISTANCE);
+        let seen = geometry::View::new(SPACE, SENSE, station(photo), [0.0, 0.0, 0.1], PRINCIPAL_DISTANCE);
         for point in 0..28 {
             let [x, y] = seen.project(&geometry::Point::new(SPACE, ground(point)));
             if x.abs() < 115.0 && y.abs() < 115.0 {

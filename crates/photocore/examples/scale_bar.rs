@@ -31,7 +31,7 @@ fn network() -> Network {
     let mut images = vec![];
     for photo in 0..5 {
         let [x, y, z, omega, phi, kappa] = pose(photo);
-        let seen = geometry::Photo::new(SPACE, SENSE, [x, y, z], [omega, phi, kappa], -50.0);
+        let seen = geometry::View::new(SPACE, SENSE, [x, y, z], [omega, phi, kappa], -50.0);
         for point in 0..16 {
             let xy = seen.project(&geometry::Point::new(SPACE, place(point)));
             images.push(Image { photo, point, xy, sd: [0.001; 2] });

@@ -30,7 +30,7 @@ fn block(photos: Vec<Photo>, places: &[[f64; 3]]) -> Network {
     let mut images = Vec::new();
     for (index, photo) in photos.iter().enumerate() {
         let orientation = Orientation::new(POSES, space, &photo.pose);
-        let view = photocore::geometry::Photo { orientation, camera: CAMERA };
+        let view = photocore::geometry::View { orientation, camera: CAMERA };
         for (point, &place) in places.iter().enumerate() {
             let [x, y] = view.project(&At::new(space, place));
             let n = 2 * images.len();

@@ -40,7 +40,7 @@ fn around(sense: RotationSense, turned: &Matrix3, image_error: f64, error: f64) 
         let station = Vector3::new(6.0 * cos, 6.0 * sin, 0.0);
         let attitude = turned * looking(station, Vector3::zeros(), Vector3::z());
         let station = turned * station;
-        let view = photocore::geometry::Photo {
+        let view = photocore::geometry::View {
             orientation: Orientation::stepping(space, station.into(), &attitude),
             camera: CAMERA,
         };

@@ -38,9 +38,9 @@ fn image(unknowns: [C; 12]) -> [C; 2] {
 }
 
 /// A photo by nine parameters: angle-axis vector, translation, f, k1, k2.
-fn bal_photo([a, b, c, x, y, z, f, k1, k2]: [f64; 9]) -> geometry::Photo<Bal> {
+fn bal_photo([a, b, c, x, y, z, f, k1, k2]: [f64; 9]) -> geometry::View<Bal> {
     let orientation = Orientation::from_vectors([a, b, c].into(), [x, y, z].into());
-    geometry::Photo { orientation, camera: Bal { focal_length: f, radial: [k1, k2] } }
+    geometry::View { orientation, camera: Bal { focal_length: f, radial: [k1, k2] } }
 }
 
 fn ground(position: [f64; 3]) -> GroundPoint {
@@ -345,7 +345,7 @@ fn a_point_that_runs_into_a_station_is_left_out_soon() {
     assert_eq!(found.degrees_of_freedom, expected.degrees_of_freedom);
 }
 
-fn adjusted_photo(solution: &Solution, photo: usize) -> geometry::Photo<Bal> {
+fn adjusted_photo(solution: &Solution, photo: usize) -> geometry::View<Bal> {
     let AdjustedPhoto { pose, camera, .. } = &solution.photos[photo];
     bal_photo(std::array::from_fn(|k| if k < 6 { pose[k] } else { camera[k - 6] }))
 }

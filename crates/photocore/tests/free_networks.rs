@@ -45,7 +45,7 @@ fn around() -> Network {
         let right = Vector3::z().cross(&back).normalize();
         let attitude = Matrix3::from_columns(&[right, back.cross(&right), back]);
         let orientation = Orientation::stepping(space, station.into(), &attitude);
-        let view = photocore::geometry::Photo { orientation, camera: CAMERA };
+        let view = photocore::geometry::View { orientation, camera: CAMERA };
         for (point, place) in places.iter().enumerate().filter(|(point, _)| index == 1 || *point != index) {
             let [x, y] = view.project(&At::new(space, (*place).into()));
             let n = 2 * images.len();
@@ -417,7 +417,7 @@ fn geographic_networks_are_free_to_move_too() {
         let angles = [0.05 * noise(index + 50), 0.05 * noise(index + 60), noise(index + 70)];
         let attitude = NUMBERS.attitude(angles);
         let orientation = Orientation::stepping(space, [longitude, latitude, height], &attitude);
-        let view = photocore::geometry::Photo { orientation, camera: CAMERA };
+        let view = photocore::geometry::View { orientation, camera: CAMERA };
         for (point, at) in network.points.iter().enumerate() {
             let [x, y] = view.project(&At::new(space, at.coordinates));
             let n = 2 * network.images.len();

@@ -5,7 +5,7 @@
 mod forward;
 
 use photocore::geometry::{
-    Ellipsoid, GeometryError, Matrix3, ObjectSpace, Photo, Point, RotationSense, Vector3, rotation,
+    Ellipsoid, GeometryError, Matrix3, ObjectSpace, Point, RotationSense, Vector3, View, rotation,
     rotation_angles,
 };
 use proptest::prelude::*;
@@ -35,7 +35,7 @@ impl Case {
     }
 
     fn photo(&self) -> Photo {
-        Photo::new(self.space(), self.sense, self.position, self.attitude, self.c)
+        View::new(self.space(), self.sense, self.position, self.attitude, self.c)
     }
 
     /// Coordinates of the point seen at `xy`.
@@ -222,7 +222,7 @@ fn sample_photo(frame: &str) -> Photo {
         other => panic!("{other} is not in the sample"),
     };
     let space = ObjectSpace::Geographic(Ellipsoid::CLARKE_1866);
-    Photo::new(space, RotationSense::PhotoToGround, position, attitude, -152.740)
+    View::new(space, RotationSense::PhotoToGround, position, attitude, -152.740)
 }
 
 /// Adjusted points of the GIANT sample (page 34).

@@ -83,7 +83,7 @@ fn images_alone() -> Network {
         for photo in 0..PHOTOS {
             let [x, y, z, omega, phi, kappa] = pose(photo);
             let (space, attitude) = (ObjectSpace::Rectangular, [omega, phi, kappa]);
-            let seen = geometry::Photo::new(space, SENSE, [x, y, z], attitude, PRINCIPAL_DISTANCE);
+            let seen = geometry::View::new(space, SENSE, [x, y, z], attitude, PRINCIPAL_DISTANCE);
             let exact = seen.project(&geometry::Point::new(space, place(point)));
             let at = 500 + 2 * images.len();
             let xy = [0, 1].map(|k| exact[k] + IMAGE_SD * noise(at + k));

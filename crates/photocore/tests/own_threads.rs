@@ -45,7 +45,7 @@ fn block(strips: usize, points: usize) -> Network {
     places.extend([[310.0, 5.0, 1490.0], [297.0, 2.0, 1496.0]]);
     let mut images = vec![];
     for photo in 0..26 * strips {
-        let seen = geometry::Photo::new(SPACE, SENSE, station(photo), [0.0, 0.0, 0.1], -150.0);
+        let seen = geometry::View::new(SPACE, SENSE, station(photo), [0.0, 0.0, 0.1], -150.0);
         for (point, &place) in places.iter().enumerate() {
             let [x, y] = seen.project(&geometry::Point::new(SPACE, place));
             let xy = [x + 0.005 * noise(2 * images.len()), y + 0.005 * noise(2 * images.len() + 1)];
@@ -88,7 +88,7 @@ fn adjust_block(network: &Network, threads: &Threads) {
 }
 
 fn resect(threads: &Threads) {
-    let photo = geometry::Photo::new(SPACE, SENSE, [420.0, 310.0, 900.0], [0.05, -0.08, 2.1], -150.0);
+    let photo = geometry::View::new(SPACE, SENSE, [420.0, 310.0, 900.0], [0.05, -0.08, 2.1], -150.0);
     let control = |i: usize| {
         let coordinates = [8.0 * grid(i)[0], 6.0 * grid(i)[1], 50.0 * noise(i)];
         let xy = photo.project(&geometry::Point::new(SPACE, coordinates));

@@ -9,9 +9,7 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64 as C;
 use photocore::geometry::atmosphere::Air;
-use photocore::geometry::{
-    AirModel, ObjectSpace, Photo, Point, Refraction, RotationSense, Water, WaterModel,
-};
+use photocore::geometry::{AirModel, ObjectSpace, Point, Refraction, RotationSense, View, Water, WaterModel};
 use proptest::prelude::*;
 
 const WGS84: (f64, f64) = (6_378_137.0, 6_356_752.314_245_179);
@@ -210,7 +208,7 @@ proptest! {
     #[test]
     fn refracted_partials_agree_with_complex_steps(case in cases()) {
         let (space, refraction) = (case.space(), case.refraction());
-        let photo = Photo::new(space, case.sense, case.position, case.attitude, case.c);
+        let photo = View::new(space, case.sense, case.position, case.attitude, case.c);
         let point = Point::new(space, case.point);
         let (station, foot) = (refraction.vertical(space, case.position), refraction.vertical(space, case.point));
         let lift = refraction.lift(&photo.orientation, &station, &point, &foot);
@@ -262,7 +260,7 @@ proptest! {
 /// The lift of a point in rectangular space.
 fn lift_of(refraction: &Refraction, station: [f64; 3], point: [f64; 3]) -> [f64; 3] {
     let space = ObjectSpace::Rectangular;
-    let photo = Photo::new(space, RotationSense::GroundToPhoto, station, [0.0; 3], -152.74);
+    let photo = View::new(space, RotationSense::GroundToPhoto, station, [0.0; 3], -152.74);
     let at = |coordinates| refraction.vertical(space, coordinates);
     refraction.lift(&photo.orientation, &at(station), &Point::new(space, point), &at(point)).vector.into()
 }

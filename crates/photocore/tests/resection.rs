@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use photocore::Threads;
 use photocore::adjustment::{Method, Options, Published, Status, Stop};
-use photocore::geometry::{ObjectSpace, Photo, Point, RotationSense, Vector3, rotation};
+use photocore::geometry::{ObjectSpace, Point, RotationSense, Vector3, View, rotation};
 use photocore::programs::resection::{
     ControlPoint, Degeneracy, Known, Partials, Pose, Resection, ResectionError, Solution, three_points,
 };
@@ -34,7 +34,7 @@ fn noises<const N: usize>(index: usize) -> [f64; N] {
 }
 
 fn photo(pose: &Pose) -> Photo {
-    Photo::new(ObjectSpace::Rectangular, RotationSense::GroundToPhoto, pose.position, pose.attitude, C)
+    View::new(ObjectSpace::Rectangular, RotationSense::GroundToPhoto, pose.position, pose.attitude, C)
 }
 
 /// Points seen from a pose, with errors of the image coordinates of the given size.

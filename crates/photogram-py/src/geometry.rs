@@ -4,7 +4,7 @@ use crate::arrays::{check_lengths, from_rows, matrices, numbers, row_major, rows
 use numpy::{PyArray2, PyArray3, PyReadonlyArrayDyn};
 use photocore::geometry::angle_axis::rotation_angle_axis;
 use photocore::geometry::{
-    self, AirModel, Ellipsoid, GeometryError, Lift, ObjectSpace, Photo, Point, Refraction, RotationSense,
+    self, AirModel, Ellipsoid, GeometryError, Lift, ObjectSpace, Point, Refraction, RotationSense, View,
     Water, WaterModel,
 };
 use pyo3::exceptions::PyValueError;
@@ -120,7 +120,7 @@ fn project<'py>(
     let sense = rotation_sense(photo_to_ground);
     let refraction = refraction.map(self::refraction).transpose()?;
     let image = |i: usize| {
-        let photo = Photo::new(space, sense, positions[i], attitudes[i], principal_distances[i]);
+        let photo = View::new(space, sense, positions[i], attitudes[i], principal_distances[i]);
         let point = Point::new(space, points[i]);
         match &refraction {
             None => photo.project(&point),
@@ -149,7 +149,7 @@ fn refraction_shift<'py>(
     let refraction = self::refraction(refraction)?;
     let shift = |i: usize| {
         // Where the camera looks does not matter.
-        let photo = Photo::new(space, RotationSense::GroundToPhoto, positions[i], [0.0; 3], -1.0);
+        let photo = View::new(space, RotationSense::GroundToPhoto, positions[i], [0.0; 3], -1.0);
         let point = Point::new(space, points[i]);
         lift(&refraction, space, (&photo, positions[i]), (&point, points[i])).vector.into()
     };
@@ -160,7 +160,7 @@ fn refraction_shift<'py>(
 fn lift(
     refraction: &Refraction,
     space: ObjectSpace,
-    (photo, position): (&Photo, [f64; 3]),
+    (photo, position): (&View, [f64; 3]),
     (point, coordinates): (&Point, [f64; 3]),
 ) -> Lift {
     let at = |coordinates| refraction.vertical(space, coordinates);

@@ -5,11 +5,11 @@
 //! coordinates in geographic space, where omega, phi, kappa refer to the local vertical frame at the station.
 
 use super::attitude::RotationSense;
-use super::projection::{Photo, Projection};
+use super::projection::{Projection, View};
 use super::space::{ObjectSpace, Point};
 use super::{Orientation, Perspective};
 
-impl Photo {
+impl View {
     /// The photo at `position` (coordinates of the object space) with `attitude` omega, phi, kappa and the
     /// signed principal distance.
     pub fn new(

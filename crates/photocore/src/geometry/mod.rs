@@ -19,11 +19,11 @@
 //! coordinates the unit of the camera.
 //!
 //! ```
-//! use photocore::geometry::{ObjectSpace, Photo, Point, RotationSense};
+//! use photocore::geometry::{ObjectSpace, View, Point, RotationSense};
 //!
 //! // A vertical photo, 150 mm, from 1,000 m above the ground: 100 m there are 15 mm here.
 //! let (space, sense) = (ObjectSpace::Rectangular, RotationSense::GroundToPhoto);
-//! let photo = Photo::new(space, sense, [0.0, 0.0, 1000.0], [0.0; 3], -150.0);
+//! let photo = View::new(space, sense, [0.0, 0.0, 1000.0], [0.0; 3], -150.0);
 //! let image = photo.linearize(&Point::new(space, [100.0, 50.0, 0.0]));
 //! assert!((image.xy[0] - 15.0).abs() < 1e-12 && (image.xy[1] - 7.5).abs() < 1e-12);
 //! assert!((image.point[0][0] - 0.15).abs() < 1e-12, "dx/dX in millimetres a metre");
@@ -59,7 +59,7 @@ pub use orientation::{Orientation, PoseNumbers};
 pub use plate_lens::{PlateLens, Plated};
 pub use pointing::{pointing, pointing_angles, pointing_with_partials};
 pub use pose::Pose;
-pub use projection::{Photo, Projection, Ray};
+pub use projection::{Projection, Ray, View};
 pub use refraction::{AirModel, Refraction, Vertical, Water, WaterModel};
 pub use rotation::{nearest_turns, rotation, rotation_angles, rotation_with_partials};
 pub use sky::{Air, Standard, Station};

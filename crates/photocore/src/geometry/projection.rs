@@ -7,7 +7,7 @@ use super::{Perspective, Vector3};
 
 /// An orientation and its camera: everything of one photo that its image points share.
 #[derive(Debug, Clone, Copy)]
-pub struct Photo<C = Perspective> {
+pub struct View<C = Perspective> {
     /// Where the photo is and how it is turned.
     pub orientation: Orientation,
     /// What it sees with.
@@ -56,7 +56,7 @@ impl Orientation {
     }
 }
 
-impl<C: CameraModel> Photo<C> {
+impl<C: CameraModel> View<C> {
     /// The image position of a point; not finite for a point in the plane u3 = 0 of the projection centre.
     #[inline]
     pub fn project(&self, point: &Point) -> [f64; 2] {

@@ -19,7 +19,7 @@
 //! network.points = corners.map(|coordinates| Point::control(coordinates, [0.02; 3])).to_vec();
 //! for (photo, station) in stations.into_iter().enumerate() {
 //!     let space = ObjectSpace::Rectangular;
-//!     let truth = geometry::Photo::new(space, RotationSense::GroundToPhoto, station, [0.01, -0.02, 0.1], -150.0);
+//!     let truth = geometry::View::new(space, RotationSense::GroundToPhoto, station, [0.01, -0.02, 0.1], -150.0);
 //!     let image = |(point, corner)| Image {
 //!         photo,
 //!         point,

@@ -111,7 +111,9 @@ pub(super) fn add_products<S: Simd, const N: usize>(
             // Eight columns are one where their sums have room in registers, or twice four, not six and two that wait for each other.
             // Unrolled lane by lane, without vectors, several columns would be a large part of the library.
             j += match width - j {
-                _ if const { S::F64_LANES == 1 } => add_columns::<S, N, 1>(simd, target, stride, &products, i, j),
+                _ if const { S::F64_LANES == 1 } => {
+                    add_columns::<S, N, 1>(simd, target, stride, &products, i, j)
+                }
                 LANES if S::F64_LANES == LANES => {
                     add_columns::<S, N, LANES>(simd, target, stride, &products, i, j)
                 }

@@ -6,11 +6,11 @@
 //!
 //! ```
 //! use photocore::adjustment::Options;
-//! use photocore::geometry::{ObjectSpace, Photo, Point, RotationSense};
+//! use photocore::geometry::{ObjectSpace, View, Point, RotationSense};
 //! use photocore::programs::resection::{ControlPoint, Known, Partials, Resection};
 //!
 //! let (space, sense) = (ObjectSpace::Rectangular, RotationSense::GroundToPhoto);
-//! let truth = Photo::new(space, sense, [520.0, 480.0, 1600.0], [0.05, -0.03, 2.0], -150.0);
+//! let truth = View::new(space, sense, [520.0, 480.0, 1600.0], [0.05, -0.03, 2.0], -150.0);
 //! let control = [[0.0, 0.0, 20.0], [1000.0, 0.0, 90.0], [1000.0, 1000.0, 0.0], [0.0, 1000.0, 60.0], [500.0, 300.0, 140.0]];
 //! let point = |coordinates| {
 //!     let xy = truth.project(&Point::new(space, coordinates));

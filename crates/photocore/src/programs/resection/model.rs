@@ -2,7 +2,7 @@
 
 use super::{ControlPoint, Partials, Pose};
 use crate::adjustment::Model;
-use crate::geometry::{ObjectSpace, Photo, Point, Projection, RotationSense};
+use crate::geometry::{ObjectSpace, Point, Projection, RotationSense, View};
 use crate::normals::GroupRows;
 
 /// One photo of control points: the collinearity equations. The local blocks are the points, the retained block is the photo.
@@ -45,7 +45,7 @@ impl Model for SinglePhoto {
         let (points, photo) = unknowns.split_at(3 * self.points.len());
         let points = points.as_chunks().0.iter().map(|&coordinates| Point::new(self.space, coordinates));
         let Pose { position, attitude } = Pose::from_unknowns(photo);
-        let photo = Photo::new(self.space, self.sense, position, attitude, self.principal_distance);
+        let photo = View::new(self.space, self.sense, position, attitude, self.principal_distance);
         (photo, points.collect())
     }
 
