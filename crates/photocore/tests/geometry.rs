@@ -34,7 +34,7 @@ impl Case {
         forward::object_space(self.spheroid)
     }
 
-    fn photo(&self) -> Photo {
+    fn photo(&self) -> View {
         View::new(self.space(), self.sense, self.position, self.attitude, self.c)
     }
 
@@ -205,7 +205,7 @@ fn dms(degrees: f64, minutes: f64, seconds: f64) -> f64 {
 
 /// Adjusted stations of the GIANT sample (pages 30 and 41): longitude, latitude, height, omega, phi, kappa
 /// photo-to-ground.
-fn sample_photo(frame: &str) -> Photo {
+fn sample_photo(frame: &str) -> View {
     let (position, attitude) = match frame {
         "SH9960" => (
             [dms(-94.0, 59.0, 4.7584), dms(29.0, 39.0, 17.7712), 4556.0633],

@@ -33,7 +33,7 @@ fn noises<const N: usize>(index: usize) -> [f64; N] {
     std::array::from_fn(|k| noise(100 * index + k))
 }
 
-fn photo(pose: &Pose) -> Photo {
+fn photo(pose: &Pose) -> View {
     View::new(ObjectSpace::Rectangular, RotationSense::GroundToPhoto, pose.position, pose.attitude, C)
 }
 

@@ -20,7 +20,7 @@ pub struct SinglePhoto {
 impl SinglePhoto {
     /// The image of a point with its partials.
     #[inline]
-    pub fn linearize(&self, photo: &Photo, point: &Point, index: usize) -> Projection {
+    pub fn linearize(&self, photo: &View, point: &Point, index: usize) -> Projection {
         match self.partials {
             Partials::AtComputed => photo.linearize(point),
             Partials::AtMeasured => photo.linearize_at_measured(point, self.points[index].xy),
@@ -39,7 +39,7 @@ impl SinglePhoto {
 }
 
 impl Model for SinglePhoto {
-    type Prepared = (Photo, Vec<Point>);
+    type Prepared = (View, Vec<Point>);
 
     fn prepare(&self, unknowns: &[f64]) -> Self::Prepared {
         let (points, photo) = unknowns.split_at(3 * self.points.len());
