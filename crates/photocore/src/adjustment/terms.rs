@@ -3,38 +3,9 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use smallvec::{SmallVec, smallvec};
-
 use super::problem::{Model, Problem};
-
-/// What was known beforehand of unknowns of one block, one after the other: an equation of unit weight for each of them.
-#[derive(Debug, Clone)]
-pub struct Term {
-    /// The first of the unknowns.
-    pub first: usize,
-    /// Observed minus computed, as many as unknowns. There may be several of each photo: on the stack.
-    pub constant: SmallVec<[f64; 3]>,
-    /// The partials of the computed by the step, square, row by row; zero where nothing is observed.
-    pub coefficients: SmallVec<[f64; 9]>,
-}
-
-impl Term {
-    /// Where the unknowns stand.
-    pub fn unknowns(&self) -> Range<usize> {
-        self.first..self.first + self.constant.len()
-    }
-
-    /// The partials, row by row.
-    pub fn rows(&self) -> impl Iterator<Item = &[f64]> {
-        self.coefficients.chunks_exact(self.constant.len())
-    }
-
-    /// Of an unknown that was observed by itself.
-    fn single(unknown: usize, apart: f64, sd: f64) -> Self {
-        let weight = sd.recip();
-        Self { first: unknown, constant: smallvec![weight * apart], coefficients: smallvec![weight] }
-    }
-}
+use super::term::{Term, is_weighted};
+use crate::normals::Prior;
 
 /// All terms of a problem at given values of its unknowns: those of its model ([`Model::terms`]), and one of each other weighted unknown.
 #[derive(Debug)]
@@ -104,11 +75,6 @@ impl<'a> Terms<'a> {
     }
 }
 
-/// Whether an unknown of this standard deviation counts as an observation: neither free nor fixed.
-pub(super) fn is_weighted(sd: f64) -> bool {
-    sd > 0.0 && sd.is_finite()
-}
-
 /// The weighted ones of some unknowns. Nearly all are free: these are passed over a stretch at a time.
 pub(super) fn weighted_among(sd: &[f64], of: Range<usize>) -> impl Iterator<Item = usize> {
     const STRETCH: usize = 64;
@@ -124,5 +90,28 @@ impl<M: Model> Problem<M> {
     /// What was known beforehand of the unknowns, at given values.
     pub fn terms<'a>(&'a self, values: &'a [f64]) -> Terms<'a> {
         Terms::new(&self.model, values, &self.prior, &self.sd)
+    }
+
+    /// The normal equations of the terms at the given values. A fixed or held unknown has an equation of its own, x = 0 with unit weight,
+    /// and no other (see [`super::equations`]); an outer one has none here.
+    pub(super) fn prior_equations(&self, values: &[f64], held: &[usize]) -> Prior {
+        let is_held = |unknown: usize| self.sd[unknown] == 0.0 || held.contains(&unknown);
+        let weight = (0..values.len()).map(|unknown| f64::from(u8::from(is_held(unknown)))).collect();
+        let mut prior = Prior { weight, right: vec![0.0; values.len()], between: vec![] };
+        self.terms(values).within(0..values.len()).for_each(|term| add_term(&mut prior, &term, &is_held));
+        let layout = self.layout();
+        layout.unknowns_of(layout.outer()).for_each(|unknown| prior.weight[unknown] = 0.0);
+        prior
+    }
+}
+
+/// Adds A^T A and A^T l of a term; none is of a held unknown.
+fn add_term(prior: &mut Prior, term: &Term, is_held: &dyn Fn(usize) -> bool) {
+    for (i, unknown) in term.unknowns().enumerate().filter(|&(_, unknown)| !is_held(unknown)) {
+        let product = |j: usize| term.rows().map(|row| row[i] * row[j]).sum::<f64>();
+        prior.weight[unknown] = product(i);
+        prior.right[unknown] = term.rows().zip(&term.constant).map(|(row, constant)| row[i] * constant).sum();
+        let others = (0..i).filter(|&j| !is_held(term.first + j));
+        prior.between.extend(others.map(|j| (unknown, term.first + j, product(j))));
     }
 }
