@@ -3,7 +3,6 @@
 from photogram.absolute_orientation import (  # noqa: F401  (the ways to show a result)
     document,
     findings,
-    html,
     plot,
     report,
     tables,

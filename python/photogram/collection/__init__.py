@@ -6,7 +6,6 @@ from photogram.collection import (  # noqa: F401  (the ways to show a result, an
     components,
     document,
     findings,
-    html,
     pictured,
     report,
     saved,

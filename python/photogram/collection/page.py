@@ -13,11 +13,13 @@ from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import observed_table
 from photogram.show.judgement import judged
 from photogram.show.page import Fact, Page, Section, significant
+from photogram.show.ways import page_of
 from photogram.statistics.findings import by_t
 
 __all__ = ["collection_page"]
 
 
+@page_of.register(AdjustedCollection)
 @np.errstate(over="ignore", invalid="ignore")
 def collection_page(result: AdjustedCollection) -> Page:
     """Return the report of an adjusted collection for the browser."""

@@ -11,21 +11,15 @@ from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.findings import tested_observations
 from photogram.collection.tables import collection_photos, costs
 from photogram.results.network_tables import control, stations
-from photogram.results.observed import image_lines, observed_lines
+from photogram.results.observed import NOTABLE, image_lines, observed_lines, suspect_lines
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, table_lines
 from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
 from photogram.show.ways import report_of
 from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
 from photogram.statistics.outliers import outliers
-from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["problems_of", "report", "size_of", "summary"]
-
-SUSPECTS = 20
-"""Image points with large standardized residuals that are listed at most."""
-NOTABLE = 3.0
-"""What is listed, not what decides: the limit of the tests stands in the verdict."""
 
 
 @report_of.register(AdjustedCollection)
@@ -58,7 +52,10 @@ def summary(result: AdjustedCollection) -> list[Section]:
         *verdict_sections(result.verdict),
         ("Problems", problems_or_none(problems_of(result), result.verdict)),
         ("Adjustment", _adjustment(result)),
-        (f"Image points with |t| > {NOTABLE:g} (externally studentized), largest first", _suspects(result)),
+        (
+            f"Image coordinates with |t| > {NOTABLE:g} (externally studentized), largest first",
+            _suspects(result),
+        ),
     ]
 
 
@@ -122,24 +119,9 @@ def size_of(result: AdjustedCollection) -> list[tuple[str, str]]:
 
 
 def _suspects(result: AdjustedCollection) -> list[str]:
-    """List the image points that fit worst, in units of what the others have."""
-    w = np.where(result.redundancy > TESTABLE, result.standardized, math.nan)
-    t = externally_studentized(w, result.weighted_sum_of_squares, result.degrees_of_freedom)
-    test = np.nan_to_num(np.abs(t), posinf=math.inf).max(axis=1, initial=0.0)
-    worst = np.flatnonzero(test > NOTABLE)
-    worst = worst[np.argsort(-test[worst], kind="stable")]
-    if not len(worst):
-        return []
-    lines = ["  photo    point     x, px     y, px       |t|  weight"]
-    for image in worst[:SUSPECTS]:
-        photo, point = result.collection.image_photos[image], result.collection.image_points[image]
-        x, y = result.residuals[image]
-        lines.append(
-            f"{photo:7d}{point:9d}{x:10.3f}{y:10.3f}{test[image]:10.1f}{result.image_weights[image]:8.4f}"
-        )
-    if len(worst) > SUSPECTS:
-        lines.append(f"and {len(worst) - SUSPECTS} more")
-    return lines
+    """List the image coordinates that fit worst, in units of what the others have."""
+    t = externally_studentized(result.standardized, result.weighted_sum_of_squares, result.degrees_of_freedom)
+    return suspect_lines(result, t, "t")
 
 
 def _iterations(result: AdjustedCollection) -> list[str]:

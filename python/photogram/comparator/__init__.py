@@ -6,7 +6,7 @@ calibration.correction.apply(xy_um)
 """
 
 from photogram.arguments.annotations import check_arguments
-from photogram.comparator import findings, html  # noqa: F401  (verdict and page)
+from photogram.comparator import findings  # noqa: F401  (the verdict)
 from photogram.comparator.calibration import Calibration, CaseResult, PlateResult, Pointing, calibrate
 from photogram.comparator.cards import read_cards, to_cards
 from photogram.comparator.correction import Correction

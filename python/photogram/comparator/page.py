@@ -31,12 +31,14 @@ from photogram.show.page import (
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.comparator.joint import JointFit
+from photogram.show.ways import page_of
 
 __all__ = ["calibration_page"]
 
 UM = "µm"
 
 
+@page_of.register(Calibration)
 def calibration_page(calibration: Calibration) -> Page:
     """Return the report of a calibration for the browser."""
     session = calibration.session

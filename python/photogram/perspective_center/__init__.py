@@ -1,7 +1,7 @@
 """Perspective centre of a projector from grid measurements (USGS Computer Contribution 2, 1969)."""
 
 from photogram.arguments.annotations import check_arguments
-from photogram.perspective_center import findings, html  # noqa: F401  (verdict and page)
+from photogram.perspective_center import findings  # noqa: F401  (the verdict)
 from photogram.perspective_center.batch import Run, Stop, run_deck
 from photogram.perspective_center.deck import read_deck
 from photogram.perspective_center.grid import Coordinatograph, Grid, joined, reduce

@@ -3,7 +3,6 @@
 from photogram.results import (  # noqa: F401  (the ways to show a result)
     document,
     findings,
-    html,
     judged,
     pictured,
     report,

@@ -14,7 +14,7 @@ from photogram.results.lens_field import LensField, lens_field
 from photogram.results.result import Result
 from photogram.show.sections import Section
 
-__all__ = ["calibration_members", "calibration_sections"]
+__all__ = ["calibration_members", "calibration_sections", "outcome"]
 
 LISTED = 20
 """Cameras that a report describes in full; the table of cameras and the JSON document have all."""
@@ -71,11 +71,12 @@ def _parameter_lines(result: Result, found: Calibration) -> list[str]:
             f"{each.redundancy:>15.3f}" if 0 < each.given_sd < math.inf else f"{'free':>15}",
             f"{each.gain:>15.4g}",
         )
-        lines.append(f"{name:<16}{''.join(cells)}  {_verdict(each)}")
+        lines.append(f"{name:<16}{''.join(cells)}  {outcome(each)}")
     return lines
 
 
-def _verdict(each: ParameterTest) -> str:
+def outcome(each: ParameterTest) -> str:
+    """Say what was found of a parameter."""
     words = ["significant" if each.significant else "not significant"]
     if not each.is_lens:
         words = ["differs from the given value" if each.significant else "as given"]
@@ -160,52 +161,13 @@ def _member(result: Result, found: Calibration) -> dict[str, Any]:
     curve, field = distortion_curve(result, found.camera), lens_field(result, found.camera)
     return {
         "camera": found.camera.name,
-        "parameters": [
-            {
-                "name": each.name,
-                "unit": each.unit,
-                "value": each.value,
-                "sd": each.sd,
-                "change": each.change,
-                "test_value": each.test_value,
-                "probability": each.probability,
-                "significant": each.significant,
-                "multiple_correlation": each.multiple_correlation,
-                "from_prior": each.from_prior,
-                "gain": each.gain,
-            }
-            for each in found.parameters
-        ],
-        "groups": [
-            {
-                "names": list(each.names),
-                "test_value": each.test_value,
-                "probability": each.probability,
-                "significant": each.significant,
-            }
-            for each in found.groups
-        ],
-        "correlations": [
-            {"first": each.first, "second": each.second, "coefficient": each.coefficient}
-            for each in found.correlations
-        ],
-        "pose_correlations": [
-            {
-                "parameter": each.parameter,
-                "component": each.component,
-                "photos": list(each.photos),
-                "coefficient": each.coefficient,
-            }
-            for each in found.poses
-        ],
+        "parameters": [_members(each, _PARAMETER) for each in found.parameters],
+        "groups": [_members(each, ("names", *_TESTED)) for each in found.groups],
+        "correlations": [vars(each) for each in found.correlations],
+        "pose_correlations": [vars(each) for each in found.poses],
         "terms": [
-            {
-                "names": list(each.names),
-                "statistic": each.statistic,
-                "probability": each.probability,
-                "largest_effect_sd": each.effect,
-                "worth_keeping": each.worth_keeping,
-            }
+            _members(each, ("names", "statistic", "probability", "worth_keeping"))
+            | {"largest_effect_sd": each.effect}
             for each in found.terms
         ],
         "removable": found.removable,
@@ -213,6 +175,17 @@ def _member(result: Result, found: Calibration) -> dict[str, Any]:
         "distortion": None if curve is None else _curve_member(curve),
         "field": None if field is None else _field_member(field),
     }
+
+
+_TESTED = ("test_value", "probability", "significant")
+_PARAMETER = (
+    *("name", "unit", "value", "sd", "change", *_TESTED),
+    *("multiple_correlation", "from_prior", "gain"),
+)
+
+
+def _members(each: object, names: Sequence[str]) -> dict[str, Any]:
+    return {name: getattr(each, name) for name in names}
 
 
 def _field_member(field: LensField) -> dict[str, Any]:

@@ -123,14 +123,16 @@ def points(result: AdjustedNetwork) -> list[Quantity]:
     ]
 
 
-def images(result: AdjustedNetwork, first: int | None = None) -> list[Quantity]:
-    """Return the images that took part, or the first of them: residuals, redundancy numbers, test values."""
-    terms, used = terms_of(result), np.flatnonzero(result.used_images)[:first]
-    axes, (unit, *_) = terms.image_axes, (axis.unit for axis in terms.image_axes)
+def images(result: AdjustedNetwork, rows: Indices | None = None) -> list[Quantity]:
+    """Return the images that took part, or some: residuals, redundancy numbers, test values."""
+    terms, used = terms_of(result), np.flatnonzero(result.used_images) if rows is None else rows
+    axes = terms.image_axes
     return [
         names(terms, "photo", terms.image_photos[used], "photo"),
         names(terms, "point", result.image_points[used], "point"),
-        Quantity(result.residuals[used], axes, "deviation", name="residual", member=f"residual_{unit}"),
+        Quantity(
+            result.residuals[used], axes, "deviation", name="residual", member=f"residual_{axes[0].unit}"
+        ),
         redundancy(result.redundancy[used], axes),
         test_value(result.standardized[used], axes),
     ]

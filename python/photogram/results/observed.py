@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -11,12 +12,16 @@ from photogram.arguments.types import Floats, Indices
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import images, part
 from photogram.show.lines import field, stacked, table_lines
-from photogram.show.quantity import Quantity, labelled
+from photogram.show.quantity import Quantity, labelled, long
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["image_lines", "observed_lines", "tested"]
+__all__ = ["NOTABLE", "image_lines", "observed_lines", "suspect_lines", "tested"]
 
+NOTABLE = 3.0
+"""Test values above are listed; what decides is the limit of the tests, which stands in the verdict."""
+SUSPECTS = 20
+"""Image coordinates with large test values that are listed at most."""
 LISTED = 10_000
 """Image points that a report lists at most; tables and documents have every one."""
 
@@ -69,14 +74,15 @@ def tested(
 
 def image_lines(result: AdjustedNetwork) -> list[str]:
     """List the image observations, one point a line: what `tested` has."""
-    photos, points, *numbers = images(result, LISTED)
+    used = np.flatnonzero(result.used_images)
+    photos, points, *numbers = images(result, used[:LISTED])
     forms = ((".2f", "{name} residual {unit}"), (".3f", "{name} redundancy"), (".2f", "{name} standardized"))
     own = [part(each, slice(axis, axis + 1)) for axis in (0, 1) for each in numbers]
     fields = [field(each, 16, *form) for each, form in zip(own, forms * 2, strict=True)]
     names = [*field(photos, 10, head="photo"), *field(points, 10, head="point", gap=" ")]
     found = table_lines([*names, *chain(*fields)])
-    if (count := int(result.used_images.sum())) > LISTED:
-        found.append(f"and {count - LISTED} more; the JSON document and the table of images have all")
+    if len(used) > LISTED:
+        found.append(f"and {len(used) - LISTED} more; the JSON document and the table of images have all")
     return found
 
 
@@ -84,3 +90,25 @@ def observed_lines(table: Sequence[Quantity], kind: str) -> list[str]:
     """List observed photos or points, four lines for each: what was observed, and how it fits."""
     forms = {"sd": ".5f", "difference": ".5f", "redundancy": ".3f", "standardized": ".2f"}
     return stacked(table[0], kind, [(labelled(table, label), form) for label, form in forms.items()])
+
+
+def suspect_lines(result: AdjustedNetwork, tests: Floats, statistic: str) -> list[str]:
+    """List image coordinates whose |test values|, (m, 2), are above `NOTABLE`, the largest first."""
+    size = np.where(result.redundancy > TESTABLE, np.nan_to_num(np.abs(tests), posinf=np.inf), 0.0)
+    places = np.argwhere(size > NOTABLE)
+    order = np.argsort(-size[tuple(places.T)], kind="stable")[:SUSPECTS]
+    rows, axis = places[order].T
+    *own, values = images(result, rows)
+    table = long([*own, replace(values, values=tests[rows])], np.column_stack([np.arange(len(rows)), axis]))
+    photos, points, names, _, residuals, redundancy, values = table
+    found = table_lines(
+        [
+            *field(photos, 10, head="photo"),
+            *field(points, 10, head="point", gap=" "),
+            *field(names, 5, gap=" ", head=""),
+            *field(residuals, 12, ".2f", "residual"),
+            *field(redundancy, 12, ".3f", "redundancy"),
+            *field(values, 14, ".2f", statistic),
+        ]
+    )
+    return found if len(rows) == len(places) else [*found, f"and {len(places) - len(rows)} more"]

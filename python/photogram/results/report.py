@@ -18,7 +18,7 @@ from photogram.results.features_report import features_sections
 from photogram.results.findings import tested_observations
 from photogram.results.kinds import ObservedKind
 from photogram.results.network_tables import control, iterations, part, photos, stations
-from photogram.results.observed import image_lines, observed_lines
+from photogram.results.observed import NOTABLE, image_lines, observed_lines, suspect_lines
 from photogram.results.result import Result
 from photogram.results.tables import (
     block_points,
@@ -35,15 +35,12 @@ from photogram.show.sections import Section, composed, headline, problems, probl
 from photogram.show.ways import report_of
 from photogram.statistics.limits import normal_limit
 from photogram.statistics.outliers import outliers
-from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
 
 __all__ = ["ORDERINGS", "bandwidths", "problems_of", "report", "size_of", "summary"]
 
-_SUSPECTS = 20
-_BLUNDER = 3.0
 ORDERINGS = {
     "input": "in input order",
     "rcm": "by reverse Cuthill-McKee",
@@ -95,13 +92,17 @@ def report(result: Result) -> str:
 @np.errstate(over="ignore")
 def summary(result: Result) -> list[Section]:
     """Return what a reader wants first, as titled sections: verdict, problems, adjustment, residuals."""
+    suspects = suspect_lines(result, result.standardized, "standardized")
     return [
         *verdict_sections(result.verdict),
         ("Problems", problems_or_none(problems_of(result), result.verdict)),
         ("Adjustment", _adjustment(result)),
         *features_sections(result.features),
         ("Residuals", _residuals(result)),
-        (f"Image coordinates with |standardized residual| > {_BLUNDER:g}, largest first", _suspects(result)),
+        (
+            f"Image coordinates with |standardized residual| > {NOTABLE:g}, largest first",
+            suspects or ["none"],
+        ),
     ]
 
 
@@ -221,27 +222,6 @@ def _iterations(result: Result) -> list[str]:
             *field(damping, 9, ".1e", "damping", " "),
         ]
     )
-
-
-def _suspects(result: Result) -> list[str]:
-    testable = result.redundancy > TESTABLE
-    size = np.where(testable, np.nan_to_num(np.abs(result.standardized)), 0.0)
-    images, axes = np.nonzero(size > _BLUNDER)
-    if not images.size:
-        return ["none"]
-    order = np.argsort(-size[images, axes], kind="stable")[:_SUSPECTS]
-    block, (x, _) = result.block, image_axes(result.block.image_unit)
-    lines = [
-        f"{'photo':<10} {'point':<10}   {f'residual {x.small}':>12} {'redundancy':>11} {'standardized':>13}"
-    ]
-    lines += [
-        f"{block.photo_ids[block.image_photos[i]]:<10} {block.point_ids[block.image_points[i]]:<10} "
-        f"{'xy'[axis]}"
-        f" {result.residuals[i, axis] * x.factor:>12.2f} {result.redundancy[i, axis]:>11.3f}"
-        f" {result.standardized[i, axis]:>13.2f}"
-        for i, axis in zip(images[order], axes[order], strict=True)
-    ]
-    return lines if images.size == len(order) else [*lines, f"and {images.size - len(order)} more"]
 
 
 def _unheld(result: Result) -> list[str]:

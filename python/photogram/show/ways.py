@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property, singledispatch
+from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn
 
 from photogram.statistics.findings import Findings
@@ -70,8 +72,18 @@ def axes_of(result: object, ax: Any = None) -> Any:
 
 @singledispatch
 def page_of(result: object) -> Page:
-    """Return the report of a result for the browser, without its last section."""
-    _undefined(result, "page")
+    """Return the report of a result for the browser, without its last section.
+
+    It is defined in the module `page` beside the class of the result, which is loaded when one is asked for.
+    """
+    for kind in type(result).__mro__:
+        package = kind.__module__.rpartition(".")[0]
+        if package and find_spec(f"{package}.page"):
+            import_module(f"{package}.page")
+    own = page_of.dispatch(type(result))
+    if own is page_of.dispatch(object):
+        _undefined(result, "page")
+    return own(result)
 
 
 def html_of(result: object, run: Run | None = None) -> bytes:

@@ -19,11 +19,13 @@ from photogram.results.tables import block_points, redundancy_by_kind, unknowns
 from photogram.show.cells import page_table, unit_written
 from photogram.show.judgement import judged
 from photogram.show.page import Fact, Page, Section, Table, significant
+from photogram.show.ways import page_of
 from photogram.statistics.findings import by_w
 
 __all__ = ["block_page"]
 
 
+@page_of.register(Result)
 @np.errstate(over="ignore", invalid="ignore")
 def block_page(result: Result) -> Page:
     """Return the report of an adjusted block for the browser."""

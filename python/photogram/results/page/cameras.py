@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.results.calibration import Calibration, ParameterTest, calibrations
+from photogram.results.calibration_report import outcome
 from photogram.results.result import Result
 from photogram.show.page import (
     Cell,
@@ -96,14 +97,6 @@ def _parameters(result: Result, found: Calibration) -> Table:
 
 
 def _parameter(each: ParameterTest) -> Row:
-    outcome = "significant" if each.significant else "not significant"
-    if not each.is_lens:
-        outcome = "differs from the given value" if each.significant else "as given"
-    notes = [outcome]
-    if not each.separable:
-        notes.append("not separable")
-    if each.from_prior:
-        notes.append("from its prior")
     decimals = min(decimals_of(np.array([each.sd])) + 1, 15)
 
     def written(value: float) -> Cell:
@@ -119,7 +112,7 @@ def _parameter(each: ParameterTest) -> Row:
         each.test_value,
         each.probability,
         each.multiple_correlation,
-        Cell(", ".join(notes), tone="look" if not each.separable or each.contradicts else ""),
+        Cell(outcome(each), tone="look" if not each.separable or each.contradicts else ""),
     ]
 
 

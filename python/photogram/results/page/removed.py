@@ -12,6 +12,7 @@ from photogram.statistics.snooping.log import Removal
 __all__ = ["snooped_page"]
 
 
+@page_of.register(Snooped)
 def snooped_page(found: Snooped) -> Page:
     """Return the page of the network without what was taken out."""
     page = page_of(found.judged)

@@ -10,9 +10,16 @@ from photogram.results.components import VarianceComponents, statement
 from photogram.results.components_picture import figure_of_components
 from photogram.show.judgement import judged
 from photogram.show.page import Column, Drawing, Page, Part, Remarks, Row, Section, Table
+from photogram.show.ways import page_of
 from photogram.statistics.components import Component
 
-__all__ = ["reweighed_page", "weighed_page"]
+__all__ = ["components_page", "reweighed_page", "weighed_page"]
+
+
+@page_of.register(VarianceComponents)
+def components_page(found: VarianceComponents) -> Page:
+    """Return the page of the adjustment with the given weights, and what is wrong about these."""
+    return weighed_page(found, page_of(found.first))
 
 
 def weighed_page(found: VarianceComponents, page: Page) -> Page:
