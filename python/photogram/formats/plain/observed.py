@@ -12,8 +12,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.rows import check_given, made
+from photogram.formats.plain.schema import AXES, POSE, ROTATIONS
 from photogram.formats.plain.surfaces import read_surfaces
-from photogram.formats.plain.tables import AXES, POSE, ROTATIONS, Tables, covariances_of, indices_of
+from photogram.formats.plain.tables import Tables, covariances_of, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.rigging import Rig
 from photogram.io.delimited import FALSE, TRUE, ColumnTable

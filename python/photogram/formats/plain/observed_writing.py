@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.rigs_writing import Rigs, angles_of
-from photogram.formats.plain.tables import AXES, POSE, ROTATIONS, covariance_columns
+from photogram.formats.plain.schema import AXES, POSE, ROTATIONS, covariance_columns
 from photogram.io.delimited import FALSE, TRUE
 from photogram.network.block import Block
 from photogram.network.cameras import Camera

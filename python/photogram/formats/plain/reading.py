@@ -18,8 +18,9 @@ from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_p
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.observed import read_observations
 from photogram.formats.plain.rigs import read_frames, read_rigs
+from photogram.formats.plain.schema import ANGLES, AXES
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
-from photogram.formats.plain.tables import ANGLES, AXES, Tables, covariances_of, indices_of
+from photogram.formats.plain.tables import Tables, covariances_of, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project, assembled
 from photogram.formats.rigging import mounted

@@ -9,7 +9,8 @@ from functools import partial
 import numpy as np
 
 from photogram.formats.plain.rows import made
-from photogram.formats.plain.tables import AXES, ROTATIONS, Tables, indices_of
+from photogram.formats.plain.schema import AXES, ROTATIONS
+from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.rigging import FrameOf, Rig
 from photogram.messages import quoted
 from photogram.network.unknowns import Sensor

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.tables import AXES, POSE
+from photogram.formats.plain.schema import AXES, POSE
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 from photogram.network.observations import Base

@@ -11,7 +11,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.rows import check_given, made
-from photogram.formats.plain.tables import AXES, Tables, covariances_of, indices_of
+from photogram.formats.plain.schema import AXES
+from photogram.formats.plain.tables import Tables, covariances_of, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.io.delimited import ColumnTable
 from photogram.network.observations import Observation, OnLevel, OnLine, OnPlane, OnPlumbLine

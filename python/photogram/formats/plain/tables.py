@@ -9,224 +9,23 @@ from functools import partial
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.formats.column_words import UNITS
 from photogram.formats.columns import PLAIN, check_unread, degrees, nameless, settled
-from photogram.formats.plain.settings import WITH_CRS, Settings
+from photogram.formats.plain.schema import ALL_ANGLES, ANGLES, AXES, POSE, TABLES, covariance_columns
+from photogram.formats.plain.settings import Settings
 from photogram.io.delimited import ColumnTable, read_columns, read_rows
 from photogram.messages import Message, listed, quoted
 from photogram.network.attitudes import Attitudes, Representation
 
 __all__ = [
-    "ANGLES",
-    "AXES",
-    "COLUMNS",
-    "POSE",
-    "ROTATIONS",
     "Tables",
-    "covariance_columns",
     "covariances_of",
     "indices_of",
     "matrices_of",
 ]
 
-AXES = ("x", "y", "z")
-ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")
-POSE = (*AXES, *ROTATIONS)
-"""Components of poses: small rotations are about the axes of the photo."""
-ANGLES: Mapping[str, tuple[str, ...]] = {
-    "omega_phi_kappa": ("omega", "phi", "kappa"),
-    "phi_omega_kappa": ("phi", "omega", "kappa"),
-    "yaw_pitch_roll": ("yaw", "pitch", "roll"),
-    "azimuth_tilt_swing": ("azimuth", "tilt", "swing"),
-    "quaternion": ("qw", "qx", "qy", "qz"),
-    "rotation_vector": ("rx", "ry", "rz"),
-    "matrix": ("m11", "m12", "m13", "m21", "m22", "m23", "m31", "m32", "m33"),
-}
-"""Columns of each representation of attitudes."""
-_ALL_ANGLES = tuple(dict.fromkeys(name for names in ANGLES.values() for name in names))
-_SD_ANGLES = tuple(f"sd_{name}" for name in _ALL_ANGLES[:8] if not name.startswith(("q", "m")))
-_ROTATIONS = tuple(f"sd_{name}" for name in ROTATIONS)
-_SD = tuple(f"sd_{axis}" for axis in AXES)
 _FLIP = np.diag([1.0, -1.0, -1.0])
-
-
-def covariance_columns(names: Sequence[str]) -> dict[str, tuple[int, int]]:
-    """Return the columns of covariances between components, and which ones: `cov_xy`, `cov_x_rotation_y`."""
-    return {
-        f"cov_{names[i]}{names[j]}" if len(names[i] + names[j]) == 2 else f"cov_{names[i]}_{names[j]}": (i, j)
-        for j in range(len(names))
-        for i in range(j)
-    }
-
-
-_COVARIANCES = tuple(covariance_columns(AXES))
-
-
-def _parameters() -> tuple[str, ...]:
-    names = {name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}
-    return tuple(sorted(names))
-
-
-_PARAMETERS = _parameters()
-
-COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "cameras": (
-        "camera",
-        "model",
-        "width",
-        "height",
-        "pixel_mm",
-        "weights",
-        "for_each",
-        *_PARAMETERS,
-        *(f"sd_{name}" for name in _PARAMETERS),
-    ),
-    "photos": (
-        "photo",
-        "camera",
-        *AXES,
-        *_ALL_ANGLES,
-        *_SD,
-        *_SD_ANGLES,
-        *_ROTATIONS,
-        "group",
-        "strip",
-        "frame",
-        "time",
-        "use",
-    ),
-    "images": (
-        "photo",
-        "point",
-        "column",
-        "row",
-        "x",
-        "y",
-        "sd",
-        "sd_x",
-        "sd_y",
-        "sd_column",
-        "sd_row",
-        "correlation",
-        "use",
-    ),
-    "points": ("point", *AXES, *_SD),
-    "control": ("point", *AXES, "sd", *_SD, *_COVARIANCES, "use"),
-    "gnss": ("photo", *AXES, "sd", *_SD, *_COVARIANCES, "group", "time"),
-    "gnss_groups": (
-        "group",
-        *(
-            f"{sd}{kind}_{axis}"
-            for kind in ("lever", "shift", "drift")
-            for sd in ("", "sd_")
-            for axis in AXES
-        ),
-        "drift_epoch",
-        "lever",
-        "shift",
-        "drift",
-    ),
-    "attitudes": (
-        "photo",
-        *_ALL_ANGLES,
-        *_SD_ANGLES,
-        *_ROTATIONS,
-        *covariance_columns(ROTATIONS),
-        "group",
-    ),
-    "attitude_groups": ("group", *_ALL_ANGLES, *_ROTATIONS),
-    "distances": ("from", "to", "distance", "sd", "instrument"),
-    "instruments": ("instrument", "scale", "constant", "sd_scale", "sd_constant"),
-    "height_differences": ("from", "to", "dz", "sd"),
-    "coordinate_differences": (
-        *("from", "to", "dx", "dy", "dz", "sd", "sd_dx", "sd_dy", "sd_dz"),
-        *covariance_columns(("dx", "dy", "dz")),
-    ),
-    "levels": ("level", "z", "sd"),
-    "level_points": ("level", "point", "dz", "sd"),
-    "planes": (
-        *("plane", *AXES, "nx", "ny", "nz"),
-        *("sd_distance", "sd_rotation_x", "sd_rotation_y"),
-    ),
-    "plane_points": ("plane", "point", "distance", "sd"),
-    "lines": (
-        *("line", *AXES, "dx", "dy", "dz"),
-        *("sd_x", "sd_y", "sd_rotation_x", "sd_rotation_y"),
-    ),
-    "line_points": ("line", "point", "sd", "sd_x", "sd_y", "cov_xy"),
-    "plumb_lines": ("plumb_line", *AXES, "sd_x", "sd_y"),
-    "plumb_line_points": ("plumb_line", "point", "sd", "sd_x", "sd_y", "cov_xy"),
-    "relative_poses": (
-        *("from", "to", *AXES, *_ALL_ANGLES, *_SD, *_ROTATIONS),
-        *covariance_columns(POSE),
-    ),
-    "rigs": ("rig", "camera", "sensor", *AXES, *_ALL_ANGLES, *_SD, *_ROTATIONS),
-    "frames": ("frame", "rig", "photo", "sensor"),
-    "bases": ("rig", "from", "to", "distance", "sd"),
-    "covariances": ("kind", "name", "first", "second", "covariance"),
-}
-"""Columns that a table may have."""
-REQUIRED: Mapping[str, tuple[str, ...]] = {
-    "cameras": ("camera",),
-    "photos": ("photo",),
-    "images": ("photo", "point"),
-    "points": ("point", *AXES),
-    "control": ("point",),
-    "gnss": ("photo", *AXES),
-    "gnss_groups": ("group",),
-    "attitudes": ("photo",),
-    "attitude_groups": ("group",),
-    "distances": ("from", "to", "distance"),
-    "height_differences": ("from", "to", "dz"),
-    "coordinate_differences": ("from", "to", "dx", "dy", "dz"),
-    "instruments": ("instrument",),
-    "levels": ("level",),
-    "level_points": ("level", "point"),
-    "planes": ("plane",),
-    "plane_points": ("plane", "point"),
-    "lines": ("line",),
-    "line_points": ("line", "point"),
-    "plumb_lines": ("plumb_line",),
-    "plumb_line_points": ("plumb_line", "point"),
-    "relative_poses": ("from", "to", *AXES),
-    "rigs": ("rig",),
-    "frames": ("frame", "rig", "photo"),
-    "bases": ("rig", "from", "to", "distance"),
-    "covariances": ("kind", "name", "first", "second", "covariance"),
-}
-_TEXTS = frozenset(
-    {
-        "camera",
-        "model",
-        "for_each",
-        "photo",
-        "point",
-        "group",
-        "strip",
-        "frame",
-        "rig",
-        "from",
-        "to",
-        "use",
-        "sensor",
-        "drift_epoch",
-        "lever",
-        "shift",
-        "drift",
-        "instrument",
-        "level",
-        "plane",
-        "line",
-        "plumb_line",
-        "kind",
-        "name",
-        "first",
-        "second",
-        "weights",
-    }
-)
 
 
 def _labelled(columns: Sequence[str]) -> list[str]:
@@ -261,13 +60,13 @@ class Tables:
         """
         if name not in self.settings.tables:
             return None
-        known, path = COLUMNS[name], self.settings.tables[name]
-        numbers = set(known) - _TEXTS
-        if name not in WITH_CRS:
+        schema, path = TABLES[name], self.settings.tables[name]
+        known, numbers = schema.columns, schema.numbers
+        if not schema.has_system:
             table = read_columns(
                 path, known=known, numbers=numbers, spelling=_labelled if name == "images" else tuple
             )
-            table.require(*REQUIRED[name])
+            table.require(*schema.required)
             check_unread(table, PLAIN, known, name, self.messages)
             return table
         given = self.settings.columns.get(name, PLAIN)
@@ -278,7 +77,7 @@ class Tables:
                 path, known=known, numbers=numbers, spelling=partial(given.spelled, known), hint=nameless
             )
         metre = 1.0 / UNITS[self.settings.length]
-        return settled(table, given, known, metre, REQUIRED[name], self.names, name, self.messages)
+        return settled(table, given, known, metre, schema.required, self.names, name, self.messages)
 
     def angle(self, text: str) -> float:
         """Return an angle in radians from a cell in the unit of the project."""
@@ -299,7 +98,7 @@ class Tables:
             Columns of another representation than that of the settings, rows with some of the numbers only.
         """
         names = ANGLES[self.settings.attitude]
-        others = [each for each in table.columns if each in _ALL_ANGLES and each not in names]
+        others = [each for each in table.columns if each in ALL_ANGLES and each not in names]
         if others and not set(names) <= set(table.columns):
             raise table.head.error(
                 f"columns {listed(others)}, but [axes] attitude is {self.settings.attitude}:"

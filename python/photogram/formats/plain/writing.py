@@ -13,8 +13,8 @@ from photogram.errors import InputError
 from photogram.formats.images import to_corner
 from photogram.formats.plain.observed_writing import correlations, observed_tables
 from photogram.formats.plain.rigs_writing import Rigs
+from photogram.formats.plain.schema import AXES
 from photogram.formats.plain.settings import VERSION
-from photogram.formats.plain.tables import AXES
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
 from photogram.network.attitudes import Attitudes
