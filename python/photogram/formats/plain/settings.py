@@ -5,8 +5,6 @@ from __future__ import annotations
 import difflib
 import math
 import os
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,8 +14,7 @@ from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns, columns_given
 from photogram.formats.plain.schema import TABLES
 from photogram.formats.project import DatumName, Frame, Options
-from photogram.io.files import read_bytes
-from photogram.io.places import Place
+from photogram.io.toml import TomlFile
 from photogram.messages import Message, listed, nearest
 from photogram.results.features import KINDS, Definition
 
@@ -202,33 +199,12 @@ def bare_settings(
     )
 
 
-class _File:
-    """A file of settings whose errors name the line."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        try:
-            self.lines = read_bytes(path).decode("utf-8-sig").replace("\r\n", "\n").split("\n")
-            self.content: dict[str, Any] = tomllib.loads("\n".join(self.lines))
-        except UnicodeDecodeError as error:
-            raise InputError(
-                f"is no text of UTF-8: {error.reason} at byte {error.start}", file=path
-            ) from None
-        except tomllib.TOMLDecodeError as error:
-            where = re.search(r"at line (\d+)", str(error))
-            record = int(where[1]) if where else None
-            text = self.lines[record - 1] if record and record <= len(self.lines) else None
-            raise InputError(f"is no TOML: {error}", file=path, record=record, text=text) from None
-        except RecursionError:
-            raise InputError("is nested too deep", file=path) from None
+class _File(TomlFile):
+    """A file of settings."""
 
     def fail(self, key: str, message: str) -> NoReturn:
         """Raise an error at the first line that has the key."""
-        pattern = re.compile(rf"^\s*\[?\[?\s*[\"']?{re.escape(key)}[\"']?\s*[\]=.]")
-        for record, line in enumerate(self.lines, 1):
-            if pattern.match(line):
-                raise Place(self.path, record, line).error(message)
-        raise Place(self.path).error(message)
+        raise self.error(key, message)
 
     def check_keys(self) -> None:
         """Refuse sections and keys that there are not."""
