@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 from photogram.errors import InputError
 from photogram.messages import Message
 
-__all__ = ["Place"]
+__all__ = ["Failing", "Place"]
+
+
+class Failing(Protocol):
+    """What can tell where it stands in a file: a place, an element of XML, a member of JSON."""
+
+    def error(self, message: str, /) -> InputError:
+        """Return an error that names the place."""
 
 
 @dataclass(frozen=True, slots=True)

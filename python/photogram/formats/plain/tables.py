@@ -1,31 +1,44 @@
-"""The tables of a plain project: which columns they have, and how cells become numbers."""
+"""The tables of a plain project: how cells become numbers, and these columns."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
 from photogram.formats.column_words import UNITS
 from photogram.formats.columns import PLAIN, check_unread, degrees, nameless, settled
 from photogram.formats.plain.schema import ALL_ANGLES, ANGLES, AXES, POSE, TABLES, covariance_columns
 from photogram.formats.plain.settings import Settings
+from photogram.formats.rotations import Y_DOWN, is_rotation
 from photogram.io.delimited import ColumnTable, read_columns, read_rows
 from photogram.messages import Message, listed, quoted
 from photogram.network.attitudes import Attitudes, Representation
+from photogram.network.block import Block
+from photogram.network.unknowns import Unknown
 
 __all__ = [
+    "DEGREE",
     "Tables",
+    "correlations",
     "covariances_of",
+    "different",
     "indices_of",
+    "made",
     "matrices_of",
+    "places_written",
+    "vectors_of",
 ]
 
-_FLIP = np.diag([1.0, -1.0, -1.0])
+DEGREE = 180 / np.pi
+"""Of a radian."""
+_Made = TypeVar("_Made")
 
 
 def _labelled(columns: Sequence[str]) -> list[str]:
@@ -105,12 +118,7 @@ class Tables:
                 f" {', '.join(names)}"
             )
         plain = self.settings.attitude in ("quaternion", "rotation_vector", "matrix")
-        columns = [table.numbers(name, read=None if plain else self.angle) for name in names]
-        values: Floats = np.stack(columns, axis=1)
-        bad = np.flatnonzero(np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1))
-        if bad.size:
-            raise table.error(int(bad[0]), f"some of {', '.join(names)} are empty: give all or none")
-        return values
+        return vectors_of(table, names, None if plain else self.angle)
 
     def matrices(self, table: ColumnTable) -> Floats:
         """Return (rows, 3, 3) attitudes A, photo to object; NaN where there are none."""
@@ -130,7 +138,7 @@ class Tables:
     @property
     def flip(self) -> Floats:
         """(3, 3) what carries vectors from the axes of photos, as the settings have them, to ours."""
-        return _FLIP if self.settings.photo == "y_down" else np.eye(3)
+        return Y_DOWN if self.settings.photo == "y_down" else np.eye(3)
 
     def turns(self, table: ColumnTable) -> Floats:
         """Return (rows, 3, 3) the axes of one photo in those of another, as columns; NaN without."""
@@ -139,7 +147,7 @@ class Tables:
 
     def vectors(self, table: ColumnTable, names: Sequence[str], default: float = math.nan) -> Floats:
         """Return (rows, 3) vectors in the axes of photos."""
-        found: Floats = np.stack([table.numbers(name, default) for name in names], axis=1) @ self.flip
+        found: Floats = table.vectors(names, default) @ self.flip
         return found
 
     def pose_covariances(self, table: ColumnTable, sd: Floats) -> Floats:
@@ -157,12 +165,8 @@ class Tables:
                 size = float(np.linalg.norm(values[row]))
                 if not 0.99 < size < 1.01:
                     raise table.error(row, f"the quaternion has the length {size:.6g}, not 1")
-            elif kind == "matrix":
-                matrix = values[row].reshape(3, 3)
-                with np.errstate(over="ignore", invalid="ignore"):
-                    apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
-                if not apart < 1e-6 or np.linalg.det(matrix) < 0:
-                    raise table.error(row, "m11 .. m33 are no rotation matrix: not orthonormal, or mirrored")
+            elif kind == "matrix" and not is_rotation(values[row].reshape(3, 3)):
+                raise table.error(row, "m11 .. m33 are no rotation matrix: not orthonormal, or mirrored")
 
     def deviations(
         self, table: ColumnTable, kind: str, columns: Sequence[str], default: float = math.nan
@@ -205,7 +209,7 @@ def matrices_of(settings: Settings, values: Floats) -> Floats:
     turned = found.transpose(0, 2, 1) if kind in ("omega_phi_kappa", "phi_omega_kappa") else found
     to_photo = turned if settings.rotation == "object_to_photo" else turned.transpose(0, 2, 1)
     if settings.photo == "y_down":
-        to_photo = np.diag([1.0, -1.0, -1.0]) @ to_photo
+        to_photo = Y_DOWN @ to_photo
     photo_to_object: Floats = to_photo.transpose(0, 2, 1)
     return photo_to_object
 
@@ -258,3 +262,47 @@ def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind:
         row = int(np.flatnonzero(found.rows == missing)[0])
         raise table.error(row, f"column {column}: there is no {kind} {quoted(found.names[missing])}")
     return rows[found.rows]
+
+
+def vectors_of(
+    table: ColumnTable, columns: Sequence[str], read: Callable[[str], float] | None = None
+) -> Floats:
+    """Return (rows, k) numbers that are given altogether or not at all; NaN where they are not."""
+    values: Floats = table.vectors(columns, read=read)
+    partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
+    if partly.any():
+        row = int(np.flatnonzero(partly)[0])
+        raise table.error(row, f"some of {', '.join(columns)} are empty: give all or none")
+    return values
+
+
+def made(table: ColumnTable, row: int, make: Callable[[], _Made]) -> _Made:
+    """Make something of a row; what it refuses is an error of the row."""
+    try:
+        return make()
+    except InputError as error:
+        raise (error if error.file else table.error(row, error.message)) from None
+
+
+def correlations(
+    covariances: Floats, names: Sequence[str], units: Sequence[float] | None = None
+) -> dict[str, Any]:
+    """Return the columns of covariances, where there are any; `units` are those of a table in ours."""
+    scales = (1.0,) * len(names) if units is None else units
+    columns = covariance_columns(names)
+    if not any(np.nan_to_num(covariances[:, i, j]).any() for i, j in columns.values()):
+        return {}
+    return {name: covariances[:, i, j] * (scales[i] * scales[j]) for name, (i, j) in columns.items()}
+
+
+def places_written(block: Block, values: Floats) -> Floats:
+    """Return positions as tables have them."""
+    if not block.geographic:
+        return values
+    found: Floats = np.column_stack([np.degrees(values[:, :2]), values[:, 2]])
+    return found
+
+
+def different(unknowns: Sequence[Unknown | None]) -> list[Any]:
+    """Return unknowns, each once."""
+    return list({id(each): each for each in unknowns if each is not None}.values())
