@@ -5,7 +5,7 @@
 Blocks between these marks and `<!-- end -->` are made anew, of all pages unless some are named:
 
 * `<!-- numbers: NAME -->`: what the function of this name returns;
-* `<!-- printed: COMMAND -->`: lines of what a command prints, as many as there are;
+* `<!-- printed: COMMAND -->`: lines of what a command prints, as many as there are, or a table;
 * `<!-- quote: PATH -->`: a file of the repository;
 * `<!-- quote: PATH | LINE -->`: what begins with the line and ends with the next bracket that closes where it
   is indented.
@@ -48,7 +48,7 @@ WRITTEN = {"performance.md": "benches/peers/compare.py"}
 """Pages that a program writes as a whole when it measures."""
 BLOCK = re.compile(r"(<!-- numbers: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 QUOTE = re.compile(r"(<!-- quote: (\S+)(?: \| (.*?))? -->\n).*?(<!-- end -->)", re.DOTALL)
-PRINTED = re.compile(r"(<!-- printed: (.+?) -->\n```text\n)(.*?)(```\n<!-- end -->)", re.DOTALL)
+PRINTED = re.compile(r"(<!-- printed: (.+?) -->\n(?:```text\n)?)(.*?)((?:```\n)?<!-- end -->)", re.DOTALL)
 MEASURED = re.compile(r"<!-- measured: (.+?) -->\n(.*?)<!-- end -->", re.DOTALL)
 MARKED = re.compile(
     r"<!-- (?:numbers|printed|measured|quote): .*?<!-- end -->|<!-- (\w+) -->.*?<!-- (?:/|end of )\1 -->",

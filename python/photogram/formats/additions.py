@@ -400,7 +400,7 @@ def with_control(
     if missing:
         messages.append(Message(f"control without images is left out: {listed(missing)}", path))
     targets = np.array([places[given.names[row]] for row in rows])
-    raw = np.stack([table.numbers(axis) for axis in "xyz"], axis=1)
+    raw = table.vectors("xyz")
     messages += check_systems(project, settings, table, targets, raw[rows], free=_is_free(project))
     held = [row for row in rows if np.isfinite(given.positions[row]).all()]
     carried = _carried(

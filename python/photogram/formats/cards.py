@@ -11,7 +11,6 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.delimited import read_columns
 from photogram.io.files import read_lines
-from photogram.io.numbers import finite_number
 from photogram.io.places import Place
 from photogram.messages import quoted
 
@@ -39,10 +38,7 @@ class Card:
         """
         if index >= len(self.words):
             raise self.place.error(f"ends before {what}")
-        try:
-            return finite_number(self.words[index])
-        except ValueError as error:
-            raise self.place.error(f"{what}: {error}") from None
+        return self.place.number(self.words[index], what)
 
     def numbers(self, first: int, names: str) -> Floats:
         """Return some words as numbers, by their names."""

@@ -11,6 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.block_contents import posed
 from photogram.formats.intersection import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size, assembled
@@ -113,16 +114,15 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
     cameras, photo_cameras = known_cameras(block)
     sizes = project.sizes
     positions = complete_positions(project)
-    poses = np.hstack([block.photo_positions, block.photo_attitudes])
     placed: Bools = np.asarray(np.isfinite(positions).all(axis=1))
-    posed: Bools = np.asarray(np.isfinite(poses).all(axis=1))
-    rows = np.flatnonzero(posed[block.image_photos] & placed[block.image_points])
+    oriented = posed(block)
+    rows = np.flatnonzero(oriented[block.image_photos] & placed[block.image_points])
     if not len(rows):
         raise InputError("no photo with a pose shows a point with a position")
     xy = _moved(project, cameras, sizes, np.asarray(photo_cameras)[block.image_photos])
     rows = rows[np.isfinite(xy[rows]).all(axis=1)]
-    photos, points = np.flatnonzero(posed), np.flatnonzero(placed)
-    of_photo, of_point = np.full(len(posed), -1), np.full(len(placed), -1)
+    photos, points = np.flatnonzero(oriented), np.flatnonzero(placed)
+    of_photo, of_point = np.full(len(oriented), -1), np.full(len(placed), -1)
     of_photo[photos], of_point[points] = np.arange(len(photos)), np.arange(len(points))
     to_photo = attitude_matrices(block)[photos].transpose(0, 2, 1)
     lenses = [

@@ -87,11 +87,8 @@ def _of_text(path: Path) -> ControlList:
         words = (place.text or "").split()
         if len(words) < 6:
             raise place.error(f"has {len(words)} words: x y z column row image [name]")
-        try:
-            for word in (*words[:2], *words[3:5], *(() if words[2].lower() == "nan" else words[2:3])):
-                finite_number(word)
-        except ValueError as error:
-            raise place.error(str(error)) from None
+        for word in (*words[:2], *words[3:5], *(() if words[2].lower() == "nan" else words[2:3])):
+            place.number(word)
         position = (words[0], words[1], "" if words[2].lower() == "nan" else words[2])
         name = (
             words[6]

@@ -20,6 +20,7 @@ from photogram.formats.reduced_writing import (
     lost_of_reduced,
     reduced_images,
 )
+from photogram.formats.rotations import is_rotation
 from photogram.io.csv_text import csv_text
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
@@ -119,9 +120,7 @@ def _rotation(card: Card, elements: list[float]) -> np.ndarray[tuple[int, int], 
     if len(elements) != 9:
         raise card.place.error(f"is followed by {len(elements)} elements of a rotation, not 9")
     matrix = np.array(elements).reshape(3, 3)
-    with np.errstate(over="ignore", invalid="ignore"):
-        apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
-    if not apart < 1e-4 or np.linalg.det(matrix) < 0:
+    if not is_rotation(matrix, 1e-4):
         raise card.place.error("is followed by no rotation matrix: not orthonormal, or mirrored")
     u, _, vt = np.linalg.svd(matrix)
     nearest: np.ndarray[tuple[int, int], np.dtype[np.float64]] = u @ vt

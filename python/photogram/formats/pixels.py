@@ -70,11 +70,8 @@ def corner_of(table: ColumnTable, pixel_origin: str | None) -> Floats:
     InputError
         An empty cell.
     """
-    found = np.column_stack([table.numbers("column"), table.numbers("row")])
-    missing = np.argwhere(np.isnan(found))
-    if len(missing):
-        row, k = missing[0].tolist()
-        raise table.error(row, f"column {('column', 'row')[k]}: is empty")
+    found = table.vectors(_NEEDED[2:])
+    table.check_given(found, _NEEDED[2:])
     return found + 0.5 if pixel_origin == "center" else found
 
 
@@ -158,7 +155,7 @@ def _sd(table: ColumnTable, wishes: Wishes) -> Floats | None:
     if not {"sd", "sd_column"} & set(table.columns):
         return None
     common = table.numbers("sd", default)
-    found = np.column_stack([table.numbers("sd_column"), table.numbers("sd_row")])
+    found = table.vectors(("sd_column", "sd_row"))
     found = np.where(np.isnan(found), common[:, np.newaxis], found)
     bad = np.flatnonzero(~(found > 0).all(axis=1))
     if len(bad):

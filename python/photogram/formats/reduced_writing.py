@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project
 from photogram.network.directions import image_directions
@@ -79,30 +80,26 @@ def reduced_images(project: Project, digits: int | None = None) -> ReducedImages
     of_photos = np.asarray(which, dtype=np.int64)
     own = directions[rows]
     scales = distances[of_photos[block.image_photos[rows]], np.newaxis]
-    matrices = attitude_matrices(block)
-    posed: Bools = np.asarray(
-        np.isfinite(np.column_stack([matrices.reshape(-1, 9), block.photo_positions])).all(axis=1)
-    )
     return ReducedImages(
         distances,
         [each.name for each in cameras],
         of_photos,
         rows,
         scales * own[:, :2] / -own[:, 2:],
-        posed,
-        matrices,
+        posed(block),
+        attitude_matrices(block),
     )
 
 
 def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
     """Return positions of control and check points, and which coordinates are held; none are of checks."""
     block = project.block
-    full = {each.point: each.observed for each in block.observations if isinstance(each, Control)}
+    full = correlated_control(block)
     found = {}
     for row, name in enumerate(block.point_ids):
         position, held = block.point_positions[row], np.isfinite(block.point_sd[row])
         if name in full:
-            position, held = full[name], np.ones(3, dtype=bool)
+            position, held = full[name].observed, np.ones(3, dtype=bool)
         if np.isfinite(position).any():
             found[name] = np.asarray(position), held
     return found

@@ -48,9 +48,14 @@ class Element:
     children: list[Element] = field(default_factory=list)
     text: str = ""
 
+    @property
+    def place(self) -> Place:
+        """Where it stands."""
+        return Place(self.file, self.line, f"<{self.name}> {self.text.strip()}"[:120])
+
     def error(self, message: str) -> InputError:
         """Return an error that names the line."""
-        return Place(self.file, self.line, f"<{self.name}> {self.text.strip()}"[:120]).error(message)
+        return self.place.error(message)
 
     def child(self, name: str) -> Element | None:
         """Return the first child of a name."""
@@ -78,6 +83,7 @@ class Element:
         return self._number(self.text.strip())
 
     def _number(self, text: str) -> float:
+        # There may be millions: the place is only made where one is at fault.
         try:
             return finite_number(text)
         except ValueError as error:

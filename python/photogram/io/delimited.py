@@ -265,6 +265,31 @@ class ColumnTable:
             return np.array([default if np.isnan(each) else read(repr(each)) for each in found.tolist()])
         return found if np.isnan(default) else np.where(np.isnan(found), default, found)
 
+    def vectors(
+        self,
+        columns: Sequence[str],
+        default: float = math.nan,
+        *,
+        infinite: bool = False,
+        read: Callable[[str], float] | None = None,
+    ) -> Floats:
+        """Return (rows, k) k columns of numbers; see :meth:`numbers`."""
+        found = [self.numbers(each, default, infinite=infinite, read=read) for each in columns]
+        return np.stack(found, axis=1)
+
+    def check_given(self, values: Floats, columns: Sequence[str], why: str = "is empty") -> None:
+        """Refuse NaN among (rows, k) numbers of some columns.
+
+        Raises
+        ------
+        InputError
+            There is one; names file, record and column.
+        """
+        missing = np.argwhere(np.isnan(values))
+        if len(missing):
+            row, column = missing[0].tolist()
+            raise self.error(row, f"column {columns[column]}: {why}")
+
     def flags(self, column: str, default: bool = True) -> Bools:
         """Return (rows,) a column of true and false (yes, no, 1, 0).
 

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 from photogram.errors import InputError
+from photogram.io.numbers import LARGEST_INTEGER, finite_number, whole_number
 from photogram.messages import Message
 
-__all__ = ["Place"]
+__all__ = ["Failing", "Place"]
+
+
+class Failing(Protocol):
+    """What can tell where it stands in a file: a place, an element of XML, a member of JSON."""
+
+    def error(self, message: str, /) -> InputError:
+        """Return an error that names the place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +31,20 @@ class Place:
     def error(self, message: str) -> InputError:
         """Return an error that names the place."""
         return InputError(message, file=self.file, record=self.record, text=self.text)
+
+    def number(self, text: str, what: str = "") -> float:
+        """Return a finite number that a text is; an error names the place, and what it should be."""
+        try:
+            return finite_number(text)
+        except ValueError as error:
+            raise self.error(f"{what}: {error}" if what else str(error)) from None
+
+    def whole(self, text: str, what: str = "", highest: int = LARGEST_INTEGER) -> int:
+        """Return a whole number that is not negative; errors as :meth:`number`."""
+        try:
+            return whole_number(text, highest=highest)
+        except ValueError as error:
+            raise self.error(f"{what}: {error}" if what else str(error)) from None
 
     def message(self, message: str) -> Message:
         """Return a remark that names the place."""

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
-import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from photogram.errors import InputError
-from photogram.io.files import read_bytes
+from photogram.io.toml import TomlFile
 from photogram.messages import listed
 from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import ABERRATION, HECTOPASCAL, Air, Effects, Site
@@ -30,9 +28,6 @@ _STATION = {
     "number",
     "name",
 }
-_MOST_DIGITS = 1000
-_ENDLESS = re.compile(rf"\d[\d_]{{{_MOST_DIGITS}}}")
-"""Python refuses whole numbers of thousands of digits, and does not say where they stand."""
 _LONGEST = 60
 """Characters of a value that an error shows."""
 
@@ -324,22 +319,7 @@ def read_document(path: Path, tables: Mapping[str, Collection[str] | None]) -> D
     InputError
         The file cannot be read, is not TOML, or has tables or keys besides these.
     """
-    try:
-        text = read_bytes(path).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(str(error), file=path) from None
-    for number, line in enumerate(text.splitlines(), 1):
-        if _ENDLESS.search(line):
-            key = line.split("=")[0].strip()[:_LONGEST]
-            raise InputError(
-                f"{key} has a number of more than {_MOST_DIGITS} digits", file=path, record=number
-            )
-    try:
-        document = tomllib.loads(text)
-    except RecursionError:
-        raise InputError("brackets are nested too deeply", file=path) from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(str(error), file=path) from None
+    document = TomlFile(path).content
     unknown = sorted(set(document) - set(tables))
     if unknown:
         raise InputError(f"there is no table {listed(unknown)}", file=path)

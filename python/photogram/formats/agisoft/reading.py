@@ -12,6 +12,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.project import Frame, Project, Size, assembled
+from photogram.formats.rotations import Y_DOWN, checked_rotation
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
@@ -20,7 +21,6 @@ from photogram.network.observations import Control, Observation, Position
 __all__ = ["TITLE", "read"]
 
 TITLE = "Agisoft camera XML"
-FLIP = np.diag([1.0, -1.0, -1.0])
 LOCAL = "LOCAL_CS"
 GEOCENTRIC = 1e6
 """Metres from the origin beyond which a world is geocentric."""
@@ -226,11 +226,11 @@ def _poses(chunk: Element, shots: list[Element]) -> tuple[Floats, Floats]:
     for row, each in enumerate(shots):
         transform = each.need("transform")
         values = transform.numbers(16).reshape(4, 4)
-        turn = _rotation(transform, values[:3, :3])
+        turn = checked_rotation(transform, values[:3, :3])
         similarity = by_component.get(each.attributes.get("component_id"), whole)
         if similarity is None:
             similarity = _Similarity(np.eye(3), np.zeros(3), 1.0)
-        matrices[row] = similarity.rotation @ turn @ FLIP
+        matrices[row] = similarity.rotation @ turn @ Y_DOWN
         centres[row] = similarity.scale * similarity.rotation @ values[:3, 3] + similarity.translation
     return centres, matrices
 
@@ -242,16 +242,7 @@ def _similarity(element: Element) -> _Similarity:
         raise element.error("the scale is not positive")
     shift = element.child("translation")
     translation = np.zeros(3) if shift is None else shift.numbers(3)
-    return _Similarity(_rotation(rotation, rotation.numbers(9).reshape(3, 3)), translation, scale)
-
-
-def _rotation(element: Element, matrix: Floats) -> Floats:
-    with np.errstate(over="ignore", invalid="ignore"):
-        apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
-    if not apart < 1e-6 or np.linalg.det(matrix) < 0:
-        raise element.error("is no rotation matrix: not orthonormal, or mirrored")
-    found: Floats = matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2
-    return found
+    return _Similarity(checked_rotation(rotation, rotation.numbers(9).reshape(3, 3)), translation, scale)
 
 
 @dataclass

@@ -10,18 +10,18 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
+from photogram.formats.block_contents import correlated_control, lost_observations, posed
 from photogram.formats.images import to_corner
 from photogram.formats.lenses import lens_of
-from photogram.formats.lost import lost_observations
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
+from photogram.formats.rotations import Y_DOWN
 from photogram.network.cameras import Camera
-from photogram.network.observations import Control, Position
+from photogram.network.observations import Position
 
 __all__ = ["FILE", "cannot_hold", "write"]
 
 FILE = "cameras.xml"
-FLIP = np.diag([1.0, -1.0, -1.0])
 LOCAL = (
     'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],UNIT["metre",1,AUTHORITY["EPSG","9001"]]]'
 )
@@ -36,7 +36,7 @@ def cannot_hold(project: Project) -> list[str]:
     found = ["standard deviations of images, poses and cameras"]
     if ties:
         found.append(f"{ties} images of tie points: export BlocksExchange for these")
-    if lost := int(np.count_nonzero(~_posed(project))):
+    if lost := int(np.count_nonzero(~posed(project.block))):
         found.append(f"{lost} photos without a pose")
     partly = _known(project) & ~marked
     if partly.any():
@@ -56,7 +56,7 @@ def write(project: Project) -> Mapping[str, bytes]:
         Cameras that Metashape does not have, pictures of unknown size, no poses.
     """
     block = project.block
-    if not _posed(project).any():
+    if not posed(project.block).any():
         raise InputError("no photo has a pose, and the file holds nothing but photos with one")
     world = _world(project.frame)
     cameras, which = known_cameras(block)
@@ -159,15 +159,9 @@ def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, f
     }
 
 
-def _posed(project: Project) -> Bools:
-    block = project.block
-    poses = np.hstack([block.photo_positions, block.photo_attitudes])
-    return np.asarray(np.isfinite(poses).all(axis=1))
-
-
 def _shots(project: Project, world: _World, which: list[int]) -> list[str]:
     block = project.block
-    turns = attitude_matrices(block) @ FLIP
+    turns = attitude_matrices(block) @ Y_DOWN
     given = [each for each in block.observations if isinstance(each, Position)]
     positions, sd = world.references(
         np.array([each.observed[:3] for each in given]).reshape(-1, 3),
@@ -178,7 +172,7 @@ def _shots(project: Project, world: _World, which: list[int]) -> list[str]:
         for each, position, deviation in zip(given, positions, sd, strict=True)
     }
     lines = [f'<cameras next_id="{len(block.photo_ids)}" next_group_id="0">']
-    for row in np.flatnonzero(_posed(project)).tolist():
+    for row in np.flatnonzero(posed(project.block)).tolist():
         name = block.photo_ids[row]
         transform = np.eye(4)
         transform[:3, :3], transform[:3, 3] = turns[row], block.photo_positions[row]
@@ -201,21 +195,16 @@ def _reference(position: Floats, sd: Floats, check: bool = False) -> str:
     return f'<reference {attributes} enabled="{"false" if check else "true"}"/>'
 
 
-def _full(project: Project) -> Mapping[str, Control]:
-    """Return control that is observed with correlations."""
-    return {each.point: each for each in project.block.observations if isinstance(each, Control)}
-
-
 def _known(project: Project) -> Bools:
     """Return which points are control or check points, in some coordinate at least."""
-    block, full = project.block, _full(project)
+    block, full = project.block, correlated_control(project.block)
     known = np.isfinite(block.point_positions).any(axis=1)
     return np.asarray(known | np.array([name in full for name in block.point_ids], dtype=bool))
 
 
 def _marked(project: Project) -> Bools:
     """Return which points are markers: control that is held in all coordinates, and check points."""
-    block, full = project.block, _full(project)
+    block, full = project.block, correlated_control(project.block)
     known = np.isfinite(block.point_positions).all(axis=1)
     held = np.isfinite(block.point_sd)
     correlated = np.array([name in full for name in block.point_ids], dtype=bool)
@@ -223,7 +212,7 @@ def _marked(project: Project) -> Bools:
 
 
 def _markers(project: Project, world: _World) -> list[str]:
-    block, full = project.block, _full(project)
+    block, full = project.block, correlated_control(project.block)
     rows = np.flatnonzero(_marked(project)).tolist()
     if not rows:
         return []
@@ -246,12 +235,12 @@ def _markers(project: Project, world: _World) -> list[str]:
 
 def _locations(project: Project, markers: Mapping[int, int]) -> list[str]:
     block, corner = project.block, to_corner(project).tolist()
-    posed = _posed(project)
+    shown = posed(project.block)
     images: dict[int, list[str]] = {k: [] for k in markers.values()}
     for photo, point, (x, y) in zip(
         block.image_photos.tolist(), block.image_points.tolist(), corner, strict=True
     ):
-        if point in markers and posed[photo]:
+        if point in markers and shown[photo]:
             images[markers[point]].append(
                 f'<location camera_id="{photo}" pinned="true" x="{x!r}" y="{y!r}"/>'
             )

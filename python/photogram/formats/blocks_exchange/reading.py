@@ -14,6 +14,7 @@ from photogram.errors import InputError
 from photogram.formats.blocks_exchange.systems import PhotoRecord, PointRecord, Systems
 from photogram.formats.format import Wishes
 from photogram.formats.project import Project, Size, assembled
+from photogram.formats.rotations import checked_rotation
 from photogram.formats.self_check import agreement
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.messages import Message
@@ -218,12 +219,7 @@ def _rotation(element: Element) -> Floats:
     """Return (3, 3) world to camera, in the axes of the camera orientation."""
     if element.child("M_00") is not None:
         matrix = np.array([[element.number(f"M_{i}{j}") for j in range(3)] for i in range(3)])
-        with np.errstate(over="ignore", invalid="ignore"):
-            apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
-        if not apart < 1e-6 or np.linalg.det(matrix) < 0:
-            raise element.error("is no rotation matrix: not orthonormal, or mirrored")
-        nearest: Floats = matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2
-        return nearest
+        return checked_rotation(element, matrix)
     if element.child("Omega") is not None:
         angles = np.radians([[element.number(name) for name in ("Omega", "Phi", "Kappa")]])
         if np.abs(angles).max() > 1e4:

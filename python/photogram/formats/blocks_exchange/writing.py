@@ -9,14 +9,15 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.block_contents import correlated_control, lost_observations
 from photogram.formats.blocks_exchange.reading import CENTER
 from photogram.formats.images import sizes_of, to_corner
 from photogram.formats.lenses import lens_of
-from photogram.formats.lost import lost_observations
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
+from photogram.formats.rotations import Y_DOWN
 from photogram.network.cameras import Camera
-from photogram.network.observations import Control, Position
+from photogram.network.observations import Position
 
 __all__ = ["FILE", "cannot_hold", "write"]
 
@@ -62,7 +63,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     gnss = {
         each.photo: each.observed[:3].tolist() for each in block.observations if isinstance(each, Position)
     }
-    rotations = np.diag([1.0, -1.0, -1.0]) @ attitude_matrices(block).transpose(0, 2, 1)
+    rotations = Y_DOWN @ attitude_matrices(block).transpose(0, 2, 1)
     for row, (camera, size) in enumerate(zip(cameras, sizes_of(project), strict=True)):
         lines += ["<Photogroup>", *_camera(camera, size)]
         for photo in np.flatnonzero(np.asarray(which) == row).tolist():
@@ -132,7 +133,7 @@ def _points(project: Project) -> list[str]:
         block.image_photos.tolist(), block.image_points.tolist(), corner, strict=True
     ):
         images[point].append(f"<Measurement><PhotoId>{photo}</PhotoId><x>{x!r}</x><y>{y!r}</y></Measurement>")
-    full = {each.point: each for each in block.observations if isinstance(each, Control)}
+    full = correlated_control(block)
     control, ties = ["<ControlPoints>"], ["<TiePoints>"]
     checks, check_sd = set(project.checks), block.point_check_sd
     for row, name in enumerate(block.point_ids):

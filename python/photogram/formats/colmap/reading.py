@@ -17,6 +17,7 @@ from photogram.formats.format import Wishes
 from photogram.formats.names import NAMES, renamed
 from photogram.formats.project import Project, Size, assembled
 from photogram.formats.rigging import FrameOf, Rig, mounted
+from photogram.formats.rotations import Y_DOWN
 from photogram.io.places import Place
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera as HouseCamera
@@ -27,7 +28,6 @@ __all__ = ["TITLE", "place_of", "read"]
 TITLE = "COLMAP model"
 LONGEST, SHORT = 1e-2, 1e-6
 """What the length of a quaternion may differ from 1 by, and what is not worth a remark."""
-FLIP = np.diag([1.0, -1.0, -1.0])
 
 
 def place_of(path: Path) -> Path | None:
@@ -68,7 +68,7 @@ def _project(model: Model, path: Path) -> Project:
     rotations = _rotations(images.quaternions, images, messages)
     translations = images.translations.copy()
     frames = _composed(model, rotations, translations, messages)
-    matrices = (FLIP @ rotations).transpose(0, 2, 1)
+    matrices = (Y_DOWN @ rotations).transpose(0, 2, 1)
     centres = -np.einsum("nji,nj->ni", rotations, translations)
     mounts, stands = mounted(frames, images.names, centres, matrices)
     of_names = {each.name: row for row, each in enumerate(cameras)}

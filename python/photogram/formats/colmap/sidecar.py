@@ -9,8 +9,9 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.formats.colmap.writing import FLIP, Made, made
+from photogram.formats.colmap.writing import Made, made
 from photogram.formats.project import Project
+from photogram.formats.rotations import Y_DOWN
 from photogram.io.json import to_json
 from photogram.results.result import Result
 
@@ -108,6 +109,6 @@ def _centre_and_rotation(result: Result) -> Floats:
     rates = _photocore.attitudes_from_numbers(kind, result.photo_attitudes, _photocore.nadir_boresight(0))[1]
     jacobian = np.zeros((len(rates), 6, 6))
     jacobian[:, :3, :3] = np.eye(3)
-    jacobian[:, 3:, 3:] = -FLIP @ rates
+    jacobian[:, 3:, 3:] = -Y_DOWN @ rates
     found: Floats = jacobian @ result.photo_covariances @ jacobian.transpose(0, 2, 1)
     return found

@@ -22,7 +22,6 @@ from photogram.formats.colmap.content import (
     Rig,
 )
 from photogram.io.files import read_lines
-from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 
 __all__ = ["read_text", "text_files"]
@@ -57,17 +56,11 @@ class _Words:
 
     def number(self, what: str) -> float:
         """Return the next word as a number."""
-        try:
-            return finite_number(self.word(what))
-        except ValueError as error:
-            raise self.place.error(f"{what}: {error}") from None
+        return self.place.number(self.word(what), what)
 
     def whole(self, what: str, highest: int = 2**32 - 1) -> int:
         """Return the next word as a whole number."""
-        try:
-            return whole_number(self.word(what), highest=highest)
-        except ValueError as error:
-            raise self.place.error(f"{what}: {error}") from None
+        return self.place.whole(self.word(what), what, highest)
 
     def pose(self) -> Pose:
         """Return a quaternion and a translation."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.block_contents import posed
 from photogram.formats.colmap.binary import binary_files
 from photogram.formats.colmap.content import (
     CAMERA,
@@ -29,15 +30,15 @@ from photogram.formats.lenses import lens_of
 from photogram.formats.names import names_file, numbered
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
+from photogram.formats.rotations import Y_DOWN
 from photogram.io.places import Place
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera as HouseCamera
 from photogram.network.rigs import Mount
 
-__all__ = ["FLIP", "Made", "cannot_hold", "made", "write", "write_as_text"]
+__all__ = ["Made", "cannot_hold", "made", "write", "write_as_text"]
 
 _NAMES = dict(MODELS)
-FLIP = np.diag([1.0, -1.0, -1.0])
 
 
 def cannot_hold(project: Project) -> list[str]:
@@ -51,9 +52,8 @@ def cannot_hold(project: Project) -> list[str]:
         )
     if block.observations:
         found.append(f"{len(block.observations)} observations beside images")
-    unposed = _unposed(project)
-    if unposed.any():
-        found.append(f"{np.count_nonzero(unposed)} photos without a pose")
+    if unposed := int(np.count_nonzero(~posed(block))):
+        found.append(f"{unposed} photos without a pose")
     lost = int(np.count_nonzero(~np.isfinite(complete_positions(project)).all(axis=1)))
     if lost:
         found.append(f"{lost} points without a position: their images are features without a point")
@@ -75,12 +75,6 @@ def _told_by_cameras(mounts: Sequence[Mount], cameras: Mapping[str, int]) -> boo
     mounted = {mount.photo for mount in mounts}
     alone = {camera for photo, camera in cameras.items() if photo not in mounted}
     return not alone & set(sensors)
-
-
-def _unposed(project: Project) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    block = project.block
-    poses = np.hstack([block.photo_positions, block.photo_attitudes])
-    return np.asarray(~np.isfinite(poses).all(axis=1))
 
 
 def write(project: Project) -> Mapping[str, bytes]:
@@ -120,27 +114,27 @@ def made(project: Project) -> Made:
     numbers = numbered([each.name for each in cameras])
     sizes = sizes_of(project)
     lines = [_camera(each, size, numbers[each.name]) for each, size in zip(cameras, sizes, strict=True)]
-    posed = np.flatnonzero(~_unposed(project))
-    if not len(posed):
+    shown = np.flatnonzero(posed(block))
+    if not len(shown):
         raise InputError("no photo has a pose, and a model holds nothing but photos with one")
-    photos = numbered([block.photo_ids[row] for row in posed], project.details.get("image numbers"))
+    photos = numbered([block.photo_ids[row] for row in shown], project.details.get("image numbers"))
     positions = complete_positions(project)
     placed = np.flatnonzero(np.isfinite(positions).all(axis=1))
     points = numbered([block.point_ids[row] for row in placed], project.details.get("point numbers"))
-    matrices = attitude_matrices(block)[posed]
-    rotations = FLIP @ matrices.transpose(0, 2, 1)
-    translations = -np.einsum("nij,nj->ni", rotations, block.photo_positions[posed])
+    matrices = attitude_matrices(block)[shown]
+    rotations = Y_DOWN @ matrices.transpose(0, 2, 1)
+    translations = -np.einsum("nij,nj->ni", rotations, block.photo_positions[shown])
     quaternions = Attitudes(matrices).values("quaternion_to_vision")
-    camera_numbers = np.array([numbers[cameras[photo_cameras[row]].name] for row in posed], dtype=np.int64)
-    ids = np.array([photos[block.photo_ids[row]] for row in posed], dtype=np.int64)
-    images, rows = _images(project, posed, ids, camera_numbers, quaternions, translations, placed, points)
+    camera_numbers = np.array([numbers[cameras[photo_cameras[row]].name] for row in shown], dtype=np.int64)
+    ids = np.array([photos[block.photo_ids[row]] for row in shown], dtype=np.int64)
+    images, rows = _images(project, shown, ids, camera_numbers, quaternions, translations, placed, points)
     colours = project.details.get("colours", {})
     poses = {
         block.photo_ids[row]: Pose(tuple(q), tuple(t))
-        for row, q, t in zip(posed.tolist(), quaternions.tolist(), translations.tolist(), strict=True)
+        for row, q, t in zip(shown.tolist(), quaternions.tolist(), translations.tolist(), strict=True)
     }
     of_photo = {
-        block.photo_ids[row]: int(number) for row, number in zip(posed.tolist(), camera_numbers, strict=True)
+        block.photo_ids[row]: int(number) for row, number in zip(shown.tolist(), camera_numbers, strict=True)
     }
     rigs, frames = _rigs(project, poses, photos, of_photo, sorted(numbers.values()))
     order = np.argsort([points[block.point_ids[row]] for row in placed], kind="stable")
@@ -252,6 +246,6 @@ def _rigs(
 
 def _sensor_pose(position: Floats, axes: Floats) -> Pose:
     """Return sensor from rig: R = F A' F and t = -R (F c)."""
-    turn = FLIP @ axes.T @ FLIP
+    turn = Y_DOWN @ axes.T @ Y_DOWN
     quaternion = Attitudes(turn[np.newaxis]).values("quaternion")[0]
-    return Pose(tuple(quaternion.tolist()), tuple((-turn @ FLIP @ position).tolist()))
+    return Pose(tuple(quaternion.tolist()), tuple((-turn @ Y_DOWN @ position).tolist()))

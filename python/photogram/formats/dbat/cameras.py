@@ -8,7 +8,6 @@ from photogram.errors import InputError
 from photogram.formats.dbat.content import Sensor, sensor_of
 from photogram.formats.project import Size
 from photogram.formats.xml_stream import Element
-from photogram.io.numbers import finite_number
 from photogram.messages import Message
 
 __all__ = ["sensors_of_cameras"]
@@ -45,14 +44,7 @@ def _numbers(element: Element, name: str, count: int) -> list[float]:
     words = [word.strip() for word in own.text.split(",")]
     if len(words) != count:
         raise own.error(f"has {len(words)} numbers, not {count}")
-    return [_number(own, word) for word in words]
-
-
-def _number(element: Element, word: str) -> float:
-    try:
-        return finite_number(word)
-    except ValueError as error:
-        raise element.error(str(error)) from None
+    return [own.place.number(word) for word in words]
 
 
 def _sensor(element: Element, number: str, messages: list[Message]) -> Sensor:
@@ -82,12 +74,12 @@ def _sides(element: Element, size: Size) -> tuple[float, float]:
     first, comma, second = (word.strip() for word in sensor.text.partition(","))
     if not comma:
         raise sensor.error("has not both width and height")
-    down = _number(sensor, second) / size[1]
+    down = sensor.place.number(second) / size[1]
     aspect = element.word("aspect", "1" if first == "auto" else "auto")
     own = element.child("aspect") or sensor
     if aspect == "auto" and first == "auto":
         raise sensor.error("neither the width of the sensor nor the aspect of pixels is a number")
-    across = _number(sensor, first) / size[0] if aspect == "auto" else _number(own, aspect) * down
+    across = sensor.place.number(first) / size[0] if aspect == "auto" else own.place.number(aspect) * down
     if not (1e-5 < down < 1 and 1e-5 < across < 1):
         raise sensor.error(f"pixels of {across:.3g} x {down:.3g} mm cannot be")
     return across, down
@@ -102,7 +94,7 @@ def _terms(element: Element) -> dict[str, float]:
         words = own.text.replace(",", " ").split()
         if len(words) > len(names):
             raise own.error(f"has {len(words)} terms; {len(names)} are the most")
-        found |= {name: _number(own, word) for name, word in zip(names, words, strict=False)}
+        found |= {name: own.place.number(word) for name, word in zip(names, words, strict=False)}
     return found
 
 

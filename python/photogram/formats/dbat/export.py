@@ -20,7 +20,6 @@ from photogram.formats.dbat.content import Content, Sensor, sensor_of
 from photogram.formats.format import Wishes
 from photogram.formats.project import Size
 from photogram.io.files import read_lines
-from photogram.io.numbers import whole_number
 from photogram.io.places import Place
 from photogram.messages import Message
 
@@ -108,10 +107,7 @@ def read_export(path: Path, wishes: Wishes) -> Content:
 def _number(card: Card, index: int) -> int:
     if index >= len(card.words):
         raise card.place.error("ends before a number of a photo or point")
-    try:
-        return whole_number(card.words[index], highest=2**53)
-    except ValueError as error:
-        raise card.place.error(str(error)) from None
+    return card.place.whole(card.words[index], highest=2**53)
 
 
 def _size(card: Card) -> Size:

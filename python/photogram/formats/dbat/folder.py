@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +16,8 @@ from photogram.formats.plain.settings import bare_settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.xml_stream import root_of
 from photogram.io.files import read_lines
-from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
+from photogram.io.rows import cells
 from photogram.messages import Message
 
 __all__ = ["is_folder", "is_measurements", "read_folder", "read_measurements"]
@@ -93,19 +92,20 @@ def read_measurements(path: Path, wishes: Wishes) -> Content:
         raise InputError(f"does not say which of {len(content.sensors)} cameras took a photo", file=path)
     camera = next(iter(content.sensors))
     pixels = []
-    for place, cells in _cells(path, _HEADER, 4):
-        point, photo = (_whole(place, cell) for cell in cells[:2])
+    for place, own in _cells(path, _HEADER, 4):
+        point, photo = (place.whole(cell, highest=2**53) for cell in own[:2])
         content.photos[photo], content.cameras[photo] = str(photo), camera
         content.image_photos.append(photo)
         content.image_points.append(point)
-        pixels.append([_number(place, cell) for cell in cells[2:4]])
+        pixels.append([place.number(cell) for cell in own[2:4]])
     content.photos = dict(sorted(content.photos.items()))
     content.pixels = np.array(pixels).reshape(-1, 2)
     content.image_sd = np.full_like(content.pixels, np.nan)
     beside = path.with_name(path.name.removesuffix(MEASURED) + COMPUTED)
     if path.name.endswith(MEASURED) and beside.is_file():
-        for place, cells in _cells(beside, "id,name,photos (used),", 6):
-            content.starts[_whole(place, cells[0])] = np.array([_number(place, cell) for cell in cells[3:6]])
+        for place, own in _cells(beside, "id,name,photos (used),", 6):
+            position = np.array([place.number(cell) for cell in own[3:6]])
+            content.starts[place.whole(own[0], highest=2**53)] = position
     return content
 
 
@@ -120,25 +120,8 @@ def _cells(path: Path, header: str, least: int) -> list[tuple[Place, list[str]]]
         if not line.strip():
             continue
         place = Place(path, record, line)
-        try:
-            cells = next(csv.reader([line]))
-        except (csv.Error, StopIteration) as error:
-            raise place.error(f"cannot be split into cells: {error}") from None
-        if len(cells) < least:
-            raise place.error(f"has {len(cells)} cells; {least} are the least")
-        found.append((place, cells))
+        own = cells(place)
+        if len(own) < least:
+            raise place.error(f"has {len(own)} cells; {least} are the least")
+        found.append((place, own))
     return found
-
-
-def _whole(place: Place, cell: str) -> int:
-    try:
-        return whole_number(cell.strip(), highest=2**53)
-    except ValueError as error:
-        raise place.error(str(error)) from None
-
-
-def _number(place: Place, cell: str) -> float:
-    try:
-        return finite_number(cell.strip())
-    except ValueError as error:
-        raise place.error(str(error)) from None

@@ -13,7 +13,6 @@ from photogram.formats.format import Wishes
 from photogram.formats.project import Options
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.delimited import ColumnTable
-from photogram.io.numbers import finite_number, whole_number
 from photogram.messages import Message, quoted
 
 __all__ = ["TITLE", "read_camera_file", "read_script"]
@@ -115,10 +114,7 @@ def _filter(points: Element) -> Callable[[int], bool]:
     found = points.child("filter")
     if found is None:
         return lambda _: True
-    try:
-        numbers = {whole_number(word.strip()) for word in found.attributes.get("id", "").split(",")}
-    except ValueError as error:
-        raise found.error(str(error)) from None
+    numbers = {found.place.whole(word.strip()) for word in found.attributes.get("id", "").split(",")}
     how = found.text.strip()
     if how not in ("keep", "remove"):
         raise found.error(f"{quoted(how)} is neither keep nor remove")
@@ -129,10 +125,7 @@ def _deviation(element: Element) -> float:
     word = element.attributes.get("sxy")
     if word is None:
         return math.nan
-    try:
-        value = finite_number(word.strip())
-    except ValueError as error:
-        raise element.error(f"sxy: {error}") from None
+    value = element.place.number(word.strip(), "sxy")
     if not value > 0:
         raise element.error(f"sxy: {value:g} is no standard deviation")
     return value
@@ -174,10 +167,7 @@ def _datum(operations: Element, content: Content) -> None:
         if each.text.strip() != "depend":
             continue
         word = each.attributes.get("ref_cam", "1")
-        try:
-            number = whole_number(word)
-        except ValueError as error:
-            raise each.error(f"ref_cam: {error}") from None
+        number = each.place.whole(word, "ref_cam")
         if number not in content.poses:
             raise each.error(f"there is no photo {number} with a pose")
         content.held.add(number)

@@ -62,10 +62,8 @@ def _whole(table: ColumnTable, column: str) -> list[int]:
 
 def _filled(table: ColumnTable, *columns: str) -> Floats:
     """Return (rows, k) numbers of which none may be missing."""
-    found = np.stack([table.numbers(column) for column in columns], axis=1)
-    if np.isnan(found).any():
-        row, k = np.argwhere(np.isnan(found))[0].tolist()
-        raise table.error(row, f"column {columns[k]}: is empty")
+    found = table.vectors(columns)
+    table.check_given(found, columns)
     return found
 
 

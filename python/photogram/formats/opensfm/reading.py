@@ -11,6 +11,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.project import Frame, Project, Size, assembled
+from photogram.formats.rotations import Y_DOWN
 from photogram.formats.tree import Tree, read_json, unknown
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number
@@ -30,7 +31,6 @@ NO_HEIGHT = 1e4
 _VERSIONS = {"OPENSFM_TRACKS_VERSION_v1": 9, "OPENSFM_TRACKS_VERSION_v2": 11}
 _FIRST = 8
 _NO_TRACKS = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty((0, 2))
-_FLIP = np.diag([1.0, -1.0, -1.0])
 
 
 def place_of(path: Path) -> Path | None:
@@ -79,7 +79,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         photo_ids=names,
         photo_cameras=of_photo,
         centres=-np.einsum("nji,nj->ni", rotations, translations),
-        matrices=(_FLIP @ rotations).transpose(0, 2, 1),
+        matrices=(Y_DOWN @ rotations).transpose(0, 2, 1),
         point_ids=list(points),
         starts=np.array([each["coordinates"].numbers(3) for each in points.values()]).reshape(-1, 3),
         image_photos=photos,

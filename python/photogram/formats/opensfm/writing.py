@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from photogram.errors import InputError
+from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.images import sizes_of, to_corner
 from photogram.formats.intersection import complete_positions
 from photogram.formats.lenses import lens_of
@@ -17,7 +18,7 @@ from photogram.formats.project import Project, Size
 from photogram.io.json import to_json
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
-from photogram.network.observations import Control, Position
+from photogram.network.observations import Position
 
 __all__ = ["cannot_hold", "write"]
 
@@ -58,7 +59,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     block = project.block
     cameras, which = known_cameras(block)
     sizes = sizes_of(project)
-    rows = np.flatnonzero(np.isfinite(np.hstack([block.photo_positions, block.photo_attitudes])).all(axis=1))
+    rows = np.flatnonzero(posed(block))
     if not len(rows):
         raise InputError("no photo has a pose, and a reconstruction holds nothing but photos with one")
     attitudes = Attitudes(attitude_matrices(block)[rows])
@@ -113,9 +114,8 @@ def _control(project: Project) -> bytes:
     block = project.block
     positions = block.point_positions.copy()
     places = {name: row for row, name in enumerate(block.point_ids)}
-    for each in block.observations:
-        if isinstance(each, Control):
-            positions[places[each.point]] = each.observed
+    for name, each in correlated_control(block).items():
+        positions[places[name]] = each.observed
     own = np.flatnonzero(np.isfinite(positions).all(axis=1))
     if not len(own) or not _placed_frame(project):
         return b""
@@ -171,7 +171,7 @@ def _camera(camera: Camera, size: Size) -> dict[str, Any]:
     return {**common, "projection_type": "brown", **normalised(lens.fx, lens.fy, lens.cx, lens.cy), **terms}
 
 
-def _tracks(project: Project, sizes: Any, which: list[int], posed: set[int]) -> bytes:
+def _tracks(project: Project, sizes: Any, which: list[int], shots: set[int]) -> bytes:
     block = project.block
     corner = to_corner(project)
     of_images = np.asarray(which)[block.image_photos]
@@ -183,7 +183,7 @@ def _tracks(project: Project, sizes: Any, which: list[int], posed: set[int]) -> 
     for photo, point, (x, y) in zip(
         block.image_photos.tolist(), block.image_points.tolist(), xy.tolist(), strict=True
     ):
-        if photo not in posed:
+        if photo not in shots:
             continue
         feature = counts[photo] = counts.get(photo, -1) + 1
         name = block.photo_ids[photo].replace("\t", " ")

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.rows import check_given, made
-from photogram.formats.plain.tables import Tables
-from photogram.io.delimited import ColumnTable
+from photogram.formats.plain.rigs import Rigs
+from photogram.formats.plain.tables import DEGREE, Tables, made
+from photogram.io.delimited import FALSE, TRUE, ColumnTable
 from photogram.messages import listed, quoted
+from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Observation, Prior
-from photogram.network.unknowns import Unknown
+from photogram.network.unknowns import Drift, Sensor, Shift, Unknown
 
-__all__ = ["Covariances", "read_covariances"]
+__all__ = ["Covariances", "covariance_tables", "read_covariances", "word_of"]
 
 CAMERA = "camera"
 
@@ -139,7 +141,7 @@ def read_covariances(tables: Tables) -> Covariances:
     if table is None:
         return Covariances(tables, None, matrices)
     values = table.numbers("covariance")
-    check_given(table, values[:, np.newaxis], ("covariance",))
+    table.check_given(values[:, np.newaxis], ("covariance",))
     kinds = [text.lower().replace("_", " ") for text in table.texts("kind")]
     columns = (table.texts("name"), table.texts("first"), table.texts("second"))
     for row, (kind, name, *pair) in enumerate(zip(kinds, *columns, strict=True)):
@@ -151,3 +153,48 @@ def read_covariances(tables: Tables) -> Covariances:
         matrix.rows.append(row)
         matrix.values[first, second] = float(values[row])
     return Covariances(tables, table, matrices)
+
+
+def covariance_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs) -> dict[str, dict[str, Any]]:
+    """Return the table of what was determined together of cameras and of unknowns."""
+    rows: list[tuple[str, str, str, str, float]] = []
+    for each in cameras:
+        if each.covariance is not None:
+            names, matrix = each.covariance
+            # In files a principal distance is positive for the positive plane, in models negative.
+            signs = np.array([-1.0 if name == "c" else 1.0 for name in names])
+            rows += _pairs(CAMERA, each.name, names, np.asarray(matrix) * signs * signs[:, np.newaxis])
+    for prior in (each for each in block.observations if isinstance(each, Prior)):
+        unknown = prior.unknown
+        units = np.array([DEGREE if name.startswith("rotation") else 1.0 for name in unknown.components])
+        matrix = prior.precision * units * units[:, np.newaxis]
+        rows += _pairs(unknown.KIND, _name(unknown, rigs), unknown.components, matrix)
+    if not rows:
+        return {}
+    columns = ("kind", "name", "first", "second", "covariance")
+    return {"covariances": {name: [row[k] for row in rows] for k, name in enumerate(columns)}}
+
+
+def _name(unknown: Unknown, rigs: Rigs) -> str:
+    """Return what reading the tables calls an unknown."""
+    if isinstance(unknown, Sensor):
+        return rigs.title(unknown)
+    return word_of(unknown) if isinstance(unknown, Shift | Drift) else unknown.name
+
+
+def _pairs(
+    kind: str, name: str, components: Sequence[str], matrix: Floats
+) -> list[tuple[str, str, str, str, float]]:
+    return [
+        (kind, name, components[i], components[j], float(matrix[i, j]))
+        for i in range(len(components))
+        for j in range(i + 1)
+        if i == j or matrix[i, j]
+    ]
+
+
+def word_of(unknown: Shift | Drift | None) -> str:
+    """Return what the column of a shift or drift says: its name, where that is no word for true or false."""
+    if unknown is None:
+        return "false"
+    return unknown.title if unknown.name.lower() in TRUE | FALSE else unknown.name

@@ -1,4 +1,4 @@
-"""Tables of what was observed beside images, but for points on surfaces."""
+"""Tables of positions, attitudes and relative poses of photos, with what they have in common."""
 
 from __future__ import annotations
 
@@ -6,34 +6,39 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.rows import check_given, made
-from photogram.formats.plain.surfaces import read_surfaces
-from photogram.formats.plain.tables import AXES, POSE, ROTATIONS, Tables, covariances_of, indices_of
+from photogram.formats.plain.covariances import covariance_tables, word_of
+from photogram.formats.plain.kinds import kind_tables, read_kinds
+from photogram.formats.plain.rigs import Rigs, angles_of, read_bases
+from photogram.formats.plain.schema import ANGLES, AXES, POSE, ROTATIONS, deviation_columns
+from photogram.formats.plain.tables import (
+    DEGREE,
+    Tables,
+    correlations,
+    covariances_of,
+    indices_of,
+    made,
+    places_written,
+)
 from photogram.formats.plain.transform import Transform
 from photogram.formats.rigging import Rig
-from photogram.io.delimited import FALSE, TRUE, ColumnTable
-from photogram.messages import quoted
-from photogram.network.observations import (
-    Attitude,
-    Base,
-    Difference,
-    Distance,
-    EqualHeight,
-    Observation,
-    Position,
-    Relative,
-)
-from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, Shift, Unknown
+from photogram.io.delimited import FALSE, TRUE
+from photogram.network.block import Block
+from photogram.network.cameras import Camera
+from photogram.network.observations import Attitude, Observation, Position, Relative
+from photogram.network.unknowns import Boresight, Drift, LeverArm, Shift, Unknown
 
-__all__ = ["read_observations"]
+__all__ = ["observed_tables", "read_observations"]
 
 _Shared = TypeVar("_Shared", LeverArm, Shift, Drift)
-_ROTATIONS = tuple(f"sd_{name}" for name in ROTATIONS)
+_ROTATIONS = deviation_columns(ROTATIONS)
+_ANGLES = ANGLES["omega_phi_kappa"]
+_Columns = dict[str, dict[str, Any]]
+_Kind = TypeVar("_Kind", bound=Observation)
 
 
 def read_observations(
@@ -54,12 +59,9 @@ def read_observations(
     return [
         *_gnss(tables, transform, photos, times),
         *_attitudes(tables, photos),
-        *_distances(tables, points),
-        *_height_differences(tables, points),
-        *_coordinate_differences(tables, points),
-        *read_surfaces(tables, transform, points),
+        *read_kinds(tables, transform, points),
         *_relative_poses(tables, photos),
-        *_bases(tables, rigs),
+        *read_bases(tables, rigs),
     ]
 
 
@@ -79,10 +81,10 @@ def _gnss(
     if table is None:
         return []
     rows = indices_of(table, "photo", photos, "photo")
-    positions = np.stack([table.numbers(axis) for axis in AXES], axis=1)
-    check_given(table, positions, AXES)
+    positions = table.vectors(AXES)
+    table.check_given(positions, AXES)
     sd = tables.deviations(table, "gnss", [f"sd_{axis}" for axis in AXES])
-    check_given(table, sd, [f"sd_{axis}" for axis in AXES], "is empty: give it, or gnss under [sd]")
+    table.check_given(sd, [f"sd_{axis}" for axis in AXES], "is empty: give it, or gnss under [sd]")
     covariances = covariances_of(sd, table)
     positions, covariances = transform.positions("gnss", positions, covariances, table)
     groups = _gnss_groups(tables)
@@ -120,12 +122,9 @@ def _gnss_groups(tables: Tables) -> dict[str, _Group]:
     if table is None:
         return {}
     zeros = {"lever": tables.vectors(table, [f"lever_{axis}" for axis in AXES], 0.0)}
-    zeros |= {
-        kind: np.stack([table.numbers(f"{kind}_{axis}", 0.0) for axis in AXES], axis=1)
-        for kind in ("shift", "drift")
-    }
+    zeros |= {kind: table.vectors([f"{kind}_{axis}" for axis in AXES], 0.0) for kind in ("shift", "drift")}
     sd = {
-        kind: np.stack([table.numbers(f"sd_{kind}_{axis}", default, infinite=True) for axis in AXES], axis=1)
+        kind: table.vectors([f"sd_{kind}_{axis}" for axis in AXES], default, infinite=True)
         for kind, default in (("lever", 0.0), ("shift", math.inf), ("drift", math.inf))
     }
     epochs = [None if math.isnan(each) else float(each) for each in table.numbers("drift_epoch")]
@@ -176,11 +175,11 @@ def _attitudes(tables: Tables, photos: Mapping[str, int]) -> list[Observation]:
     rows = indices_of(table, "photo", photos, "photo")
     matrices = tables.matrices(table)
     given = tables.settings.sd.get("attitudes")
-    sd = np.stack([table.numbers(name, read=tables.angle) for name in _ROTATIONS], axis=1)
+    sd = table.vectors(_ROTATIONS, read=tables.angle)
     if given is not None:
         defaults = np.broadcast_to([tables.angle(repr(each)) for each in given], 3)
         sd = np.where(np.isnan(sd), defaults, sd)
-    check_given(table, sd, _ROTATIONS, "is empty: give it, or attitudes under [sd]")
+    table.check_given(sd, _ROTATIONS, "is empty: give it, or attitudes under [sd]")
     boresights = _attitude_groups(tables)
     groups, names = table.texts("group"), list(photos)
     for row in range(table.count):
@@ -211,9 +210,7 @@ def _attitude_groups(tables: Tables) -> dict[str, Boresight]:
     if table is None:
         return {}
     matrices = tables.matrices(table)
-    sd = np.stack(
-        [table.numbers(name, math.inf, infinite=True, read=tables.angle) for name in _ROTATIONS], axis=1
-    )
+    sd = table.vectors(_ROTATIONS, math.inf, infinite=True, read=tables.angle)
     found: dict[str, Boresight] = {}
     for row, name in enumerate(table.texts("group")):
         if name in found:
@@ -227,79 +224,6 @@ def _attitude_groups(tables: Tables) -> dict[str, Boresight]:
     return found
 
 
-def _distances(tables: Tables, points: Mapping[str, int]) -> list[Observation]:
-    table = tables.read("distances")
-    if table is None:
-        return []
-    first, second = _ends(table, points)
-    lengths = table.numbers("distance")
-    sd = tables.deviations(table, "distances", ["sd"])[:, 0]
-    check_given(table, np.column_stack([lengths, sd]), ("distance", "sd"))
-    known, names = _instruments(tables), table.texts("instrument")
-
-    def distance(row: int) -> Distance:
-        if names[row] and names[row] not in known:
-            known[names[row]] = Instrument(names[row])
-        return Distance(first[row], second[row], float(lengths[row]), float(sd[row]), known.get(names[row]))
-
-    return [made(table, row, partial(distance, row)) for row in range(table.count)]
-
-
-def _instruments(tables: Tables) -> dict[str, Instrument]:
-    """Return instruments; one that only the distances name has a free scale and constant."""
-    table = tables.read("instruments")
-    if table is None:
-        return {}
-    table.names("instrument")
-    scale, constant = table.numbers("scale", 1.0), table.numbers("constant", 0.0)
-    sd = np.stack(
-        [table.numbers(name, math.inf, infinite=True) for name in ("sd_scale", "sd_constant")], axis=1
-    )
-    found: dict[str, Instrument] = {}
-    for row, name in enumerate(table.texts("instrument")):
-        if name in found:
-            raise table.error(row, f"the instrument {name} is there twice")
-        found[name] = made(
-            table,
-            row,
-            partial(Instrument, name, float(scale[row]), float(constant[row]), sd[row]),
-        )
-    return found
-
-
-def _height_differences(tables: Tables, points: Mapping[str, int]) -> list[Observation]:
-    table = tables.read("height_differences")
-    if table is None:
-        return []
-    first, second = _ends(table, points)
-    heights, sd = table.numbers("dz"), tables.deviations(table, "height_differences", ["sd"])[:, 0]
-    check_given(table, np.column_stack([heights, sd]), ("dz", "sd"))
-    return [
-        made(table, row, partial(EqualHeight, first[row], second[row], float(sd[row]), float(heights[row])))
-        for row in range(table.count)
-    ]
-
-
-def _coordinate_differences(tables: Tables, points: Mapping[str, int]) -> list[Observation]:
-    table = tables.read("coordinate_differences")
-    if table is None:
-        return []
-    first, second = _ends(table, points)
-    columns = ("dx", "dy", "dz")
-    vectors = np.stack([table.numbers(each) for each in columns], axis=1)
-    sd = tables.deviations(table, "coordinate_differences", [f"sd_{each}" for each in columns])
-    check_given(table, np.where(np.isnan(vectors), 0.0, sd), [f"sd_{each}" for each in columns])
-    covariances = covariances_of(np.where(np.isnan(vectors), 1.0, sd), table, columns)
-    return [
-        made(
-            table,
-            row,
-            partial(Difference, first[row], second[row], vectors[row], covariance=covariances[row]),
-        )
-        for row in range(table.count)
-    ]
-
-
 def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observation]:
     table = tables.read("relative_poses")
     if table is None:
@@ -307,11 +231,11 @@ def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observati
     names = list(photos)
     first, second = (indices_of(table, column, photos, "photo").tolist() for column in ("from", "to"))
     vectors, turns = tables.vectors(table, AXES), tables.turns(table)
-    check_given(table, vectors, AXES)
+    table.check_given(vectors, AXES)
     lengths = tables.deviations(table, "relative_poses", [f"sd_{axis}" for axis in AXES])
-    angles = np.stack([table.numbers(name, read=tables.angle) for name in _ROTATIONS], axis=1)
+    angles = table.vectors(_ROTATIONS, read=tables.angle)
     sd = np.column_stack([lengths, angles])
-    check_given(table, sd, [f"sd_{name}" for name in POSE])
+    table.check_given(sd, [f"sd_{name}" for name in POSE])
     covariances = tables.pose_covariances(table, sd)
     for row in np.flatnonzero(np.isnan(turns).any(axis=(1, 2))).tolist():
         raise table.error(row, "there are no angles")
@@ -332,40 +256,127 @@ def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observati
     ]
 
 
-def _bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
-    table = tables.read("bases")
-    if table is None:
-        return []
-    lengths = table.numbers("distance")
-    sd = tables.deviations(table, "bases", ["sd"])[:, 0]
-    check_given(table, np.column_stack([lengths, sd]), ("distance", "sd"))
-    found: list[Observation] = []
-    for row, (name, *ends) in enumerate(
-        zip(*(table.texts(column) for column in ("rig", "from", "to")), strict=True)
-    ):
-        if name not in rigs:
-            raise table.error(row, f"column rig: there is no rig {quoted(name)}")
-        rig = rigs[name]
-        for column, end in zip(("from", "to"), ends, strict=True):
-            if end != rig.reference and end not in rig.sensors:
-                raise table.error(row, f"column {column}: the rig {name} has no camera {quoted(end)}")
-        # The reference is the frame: what lies between two cameras has no direction.
-        first, second = sorted(ends, key=lambda end: end != rig.reference)
-        if first == second:
-            raise table.error(row, f"a base from {first} to itself")
-        found.append(
-            made(
-                table,
-                row,
-                partial(
-                    Base, rig.sensors.get(first), rig.sensors[second], float(lengths[row]), float(sd[row])
-                ),
-            )
-        )
+def observed_tables(block: Block, cameras: Sequence[Camera], photo_cameras: Sequence[int]) -> _Columns:
+    """Return the tables of all observations beside images, of what they have in common, and of rigs."""
+    rigs = Rigs(block, [cameras[row].name for row in photo_cameras])
+    return {
+        **_gnss_tables(block),
+        **_attitude_tables(block),
+        **kind_tables(block),
+        **_pose_tables(block),
+        **rigs.tables(block),
+        **covariance_tables(block, cameras, rigs),
+    }
+
+
+def _all(block: Block, kind: type[_Kind]) -> list[_Kind]:
+    return [each for each in block.observations if isinstance(each, kind)]
+
+
+def _columns(names: Sequence[str], values: Floats) -> dict[str, Any]:
+    return dict(zip(names, values.T, strict=True))
+
+
+def _deviations(observations: Sequence[Observation]) -> Floats:
+    """Return (n, k) standard deviations of observations."""
+    found: Floats = np.sqrt(np.array([np.diag(each.precision) for each in observations]))
     return found
 
 
-def _ends(table: ColumnTable, points: Mapping[str, int]) -> tuple[list[str], list[str]]:
-    names = list(points)
-    first, second = (indices_of(table, column, points, "point").tolist() for column in ("from", "to"))
-    return [names[row] for row in first], [names[row] for row in second]
+def _gnss_tables(block: Block) -> _Columns:
+    positions = _all(block, Position)
+    if not positions:
+        return {}
+    keys = [(_lever(each), each.shift, each.drift) for each in positions]
+    groups = {key: str(row) for row, key in enumerate(dict.fromkeys(keys), 1)}
+    covariances = np.array([each.precision for each in positions])
+    table: dict[str, Any] = {
+        "photo": [each.photo for each in positions],
+        **_columns(AXES, places_written(block, np.array([each.observed[:3] for each in positions]))),
+        **_columns([f"sd_{axis}" for axis in AXES], _deviations(positions)),
+        **correlations(covariances, AXES),
+    }
+    if list(groups) == [((0.0, 0.0, 0.0), None, None)]:
+        return {"gnss": table}
+    table["group"] = [groups[key] for key in keys]
+    levers = [key[0] if isinstance(key[0], LeverArm) else None for key in groups]
+    own: dict[str, Any] = {
+        "group": list(groups.values()),
+        "lever": ["" if each is None else each.name for each in levers],
+        "shift": [word_of(key[1]) for key in groups],
+        "drift": [word_of(key[2]) for key in groups],
+    }
+    known = np.array(
+        [(0.0,) * 3 if each is not None else key[0] for each, key in zip(levers, groups, strict=True)]
+    )
+    given = [each.position if each is not None else row for each, row in zip(levers, known, strict=True)]
+    own |= _columns([f"lever_{axis}" for axis in AXES], np.array(given))
+    own |= _columns([f"sd_lever_{axis}" for axis in AXES], _of(levers, "deviations", 0.0))
+    for what, column in (("shift", 1), ("drift", 2)):
+        unknowns = [key[column] for key in groups]
+        own |= _columns([f"{what}_{axis}" for axis in AXES], _of(unknowns, "position", np.nan))
+        own |= _columns([f"sd_{what}_{axis}" for axis in AXES], _of(unknowns, "deviations", np.nan))
+    epochs = [None if drift is None else drift.epoch for _, _, drift in groups]
+    if any(each is not None for each in epochs):
+        own["drift_epoch"] = np.array([np.nan if each is None else each for each in epochs])
+    return {"gnss": table, "gnss_groups": own}
+
+
+def _of(unknowns: Sequence[Unknown | None], what: str, missing: float) -> Floats:
+    """Return (n, 3) numbers of unknowns."""
+    return np.array([(missing,) * 3 if each is None else getattr(each, what) for each in unknowns])
+
+
+def _lever(each: Position) -> Any:
+    if isinstance(each.lever_arm, LeverArm):
+        return each.lever_arm
+    return tuple(np.broadcast_to(np.asarray(each.lever_arm, dtype=float), 3).tolist())
+
+
+def _attitude_tables(block: Block) -> _Columns:
+    attitudes = _all(block, Attitude)
+    if not attitudes:
+        return {}
+    groups = {id(each.boresight): each.boresight for each in attitudes if each.boresight is not None}
+    names = {
+        key: each.name if isinstance(each, Boresight) else f"known {row}"
+        for row, (key, each) in enumerate(groups.items(), 1)
+    }
+    covariances = np.array([each.precision for each in attitudes])
+    table: dict[str, Any] = {
+        "photo": [each.photo for each in attitudes],
+        **_columns(_ANGLES, angles_of(np.array([np.asarray(each.attitude) for each in attitudes]), block)),
+        **_columns([f"sd_{name}" for name in ROTATIONS], np.degrees(_deviations(attitudes))),
+        **correlations(covariances, ROTATIONS, (DEGREE,) * 3),
+    }
+    if not groups:
+        return {"attitudes": table}
+    table["group"] = [names.get(id(each.boresight), "") for each in attitudes]
+    given = list(groups.values())
+    # The boresight is body to photo; the tables have attitudes of the photo in the axes of what carries it.
+    matrices = np.array(
+        [each.attitude if isinstance(each, Boresight) else np.asarray(each, dtype=float) for each in given]
+    ).transpose(0, 2, 1)
+    angles = angles_of(matrices, block)
+    angles[[isinstance(each, Boresight) and each.is_open for each in given]] = np.nan
+    sd = np.array([each.deviations if isinstance(each, Boresight) else np.zeros(3) for each in given])
+    own: dict[str, Any] = {"group": list(names.values()), **_columns(_ANGLES, angles)}
+    own |= _columns([f"sd_{name}" for name in ROTATIONS], np.degrees(sd))
+    return {"attitudes": table, "attitude_groups": own}
+
+
+def _pose_tables(block: Block) -> _Columns:
+    poses = _all(block, Relative)
+    if not poses:
+        return {}
+    units = (1.0,) * 3 + (DEGREE,) * 3
+    return {
+        "relative_poses": {
+            "from": [each.first for each in poses],
+            "to": [each.second for each in poses],
+            **_columns(AXES, np.array([np.asarray(each.translation) for each in poses])),
+            **_columns(_ANGLES, angles_of(np.array([np.asarray(each.rotation) for each in poses]), block)),
+            **_columns([f"sd_{name}" for name in POSE], _deviations(poses) * units),
+            **correlations(np.array([each.precision for each in poses]), POSE, units),
+        }
+    }

@@ -18,8 +18,9 @@ from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_p
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.observed import read_observations
 from photogram.formats.plain.rigs import read_frames, read_rigs
+from photogram.formats.plain.schema import ANGLES, AXES
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
-from photogram.formats.plain.tables import ANGLES, AXES, Tables, covariances_of, indices_of
+from photogram.formats.plain.tables import Tables, covariances_of, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project, assembled
 from photogram.formats.rigging import mounted
@@ -146,7 +147,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     if control is not None and given is not None:
         from photogram.formats.exchanged import check_systems
 
-        raw = np.stack([control.numbers(axis) for axis in AXES], axis=1)
+        raw = control.vectors(AXES)
         rows = np.array([points.names.index(name) for name in given.names], dtype=np.int64)
         check_systems(project, settings, control, rows, raw, free=False)
     return project
@@ -181,7 +182,7 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
         raise InputError("has no table of photos (photos.csv)", file=tables.settings.path)
     texts = table.names_once("photo")
     use = table.flags("use")
-    centres = np.stack([table.numbers(axis) for axis in AXES], axis=1)
+    centres = table.vectors(AXES)
     sd = tables.deviations(table, "photos", _SD, math.inf)
     weighted = np.isfinite(sd) & np.isnan(centres)
     if weighted.any():
@@ -244,9 +245,7 @@ def _attitude_weights(
     columns = steps if any(each in table for each in steps) else own
     if not any(each in table for each in columns):
         return free, []
-    sd = np.stack(
-        [table.numbers(each, math.inf, infinite=True, read=tables.angle) for each in columns], axis=1
-    )
+    sd = table.vectors(columns, math.inf, infinite=True, read=tables.angle)
     if (sd < 0).any():
         row = int(np.argwhere(sd < 0)[0][0])
         raise table.error(row, "a standard deviation of an angle is negative")
@@ -297,11 +296,8 @@ def read_images(tables: Tables, photos: Photos) -> Images:
     places = {name: row for row, name in enumerate(photos.names)}
     rows = indices_of(table, "photo", places | dict.fromkeys(photos.unused, len(places)), "photo")
     names = table.names("point")
-    xy = np.column_stack([table.numbers(xs), table.numbers(ys)])
-    missing = np.argwhere(np.isnan(xy))
-    if len(missing):
-        row, k = missing[0].tolist()
-        raise table.error(row, f"column {(xs, ys)[k]}: is empty")
+    xy = table.vectors((xs, ys))
+    table.check_given(xy, (xs, ys))
     _check_twice(table, rows, names.rows, len(names.names))
     keep = table.flags("use") & (rows < len(places)) if "use" in table or photos.unused else None
     sd = _image_sd(tables, table)
@@ -400,9 +396,9 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
         A point that is there twice or has no coordinate, a standard deviation that is missing.
     """
     names = table.names_once("point")
-    values = np.stack([table.numbers(axis) for axis in AXES], axis=1)
+    values = table.vectors(AXES)
     uses = [each.lower() for each in table.texts("use", "control")]
-    sd = np.stack([table.numbers(name, infinite=True) for name in _SD], axis=1)
+    sd = table.vectors(_SD, infinite=True)
     stray = ~np.isnan(sd) & np.isnan(values)
     if stray.any():
         row, k = np.argwhere(stray)[0].tolist()
@@ -471,7 +467,7 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
     positions, sd, check_sd = starts.copy(), np.full((len(names), 3), np.inf), starts.copy()
     if table is not None:
         rows = np.array([places[name] for name in own], dtype=np.int64)
-        given = np.stack([table.numbers(axis) for axis in AXES], axis=1)
+        given = table.vectors(AXES)
         own_sd = tables.deviations(table, "points", _SD, math.inf)
         given, _ = transform.positions("points", given, None, table)
         starts[rows] = given

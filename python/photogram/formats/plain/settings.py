@@ -5,8 +5,6 @@ from __future__ import annotations
 import difflib
 import math
 import os
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,64 +12,18 @@ from typing import Any, NoReturn, cast
 
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns, columns_given
+from photogram.formats.plain.schema import TABLES
 from photogram.formats.project import DatumName, Frame, Options
-from photogram.io.files import read_bytes
-from photogram.io.places import Place
+from photogram.io.toml import TomlFile
 from photogram.messages import Message, listed, nearest
 from photogram.results.features import KINDS, Definition
 
-__all__ = ["TABLES", "Settings", "bare_settings", "read_settings", "unread_tables"]
+__all__ = ["Settings", "bare_settings", "read_settings", "unread_tables"]
 
 VERSION = 1
-TABLES = (
-    "cameras",
-    "photos",
-    "images",
-    "points",
-    "control",
-    "distances",
-    "instruments",
-    "height_differences",
-    "coordinate_differences",
-    "levels",
-    "level_points",
-    "planes",
-    "plane_points",
-    "lines",
-    "line_points",
-    "plumb_lines",
-    "plumb_line_points",
-    "gnss",
-    "gnss_groups",
-    "attitudes",
-    "attitude_groups",
-    "relative_poses",
-    "rigs",
-    "frames",
-    "bases",
-    "covariances",
-)
-"""In the order in which they are read and written."""
-WITH_CRS = ("control", "gnss", "points", "photos")
-WITH_SD = (
-    "images",
-    "control",
-    "check",
-    "points",
-    "gnss",
-    "photos",
-    "attitudes",
-    "distances",
-    "height_differences",
-    "coordinate_differences",
-    "level_points",
-    "plane_points",
-    "line_points",
-    "plumb_line_points",
-    "bases",
-)
-WITH_THREE = ("control", "points", "gnss", "photos", "attitudes", "coordinate_differences")
-"""Of these those that may have three; images may have two, all others have one."""
+WITH_CRS = tuple(name for name, each in TABLES.items() if each.has_system)
+WITH_SD = {name: each.deviations for name, each in TABLES.items() if each.deviations} | {"check": (1, 3)}
+"""Of check points they are those of the table of control."""
 ENDINGS = (".csv", ".tsv", ".txt", ".parquet")
 
 _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
@@ -102,8 +54,8 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
     "frame": ("kind", "crs", "origin", "ellipsoid"),
     "units": ("length", "angle", "image"),
     "axes": ("image_y", "pixel_origin", "attitude", "rotation", "photo"),
-    "sd": WITH_SD,
-    "tables": TABLES,
+    "sd": tuple(WITH_SD),
+    "tables": tuple(TABLES),
     "adjust": ("datum", "loss", "unit_variance"),
     **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
     "features": (),
@@ -247,33 +199,12 @@ def bare_settings(
     )
 
 
-class _File:
-    """A file of settings whose errors name the line."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        try:
-            self.lines = read_bytes(path).decode("utf-8-sig").replace("\r\n", "\n").split("\n")
-            self.content: dict[str, Any] = tomllib.loads("\n".join(self.lines))
-        except UnicodeDecodeError as error:
-            raise InputError(
-                f"is no text of UTF-8: {error.reason} at byte {error.start}", file=path
-            ) from None
-        except tomllib.TOMLDecodeError as error:
-            where = re.search(r"at line (\d+)", str(error))
-            record = int(where[1]) if where else None
-            text = self.lines[record - 1] if record and record <= len(self.lines) else None
-            raise InputError(f"is no TOML: {error}", file=path, record=record, text=text) from None
-        except RecursionError:
-            raise InputError("is nested too deep", file=path) from None
+class _File(TomlFile):
+    """A file of settings."""
 
     def fail(self, key: str, message: str) -> NoReturn:
         """Raise an error at the first line that has the key."""
-        pattern = re.compile(rf"^\s*\[?\[?\s*[\"']?{re.escape(key)}[\"']?\s*[\]=.]")
-        for record, line in enumerate(self.lines, 1):
-            if pattern.match(line):
-                raise Place(self.path, record, line).error(message)
-        raise Place(self.path).error(message)
+        raise self.error(key, message)
 
     def check_keys(self) -> None:
         """Refuse sections and keys that there are not."""
@@ -357,8 +288,7 @@ class _File:
 
     def deviations(self, table: str) -> tuple[float, ...]:
         """Return standard deviations of a table."""
-        counts = (1, 2) if table == "images" else (1, 3) if table in WITH_THREE else (1,)
-        found = self.numbers("sd", table, counts)
+        found = self.numbers("sd", table, WITH_SD[table])
         if not all(each >= 0 for each in found):
             self.fail(table, f"{list(found)} is no standard deviation")
         return found

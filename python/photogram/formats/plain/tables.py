@@ -1,232 +1,44 @@
-"""The tables of a plain project: which columns they have, and how cells become numbers."""
+"""The tables of a plain project: how cells become numbers, and these columns."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
 from photogram.formats.column_words import UNITS
 from photogram.formats.columns import PLAIN, check_unread, degrees, nameless, settled
-from photogram.formats.plain.settings import WITH_CRS, Settings
+from photogram.formats.plain.schema import ALL_ANGLES, ANGLES, AXES, POSE, TABLES, covariance_columns
+from photogram.formats.plain.settings import Settings
+from photogram.formats.rotations import Y_DOWN, is_rotation
 from photogram.io.delimited import ColumnTable, read_columns, read_rows
 from photogram.messages import Message, listed, quoted
 from photogram.network.attitudes import Attitudes, Representation
+from photogram.network.block import Block
+from photogram.network.unknowns import Unknown
 
 __all__ = [
-    "ANGLES",
-    "AXES",
-    "COLUMNS",
-    "POSE",
-    "ROTATIONS",
+    "DEGREE",
     "Tables",
-    "covariance_columns",
+    "correlations",
     "covariances_of",
+    "different",
     "indices_of",
+    "made",
     "matrices_of",
+    "places_written",
+    "vectors_of",
 ]
 
-AXES = ("x", "y", "z")
-ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")
-POSE = (*AXES, *ROTATIONS)
-"""Components of poses: small rotations are about the axes of the photo."""
-ANGLES: Mapping[str, tuple[str, ...]] = {
-    "omega_phi_kappa": ("omega", "phi", "kappa"),
-    "phi_omega_kappa": ("phi", "omega", "kappa"),
-    "yaw_pitch_roll": ("yaw", "pitch", "roll"),
-    "azimuth_tilt_swing": ("azimuth", "tilt", "swing"),
-    "quaternion": ("qw", "qx", "qy", "qz"),
-    "rotation_vector": ("rx", "ry", "rz"),
-    "matrix": ("m11", "m12", "m13", "m21", "m22", "m23", "m31", "m32", "m33"),
-}
-"""Columns of each representation of attitudes."""
-_ALL_ANGLES = tuple(dict.fromkeys(name for names in ANGLES.values() for name in names))
-_SD_ANGLES = tuple(f"sd_{name}" for name in _ALL_ANGLES[:8] if not name.startswith(("q", "m")))
-_ROTATIONS = tuple(f"sd_{name}" for name in ROTATIONS)
-_SD = tuple(f"sd_{axis}" for axis in AXES)
-_FLIP = np.diag([1.0, -1.0, -1.0])
-
-
-def covariance_columns(names: Sequence[str]) -> dict[str, tuple[int, int]]:
-    """Return the columns of covariances between components, and which ones: `cov_xy`, `cov_x_rotation_y`."""
-    return {
-        f"cov_{names[i]}{names[j]}" if len(names[i] + names[j]) == 2 else f"cov_{names[i]}_{names[j]}": (i, j)
-        for j in range(len(names))
-        for i in range(j)
-    }
-
-
-_COVARIANCES = tuple(covariance_columns(AXES))
-
-
-def _parameters() -> tuple[str, ...]:
-    names = {name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}
-    return tuple(sorted(names))
-
-
-_PARAMETERS = _parameters()
-
-COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "cameras": (
-        "camera",
-        "model",
-        "width",
-        "height",
-        "pixel_mm",
-        "weights",
-        "for_each",
-        *_PARAMETERS,
-        *(f"sd_{name}" for name in _PARAMETERS),
-    ),
-    "photos": (
-        "photo",
-        "camera",
-        *AXES,
-        *_ALL_ANGLES,
-        *_SD,
-        *_SD_ANGLES,
-        *_ROTATIONS,
-        "group",
-        "strip",
-        "frame",
-        "time",
-        "use",
-    ),
-    "images": (
-        "photo",
-        "point",
-        "column",
-        "row",
-        "x",
-        "y",
-        "sd",
-        "sd_x",
-        "sd_y",
-        "sd_column",
-        "sd_row",
-        "correlation",
-        "use",
-    ),
-    "points": ("point", *AXES, *_SD),
-    "control": ("point", *AXES, "sd", *_SD, *_COVARIANCES, "use"),
-    "gnss": ("photo", *AXES, "sd", *_SD, *_COVARIANCES, "group", "time"),
-    "gnss_groups": (
-        "group",
-        *(
-            f"{sd}{kind}_{axis}"
-            for kind in ("lever", "shift", "drift")
-            for sd in ("", "sd_")
-            for axis in AXES
-        ),
-        "drift_epoch",
-        "lever",
-        "shift",
-        "drift",
-    ),
-    "attitudes": (
-        "photo",
-        *_ALL_ANGLES,
-        *_SD_ANGLES,
-        *_ROTATIONS,
-        *covariance_columns(ROTATIONS),
-        "group",
-    ),
-    "attitude_groups": ("group", *_ALL_ANGLES, *_ROTATIONS),
-    "distances": ("from", "to", "distance", "sd", "instrument"),
-    "instruments": ("instrument", "scale", "constant", "sd_scale", "sd_constant"),
-    "height_differences": ("from", "to", "dz", "sd"),
-    "coordinate_differences": (
-        *("from", "to", "dx", "dy", "dz", "sd", "sd_dx", "sd_dy", "sd_dz"),
-        *covariance_columns(("dx", "dy", "dz")),
-    ),
-    "levels": ("level", "z", "sd"),
-    "level_points": ("level", "point", "dz", "sd"),
-    "planes": (
-        *("plane", *AXES, "nx", "ny", "nz"),
-        *("sd_distance", "sd_rotation_x", "sd_rotation_y"),
-    ),
-    "plane_points": ("plane", "point", "distance", "sd"),
-    "lines": (
-        *("line", *AXES, "dx", "dy", "dz"),
-        *("sd_x", "sd_y", "sd_rotation_x", "sd_rotation_y"),
-    ),
-    "line_points": ("line", "point", "sd", "sd_x", "sd_y", "cov_xy"),
-    "plumb_lines": ("plumb_line", *AXES, "sd_x", "sd_y"),
-    "plumb_line_points": ("plumb_line", "point", "sd", "sd_x", "sd_y", "cov_xy"),
-    "relative_poses": (
-        *("from", "to", *AXES, *_ALL_ANGLES, *_SD, *_ROTATIONS),
-        *covariance_columns(POSE),
-    ),
-    "rigs": ("rig", "camera", "sensor", *AXES, *_ALL_ANGLES, *_SD, *_ROTATIONS),
-    "frames": ("frame", "rig", "photo", "sensor"),
-    "bases": ("rig", "from", "to", "distance", "sd"),
-    "covariances": ("kind", "name", "first", "second", "covariance"),
-}
-"""Columns that a table may have."""
-REQUIRED: Mapping[str, tuple[str, ...]] = {
-    "cameras": ("camera",),
-    "photos": ("photo",),
-    "images": ("photo", "point"),
-    "points": ("point", *AXES),
-    "control": ("point",),
-    "gnss": ("photo", *AXES),
-    "gnss_groups": ("group",),
-    "attitudes": ("photo",),
-    "attitude_groups": ("group",),
-    "distances": ("from", "to", "distance"),
-    "height_differences": ("from", "to", "dz"),
-    "coordinate_differences": ("from", "to", "dx", "dy", "dz"),
-    "instruments": ("instrument",),
-    "levels": ("level",),
-    "level_points": ("level", "point"),
-    "planes": ("plane",),
-    "plane_points": ("plane", "point"),
-    "lines": ("line",),
-    "line_points": ("line", "point"),
-    "plumb_lines": ("plumb_line",),
-    "plumb_line_points": ("plumb_line", "point"),
-    "relative_poses": ("from", "to", *AXES),
-    "rigs": ("rig",),
-    "frames": ("frame", "rig", "photo"),
-    "bases": ("rig", "from", "to", "distance"),
-    "covariances": ("kind", "name", "first", "second", "covariance"),
-}
-_TEXTS = frozenset(
-    {
-        "camera",
-        "model",
-        "for_each",
-        "photo",
-        "point",
-        "group",
-        "strip",
-        "frame",
-        "rig",
-        "from",
-        "to",
-        "use",
-        "sensor",
-        "drift_epoch",
-        "lever",
-        "shift",
-        "drift",
-        "instrument",
-        "level",
-        "plane",
-        "line",
-        "plumb_line",
-        "kind",
-        "name",
-        "first",
-        "second",
-        "weights",
-    }
-)
+DEGREE = 180 / np.pi
+"""Of a radian."""
+_Made = TypeVar("_Made")
 
 
 def _labelled(columns: Sequence[str]) -> list[str]:
@@ -261,13 +73,13 @@ class Tables:
         """
         if name not in self.settings.tables:
             return None
-        known, path = COLUMNS[name], self.settings.tables[name]
-        numbers = set(known) - _TEXTS
-        if name not in WITH_CRS:
+        schema, path = TABLES[name], self.settings.tables[name]
+        known, numbers = schema.columns, schema.numbers
+        if not schema.has_system:
             table = read_columns(
                 path, known=known, numbers=numbers, spelling=_labelled if name == "images" else tuple
             )
-            table.require(*REQUIRED[name])
+            table.require(*schema.required)
             check_unread(table, PLAIN, known, name, self.messages)
             return table
         given = self.settings.columns.get(name, PLAIN)
@@ -278,7 +90,7 @@ class Tables:
                 path, known=known, numbers=numbers, spelling=partial(given.spelled, known), hint=nameless
             )
         metre = 1.0 / UNITS[self.settings.length]
-        return settled(table, given, known, metre, REQUIRED[name], self.names, name, self.messages)
+        return settled(table, given, known, metre, schema.required, self.names, name, self.messages)
 
     def angle(self, text: str) -> float:
         """Return an angle in radians from a cell in the unit of the project."""
@@ -299,19 +111,14 @@ class Tables:
             Columns of another representation than that of the settings, rows with some of the numbers only.
         """
         names = ANGLES[self.settings.attitude]
-        others = [each for each in table.columns if each in _ALL_ANGLES and each not in names]
+        others = [each for each in table.columns if each in ALL_ANGLES and each not in names]
         if others and not set(names) <= set(table.columns):
             raise table.head.error(
                 f"columns {listed(others)}, but [axes] attitude is {self.settings.attitude}:"
                 f" {', '.join(names)}"
             )
         plain = self.settings.attitude in ("quaternion", "rotation_vector", "matrix")
-        columns = [table.numbers(name, read=None if plain else self.angle) for name in names]
-        values: Floats = np.stack(columns, axis=1)
-        bad = np.flatnonzero(np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1))
-        if bad.size:
-            raise table.error(int(bad[0]), f"some of {', '.join(names)} are empty: give all or none")
-        return values
+        return vectors_of(table, names, None if plain else self.angle)
 
     def matrices(self, table: ColumnTable) -> Floats:
         """Return (rows, 3, 3) attitudes A, photo to object; NaN where there are none."""
@@ -331,7 +138,7 @@ class Tables:
     @property
     def flip(self) -> Floats:
         """(3, 3) what carries vectors from the axes of photos, as the settings have them, to ours."""
-        return _FLIP if self.settings.photo == "y_down" else np.eye(3)
+        return Y_DOWN if self.settings.photo == "y_down" else np.eye(3)
 
     def turns(self, table: ColumnTable) -> Floats:
         """Return (rows, 3, 3) the axes of one photo in those of another, as columns; NaN without."""
@@ -340,7 +147,7 @@ class Tables:
 
     def vectors(self, table: ColumnTable, names: Sequence[str], default: float = math.nan) -> Floats:
         """Return (rows, 3) vectors in the axes of photos."""
-        found: Floats = np.stack([table.numbers(name, default) for name in names], axis=1) @ self.flip
+        found: Floats = table.vectors(names, default) @ self.flip
         return found
 
     def pose_covariances(self, table: ColumnTable, sd: Floats) -> Floats:
@@ -358,12 +165,8 @@ class Tables:
                 size = float(np.linalg.norm(values[row]))
                 if not 0.99 < size < 1.01:
                     raise table.error(row, f"the quaternion has the length {size:.6g}, not 1")
-            elif kind == "matrix":
-                matrix = values[row].reshape(3, 3)
-                with np.errstate(over="ignore", invalid="ignore"):
-                    apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
-                if not apart < 1e-6 or np.linalg.det(matrix) < 0:
-                    raise table.error(row, "m11 .. m33 are no rotation matrix: not orthonormal, or mirrored")
+            elif kind == "matrix" and not is_rotation(values[row].reshape(3, 3)):
+                raise table.error(row, "m11 .. m33 are no rotation matrix: not orthonormal, or mirrored")
 
     def deviations(
         self, table: ColumnTable, kind: str, columns: Sequence[str], default: float = math.nan
@@ -406,7 +209,7 @@ def matrices_of(settings: Settings, values: Floats) -> Floats:
     turned = found.transpose(0, 2, 1) if kind in ("omega_phi_kappa", "phi_omega_kappa") else found
     to_photo = turned if settings.rotation == "object_to_photo" else turned.transpose(0, 2, 1)
     if settings.photo == "y_down":
-        to_photo = np.diag([1.0, -1.0, -1.0]) @ to_photo
+        to_photo = Y_DOWN @ to_photo
     photo_to_object: Floats = to_photo.transpose(0, 2, 1)
     return photo_to_object
 
@@ -459,3 +262,47 @@ def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind:
         row = int(np.flatnonzero(found.rows == missing)[0])
         raise table.error(row, f"column {column}: there is no {kind} {quoted(found.names[missing])}")
     return rows[found.rows]
+
+
+def vectors_of(
+    table: ColumnTable, columns: Sequence[str], read: Callable[[str], float] | None = None
+) -> Floats:
+    """Return (rows, k) numbers that are given altogether or not at all; NaN where they are not."""
+    values: Floats = table.vectors(columns, read=read)
+    partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
+    if partly.any():
+        row = int(np.flatnonzero(partly)[0])
+        raise table.error(row, f"some of {', '.join(columns)} are empty: give all or none")
+    return values
+
+
+def made(table: ColumnTable, row: int, make: Callable[[], _Made]) -> _Made:
+    """Make something of a row; what it refuses is an error of the row."""
+    try:
+        return make()
+    except InputError as error:
+        raise (error if error.file else table.error(row, error.message)) from None
+
+
+def correlations(
+    covariances: Floats, names: Sequence[str], units: Sequence[float] | None = None
+) -> dict[str, Any]:
+    """Return the columns of covariances, where there are any; `units` are those of a table in ours."""
+    scales = (1.0,) * len(names) if units is None else units
+    columns = covariance_columns(names)
+    if not any(np.nan_to_num(covariances[:, i, j]).any() for i, j in columns.values()):
+        return {}
+    return {name: covariances[:, i, j] * (scales[i] * scales[j]) for name, (i, j) in columns.items()}
+
+
+def places_written(block: Block, values: Floats) -> Floats:
+    """Return positions as tables have them."""
+    if not block.geographic:
+        return values
+    found: Floats = np.column_stack([np.degrees(values[:, :2]), values[:, 2]])
+    return found
+
+
+def different(unknowns: Sequence[Unknown | None]) -> list[Any]:
+    """Return unknowns, each once."""
+    return list({id(each): each for each in unknowns if each is not None}.values())

@@ -10,11 +10,13 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
+from photogram.formats.block_contents import correlated_control
 from photogram.formats.images import to_corner
-from photogram.formats.plain.observed_writing import correlations, observed_tables
-from photogram.formats.plain.rigs_writing import Rigs
+from photogram.formats.plain.observed import observed_tables
+from photogram.formats.plain.rigs import Rigs
+from photogram.formats.plain.schema import AXES
 from photogram.formats.plain.settings import VERSION
-from photogram.formats.plain.tables import AXES
+from photogram.formats.plain.tables import correlations
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
 from photogram.network.attitudes import Attitudes
@@ -238,7 +240,7 @@ def control_table(project: Project) -> dict[str, Any]:
     rows = {int(row): "control" for row in np.flatnonzero(held.any(axis=1))} | dict.fromkeys(
         project.checks, "check"
     )
-    full = {each.points[0]: each for each in block.observations if isinstance(each, Control)}
+    full = correlated_control(block)
     places = {name: row for row, name in enumerate(block.point_ids)}
     order = sorted({*rows, *(places[name] for name in full)})
     if not order:
@@ -271,7 +273,7 @@ def control_table(project: Project) -> dict[str, Any]:
 def _points(project: Project) -> dict[str, Any]:
     block = project.block
     held: Bools = np.asarray(np.isfinite(block.point_positions).any(axis=1))
-    full = {each.points[0] for each in block.observations if isinstance(each, Control)}
+    full = correlated_control(block)
     own = [row for row, name in enumerate(block.point_ids) if not held[row] and name not in full]
     if not own:
         return {}

@@ -1,0 +1,289 @@
+"""The tables of the plain project, each declared once: its columns, which it needs, what is said of it.
+
+`python -m photogram.formats.plain.schema` prints the table of the documentation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from photogram import _photocore
+
+__all__ = [
+    "ALL_ANGLES",
+    "ANGLES",
+    "AXES",
+    "POSE",
+    "ROTATIONS",
+    "TABLES",
+    "Schema",
+    "covariance_columns",
+    "deviation_columns",
+]
+
+AXES = ("x", "y", "z")
+ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")
+POSE = (*AXES, *ROTATIONS)
+"""Components of poses: small rotations are about the axes of the photo."""
+ANGLES: Mapping[str, tuple[str, ...]] = {
+    "omega_phi_kappa": ("omega", "phi", "kappa"),
+    "phi_omega_kappa": ("phi", "omega", "kappa"),
+    "yaw_pitch_roll": ("yaw", "pitch", "roll"),
+    "azimuth_tilt_swing": ("azimuth", "tilt", "swing"),
+    "quaternion": ("qw", "qx", "qy", "qz"),
+    "rotation_vector": ("rx", "ry", "rz"),
+    "matrix": ("m11", "m12", "m13", "m21", "m22", "m23", "m31", "m32", "m33"),
+}
+"""Columns of each representation of attitudes."""
+ALL_ANGLES = tuple(dict.fromkeys(name for names in ANGLES.values() for name in names))
+
+
+def covariance_columns(names: Sequence[str]) -> dict[str, tuple[int, int]]:
+    """Return the columns of covariances between components, and which ones: `cov_xy`, `cov_x_rotation_y`."""
+    return {
+        f"cov_{names[i]}{names[j]}" if len(names[i] + names[j]) == 2 else f"cov_{names[i]}_{names[j]}": (i, j)
+        for j in range(len(names))
+        for i in range(j)
+    }
+
+
+def deviation_columns(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the columns of standard deviations of components."""
+    return tuple(f"sd_{name}" for name in names)
+
+
+@dataclass(frozen=True)
+class Schema:
+    """A table.
+
+    Attributes
+    ----------
+    required
+        Columns that it must have.
+    texts, numbers
+        All columns that it may have: names and words, and numbers.
+    about
+        What the documentation says of them.
+    deviations
+        How many standard deviations `[sd]` may have for it; none: it has no place there.
+    has_system
+        Whether its coordinates may be in another system than the frame, and its headings be those of others.
+    """
+
+    required: tuple[str, ...]
+    texts: tuple[str, ...]
+    numbers: tuple[str, ...]
+    about: str
+    deviations: tuple[int, ...] = ()
+    has_system: bool = False
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """All columns that the table may have."""
+        return self.texts + self.numbers
+
+
+_SD_AXES, _SD_ROTATIONS = deviation_columns(AXES), deviation_columns(ROTATIONS)
+_SD_ANGLES = deviation_columns(ALL_ANGLES[:9])
+"""Of angles about axes."""
+_PARAMETERS = tuple(sorted({name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}))
+_ENDS, _DIFFERENCE = ("from", "to"), ("dx", "dy", "dz")
+_ACROSS = ("sd", "sd_x", "sd_y", "cov_xy")
+_COMMON = tuple(
+    f"{sd}{kind}_{axis}" for kind in ("lever", "shift", "drift") for sd in ("", "sd_") for axis in AXES
+)
+
+TABLES: Mapping[str, Schema] = {
+    "cameras": Schema(
+        ("camera",),
+        ("camera", "model", "for_each", "weights"),
+        ("width", "height", "pixel_mm", *_PARAMETERS, *deviation_columns(_PARAMETERS)),
+        "`camera`; `model` (default `brown` with `c`, else `pinhole`), `width`, `height`, `pixel_mm`, `f` or"
+        " `fx`, `fy` or `c` (positive for the positive plane), all other parameters by the names of the"
+        " model, `sd_NAME` (0 held, `inf` unknown), `for_each` (`all`, `photo`, `group`), `weights`"
+        " (`corrected`, `measured`) of backward models",
+    ),
+    "photos": Schema(
+        ("photo",),
+        ("photo", "camera", "group", "strip", "frame", "use"),
+        (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ANGLES, *_SD_ROTATIONS, "time"),
+        "`photo`; `camera` (if there are several), `x`, `y`, `z`, angles by `[axes] attitude`, `sd_x` ..,"
+        " `sd_omega` .. or `sd_rotation_x` .., `group`, `time`, `use`",
+        deviations=(1, 3),
+        has_system=True,
+    ),
+    "images": Schema(
+        ("photo", "point"),
+        ("photo", "point", "use"),
+        ("column", "row", "x", "y", "sd", "sd_x", "sd_y", "sd_column", "sd_row", "correlation"),
+        "`photo`, `point`, `column`, `row` (or `x`, `y`); `sd`, or `sd_column`, `sd_row`; `use`",
+        deviations=(1, 2),
+    ),
+    "points": Schema(
+        ("point", *AXES),
+        ("point",),
+        (*AXES, *_SD_AXES),
+        "`point`, `x`, `y`, `z`; `sd_x` ..: initial values, may be left out altogether",
+        deviations=(1, 3),
+        has_system=True,
+    ),
+    "control": Schema(
+        ("point",),
+        ("point", "use"),
+        (*AXES, "sd", *_SD_AXES, *covariance_columns(AXES)),
+        "`point`, one of `x`, `y`, `z`; `sd_x` .., `cov_xy`, `cov_xz`, `cov_yz`, `use` (`control`, `check`,"
+        " `off`): of a check point `sd_x` .. say how good its coordinates are"
+        " ([tests](tests.md#check-points)); `[sd]` has `check` for these",
+        deviations=(1, 3),
+        has_system=True,
+    ),
+    "distances": Schema(
+        (*_ENDS, "distance"),
+        (*_ENDS, "instrument"),
+        ("distance", "sd"),
+        "`from`, `to`, `distance`; `sd`, `instrument`",
+        deviations=(1,),
+    ),
+    "instruments": Schema(
+        ("instrument",),
+        ("instrument",),
+        ("scale", "constant", "sd_scale", "sd_constant"),
+        "`instrument`; `scale` (1), `constant` (0), `sd_scale`, `sd_constant` (empty: free)",
+    ),
+    "height_differences": Schema(
+        (*_ENDS, "dz"),
+        _ENDS,
+        ("dz", "sd"),
+        "`from`, `to`, `dz`; `sd`: levelled heights, above the ellipsoid in geographic space",
+        deviations=(1,),
+    ),
+    "coordinate_differences": Schema(
+        (*_ENDS, *_DIFFERENCE),
+        _ENDS,
+        (*_DIFFERENCE, "sd", *deviation_columns(_DIFFERENCE), *covariance_columns(_DIFFERENCE)),
+        "`from`, `to`, `dx`, `dy`, `dz` (empty: not observed); `sd`, `sd_dx` .., `cov_dx_dy` ..",
+        deviations=(1, 3),
+    ),
+    "levels": Schema(("level",), ("level",), ("z", "sd"), "`level`; `z`, `sd`"),
+    "level_points": Schema(
+        ("level", "point"),
+        ("level", "point"),
+        ("dz", "sd"),
+        "`level`, `point`; `dz` above it (0), `sd`",
+        deviations=(1,),
+    ),
+    "planes": Schema(
+        ("plane",),
+        ("plane",),
+        (*AXES, "nx", "ny", "nz", "sd_distance", "sd_rotation_x", "sd_rotation_y"),
+        "`plane`; `x`, `y`, `z` of a place, `nx`, `ny`, `nz` of the normal, `sd_distance`, `sd_rotation_x`,"
+        " `sd_rotation_y`",
+    ),
+    "plane_points": Schema(
+        ("plane", "point"),
+        ("plane", "point"),
+        ("distance", "sd"),
+        "`plane`, `point`; `distance` from it along the normal (0), `sd`",
+        deviations=(1,),
+    ),
+    "lines": Schema(
+        ("line",),
+        ("line",),
+        (*AXES, *_DIFFERENCE, "sd_x", "sd_y", "sd_rotation_x", "sd_rotation_y"),
+        "`line`; `x`, `y`, `z` of a place, `dx`, `dy`, `dz` of the direction, `sd_x`, `sd_y`,"
+        " `sd_rotation_x`, `sd_rotation_y`",
+    ),
+    "line_points": Schema(
+        ("line", "point"),
+        ("line", "point"),
+        _ACROSS,
+        "`line`, `point`; `sd`, or `sd_x`, `sd_y` across it, `cov_xy`",
+        deviations=(1,),
+    ),
+    "plumb_lines": Schema(
+        ("plumb_line",),
+        ("plumb_line",),
+        (*AXES, "sd_x", "sd_y"),
+        "`plumb_line`; `x`, `y`, `z` of a place, `sd_x`, `sd_y`",
+    ),
+    "plumb_line_points": Schema(
+        ("plumb_line", "point"),
+        ("plumb_line", "point"),
+        _ACROSS,
+        "`plumb_line`, `point`; `sd`, or `sd_x`, `sd_y`, `cov_xy`",
+        deviations=(1,),
+    ),
+    "gnss": Schema(
+        ("photo", *AXES),
+        ("photo", "group"),
+        (*AXES, "sd", *_SD_AXES, *covariance_columns(AXES), "time"),
+        "`photo`, `x`, `y`, `z`; `sd`, `sd_x` .., `cov_xy` .., `group`, `time`",
+        deviations=(1, 3),
+        has_system=True,
+    ),
+    "gnss_groups": Schema(
+        ("group",),
+        ("group", "lever", "shift", "drift", "drift_epoch"),
+        _COMMON,
+        "`group`; `lever` (a name that groups share; default: the group's), `lever_x` .., `sd_lever_x` .. (0:"
+        " known), `shift`, `drift` (true, false, or a name that groups share), `shift_x` .., `drift_x` ..,"
+        " `sd_shift_x` .., `sd_drift_x` .. (empty: free), `drift_epoch` (the time that a drift counts from;"
+        " empty: the mean time of its observations)",
+    ),
+    "attitudes": Schema(
+        ("photo",),
+        ("photo", "group"),
+        (*ALL_ANGLES, *_SD_ANGLES, *_SD_ROTATIONS, *covariance_columns(ROTATIONS)),
+        "`photo`, angles; `sd_rotation_x` .., `cov_rotation_x_rotation_y` .., `group`",
+        deviations=(1, 3),
+    ),
+    "attitude_groups": Schema(
+        ("group",),
+        ("group",),
+        (*ALL_ANGLES, *_SD_ROTATIONS),
+        "`group`; angles of the boresight (empty: from photos and attitudes), `sd_rotation_x` .. (empty:"
+        " free)",
+    ),
+    "relative_poses": Schema(
+        (*_ENDS, *AXES),
+        _ENDS,
+        (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ROTATIONS, *covariance_columns(POSE)),
+        "`from`, `to` (photos), `x`, `y`, `z`, angles: the second photo in the axes of the first; `sd_x` ..,"
+        " `sd_rotation_x` .., `cov_xy` .., `cov_x_rotation_z` ..",
+    ),
+    "rigs": Schema(
+        ("rig",),
+        ("rig", "camera", "sensor"),
+        (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ROTATIONS),
+        "`rig`, `camera` or `sensor`; `x`, `y`, `z`, angles, `sd_x` .., `sd_rotation_x` ..; the first row of"
+        " a rig is its reference, a row with no numbers an unknown sensor",
+    ),
+    "frames": Schema(
+        ("frame", "rig", "photo"),
+        ("frame", "rig", "photo", "sensor"),
+        (),
+        "`frame`, `rig`, `photo`; `sensor`, where the photo's camera does not tell it",
+    ),
+    "bases": Schema(
+        ("rig", *_ENDS, "distance"),
+        ("rig", *_ENDS),
+        ("distance", "sd"),
+        "`rig`, `from`, `to` (cameras or sensors), `distance`; `sd`",
+        deviations=(1,),
+    ),
+    "covariances": Schema(
+        ("kind", "name", "first", "second", "covariance"),
+        ("kind", "name", "first", "second"),
+        ("covariance",),
+        "`kind`, `name`, `first`, `second`, `covariance`: what was determined together of a `camera`"
+        " (parameters), or of a `lever arm`, `shift`, `drift`, `boresight`, `instrument`, `level`, `plane`,"
+        " `line`, `plumb line`, `sensor` (components as [observations](observations.md) call them); one"
+        " triangle with its diagonal, what is missing is 0",
+    ),
+}
+"""In the order in which they are read and written."""
+
+if __name__ == "__main__":
+    print("| table | columns (required ones first) |\n| --- | --- |")
+    print("\n".join(f"| `{name}` | {each.about} |" for name, each in TABLES.items()))
