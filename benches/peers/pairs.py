@@ -4,7 +4,7 @@ python benches/peers/pairs.py free 100x500 [...] [--repetitions N]
 python benches/peers/pairs.py cameras 50x100 [...] [--repetitions N]
 
 `free`: inner constraints over all points, beside the same block with control. `cameras`: a camera of eight
-weighted parameters for each photo, retained blocks of fourteen, beside one known camera. All with covariances and
+weighted parameters for each photo, blocks of fourteen, beside one known camera. All with covariances and
 redundancy numbers, from the same initial values, interleaved; processor time is compared.
 """
 
