@@ -11,6 +11,7 @@ ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "extending.md").read_text()
 CAMERAS = Path("crates/photocore/src/geometry/camera")
 KINDS = Path("crates/photocore/src/network/observations")
+MOUNTS = Path("crates/photocore/src/network/mounts")
 FORMATS = Path("python/photogram/collection/formats")
 PACKAGE = [
     path
@@ -39,6 +40,13 @@ EXTENSIONS = {
         "equal_height::EqualHeight;",
         r"EqualHeight|equal.height",
         [*CRATE, *BINDING],
+    ),
+    "motion": (
+        MOUNTS / "rolling.rs",
+        MOUNTS / "mod.rs",
+        "rolling::Rolling;",
+        r"\b[Rr]olling\b",
+        [*CRATE, *BINDING, *PACKAGE],
     ),
 }
 """Its file, the file that registers it, the line there, its name, and the sources that do not know it."""

@@ -8,12 +8,13 @@ use std::ops::ControlFlow;
 use photocore::Threads;
 use photocore::adjustment::{self, Method, Status, Stop};
 use photocore::geometry::{AttitudeNumbers, Matrix3, Perspective, Pose, RotationSense, Vector3, rotation};
+use photocore::network::mounts::OnFrame;
 use photocore::network::observations::{
     Attitude, Base, Distance, OnLevel, OnLine, OnPlane, OnPlumbLine, Position, Quantity, Relative,
 };
 use photocore::network::{
-    Camera, Combination, Common, CommonKind, Image, InnerConstraints, Mount, Network, NetworkDatum,
-    NetworkError, Observation, Options, Photo, Point, Precision, Solution,
+    Camera, Combination, Common, CommonKind, Image, InnerConstraints, Network, NetworkDatum, NetworkError,
+    Observation, Options, Photo, Point, Precision, Solution,
 };
 
 const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
@@ -113,8 +114,10 @@ fn free(errors: f64) -> Network {
         common(CommonKind::Instrument, Vector3::new(1.0, 0.0, 0.0), Matrix3::identity()),
         common(CommonKind::Sensor, sensor.position + 0.02 * noises(5), sensor.attitude),
     ];
-    network.mounts =
-        vec![Mount { photo: 5, frame: 0, sensor: SENSOR }, Mount { photo: 6, frame: 2, sensor: SENSOR }];
+    network.mounts = vec![
+        OnFrame { photo: 5, frame: 0, sensor: SENSOR }.into(),
+        OnFrame { photo: 6, frame: 2, sensor: SENSOR }.into(),
+    ];
     let plane = |point: usize| {
         let distance = errors * 1e-3 * noise(60 + point);
         Observation::from(OnPlane { point, plane: PLANE, distance, sd: 1e-3 })

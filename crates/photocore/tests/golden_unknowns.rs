@@ -11,10 +11,11 @@ use nalgebra::{DMatrix, Matrix6};
 use photocore::Threads;
 use photocore::adjustment::{self, Method, Status, Stop};
 use photocore::geometry::{self, AttitudeNumbers, Matrix3, Perspective, PoseNumbers, RotationSense};
+use photocore::network::mounts::OnFrame;
 use photocore::network::observations::{Attitude, Control, Position, Quantity};
 use photocore::network::{
-    AdjustedObservation, AdjustedPhoto, Camera, Common, CommonKind, Image, Mount, Network, Observation, Of,
-    Options, Photo, Point, Precision, Solution,
+    AdjustedObservation, AdjustedPhoto, Camera, Common, CommonKind, Image, Network, Observation, Of, Options,
+    Photo, Point, Precision, Solution,
 };
 use serde_json::Value;
 
@@ -334,7 +335,7 @@ fn a_rig_with_an_unknown_sensor() {
     for frame in 0..frames {
         let photo = Photo { camera: 1, ..file.network.photos[frame] };
         file.network.photos.push(photo);
-        file.network.mounts.push(Mount { photo: frames + frame, frame, sensor: 0 });
+        file.network.mounts.push(OnFrame { photo: frames + frame, frame, sensor: 0 }.into());
     }
     file.add_images("image sensor 1", |index, names| index[names[0]]);
     let first = file.network.images.len();

@@ -8,10 +8,12 @@ use faer::{Mat, Side};
 use num_complex::Complex64 as C;
 use photocore::Threads;
 use photocore::adjustment::{self, Loss, Method, Status, Stop};
+use photocore::geometry::angle_axis::rotation_angle_axis;
 use photocore::geometry::{
     self, AttitudeNumbers, Matrix3, ObjectSpace, Perspective, Pose, PoseNumbers, RotationSense, Vector3,
-    rotation,
+    angle_axis_rotation, rotation,
 };
+use photocore::network::mounts::{OnFrame, Rolling};
 use photocore::network::observations::{
     Attitude, Base, Control, Difference, Distance, EqualHeight, Fault, OnLevel, OnLine, OnPlane, OnPlumbLine,
     Position, Prior, Quantity, Relative,
@@ -199,6 +201,10 @@ const SENSOR: usize = 9;
 /// Photos on frames; that of the last has no images itself.
 const MOUNTED: [usize; 3] = [5, 6, 8];
 const FRAMES: [usize; 3] = [0, 1, 7];
+const MOTION: usize = 10;
+/// Photos that move while they are read: the frame of another, and one by itself. Seconds per unit of image coordinates.
+const ROLLING: [usize; 2] = [1, 3];
+const BY_XY: [f64; 2] = [0.001, -0.01];
 const ALL: usize = 9;
 
 /// What a common unknown is, without errors.
@@ -213,6 +219,7 @@ fn truth(common: usize) -> Pose {
         CommonKind::Line => place(10),
         CommonKind::Plane => place(3),
         CommonKind::Sensor => [0.4, 0.05, -0.1],
+        CommonKind::Motion => [0.3, -0.4, 0.2],
         CommonKind::Boresight => [0.0; 3],
     };
     let attitude = match CommonKind::ALL[common] {
@@ -224,6 +231,7 @@ fn truth(common: usize) -> Pose {
         }
         CommonKind::Plane => rotation([0.3, -0.6, 0.2]),
         CommonKind::Sensor => rotation([0.1, -0.2, 0.15]),
+        CommonKind::Motion => angle_axis_rotation(&Vector3::new(0.2, -0.1, 0.4)),
         _ => Matrix3::identity(),
     };
     Pose { position: position.into(), attitude }
@@ -231,7 +239,18 @@ fn truth(common: usize) -> Pose {
 
 /// The pose of a photo, on a frame or not.
 fn seen(photo: usize) -> Pose {
-    let own = |k: usize| Pose { position: position(&pose(k)), attitude: attitude(&pose(k)) };
+    seen_at(photo, 0.0)
+}
+
+/// That of an image so many seconds later.
+fn seen_at(photo: usize, time: f64) -> Pose {
+    let own = |k: usize| {
+        let (time, Pose { position: v, attitude: turn }) =
+            (if ROLLING.contains(&k) { time } else { 0.0 }, truth(MOTION));
+        let (centre, a) = (position(&pose(k)), attitude(&pose(k)));
+        let attitude = a * angle_axis_rotation(&(time * rotation_angle_axis(&turn)));
+        Pose { position: centre + time * a * v, attitude }
+    };
     match MOUNTED.iter().position(|&mounted| mounted == photo) {
         None => own(photo),
         Some(k) => {
@@ -244,6 +263,16 @@ fn seen(photo: usize) -> Pose {
     }
 }
 
+/// The image of a point without errors: its time depends on where it is.
+fn imaged(photo: usize, point: usize) -> [f64; 2] {
+    let mut xy = [0.0; 2];
+    for _ in 0..20 {
+        let u = seen_at(photo, BY_XY[0] * xy[0] + BY_XY[1] * xy[1]).sight(&place(point).into());
+        xy = [0, 1].map(|k| PRINCIPAL_DISTANCE * u[k] / u[2]);
+    }
+    xy
+}
+
 /// Adds a rig, common unknowns of all types, and what is observed of them.
 fn with_commons(network: &mut Network) {
     let free = network.photos[0];
@@ -252,12 +281,19 @@ fn with_commons(network: &mut Network) {
         network.photos.push(Photo { pose, observed: pose, ..free });
     }
     for (photo, point) in MOUNTED.iter().flat_map(|&photo| (0..POINTS).map(move |point| (photo, point))) {
-        let u = seen(photo).sight(&place(point).into());
-        let xy = [0, 1].map(|k| PRINCIPAL_DISTANCE * u[k] / u[2] + IMAGE_SD * noise(1500 + 29 * point + k));
+        let xy = [0, 1].map(|k| imaged(photo, point)[k] + IMAGE_SD * noise(1500 + 29 * point + k));
         network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
     }
-    let mount = |k: usize| Mount { photo: MOUNTED[k], frame: FRAMES[k], sensor: SENSOR };
+    for Image { photo, point, xy, .. } in
+        network.images.iter_mut().filter(|image| ROLLING.contains(&image.photo))
+    {
+        let u = seen(*photo).sight(&place(*point).into());
+        (0..2).for_each(|k| xy[k] += imaged(*photo, *point)[k] - PRINCIPAL_DISTANCE * u[k] / u[2]);
+    }
+    let mount = |k: usize| OnFrame { photo: MOUNTED[k], frame: FRAMES[k], sensor: SENSOR }.into();
     network.mounts = [0, 1, 2].map(mount).to_vec();
+    let moving = |photo| -> Mount { Rolling { photo, motion: MOTION, start: 0.0, by_xy: BY_XY }.into() };
+    network.mounts.extend(ROLLING.map(moving));
     let infinite = f64::INFINITY;
     let deviations = |kind: CommonKind| match kind {
         CommonKind::LeverArm => vec![0.02, 0.03, infinite],
@@ -271,6 +307,8 @@ fn with_commons(network: &mut Network) {
         let small = |first: usize, size: f64| [0, 1, 2].map(|k| size * noise(1600 + 10 * common + first + k));
         let turns = kind.unknowns().iter().any(|&(_, component, _)| component > 2);
         let size = if kind == CommonKind::Drift || kind == CommonKind::Instrument { 0.001 } else { 0.01 };
+        let turns = turns && kind != CommonKind::Motion;
+        let attitude = if kind == CommonKind::Motion { Matrix3::identity() } else { attitude };
         let attitude = if turns { attitude * rotation(small(3, 0.02)) } else { attitude };
         Common {
             kind,
@@ -475,7 +513,9 @@ mod dense {
                 start += block.nrows();
             }
             let fixed_points = network.points.iter().flat_map(|point| point.sd);
-            let mounted = |photo: usize| network.mounts.iter().any(|mount| mount.photo == photo);
+            let mounted = |photo: usize| {
+                network.mounts.iter().any(|mount| mount.photo() == photo && mount.frame().is_some())
+            };
             let photo = |(k, photo): (usize, &Photo)| if mounted(k) { [0.0; 6] } else { photo.sd };
             let all = fixed_points.chain(network.photos.iter().enumerate().flat_map(photo));
             let all = all.chain(network.commons.iter().flat_map(|common| common.sd.clone()));
@@ -504,12 +544,28 @@ mod dense {
 
         /// The pose of a photo.
         pub fn photo(&self, x: &[C], i: usize) -> (V, M) {
+            self.photo_at(x, i, 0.0)
+        }
+
+        /// That of an image so many seconds later.
+        fn photo_at(&self, x: &[C], i: usize, time: f64) -> (V, M) {
             let own = |i: usize| -> (V, M) {
                 let own = &x[3 * self.network.points.len() + 6 * i..][..6];
                 let m = product(&about(2, own[5]), &product(&about(1, own[4]), &about(0, own[3])));
-                ([own[0], own[1], own[2]], transposed(&m))
+                let ([x0, y0, z0], a) = ([own[0], own[1], own[2]], transposed(&m));
+                if !ROLLING.contains(&i) || self.network.mounts.is_empty() {
+                    return ([x0, y0, z0], a);
+                }
+                // Its rotation is given as none.
+                let first = self.first(MOTION) + 3;
+                let way = times(&a, &self.common(x, MOTION).1.map(|v| time * v));
+                let turn = exponential(&std::array::from_fn(|k| time * x[first + k]));
+                ([x0 + way[0], y0 + way[1], z0 + way[2]], product(&a, &turn))
             };
-            let Some(mount) = self.network.mounts.iter().find(|mount| mount.photo == i) else {
+            let mut mounts = self.network.mounts.iter();
+            let Some(Mount::OnFrame(mount)) =
+                mounts.find(|mount| mount.photo() == i && mount.frame().is_some())
+            else {
                 return own(i);
             };
             let ((centre, a), (_, arm, turn)) = (own(mount.frame), self.common(x, mount.sensor));
@@ -524,7 +580,8 @@ mod dense {
             let place = |i: usize| -> V { self.network.commons[i].position.map(C::from) };
             let mut all = vec![];
             for image in &self.network.images {
-                let (centre, a) = photo(image.photo);
+                let time = BY_XY[0] * image.xy[0] + BY_XY[1] * image.xy[1];
+                let (centre, a) = self.photo_at(x, image.photo, time);
                 let u = times(&transposed(&a), &minus(&point(image.point), &centre));
                 all.extend([0, 1].map(|k| image.xy[k] - PRINCIPAL_DISTANCE * u[k] / u[2]));
             }

@@ -2,6 +2,7 @@
 
 use photocore::geometry::Matrix3;
 use photocore::network::commons::Measure;
+use photocore::network::mounts::OnFrame;
 use photocore::network::{AdjustedCommon, Common, CommonKind, Mount};
 use pyo3::prelude::*;
 
@@ -22,6 +23,7 @@ fn measured(measure: Measure) -> &'static str {
         Measure::Length => "length",
         Measure::Speed => "speed",
         Measure::Angle => "angle",
+        Measure::Rate => "rate",
         Measure::Ratio => "ratio",
     }
 }
@@ -40,7 +42,7 @@ pub type MountRow = (usize, usize, usize);
 
 /// The mount of a row.
 pub fn mount((photo, frame, sensor): MountRow) -> Mount {
-    Mount { photo, frame, sensor }
+    OnFrame { photo, frame, sensor }.into()
 }
 
 /// Change, position, rotation matrix row by row, cofactors row by row, redundancy numbers, number of observations.

@@ -5,6 +5,7 @@ use nalgebra::Matrix6;
 use super::angle_axis::rotation_angle_axis;
 use super::attitude::{AttitudeNumbers, RotationSense};
 use super::ellipsoid::{local_vertical, local_vertical_turns};
+use super::pose::column;
 use super::space::{Lift, ObjectSpace, Point};
 use super::{Matrix3, Pose, Vector3, angle_axis_with_jacobian};
 
@@ -90,6 +91,12 @@ impl Orientation {
         Self { pose: Pose { position: centre, attitude }, unknowns }
     }
 
+    /// The orientation of a pose that is known: its unknowns are its coordinates and a rotation step.
+    pub fn of_pose(space: ObjectSpace, pose: &Pose) -> Self {
+        let (coordinates, local) = local(space, pose);
+        Self::stepping(space, coordinates, &local)
+    }
+
     /// The orientation with the rotation vector of A^T and the translation t.
     pub fn from_vectors(rotation: Vector3, translation: Vector3) -> Self {
         let (to_photo, turns) = angle_axis_with_jacobian(&rotation);
@@ -168,12 +175,7 @@ impl Orientation {
 
     /// The steps of [`Orientation::steps`] as columns, dC, then rho.
     pub fn step_matrix(&self) -> Matrix6<f64> {
-        let mut steps = Matrix6::zeros();
-        for (k, (shift, rho)) in self.steps().iter().enumerate() {
-            steps.fixed_view_mut::<3, 1>(0, k).copy_from(shift);
-            steps.fixed_view_mut::<3, 1>(3, k).copy_from(rho);
-        }
-        steps
+        Matrix6::from_columns(&self.steps().map(|(shift, rho)| column(&shift, &rho)))
     }
 
     /// How the six unknowns move with a step of the pose, dC, then rho: the inverse of [`Orientation::steps`]. None where angles are
@@ -187,11 +189,7 @@ impl Orientation {
         let Pose { position, attitude } = self.pose;
         match numbers {
             PoseNumbers::Angles(sense) => {
-                let [x, y, z] = space.coordinates(position);
-                let local = match space {
-                    ObjectSpace::Rectangular => attitude,
-                    ObjectSpace::Geographic(_) => local_vertical(x, y) * attitude,
-                };
+                let ([x, y, z], local) = local(space, &self.pose);
                 let [omega, phi, kappa] = AttitudeNumbers::OmegaPhiKappa(sense).numbers(&local);
                 [x, y, z, omega, phi, kappa]
             }
@@ -249,4 +247,15 @@ impl Orientation {
         };
         (by_photo, point.by_coordinates(&by_place).into())
     }
+}
+
+/// The coordinates of a pose, and its attitude in the axes that its angles refer to: those of the space or, where it is geographic, east,
+/// north and up there.
+fn local(space: ObjectSpace, pose: &Pose) -> ([f64; 3], Matrix3) {
+    let coordinates = space.coordinates(pose.position);
+    let local = match space {
+        ObjectSpace::Rectangular => pose.attitude,
+        ObjectSpace::Geographic(_) => local_vertical(coordinates[0], coordinates[1]) * pose.attitude,
+    };
+    (coordinates, local)
 }

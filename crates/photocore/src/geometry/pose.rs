@@ -1,5 +1,7 @@
 //! Where a photo stands and how it is turned: its pose, and the step of a pose.
 
+use nalgebra::{Matrix6xX, Vector6};
+
 use super::angle_axis::angle_axis_rotation;
 use super::{Matrix3, Vector3};
 
@@ -19,6 +21,25 @@ pub struct Pose {
     pub position: Vector3,
     /// A, photo to object: its columns are the photo's axes.
     pub attitude: Matrix3,
+}
+
+/// How a pose steps (see [`Pose::step`]) with unknowns: dC, then rho, a column for each.
+pub type Steps = Matrix6xX<f64>;
+
+/// Steps, dC and rho, as columns.
+pub fn steps(each: impl IntoIterator<Item = (Vector3, Vector3)>) -> Steps {
+    let columns: Vec<Vector6<f64>> = each.into_iter().map(|(shift, rho)| column(&shift, &rho)).collect();
+    Steps::from_columns(&columns)
+}
+
+/// What becomes of each step.
+fn each(all: &Steps, step: impl Fn(Vector3, Vector3) -> (Vector3, Vector3)) -> Steps {
+    steps(all.column_iter().map(|own| step(own.fixed_rows::<3>(0).into(), own.fixed_rows::<3>(3).into())))
+}
+
+/// A step as a column.
+pub(super) fn column(shift: &Vector3, rho: &Vector3) -> Vector6<f64> {
+    Vector6::new(shift.x, shift.y, shift.z, rho.x, rho.y, rho.z)
 }
 
 impl Pose {
@@ -55,5 +76,24 @@ impl Pose {
         // One step of Newton's method for the nearest orthonormal matrix.
         let attitude = turned * (3.0 * Matrix3::identity() - turned.tr_mul(&turned)) / 2.0;
         Self { position: self.position + shift, attitude }
+    }
+
+    /// A pose that is given in the axes of this one, in object space: C + A c and A a.
+    pub fn of_inner(&self, inner: &Self) -> Self {
+        Self {
+            position: self.position + self.attitude * inner.position,
+            attitude: self.attitude * inner.attitude,
+        }
+    }
+
+    /// How that steps when this one does so: dC - `A [c]x rho` and `a^T rho`.
+    pub fn carried(&self, inner: &Self, steps: &Steps) -> Steps {
+        let moves = -self.attitude * inner.position.cross_matrix();
+        each(steps, |shift, rho| (shift + moves * rho, inner.attitude.tr_mul(&rho)))
+    }
+
+    /// How that steps when it does so in the axes of this one: `A dc` and rho.
+    pub fn carrying(&self, steps: &Steps) -> Steps {
+        each(steps, |shift, rho| (self.attitude * shift, rho))
     }
 }

@@ -76,7 +76,7 @@ pub(super) fn adjusted_photos(
             None if values.len() > 6 => values[6..].to_vec(),
             None => model.cameras[index].parameters(),
         };
-        if model.mount(index).is_some() {
+        if model.is_carried(index) {
             // In a part of a network its images may be at home below.
             let asked = model.images_on[index] > 0 || !problem.layout().contributions().is_empty();
             let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
@@ -109,8 +109,9 @@ fn mounted_pose(
 ) -> ([f64; 6], DMatrix<f64>) {
     let (model, orientation) = (&problem.model, &photos[photo].orientation);
     let (mut pose, taken) = model.reported(orientation);
-    let found = cofactors.zip(mounted[photo].as_ref()).zip(taken).map(|((all, own), taken)| {
-        let cofactors = model.mounted_cofactors(problem.layout(), photo, own, all);
+    let own = mounted.as_ref().and_then(|mounted| mounted.of(photo));
+    let found = cofactors.zip(own).zip(taken).map(|((all, own), taken)| {
+        let cofactors = model.mounted_cofactors(problem.layout(), own, all);
         DMatrix::from_column_slice(6, 6, (taken * cofactors * taken.transpose()).as_slice())
     });
     if let PoseNumbers::Angles(_) = network.poses {

@@ -30,12 +30,12 @@ pub struct AdjustedCamera {
 }
 
 impl Network {
-    /// The cameras with unknown parameters that several photos share, here or in other nodes, or one on a frame has, ascending.
+    /// The cameras with unknown parameters that several photos share, here or in other nodes, or one that is mounted has, ascending.
     pub(super) fn shared_cameras(&self, surroundings: &Surroundings) -> Vec<usize> {
         let mut photos = vec![0; self.cameras.len()];
         self.photos.iter().for_each(|photo| photos[photo.camera] += 1);
-        // A photo on a frame has no unknowns of its own.
-        self.mounts.iter().for_each(|mount| photos[self.photos[mount.photo].camera] += 1);
+        // The unknowns of a photo that is mounted are of no camera.
+        self.mounts.iter().for_each(|mount| photos[self.photos[mount.photo()].camera] += 1);
         surroundings.cameras().into_iter().for_each(|camera| photos[camera] += 2);
         (0..photos.len()).filter(|&camera| photos[camera] > 1 && !self.cameras[camera].is_held()).collect()
     }
@@ -102,8 +102,8 @@ impl Bundle {
     /// are those of the points that are not local.
     pub(super) fn places_of_commons(&self, photos: &[[f64; 3]], tied: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let mut of_commons: Vec<Vec<[f64; 3]>> = vec![Vec::new(); self.commons.len()];
-        for mount in self.mounts.iter().flatten() {
-            of_commons[mount.sensor].push(photos[mount.photo]);
+        for (photo, &place) in photos.iter().enumerate() {
+            self.mounts.commons(photo, None).into_iter().for_each(|common| of_commons[common].push(place));
         }
         for touches in self.observations.iter().map(|tied| &tied.touches) {
             let points = touches.points.iter().map(|&point| tied[point - self.locals]);

@@ -1,8 +1,9 @@
 //! Networks that contradict themselves are refused.
 
-use super::commons::CommonKind;
+use std::mem::discriminant;
+
 use super::surroundings::{BlockOf, Surroundings};
-use super::{Image, Network, NetworkError};
+use super::{Image, Mount, Network, NetworkError};
 use crate::geometry::{ObjectSpace, PoseNumbers};
 
 impl Network {
@@ -47,17 +48,25 @@ impl Network {
 
     /// Refuses mounts that contradict the network or each other.
     fn check_mounts(&self) -> Result<(), NetworkError> {
-        let mut mounted = vec![false; self.photos.len()];
-        let mut carries = mounted.clone();
+        let mut mounted = vec![vec![]; self.photos.len()];
+        let mut carries = vec![false; self.photos.len()];
         for (index, mount) in self.mounts.iter().enumerate() {
-            let sensor = self.commons.get(mount.sensor).is_some_and(|own| own.kind == CommonKind::Sensor);
-            let there = mount.photo.max(mount.frame) < self.photos.len();
-            if !sensor || !there || std::mem::replace(&mut mounted[mount.photo], true) {
+            let (photo, frame) = (mount.photo(), mount.frame());
+            let of_type =
+                |&common: &usize| self.commons.get(common).map(|own| own.kind) == Some(mount.unknowns());
+            let there = photo.max(frame.unwrap_or(photo)) < self.photos.len();
+            if !there || !mount.commons(None).iter().all(of_type) {
                 return Err(NetworkError::Mount(index));
             }
-            carries[mount.frame] = true;
+            // On a frame first, then what moves it, once each.
+            let before: &mut Vec<&Mount> = &mut mounted[photo];
+            if before.iter().any(|own| frame.is_some() || discriminant(*own) == discriminant(mount)) {
+                return Err(NetworkError::Mount(index));
+            }
+            before.push(mount);
+            frame.into_iter().for_each(|frame| carries[frame] = true);
         }
-        let both = self.mounts.iter().position(|mount| carries[mount.photo]);
+        let both = self.mounts.iter().position(|mount| mount.frame().is_some() && carries[mount.photo()]);
         both.map_or(Ok(()), |index| Err(NetworkError::Mount(index)))
     }
 

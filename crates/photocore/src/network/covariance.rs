@@ -5,12 +5,13 @@ use std::ops::ControlFlow;
 use nalgebra::{DMatrix, Matrix6};
 
 use super::model::Owner;
+use super::mounts::Composed;
 use super::problem::Assembled;
 use super::state::{InnerConstraints, NetworkDatum, State};
 use super::{Network, NetworkError, Options, Solution};
 use crate::Threads;
 use crate::adjustment::{Adjusted, Adjustment, Classes, CofactorError, Datum, Event, Linearized, Phase};
-use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
+use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers, Steps};
 use crate::normals::Function;
 
 /// Shares that are more than rounding.
@@ -374,7 +375,7 @@ impl Covariances {
                     return Err(NetworkError::NoPhoto(photo));
                 }
                 let step = matches!(of, Of::PhotoStep(_));
-                if model.mount(photo).is_some() {
+                if model.is_carried(photo) {
                     return Ok(self.mounted(photo, step));
                 }
                 let first = model.of_block(photo).start;
@@ -411,20 +412,20 @@ impl Covariances {
         }
     }
 
-    /// The pose of a photo that is mounted, by the unknowns of its frame and its sensor.
+    /// The pose of a photo that is mounted, by the unknowns of all blocks that it is made of.
     fn mounted(&self, photo: usize, step: bool) -> Vec<Function> {
         let model = &self.assembled.problem.model;
         let unknowns = &self.linearized.values()[model.of_stations()];
-        let Some((orientation, own)) = model.on_frame(photo, unknowns) else { return vec![] };
+        let Some(Composed { orientation, parts }) = model.composed(photo, unknowns) else { return vec![] };
         let reported = || model.reported(&orientation).1.unwrap_or_else(|| Matrix6::repeat(f64::NAN));
         let to = if step { Matrix6::identity() } else { reported() };
-        let parts: Vec<(usize, Matrix6<f64>)> = model
-            .blocks_of_pose(photo)
-            .zip([own.by_frame, own.by_sensor])
-            .map(|(block, by)| (model.of_block(block).start, to * by))
-            .collect();
+        let parts: Vec<(usize, Steps)> =
+            parts.iter().map(|(block, by)| (model.of_block(*block).start, to * by)).collect();
         let row = |k: usize| -> Function {
-            parts.iter().flat_map(|(first, by)| (0..6).map(move |m| (first + m, by[(k, m)]))).collect()
+            let of = |(first, by): &(usize, Steps)| -> Function {
+                (*first..).zip(by.row(k).iter().copied()).collect()
+            };
+            parts.iter().flat_map(of).collect()
         };
         (0..6).map(row).collect()
     }

@@ -66,8 +66,9 @@ impl Bundle {
             let own = touches.photos.iter().map(|&photo| self.carrier(photo));
             joined.join(own.chain(touches.points.iter().map(|&point| of_point(point))).chain(commons));
         }
-        for mount in self.mounts.iter().flatten().filter(|mount| moves(&mount.sensor)) {
-            joined.join([mount.frame, of_common(mount.sensor)]);
+        for photo in 0..photos {
+            let commons = self.mounts.commons(photo, None).into_iter().filter(moves);
+            joined.join(std::iter::once(self.carrier(photo)).chain(commons.map(of_common)));
         }
         let mut images_on = vec![0; photos];
         self.images_on.iter().enumerate().for_each(|(photo, n)| images_on[self.carrier(photo)] += n);
@@ -120,7 +121,7 @@ impl Bundle {
                 vector[self.of_point(point)].copy_from_slice(moved.as_slice());
             }
         }
-        for (photo, station) in photos.iter().enumerate().filter(|&(photo, _)| self.mount(photo).is_none()) {
+        for (photo, station) in photos.iter().enumerate().filter(|&(photo, _)| !self.is_carried(photo)) {
             let by_step = station.orientation.unknowns_by_step()?;
             let pose = station.orientation.pose();
             let Some(part) = parts.of_photo[photo] else { continue };
@@ -227,7 +228,7 @@ impl Bundle {
         {
             unknowns[self.of_point(point)].copy_from_slice(&at);
         }
-        let own = |photo: usize| self.mount(photo).is_none() && parts.of_photo[photo] == Some(part);
+        let own = |photo: usize| !self.is_carried(photo) && parts.of_photo[photo] == Some(part);
         for (photo, station) in photos.iter().enumerate().filter(|&(photo, _)| own(photo)) {
             let pose = &mut unknowns[self.of_block(photo)][..6];
             let (centre, attitude) =
@@ -325,7 +326,7 @@ impl Assembled {
     /// The unknowns of points and poses that are weighted or fixed, ascending: what may give a datum besides observations.
     pub(super) fn controlled(&self) -> Vec<usize> {
         let model = &self.problem.model;
-        let photos = (0..model.cameras.len()).filter(|&photo| model.mount(photo).is_none());
+        let photos = (0..model.cameras.len()).filter(|&photo| !model.is_carried(photo));
         let poses =
             photos.filter(|&photo| model.images_on[photo] > 0).flat_map(|p| model.of_block(p).take(6));
         let points = (0..model.points.len()).flat_map(|point| model.of_point(point));

@@ -17,7 +17,7 @@ pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, Ne
         let (mut shared_ptr, mut further) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
         shared_ptr.push(0);
         for image in images {
-            further.extend(model.further(image).map(|block| block as u32));
+            further.extend(model.blocks_of_image(image).skip(1).map(|block| block as u32));
             shared_ptr.push(further.len());
         }
         layout = layout.with_shared(shared_ptr, further)?;

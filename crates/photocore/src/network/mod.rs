@@ -46,6 +46,7 @@ mod camera_priors;
 mod cameras;
 mod check;
 pub mod commons;
+mod composed;
 mod covariance;
 mod datum;
 mod effects;
@@ -57,12 +58,11 @@ mod intersection;
 mod layout;
 mod median;
 mod model;
-mod mounts;
+pub mod mounts;
 mod naming;
 mod neighbourhood;
 mod node;
 pub mod observations;
-mod on_frames;
 mod parts;
 mod precision;
 mod predictions;
@@ -222,9 +222,9 @@ pub struct Network {
     pub images: Vec<Image>,
     /// What else was observed.
     pub observations: Vec<Observation>,
-    /// Unknowns that observations, and the photos of rigs, have in common.
+    /// Unknowns that observations, and photos that are mounted, have in common.
     pub commons: Vec<Common>,
-    /// Which photos are on a frame with others.
+    /// Which photos are on a frame with others, or move while they are taken.
     pub mounts: Vec<Mount>,
 }
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
 use super::in_lanes::{FEWEST, Sight, write_in_lanes};
-use super::mounts::{Mount, mounted};
+use super::mounts::{AT_PHOTO, Mounts, When};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::parts::{MOTIONS, Parts};
 use super::stations::{Bent, Placed, Refracted, Station, Stations, write_in_its_place};
@@ -34,7 +34,7 @@ pub struct Bundle {
     /// Of each photo, with the parameters that it starts from.
     pub cameras: Vec<Camera>,
     /// The unknowns of retained block i are `first[i]..first[i + 1]` of the retained ones: photos (six of the pose, then those of a camera of
-    /// their own; six that are held where it is mounted), then shared cameras, then common unknowns.
+    /// their own; six that are held where it is on a frame), then shared cameras, then common unknowns.
     pub first: Vec<usize>,
     /// Where the cofactors of each of these blocks start among those of all retained ones.
     pub squares: Vec<usize>,
@@ -50,8 +50,8 @@ pub struct Bundle {
     pub common_block: Vec<Option<usize>>,
     /// How many observations and images that take part are of each.
     pub uses_of_commons: Vec<usize>,
-    /// The mount of each photo; none at all where there are no rigs.
-    pub mounts: Vec<Option<Mount>>,
+    /// Which photos are on a frame, or move.
+    pub mounts: Mounts,
     /// What coordinates are counted from.
     pub origin: [f64; 3],
     /// The points, local ones first; coordinates counted from the origin.
@@ -135,7 +135,7 @@ impl Bundle {
     pub fn ties(&self) -> Vec<Tie> {
         let images = self.images[self.start[self.locals]..].iter().enumerate().map(|(tie, image)| {
             let point = self.point_of(self.start[self.locals] + tie);
-            let others = self.blocks_of_pose(image.photo).chain(self.camera_block[image.photo]);
+            let others = self.blocks_of_image(image);
             let blocks = std::iter::once(self.block_of_point(point)).chain(others);
             Tie { rows: 2, retained: blocks.map(|block| block as u32).collect() }
         });
@@ -156,15 +156,15 @@ impl Bundle {
         if block < self.stations() { self.of_block(block).len() } else { 3 }
     }
 
-    /// The shared blocks of an image: sensor, then camera.
-    pub fn further(&self, image: &Image) -> impl Iterator<Item = usize> {
-        self.blocks_of_pose(image.photo).skip(1).chain(self.camera_block[image.photo])
+    /// The retained blocks of an image: those of its pose, then the camera where that is shared.
+    pub fn blocks_of_image(&self, image: &Image) -> impl Iterator<Item = usize> {
+        self.blocks_of_pose(image.photo, When::Image(image.xy)).chain(self.camera_block[image.photo])
     }
 
     /// The retained blocks of what an observation touches, each once; points as the model numbers them.
     pub fn blocks_of(&self, touches: &Touches) -> Vec<usize> {
         let points = touches.points.iter().map(|&point| self.block_of_point(point));
-        let photos = touches.photos.iter().flat_map(|&photo| self.blocks_of_pose(photo));
+        let photos = touches.photos.iter().flat_map(|&photo| self.blocks_of_pose(photo, AT_PHOTO));
         let commons = touches.commons.iter().filter_map(|&(common, _)| self.common_block[common]);
         let mut blocks: Vec<usize> = points.chain(photos).chain(commons).collect();
         blocks.sort_unstable();
@@ -206,14 +206,12 @@ impl Bundle {
             coordinates: stations.tied[point - self.locals],
             block: self.block_of_point(point),
         };
-        let mounted = |photo: usize| {
-            let own = stations.bent.as_ref()?.mounted.get(photo)?.as_ref()?;
-            Some((own, self.blocks_of_pose(photo).nth(1)))
-        };
-        let photo = |photo: usize| PhotoSite {
-            orientation: &stations.photos[photo].orientation,
-            block: self.carrier(photo),
-            mounted: mounted(photo),
+        let mounted = stations.bent.as_ref().and_then(|bent| bent.mounted.as_ref());
+        let photo = |photo: usize| match mounted.and_then(|mounted| mounted.of(photo)) {
+            None => PhotoSite { orientation: &stations.photos[photo].orientation, block: photo, parts: &[] },
+            Some(own) => {
+                PhotoSite { orientation: &own.orientation, block: self.carrier(photo), parts: &own.parts }
+            }
         };
         let common =
             |common: usize| CommonSite { state: &stations.commons[common], block: self.common_block[common] };
@@ -241,15 +239,8 @@ impl Bundle {
         };
         let mut photos: Vec<Station> = (0..self.cameras.len()).map(photo).collect();
         let commons = self.common_states(unknowns);
-        let mut on_frames = vec![None; self.mounts.len()];
-        for mount in self.mounts.iter().flatten() {
-            let frame = photos[mount.frame].orientation;
-            let unknown = self.common_block[mount.sensor].is_some();
-            let (orientation, own) = mounted(self.space, &frame, &commons[mount.sensor], unknown);
-            photos[mount.photo].orientation = orientation;
-            on_frames[mount.photo] = Some(own);
-        }
-        Placed { photos, commons, mounted: on_frames }
+        let mounted = self.mount_all(&mut photos, &commons);
+        Placed { photos, commons, mounted }
     }
 
     /// The photos alone.
@@ -302,9 +293,12 @@ impl Bundle {
         unknowns: &[f64],
         photos: &[Station],
     ) -> Vec<Vertical> {
-        let place = |(photo, station): (usize, &Station)| match self.mount(photo) {
-            None => std::array::from_fn(|k| unknowns[self.first[photo] + k]),
-            Some(_) => self.space.coordinates(station.orientation.centre()),
+        let place = |(photo, station): (usize, &Station)| {
+            if self.is_carried(photo) {
+                self.space.coordinates(station.orientation.centre())
+            } else {
+                std::array::from_fn(|k| unknowns[self.first[photo] + k])
+            }
         };
         let places = photos.iter().enumerate().map(place);
         places.map(|place: [f64; 3]| refraction.vertical(self.space, place)).collect()
@@ -341,7 +335,7 @@ impl Model for Bundle {
                 local.chunks(3).chain(tied.as_flattened().chunks(3)),
             ),
         });
-        let plain = refracted.is_none() && mounted.is_empty();
+        let plain = refracted.is_none() && mounted.is_none();
         let bent = (!plain).then_some(Bent { refracted, mounted });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
         let mut points: Vec<geometry::Point> =
@@ -413,7 +407,7 @@ impl Model for Bundle {
                 let point = &stations.points[local];
                 each_camera!(camera, camera => write_in_its_place(orientation, camera, point, image, rows));
             }
-            Some(bent) => bent.write(stations, image, local, rows),
+            Some(bent) => self.observe_bent((stations, bent), image, local, rows),
         }
     }
 
@@ -467,7 +461,7 @@ impl Model for Bundle {
 
     /// Straight rays turn and stretch with everything else; what a frame carries may have known lengths.
     fn groups_leave_open(&self) -> bool {
-        self.refraction.is_none() && self.mounts.iter().all(Option::is_none)
+        self.refraction.is_none() && self.mounts.is_empty()
     }
 
     fn motions(&self, unknowns: &[f64]) -> Option<Motions> {

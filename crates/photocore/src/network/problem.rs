@@ -11,12 +11,13 @@ use super::commons::PlacedCommon;
 use super::layout::layout;
 use super::median::median;
 use super::model::Bundle;
+use super::mounts::{Mounts, When};
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::selection::{Dropped, LeftOut, Selected, TOGETHER};
 use super::state::State;
 use super::stations::Station;
 use super::surroundings::Surroundings;
-use super::{Camera, Image, Mount, Network, NetworkError, Options, Photo, Point, Screens, Start};
+use super::{Camera, Image, Network, NetworkError, Options, Photo, Point, Screens, Start};
 use crate::Threads;
 use crate::adjustment::{Method, Model, Problem};
 use crate::geometry::{Matrix3, ObjectSpace, PoseNumbers, Refraction, local_vertical};
@@ -153,7 +154,8 @@ impl Network {
         images.iter().for_each(|image| images_on[image.photo] += 1);
         // A frame is used when a photo on it is.
         let mut used: Vec<bool> = images_on.iter().map(|&images| images > 0).collect();
-        self.mounts.iter().for_each(|mount| used[mount.frame] |= images_on[mount.photo] > 0);
+        let on_frames = self.mounts.iter().filter_map(|mount| Some((mount.frame()?, mount.photo())));
+        on_frames.for_each(|(frame, photo)| used[frame] |= images_on[photo] > 0);
         let loose = selected.loose.clone();
         let unused =
             |photo: usize| !used[photo] && (options.hold_unused || loose.binary_search(&photo).is_ok());
@@ -167,7 +169,7 @@ impl Network {
         model.screens = options.screens;
         // The programs of their time stepped in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
-            let turns = |photo: usize| self.turns(photo) && !unused(photo) && model.mount(photo).is_none();
+            let turns = |photo: usize| self.turns(photo) && !unused(photo) && !model.is_carried(photo);
             model.turning = (0..self.photos.len()).map(turns).collect();
         }
         let local = |pose: [f64; 6]| match self.poses {
@@ -287,11 +289,10 @@ impl Network {
         let vertical = self.vertical(middle);
         let place = |common| PlacedCommon::new(common, self.space, origin, &vertical);
         let block = |photo: &Photo| Some(self.photos.len() + shared.binary_search(&photo.camera).ok()?);
-        let mounts = self.mounts_by_photo();
+        let mounts = Mounts::new(&self.mounts, self.photos.len());
         let mut uses_of_commons = vec![0; self.commons.len()];
-        for mount in images.iter().filter_map(|image| mounts.get(image.photo)?.as_ref()) {
-            uses_of_commons[mount.sensor] += 1;
-        }
+        let of_image = |image: &Image| mounts.commons(image.photo, Some(When::Image(image.xy)));
+        images.iter().flat_map(of_image).for_each(|common| uses_of_commons[common] += 1);
         let commons_of = |&observation: &usize| self.observations[observation].touches().commons;
         let touched = selected.observations.iter().flat_map(commons_of);
         touched.for_each(|(common, _)| uses_of_commons[common] += 1);
@@ -337,16 +338,6 @@ impl Network {
         Ok(bundle)
     }
 
-    /// The mount of each photo; none at all where there are no rigs.
-    fn mounts_by_photo(&self) -> Vec<Option<Mount>> {
-        if self.mounts.is_empty() {
-            return vec![];
-        }
-        let mut all = vec![None; self.photos.len()];
-        self.mounts.iter().for_each(|mount| all[mount.photo] = Some(*mount));
-        all
-    }
-
     /// The axes amid the photos, as rows, that shifts and drifts are told in: X, Y, Z or, in geographic space, east, north and up.
     fn vertical(&self, middle: [f64; 3]) -> Matrix3 {
         match self.space {
@@ -357,16 +348,16 @@ impl Network {
 
     /// Whether the datum is the user's.
     pub(super) fn is_placed(&self, selected: &Selected) -> bool {
-        self.placed(selected, &self.mounts_by_photo()).0
+        self.placed(selected, &Mounts::new(&self.mounts, self.photos.len())).0
     }
 
     /// The same, and the photo to hold where it is not, but the position of a single one is fixed.
-    fn placed(&self, selected: &Selected, mounts: &[Option<Mount>]) -> (bool, Option<usize>) {
+    fn placed(&self, selected: &Selected, mounts: &Mounts) -> (bool, Option<usize>) {
         // Angles alone leave position and scale open.
         let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };
         let own = |photo: &Photo| photo.sd[..positions].iter().any(|sd| sd.is_finite());
-        let mounted = |index: usize| mounts.get(index).is_some_and(Option::is_some);
-        let mut photos = (0..self.photos.len()).filter(|&index| !mounted(index) && own(&self.photos[index]));
+        let carried = |index: usize| mounts.carrier(index) != index;
+        let mut photos = (0..self.photos.len()).filter(|&index| !carried(index) && own(&self.photos[index]));
         let fixed = |index: usize| self.photos[index].sd[..positions].iter().all(|&sd| sd == 0.0);
         match (photos.next(), photos.next()) {
             _ if selected.points.iter().any(|&point| self.points[point].held() != [false; 3]) => (true, None),

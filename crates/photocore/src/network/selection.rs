@@ -139,7 +139,8 @@ impl Network {
             self.photos.iter().map(|photo| photo.sd.iter().any(|sd| sd.is_infinite())).collect();
         self.images.iter().for_each(|image| untouched[image.photo] = false);
         for mount in &self.mounts {
-            (untouched[mount.frame], untouched[mount.photo]) = (false, false);
+            let on_frame = mount.frame().into_iter().flat_map(|frame| [frame, mount.photo()]);
+            on_frame.for_each(|photo| untouched[photo] = false);
         }
         let touched = self.observations.iter().flat_map(|each| each.touches().photos);
         touched.for_each(|photo| untouched[photo] = false);

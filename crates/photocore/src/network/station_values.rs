@@ -35,7 +35,7 @@ impl Network {
         &self.cameras[photo.camera]
     }
 
-    /// Standard deviations of the unknowns of photos, shared cameras and common unknowns; those of `unused` and of mounted photos, of
+    /// Standard deviations of the unknowns of photos, shared cameras and common unknowns; those of `unused` and of carried photos, of
     /// cameras that have no others, and of common unknowns that nothing which takes part is of, are held.
     pub(super) fn station_sd(
         &self,
@@ -50,7 +50,7 @@ impl Network {
         for (index, photo) in self.photos.iter().enumerate() {
             let own = if model.has_own_camera(index) { &self.camera(photo).sd[..] } else { &[] };
             used[photo.camera] |= !unused(index);
-            let held = unused(index) || model.mount(index).is_some();
+            let held = unused(index) || model.is_carried(index);
             all.extend(photo.sd.iter().chain(own).map(|&sd| if held { 0.0 } else { sd }));
         }
         for &camera in &model.shared {

@@ -1,12 +1,12 @@
 //! Photos and points at given values of the unknowns, and the equations of images there.
 
-use nalgebra::Matrix2x6;
-
 use super::Image;
 use super::commons::CommonState;
-use super::mounts::Mounted;
+use super::mounts::Composed;
 use crate::geometry::camera::each_camera;
-use crate::geometry::{self, Camera, CameraModel, Orientation, Ray, Refraction, Vertical};
+use crate::geometry::{
+    self, Camera, CameraModel, ObjectSpace, Orientation, Ray, Refraction, Steps, Vertical,
+};
 use crate::normals::GroupRows;
 
 /// Photos and points at given values of the unknowns.
@@ -24,16 +24,24 @@ pub struct Stations {
 #[derive(Debug)]
 pub struct Bent {
     pub refracted: Option<Refracted>,
-    /// By photo; none at all where there are no rigs.
-    pub mounted: Vec<Option<Mounted>>,
+    pub mounted: Option<Mounted>,
+}
+
+/// Photos that are mounted.
+#[derive(Debug)]
+pub struct Mounted {
+    /// All photos as their own six unknowns have them.
+    pub own: Vec<Orientation>,
+    /// By photo, at its time; None of photos that are not mounted.
+    pub composed: Vec<Option<Composed>>,
 }
 
 /// Photos and common unknowns at given values.
 pub struct Placed {
     pub photos: Vec<Station>,
     pub commons: Vec<CommonState>,
-    /// By photo; none at all where there are no rigs.
-    pub mounted: Vec<Option<Mounted>>,
+    /// None where no photo is.
+    pub mounted: Option<Mounted>,
 }
 
 /// A photo at given values of its unknowns.
@@ -58,53 +66,69 @@ pub struct Refracted {
     pub at_points: Vec<Vertical>,
 }
 
-impl Refracted {
-    /// The orientation and the place of a point as its image has them.
-    fn lifted(&self, stations: &Stations, image: &Image, local: usize) -> (Orientation, geometry::Point) {
-        let Station { orientation, .. } = &stations.photos[image.photo];
-        let (from, to) = (&self.at_photos[image.photo], &self.at_points[local]);
-        let point = &stations.points[local];
-        let lift = self.refraction.lift(orientation, from, point, to);
-        (orientation.under(&lift), point.lifted(&lift))
+impl Mounted {
+    /// The pose of a photo that is mounted.
+    pub fn of(&self, photo: usize) -> Option<&Composed> {
+        self.composed[photo].as_ref()
     }
 }
 
 impl Bent {
-    /// Out of line, so that plain images do not pay for it.
-    #[inline(never)]
-    pub fn write(&self, stations: &Stations, image: &Image, local: usize, rows: &mut GroupRows<'_>) {
+    /// Writes an image, with its pose where it is not that of the photo at its time.
+    pub fn write(
+        &self,
+        space: ObjectSpace,
+        stations: &Stations,
+        timed: Option<&Composed>,
+        image: &Image,
+        local: usize,
+        rows: &mut GroupRows<'_>,
+    ) {
         let Station { orientation, camera } = &stations.photos[image.photo];
-        let (orientation, point) = match &self.refracted {
-            None => (*orientation, stations.points[local]),
-            Some(refracted) => refracted.lifted(stations, image, local),
-        };
+        let composed = timed.or_else(|| self.mounted.as_ref()?.of(image.photo));
+        let mut orientation = composed.map_or(*orientation, |own| own.orientation);
+        let mut point = stations.points[local];
+        if let Some(Refracted { refraction, at_photos, at_points }) = &self.refracted {
+            let from = timed.map(|_| refraction.vertical(space, space.coordinates(orientation.centre())));
+            let from = from.as_ref().unwrap_or(&at_photos[image.photo]);
+            let lift = refraction.lift(&orientation, from, &point, &at_points[local]);
+            (orientation, point) = (orientation.under(&lift), point.lifted(&lift));
+        }
         let write = |rows: &mut GroupRows<'_>| {
             each_camera!(camera, camera => write_in_its_place(&orientation, camera, &point, image, rows));
         };
-        match self.mounted.get(image.photo).and_then(Option::as_ref) {
+        match composed {
             None => write(rows),
-            Some(mounted) => mounted.write(rows, write),
+            Some(composed) => composed.write(rows, write),
         }
     }
 }
 
-impl Mounted {
-    /// Writes an image of its photo: `write` does so as if the photo had six unknowns of its own. They are those of the frame, the main
-    /// block, and of the sensor, the first of what is common with others where it is as wide as there is room besides the camera.
+impl Composed {
+    /// Writes an image: `write` does so as if its photo had six unknowns of its own. They are those of the parts, of which the first is the
+    /// main block and the others the first of what is common with others; the camera is the last of that.
     fn write(&self, rows: &mut GroupRows<'_>, write: impl FnOnce(&mut GroupRows<'_>)) {
-        let (width, common) = (rows.retained.len() / 2, rows.shared.len() / 2);
-        let sensor = if self.sensor_is_unknown { 6 } else { 0 };
-        let (mut pose, mut camera) = ([0.0; 12], vec![0.0; 2 * (common - sensor)]);
+        let (main, common) = (rows.retained.len() / 2, rows.shared.len() / 2);
+        let parts: usize = self.parts[1..].iter().map(|(_, steps)| steps.ncols()).sum();
+        let (mut pose, mut camera) = ([0.0; 12], vec![0.0; 2 * (common - parts)]);
         let (constant, local) = (&mut *rows.constant, &mut *rows.local);
         write(&mut GroupRows { constant, local, retained: &mut pose, shared: &mut camera });
-        let pose = Matrix2x6::from_row_slice(&pose);
-        let (by_frame, by_sensor) = (pose * self.by_frame, pose * self.by_sensor);
         rows.retained.fill(0.0);
-        for row in 0..2 {
-            (0..6).for_each(|k| rows.retained[width * row + k] = by_frame[(row, k)]);
-            let own = &mut rows.shared[common * row..][..common];
-            (0..sensor).for_each(|k| own[k] = by_sensor[(row, k)]);
-            own[sensor..].copy_from_slice(&camera[(common - sensor) * row..][..common - sensor]);
+        for (row, pose) in pose.as_chunks::<6>().0.iter().enumerate() {
+            let by = |steps: &Steps, to: &mut [f64]| {
+                let columns = steps.column_iter();
+                to.iter_mut()
+                    .zip(columns)
+                    .for_each(|(to, by)| *to = pose.iter().zip(&by).map(|(a, b)| a * b).sum());
+            };
+            by(&self.parts[0].1, &mut rows.retained[main * row..][..main]);
+            let mut rest = &mut rows.shared[common * row..][..common];
+            for (_, steps) in &self.parts[1..] {
+                let (own, after) = rest.split_at_mut(steps.ncols());
+                by(steps, own);
+                rest = after;
+            }
+            rest.copy_from_slice(&camera[rest.len() * row..][..rest.len()]);
         }
     }
 }

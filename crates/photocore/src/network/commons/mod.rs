@@ -41,6 +41,8 @@ pub enum Measure {
     Speed,
     /// An angle in radians.
     Angle,
+    /// An angle in a second.
+    Rate,
     /// A ratio.
     Ratio,
 }
@@ -107,6 +109,11 @@ kinds! {
     Sensor = "sensor", Scales, [
         ("x", 0, Length), ("y", 1, Length), ("z", 2, Length),
         ("rotation x", 3, Angle), ("rotation y", 4, Angle), ("rotation z", 5, Angle)
+    ];
+    /// A uniform motion in the axes of what moves: its position is the way, its rotation the turn of one second.
+    Motion = "motion", Scales, [
+        ("x", 0, Speed), ("y", 1, Speed), ("z", 2, Speed),
+        ("rotation x", 3, Rate), ("rotation y", 4, Rate), ("rotation z", 5, Rate)
     ];
 }
 
@@ -261,7 +268,7 @@ pub struct CommonState {
 }
 
 impl CommonState {
-    /// Its position as a vector: of a lever arm, shift, drift, instrument or sensor.
+    /// Its position as a vector: of a lever arm, shift, drift, instrument, sensor or motion.
     pub fn vector(&self) -> Vector3 {
         self.base + self.offset
     }
@@ -271,7 +278,7 @@ impl CommonState {
         &self.attitude
     }
 
-    /// The position and rotation of a sensor.
+    /// Its position and rotation: of a sensor or a motion.
     pub fn pose(&self) -> Pose {
         Pose { position: self.vector(), attitude: self.attitude }
     }

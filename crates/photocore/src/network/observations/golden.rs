@@ -10,7 +10,7 @@ use super::tied::TiedModel;
 use super::{Named, Observation, TiedObservation};
 use crate::geometry::{Camera, Matrix3, ObjectSpace, Orientation, Perspective, Point, Vector3};
 use crate::network::commons::{Common, CommonKind, CommonState, PlacedCommon};
-use crate::network::mounts::mounted;
+use crate::network::mounts::{AT_PHOTO, Composed, Grounds, Mounts, OnFrame};
 
 #[path = "../../../tests/golden/mod.rs"]
 mod data;
@@ -134,7 +134,7 @@ fn assert_case(case: &Value) -> bool {
         space: SPACE,
         origin: [0.0; 3],
         point: &|i| PointSite { point: Point::new(SPACE, points[i]), coordinates: points[i], block: i },
-        photo: &|i| PhotoSite { orientation: &photos[i], block: 100 + i, mounted: None },
+        photo: &|i| PhotoSite { orientation: &photos[i], block: 100 + i, parts: &[] },
         common: &|i| CommonSite { state: &commons[i].0, block: Some(200 + i) },
         width: &width,
     };
@@ -171,7 +171,10 @@ fn assert_rig(case: &Value) {
     let frame = orientation(&blocks[0]);
     let in_frame = list(&blocks[1]["position"]).try_into().unwrap();
     let sensor = state(CommonKind::Sensor, in_frame, matrix(&blocks[1]["matrix_photo_to_object"]));
-    let (photo, steps) = mounted(SPACE, &frame, &sensor, true);
+    let mounts = Mounts::new(&[OnFrame { photo: 1, frame: 0, sensor: 0 }.into()], 2);
+    let common = |_| (sensor.clone(), Some(2));
+    let grounds = Grounds { space: SPACE, mounts: &mounts, photo: &|_| frame, common: &common };
+    let Composed { orientation: photo, parts } = grounds.composed(1, AT_PHOTO).unwrap();
     let point = Point::new(SPACE, list(&blocks[2]["value"]).try_into().unwrap());
     let camera = Camera::from(Perspective { principal_distance: case["c"].as_f64().unwrap() });
     let u = photo.sight(&point);
@@ -179,7 +182,7 @@ fn assert_rig(case: &Value) {
     let Camera::Perspective(own) = camera else { return };
     let found = photo.projection(&u, &crate::geometry::CameraModel::linearize(&own, &u), &point);
     let by_photo = nalgebra::Matrix2x6::from_fn(|i, k| found.photo[i][k]);
-    let ours = [by_photo * steps.by_frame, by_photo * steps.by_sensor];
+    let ours: Vec<_> = parts.iter().map(|(_, steps)| by_photo * steps).collect();
     for (row, expected) in list(&case["computed"]).into_iter().enumerate() {
         assert_close(image[row], expected, expected.abs(), "rig");
         for (own, block) in ours.iter().zip(blocks) {

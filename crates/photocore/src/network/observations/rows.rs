@@ -2,9 +2,8 @@
 
 use nalgebra::{DMatrix, SMatrix};
 
-use crate::geometry::{Matrix3, ObjectSpace, Orientation, Point, Pose, Vector3, local_vertical};
+use crate::geometry::{Matrix3, ObjectSpace, Orientation, Point, Pose, Steps, Vector3, local_vertical};
 use crate::network::commons::CommonState;
-use crate::network::mounts::Mounted;
 
 /// The points, photos and common unknowns that an observation touches, each known by its place in [`super::Touches`], at given values
 /// of the unknowns. Cartesian positions are counted from an origin amid the network.
@@ -25,12 +24,12 @@ pub(in crate::network) struct PointSite {
     pub block: usize,
 }
 
-/// A photo, and the block of its unknowns or, where it is mounted, those of its frame and sensor.
+/// A pose, the block of its unknowns and, where it is made of several blocks, how its six step with the first unknowns of each.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::network) struct PhotoSite<'a> {
     pub orientation: &'a Orientation,
     pub block: usize,
-    pub mounted: Option<(&'a Mounted, Option<usize>)>,
+    pub parts: &'a [(usize, Steps)],
 }
 
 /// A common unknown, and its block unless it is known.
@@ -182,18 +181,17 @@ impl Rows<'_> {
     }
 
     fn by_pose<const N: usize>(&mut self, row: usize, photo: usize, partials: [SMatrix<f64, N, 1>; 6]) {
-        let PhotoSite { block, mounted, .. } = self.sites.photos[photo];
-        let Some((Mounted { by_frame, by_sensor, .. }, sensor)) = mounted else {
+        let PhotoSite { block, parts, .. } = self.sites.photos[photo];
+        if parts.is_empty() {
             for (k, partials) in partials.iter().enumerate() {
                 self.add(row, block, k, partials.iter());
             }
-            return;
-        };
+        }
         let all = SMatrix::<f64, N, 6>::from_columns(&partials);
-        for (steps, block) in [(by_frame, Some(block)), (by_sensor, sensor)] {
-            let Some(block) = block else { continue };
-            let partials = all * steps;
-            (0..6).for_each(|k| self.add(row, block, k, partials.column(k).iter()));
+        for (block, steps) in parts {
+            for (k, step) in steps.column_iter().enumerate() {
+                self.add(row, *block, k, (all * step).iter());
+            }
         }
     }
 

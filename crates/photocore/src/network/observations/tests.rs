@@ -9,7 +9,7 @@ use crate::geometry::{
     Ellipsoid, Matrix3, ObjectSpace, Orientation, Point, PoseNumbers, RotationSense, rotation,
 };
 use crate::network::commons::{CommonState, PlacedCommon};
-use crate::network::mounts::{Mounted, mounted};
+use crate::network::mounts::{AT_PHOTO, Composed, Grounds, Mounts, OnFrame};
 
 /// Two points or photos in rectangular space.
 pub const PLACES: [[f64; 3]; 2] = [[10.0, 20.0, 1.5], [13.0, 18.5, 2.0]];
@@ -29,7 +29,7 @@ pub const LEVEL: usize = 5;
 pub const PLUMB_LINE: usize = 6;
 pub const LINE: usize = 7;
 pub const PLANE: usize = 8;
-pub const SENSORS: [usize; 2] = [9, 10];
+pub const SENSORS: [usize; 2] = [9, 11];
 
 /// A space with two places of points and two photos, as unknowns.
 struct Scene {
@@ -112,16 +112,15 @@ impl Scene {
         starts[block]..starts[block + 1]
     }
 
-    fn orientations(&self, unknowns: &[f64]) -> ([Orientation; 2], Option<Mounted>) {
+    fn orientations(&self, unknowns: &[f64]) -> ([Orientation; 2], Option<Composed>) {
         let pose = |k: usize| std::array::from_fn(|i| unknowns[6 + PHOTO * k + i]);
         let [first, second] = [0, 1].map(|k| Orientation::new(self.poses, self.space, &pose(k)));
-        if self.rig {
-            let sensor = &self.states(unknowns)[SENSORS[0]];
-            let (second, mounted) = mounted(self.space, &first, sensor, true);
-            ([first, second], Some(mounted))
-        } else {
-            ([first, second], None)
-        }
+        let mounts = Mounts::new(&[OnFrame { photo: 3, frame: 2, sensor: SENSORS[0] }.into()], BLOCKS);
+        let states = self.states(unknowns);
+        let common = |common: usize| (states[common].clone(), Some(BLOCKS + common));
+        let grounds = Grounds { space: self.space, mounts: &mounts, photo: &|_| first, common: &common };
+        let mounted = grounds.composed(3, AT_PHOTO).filter(|_| self.rig);
+        ([first, mounted.as_ref().map_or(second, |own| own.orientation)], mounted)
     }
 
     fn states(&self, unknowns: &[f64]) -> Vec<CommonState> {
@@ -145,9 +144,8 @@ impl Scene {
             PointSite { point: Point::new(self.space, coordinates), coordinates, block: i }
         };
         let photo = |i: usize| {
-            let mounted = mounted.as_ref().filter(|_| i == 1).map(|own| (own, Some(BLOCKS + SENSORS[0])));
-            let block = if mounted.is_some() { 2 } else { 2 + i };
-            PhotoSite { orientation: &orientations[i], block, mounted }
+            let parts = mounted.as_ref().filter(|_| i == 1).map_or(&[][..], |own| &own.parts);
+            PhotoSite { orientation: &orientations[i], block: 2 + i, parts }
         };
         let model = TiedModel {
             space: self.space,

@@ -46,7 +46,7 @@ impl Assembled {
         };
         photos.sort_unstable();
         photos.dedup();
-        let is_frame = |photo: usize| model.mounts.iter().flatten().any(|mount| mount.frame == photo);
+        let is_frame = |photo: usize| model.mounts.all().any(|mount| mount.frame() == Some(photo));
         let few = HALF * photos.len() <= model.cameras.len() && !photos.iter().any(|&photo| is_frame(photo));
         if few { photos } else { vec![] }
     }

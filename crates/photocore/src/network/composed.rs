@@ -1,0 +1,142 @@
+//! Poses of a model that are made of several blocks: which these are, the poses, and their cofactors.
+
+use nalgebra::{DMatrix, Matrix6};
+
+use super::Image;
+use super::commons::CommonState;
+use super::model::Bundle;
+use super::mounts::{AT_PHOTO, Composed, Grounds, When};
+use super::stations::{Bent, Mounted, Station, Stations};
+use crate::geometry::{Orientation, Steps};
+use crate::normals::{Cofactors, GroupRows, Layout};
+
+impl Bundle {
+    /// The photo whose six unknowns the pose of a photo begins with: its frame, or itself.
+    pub(super) fn carrier(&self, photo: usize) -> usize {
+        self.mounts.carrier(photo)
+    }
+
+    /// Whether it is another.
+    pub(super) fn is_carried(&self, photo: usize) -> bool {
+        self.carrier(photo) != photo
+    }
+
+    /// The retained blocks that a pose is made of: that of the carrier of its photo, then those of common unknowns that are not known.
+    pub(super) fn blocks_of_pose(&self, photo: usize, when: When) -> impl Iterator<Item = usize> {
+        let commons = self.mounts.commons(photo, Some(when)).into_iter();
+        std::iter::once(self.carrier(photo)).chain(commons.filter_map(|common| self.common_block[common]))
+    }
+
+    fn grounds<'a>(
+        &'a self,
+        photo: &'a dyn Fn(usize) -> Orientation,
+        common: &'a dyn Fn(usize) -> (CommonState, Option<usize>),
+    ) -> Grounds<'a> {
+        Grounds { space: self.space, mounts: &self.mounts, photo, common }
+    }
+
+    /// The pose of a photo that is mounted; None of others. `unknowns` are those of all stations.
+    pub(super) fn composed(&self, photo: usize, unknowns: &[f64]) -> Option<Composed> {
+        let own = |photo: usize| {
+            let pose = &unknowns[self.first[photo]..][..6];
+            self.orientation(photo, &std::array::from_fn(|k| pose[k]))
+        };
+        let common = |common: usize| {
+            let block = self.common_block[common];
+            let own =
+                block.map_or(&[] as &[f64], |block| &unknowns[self.first[block]..self.first[block + 1]]);
+            (self.commons[common].at(own), block)
+        };
+        self.grounds(&own, &common).composed(photo, AT_PHOTO)
+    }
+
+    /// The poses of all photos that are mounted, which those that are carried take; None where there are none.
+    pub(super) fn mount_all(&self, photos: &mut [Station], commons: &[CommonState]) -> Option<Mounted> {
+        if self.mounts.is_empty() {
+            return None;
+        }
+        let own: Vec<Orientation> = photos.iter().map(|photo| photo.orientation).collect();
+        let composed = {
+            let photo = |photo: usize| own[photo];
+            let common = |common: usize| (commons[common].clone(), self.common_block[common]);
+            let grounds = self.grounds(&photo, &common);
+            (0..own.len()).map(|photo| grounds.composed(photo, AT_PHOTO)).collect::<Vec<_>>()
+        };
+        for (photo, composed) in composed.iter().enumerate().filter(|&(photo, _)| self.is_carried(photo)) {
+            composed.iter().for_each(|composed| photos[photo].orientation = composed.orientation);
+        }
+        Some(Mounted { own, composed })
+    }
+
+    /// Writes the equations of an image that is not plain. Out of line, so that plain images do not pay for it.
+    #[inline(never)]
+    pub(super) fn observe_bent(
+        &self,
+        (stations, bent): (&Stations, &Bent),
+        image: &Image,
+        local: usize,
+        rows: &mut GroupRows<'_>,
+    ) {
+        let timed =
+            bent.mounted.as_ref().filter(|_| self.mounts.are_timed(image.photo)).and_then(|mounted| {
+                let photo = |photo: usize| mounted.own[photo];
+                let common = |common: usize| (stations.commons[common].clone(), self.common_block[common]);
+                self.grounds(&photo, &common).composed(image.photo, When::Image(image.xy))
+            });
+        bent.write(self.space, stations, timed.as_ref(), image, local, rows);
+    }
+
+    /// The six numbers of a pose, counted from the origin, and what leads to them from its own unknowns; None where angles are singular.
+    pub(super) fn reported(&self, orientation: &Orientation) -> ([f64; 6], Option<Matrix6<f64>>) {
+        let numbers = orientation.numbers(self.poses, self.space);
+        let by_step = Orientation::new(self.poses, self.space, &numbers).unknowns_by_step();
+        (numbers, by_step.map(|by_step| by_step * orientation.step_matrix()))
+    }
+
+    /// The pairs of retained blocks whose cofactors those of the poses of mounted photos need.
+    pub(super) fn pairs(&self) -> Vec<[u32; 2]> {
+        let of_photo = |photo: usize| {
+            let mut blocks: Vec<u32> =
+                self.blocks_of_pose(photo, AT_PHOTO).map(|block| block as u32).collect();
+            blocks.sort_unstable();
+            let before = |j: usize| blocks[..j].iter().map(|&i| [i, blocks[j]]).collect::<Vec<_>>();
+            (1..blocks.len()).flat_map(before).collect::<Vec<_>>()
+        };
+        (0..self.cameras.len())
+            .filter(|&photo| !self.mounts.of(photo).is_empty())
+            .flat_map(of_photo)
+            .collect()
+    }
+
+    /// Cofactors of the six unknowns, as its orientation has them, of a photo that is mounted: J Q J^T over all pairs of its blocks.
+    pub(super) fn mounted_cofactors(
+        &self,
+        layout: &Layout,
+        Composed { parts, .. }: &Composed,
+        all: &Cofactors,
+    ) -> Matrix6<f64> {
+        let term = |(i, by_i): &(usize, Steps), (j, by_j): &(usize, Steps)| -> Matrix6<f64> {
+            let (rows, columns) = (by_i.ncols(), by_j.ncols());
+            let (width, numbers) = if i == j {
+                (self.of_block(*i).len(), Some(self.cofactors_of_block(all, *i)))
+            } else {
+                let range = layout.pair([*i as u32, *j as u32]);
+                (self.of_block(*j).len(), range.map(|range| &all.pairs[range]))
+            };
+            let of = |r: usize, c: usize| numbers.map_or(f64::NAN, |numbers| numbers[width * r + c]);
+            by_i * DMatrix::from_fn(rows, columns, of) * by_j.transpose()
+        };
+        let mut parts: Vec<&(usize, Steps)> = parts.iter().collect();
+        parts.sort_by_key(|part| part.0);
+        let mut sum = Matrix6::zeros();
+        for (j, part) in parts.iter().enumerate() {
+            for before in &parts[..j] {
+                let mixed = term(before, part);
+                sum += mixed;
+                sum += mixed.transpose();
+            }
+            sum += term(part, part);
+        }
+        sum
+    }
+}

@@ -1,0 +1,192 @@
+//! Photos that move while they are read: their motion is found with its covariance, and named where nothing shows it.
+
+#![allow(clippy::unwrap_used)]
+
+use nalgebra::{Matrix6, Vector6};
+use photocore::Threads;
+use photocore::adjustment::Status;
+use photocore::geometry::angle_axis::rotation_angle_axis;
+use photocore::geometry::{
+    AttitudeNumbers, Matrix3, ObjectSpace, Perspective, Pose, PoseNumbers, RotationSense, Vector3,
+    angle_axis_rotation, rotation,
+};
+use photocore::network::mounts::Rolling;
+use photocore::network::{
+    Camera, Combination, Common, CommonKind, Image, Network, NetworkError, Options, Photo, Point, Solution,
+};
+
+const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
+const SENSE: RotationSense = RotationSense::GroundToPhoto;
+const SD: f64 = 0.002;
+const FREE: f64 = f64::INFINITY;
+/// Rows are read from above, 80 of an image's 18 millimetres in a second.
+const BY_XY: [f64; 2] = [0.0, -1.0 / 80.0];
+const START: f64 = 0.02;
+const PHOTOS: usize = 8;
+const POINTS: usize = 42;
+
+/// The way and the turn of a second: of the photos of a strip, and of those of the strip back.
+const MOTIONS: [([f64; 3], [f64; 3]); 2] =
+    [([5.0, 0.3, -0.1], [0.05, -0.2, 0.1]), ([-4.0, 0.2, 0.3], [-0.1, 0.15, 0.05])];
+
+/// Numbers of a normal distribution, the same for a seed on every machine.
+struct Normal(u64);
+
+impl Normal {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+    }
+
+    fn next(&mut self) -> f64 {
+        let (a, b) = (self.uniform(), self.uniform());
+        (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+    }
+}
+
+fn place(k: usize) -> Vector3 {
+    let [i, j] = [k % 7, k / 7].map(|i| i as f64);
+    Vector3::new(6.0 * i, 5.0 * j, (1.3 * i + 2.1 * j).sin())
+}
+
+/// Four photos along X, and four back.
+fn pose(k: usize) -> Pose {
+    let (along, back) = (8.0 * (k % 4) as f64 + 6.0, k / 4);
+    let wiggle = |n: usize| 0.05 * ((7 * k + n) as f64).sin();
+    Pose {
+        position: Vector3::new(along, 6.0 + 13.0 * back as f64, 30.0 + wiggle(0)),
+        attitude: rotation([wiggle(1), wiggle(2), 0.3 * wiggle(3)]).transpose(),
+    }
+}
+
+fn image(photo: usize, point: usize) -> [f64; 2] {
+    let (Pose { position, attitude }, (v, w)) = (pose(photo), MOTIONS[photo / 4]);
+    let mut xy = [0.0; 2];
+    for _ in 0..30 {
+        let t = START + BY_XY[0] * xy[0] + BY_XY[1] * xy[1];
+        let at = Pose {
+            position: position + t * attitude * Vector3::from(v),
+            attitude: attitude * angle_axis_rotation(&(t * Vector3::from(w))),
+        };
+        let u = at.sight(&place(point));
+        xy = [0, 1].map(|k| CAMERA.principal_distance * u[k] / u[2]);
+    }
+    xy
+}
+
+/// The block with errors of a seed; the motions start at rest.
+fn network(seed: u64) -> Network {
+    let mut normal = Normal(seed);
+    let mut images = vec![];
+    for photo in 0..PHOTOS {
+        for point in 0..POINTS {
+            let exact = image(photo, point);
+            if exact[0].abs() < 14.0 && exact[1].abs() < 14.0 {
+                images.push(Image { photo, point, xy: exact.map(|x| x + SD * normal.next()), sd: [SD; 2] });
+            }
+        }
+    }
+    let photo = |k: usize| {
+        let Pose { position, attitude } = pose(k);
+        let [omega, phi, kappa] = AttitudeNumbers::OmegaPhiKappa(SENSE).numbers(&attitude);
+        let pose = [position.x + 0.1, position.y, position.z - 0.1, omega, phi, kappa + 0.01];
+        Photo { pose, observed: pose, sd: [FREE; 6], camera: 0 }
+    };
+    let mut point = |k: usize| {
+        if k % 4 != 0 {
+            return Point { coordinates: [f64::NAN; 3], sd: [FREE; 3] };
+        }
+        let coordinates = place(k).map(|x| x + 0.005 * normal.next());
+        Point { coordinates: coordinates.into(), sd: [0.005; 3] }
+    };
+    let motion = |_| Common {
+        kind: CommonKind::Motion,
+        position: [0.0; 3],
+        attitude: Matrix3::identity(),
+        sd: vec![FREE; 6],
+    };
+    let moves = |photo: usize| Rolling { photo, motion: photo / 4, start: START, by_xy: BY_XY }.into();
+    Network {
+        space: ObjectSpace::Rectangular,
+        poses: PoseNumbers::Angles(SENSE),
+        refraction: None,
+        cameras: vec![Camera::held(CAMERA.into())],
+        photos: (0..PHOTOS).map(photo).collect(),
+        points: (0..POINTS).map(&mut point).collect(),
+        images,
+        observations: vec![],
+        commons: (0..2).map(motion).collect(),
+        mounts: (0..PHOTOS).map(moves).collect(),
+    }
+}
+
+fn adjust(network: &Network) -> Result<Solution, NetworkError> {
+    let threads = Threads::new(1).unwrap();
+    network.adjustment(&Options::default()).on(&threads).run()
+}
+
+#[test]
+fn motions_are_found_within_their_covariance() {
+    const DRAWS: u64 = 30;
+    let mut sum = 0.0;
+    for seed in 0..DRAWS {
+        let solution = adjust(&network(seed)).unwrap();
+        assert_eq!(solution.adjustment.status, Status::Converged);
+        for (found, (v, w)) in solution.commons.iter().zip(MOTIONS) {
+            let way = Vector3::from(found.position) - Vector3::from(v);
+            let truth = angle_axis_rotation(&Vector3::from(w));
+            let turn = rotation_angle_axis(&truth.tr_mul(&found.attitude));
+            let error = Vector6::new(way.x, way.y, way.z, turn.x, turn.y, turn.z);
+            let cofactors = Matrix6::from_row_slice(found.cofactors.as_slice());
+            sum += error.dot(&(cofactors.try_inverse().unwrap() * error));
+        }
+    }
+    // Of so many times six components; four standard deviations of their mean.
+    let (count, mean) = (2.0 * DRAWS as f64, sum / (2.0 * DRAWS as f64));
+    assert!((mean - 6.0).abs() < 4.0 * (12.0 / count).sqrt(), "{mean}");
+}
+
+#[test]
+fn redundancy_numbers_add_up_to_the_degrees_of_freedom() {
+    let mut network = network(100);
+    // One motion is known beforehand.
+    network.commons[1].sd = vec![0.5, 0.5, 0.5, 0.05, 0.05, 0.05];
+    let solution = adjust(&network).unwrap();
+    let points = || network.points.iter().zip(&solution.points).filter(|(_, found)| found.is_some());
+    let (seen, control) = (points().count(), points().filter(|(point, _)| point.held() == [true; 3]).count());
+    let images = || solution.images.iter().flatten();
+    let freedom = 2 * images().count() + 3 * control + 6 - 3 * seen - 6 * PHOTOS - 12;
+    let mut total = images().flat_map(|image| image.redundancy).sum::<f64>();
+    total += solution.points.iter().flatten().flat_map(|point| point.redundancy).sum::<f64>();
+    total += solution.commons.iter().flat_map(|own| own.redundancy.clone()).sum::<f64>();
+    assert!((total - freedom as f64).abs() < 1e-8, "{total} of {freedom}");
+}
+
+#[test]
+fn a_motion_that_no_row_shows_is_named() {
+    let mut network = network(200);
+    let at_once = |photo| Rolling { photo, motion: 1, start: 0.0, by_xy: [0.0; 2] }.into();
+    (4..PHOTOS).for_each(|photo| network.mounts[photo] = at_once(photo));
+    let combination = Combination { commons: vec![1], ..Combination::default() };
+    assert_eq!(adjust(&network).err(), Some(NetworkError::Undetermined(vec![combination; 6])));
+    // Readings at one time are those of another pose.
+    let later = |photo| Rolling { photo, motion: 1, start: 0.1, by_xy: [0.0; 2] }.into();
+    (4..PHOTOS).for_each(|photo| network.mounts[photo] = later(photo));
+    let Err(NetworkError::Undetermined(found)) = adjust(&network) else { unreachable!() };
+    assert!(found.iter().all(|own| own.commons == [1] && !own.photos.is_empty()), "{found:?}");
+}
+
+#[test]
+fn photos_at_rest_are_photos() {
+    let mut resting = network(300);
+    resting.commons.iter_mut().for_each(|motion| motion.sd.fill(0.0));
+    let plain = Network { mounts: vec![], ..resting.clone() };
+    let [resting, plain] = [&resting, &plain].map(|network| adjust(network).unwrap());
+    for (a, b) in resting.photos.iter().zip(&plain.photos) {
+        for k in 0..36 {
+            let scale = (b.cofactors[k / 6 * 7] * b.cofactors[k % 6 * 7]).sqrt();
+            assert!((a.cofactors[k] - b.cofactors[k]).abs() < 1e-9 * scale);
+            assert!((a.pose[k / 6] - b.pose[k / 6]).abs() < 1e-9);
+        }
+    }
+}
