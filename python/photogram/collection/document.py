@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from photogram import _photocore
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.tables import collection_photos, costs
 from photogram.io import json
-from photogram.results.network_tables import control, images, points, stations
+from photogram.results.document import network_members
+from photogram.results.network_tables import images, points
 from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show.quantity import Quantity, records
 from photogram.show.ways import document_of
@@ -24,7 +24,7 @@ def to_json(result: AdjustedCollection) -> bytes:
 
 def _document(result: AdjustedCollection) -> dict[str, Any]:
     return {
-        "program": f"photogram {_photocore.__version__}",
+        **network_members(result),
         "units": {
             **_units(result),
             "covariance": "products of these",
@@ -40,18 +40,10 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
             "cost": "half the sum that is minimised",
             "control, stations": "residual: given minus adjusted; sd 0: fixed, null: free",
         },
-        "status": result.status,
-        "messages": [str(message) for message in result.messages],
-        "loss": None if result.loss is None else {"name": result.loss[0], "scale": result.loss[1]},
         "initial_cost": 0.5 * result.initial_weighted_sum_of_squares,
         "cost": result.cost,
         "iterations": records(costs(result))[1:],
         "weighted_sum_of_squares": result.weighted_sum_of_squares,
-        "degrees_of_freedom": result.degrees_of_freedom,
-        "variance_of_unit_weight": result.variance_of_unit_weight,
-        "covariance_scale": result.covariance_scale,
-        "verdict": result.verdict.document(),
-        "reliability": summary.document() if (summary := result.reliability_summary) else None,
         "weakest": {
             "points": [vars(each) | {"point": int(each.point)} for each in weakest_points(result)],
             "photos": [vars(each) | {"photo": int(each.photo)} for each in weakest_photos(result)],
@@ -62,12 +54,6 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
         "photos": _photos(result),
         "points": _points(result),
         "observations": _observations(result),
-        "control": records(control(result)),
-        "stations": records(stations(result)),
-        "ordering": result.ordering,
-        "predictions": dict(result.predictions),
-        "operations": dict(result.operations),
-        "seconds": dict(result.seconds),
     }
 
 

@@ -11,6 +11,7 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.results.calibration_report import calibration_members
 from photogram.results.features_report import features_document
+from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import control, images, iterations, photos, stations
 from photogram.results.report import problems_of
 from photogram.results.result import Result, SumsByKind
@@ -19,7 +20,7 @@ from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show.quantity import Quantity, chosen, records
 from photogram.show.ways import document_of
 
-__all__ = ["to_json"]
+__all__ = ["network_members", "to_json"]
 
 
 @document_of.register(Result)
@@ -28,10 +29,32 @@ def to_json(result: Result) -> bytes:
     return json.to_json(_document(result))
 
 
+def network_members(result: AdjustedNetwork) -> dict[str, Any]:
+    """Return what the documents of all networks have."""
+    summary = result.reliability_summary
+    return {
+        "program": f"photogram {_photocore.__version__}",
+        "status": result.status,
+        "messages": [str(message) for message in result.messages],
+        "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
+        "degrees_of_freedom": result.degrees_of_freedom,
+        "variance_of_unit_weight": result.variance_of_unit_weight,
+        "covariance_scale": result.covariance_scale,
+        "verdict": result.verdict.document(),
+        "reliability": summary.document() if summary else None,
+        "control": records(control(result)),
+        "stations": records(stations(result)),
+        "ordering": result.ordering,
+        "predictions": dict(result.predictions),
+        "operations": dict(result.operations),
+        "seconds": dict(result.seconds),
+    }
+
+
 def _document(result: Result) -> dict[str, Any]:
     sums = result.sums_of_squares
     return {
-        "program": f"photogram {_photocore.__version__}",
+        **network_members(result),
         "title": result.block.title,
         "units": _units(result),
         "conventions": {
@@ -46,21 +69,13 @@ def _document(result: Result) -> dict[str, Any]:
         },
         "datum": result.datum.document(),
         "refraction": asdict(result.block.refraction) if result.block.refraction else None,
-        "status": result.status,
         "problems": problems_of(result),
-        "messages": [str(message) for message in result.messages],
-        "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
         "initial_weighted_sum_of_squares": result.initial_weighted_sum_of_squares,
         "iterations": records(iterations(result))[1:],
         "weighted_sum_of_squares": _by_kind(sums),
         "redundancy": None if result.redundancies is None else _by_kind(result.redundancies),
-        "degrees_of_freedom": result.degrees_of_freedom,
         "unit_variance": result.unit_variance,
-        "variance_of_unit_weight": result.variance_of_unit_weight,
         "global_test": _global_test(result),
-        "verdict": result.verdict.document(),
-        "reliability": summary.document() if (summary := result.reliability_summary) else None,
-        "covariance_scale": result.covariance_scale,
         "photos": _photos(result),
         **(
             {"cameras": _cameras(result), "calibrations": calibration_members(result)}
@@ -72,18 +87,12 @@ def _document(result: Result) -> dict[str, Any]:
         "points": _points(result),
         "observations": _observations(result),
         "observations_beside_images": _beside_images(result),
-        "control": records(control(result)),
-        "stations": records(stations(result)),
         "check_points": records(check_points(result)),
         "weakest": {
             "points": [vars(each) for each in weakest_points(result)],
             "photos": [vars(each) for each in weakest_photos(result)],
         },
         "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
-        "ordering": result.ordering,
-        "predictions": dict(result.predictions),
-        "operations": dict(result.operations),
-        "seconds": dict(result.seconds),
     }
 
 
