@@ -24,6 +24,7 @@ from photogram.show.page import (
     decimals_of,
     significant,
 )
+from photogram.show.ways import page_of
 
 __all__ = ["orientation_page"]
 
@@ -32,6 +33,7 @@ LISTED = 300
 """Transformed points that are listed at most."""
 
 
+@page_of.register(Orientation)
 def orientation_page(result: Orientation) -> Page:
     """Return the report of an orientation for the browser."""
     sections = [

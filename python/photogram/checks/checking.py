@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -41,6 +40,7 @@ from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos
 from photogram.network.observations import Position
 from photogram.network.rays import Rays
+from photogram.show.ways import Way
 
 __all__ = ["Manner", "check", "check_block", "check_of"]
 
@@ -110,7 +110,7 @@ def check(network: object, *, threads: int | None = None) -> Check:
     return check_of(network, threads)
 
 
-@singledispatch
+@Way
 def check_of(network: object, threads: int | None) -> Check:
     """Check a network; defined for each class of networks in the files above it."""
     del threads

@@ -27,6 +27,7 @@ from photogram.show.page import (
     fixed,
     significant,
 )
+from photogram.show.ways import page_of
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
@@ -37,6 +38,7 @@ __all__ = ["calibration_page"]
 UM = "µm"
 
 
+@page_of.register(Calibration)
 def calibration_page(calibration: Calibration) -> Page:
     """Return the report of a calibration for the browser."""
     session = calibration.session

@@ -26,10 +26,12 @@ from photogram.show.page import (
     decimals_of,
     significant,
 )
+from photogram.show.ways import page_of
 
 __all__ = ["run_page"]
 
 
+@page_of.register(Run)
 def run_page(run: Run) -> Page:
     """Return the report of a run for the browser."""
     sections = [

@@ -1,8 +1,10 @@
 """Planning: what a network promises before it is flown, for several patterns of control side by side."""
 
-from photogram.planning import html  # noqa: F401  (the way to show a plan)
 from photogram.planning.networks import Plan, plan
 from photogram.planning.pattern import Pattern
 from photogram.planning.statistics import ControlQuality, PhotoQuality, PointQuality
 
 __all__ = ["ControlQuality", "Pattern", "PhotoQuality", "Plan", "PointQuality", "plan"]
+
+WAYS = {"page_of": ("page",)}
+"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""

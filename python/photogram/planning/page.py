@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from photogram.planning.networks import Plan
 from photogram.planning.pattern import Pattern
 from photogram.planning.plot import figure
 from photogram.planning.statistics import PointQuality
@@ -24,6 +25,7 @@ from photogram.show.page import (
     Table,
     significant,
 )
+from photogram.show.ways import page_of
 
 __all__ = ["plan_page"]
 
@@ -31,8 +33,10 @@ NOTICED = 1.05
 """Ratio of standard deviations below which patterns are called alike."""
 
 
-def plan_page(patterns: Sequence[Pattern]) -> Page:
+@page_of.register(Plan)
+def plan_page(made: Plan) -> Page:
     """Return the report of a plan for the browser."""
+    patterns = made.patterns
     sections = [
         Section("network", "Plan of the network", [_drawing(patterns)] if _has_points(patterns) else []),
         _comparison(patterns),

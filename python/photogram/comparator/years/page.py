@@ -8,12 +8,14 @@ from photogram.comparator.years.comparison import Comparison
 from photogram.show.history import control_charts, series_table, values_table
 from photogram.show.judgement import judged, tests_section
 from photogram.show.page import Column, Drawing, Fact, Page, Part, Row, Section, Table, significant
+from photogram.show.ways import page_of
 
 __all__ = ["comparison_page"]
 
 UM = "µm"
 
 
+@page_of.register(Comparison)
 def comparison_page(comparison: Comparison) -> Page:
     """Return the report of a comparison for the browser."""
     histories = comparison.histories
