@@ -41,3 +41,24 @@ def test_the_reference_says_names_that_there_are():
     assert len(said) > 40
     for name in said:
         assert resolve_name(name) is not None
+
+
+PARTS = """
+from photogram.adjustment import adjust
+from photogram.network.simulation import simulate
+
+print(adjust(simulate(strips=2, photos_per_strip=4, seed=1).block, parts=2).report().splitlines()[0])
+"""
+COLLECTED = """
+from photogram.adjustment.snooping import snoop
+from photogram.collection.simulation import simulate
+
+print(snoop(simulate(seed=1).collection).result.report().splitlines()[0])
+"""
+
+
+@pytest.mark.parametrize("program", [PARTS, COLLECTED])
+def test_what_is_called_finds_what_it_needs(program):
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip()

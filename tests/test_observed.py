@@ -156,7 +156,7 @@ def test_a_way_that_nobody_has_defined_says_so():
     ):
         with pytest.raises(NotImplementedError, match="Bare has no"):
             way()
-    assert report_of.dispatch(Result) is not report_of.dispatch(object)
+    assert report_of.of(Result) is not report_of.of(object)
 
 
 def test_a_report_lists_no_more_than_can_be_read(monkeypatch):

@@ -1,12 +1,5 @@
 """Absolute orientation: the similarity between a model and its control (C&GS Technical Bulletin 19, 1962)."""
 
-from photogram.absolute_orientation import (  # noqa: F401  (the ways to show a result)
-    document,
-    findings,
-    plot,
-    report,
-    tables,
-)
 from photogram.absolute_orientation.adjust import orient
 from photogram.absolute_orientation.cards import read_cards
 from photogram.absolute_orientation.csv_files import read_csv
@@ -32,3 +25,13 @@ __all__ = [
 ]
 
 check_arguments(globals(), ["read_cards", "read_csv", "relative_model", "strip_of", "transform_file"])
+
+WAYS = {
+    "axes_of": ("plot",),
+    "columns_of": ("tables",),
+    "document_of": ("document",),
+    "findings_of": ("findings",),
+    "page_of": ("page",),
+    "report_of": ("report",),
+}
+"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""

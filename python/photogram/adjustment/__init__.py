@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photogram.adjustment import findings  # noqa: F401  (what the verdict on a resection rests on)
-
 if TYPE_CHECKING:
     from photogram.adjustment.adjustment import AsPublished, Ordering, Progress, UnitVariance, adjust
 
 __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
+
+WAYS = {"findings_of": ("findings",)}
+"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""
 
 
 def __getattr__(name: str) -> object:

@@ -6,7 +6,6 @@ import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from photogram.results.group_sums import Left, Probing, factored, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
+from photogram.show.ways import Way
 from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
 
 __all__ = ["Settings", "Weighing", "of_grouping", "scaled", "variance_components", "weighing"]
@@ -78,7 +78,7 @@ class _Block(Weighing):
         return factored(self.result)
 
 
-@singledispatch
+@Way
 def weighing(network: object, *, threads: int | None, tolerance: float) -> Weighing:
     """Return what adjusts a block or a collection with other weights."""
     raise InputError(f"no block or collection: {shown(network)}")
@@ -89,7 +89,7 @@ def _(network: Block, *, threads: int | None, tolerance: float) -> Weighing:
     return _Block(network, threads, tolerance)
 
 
-@singledispatch
+@Way
 def scaled(network: Any, grouping: Grouping, factors: Floats) -> Any:
     """Return a block or collection with the variances of (G,) groups multiplied by factors."""
     raise InputError(f"no block or collection: {shown(network)}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from functools import singledispatch
 from typing import Any, get_args
 
 import numpy as np
@@ -34,6 +33,7 @@ from photogram.results.network_trial import (
 from photogram.results.result import Result
 from photogram.results.snooped import Snooped
 from photogram.results.suspects import network_trial
+from photogram.show.ways import Way
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
@@ -114,7 +114,7 @@ def snoop(
     )
 
 
-@singledispatch
+@Way
 def of_network(network: object, **options: Any) -> Snooped:
     """Take gross errors out of a network of any class; see :func:`snoop`."""
     raise InputError(f"snoop takes a Block or a Collection, not {type(network).__name__}")

@@ -106,7 +106,12 @@ def _is_real(value: object) -> bool:
 
 
 def _masked(value: object) -> bool:
-    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.getmaskarray(value).any())
+    # What is an array and no more is not masked: numpy.ma, which takes long to import, is not asked.
+    return (
+        type(value) is not np.ndarray
+        and isinstance(value, np.ma.MaskedArray)
+        and bool(np.ma.getmaskarray(value).any())
+    )
 
 
 def _plain(name: str, value: ArrayLike, of: str) -> NDArray[Any]:

@@ -1,18 +1,6 @@
 """Collections of photos of unknown cameras: bundle adjustment "in the large"."""
 
 from photogram.arguments.annotations import check_arguments
-from photogram.collection import (  # noqa: F401  (the ways to show a result, and what works on it)
-    checking,
-    components,
-    document,
-    findings,
-    pictured,
-    report,
-    saved,
-    snooping,
-    tables,
-    weakest,
-)
 from photogram.collection.adjust import adjust
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import PARAMETERS, Collection
@@ -32,3 +20,21 @@ __all__ = [
 ]
 
 check_arguments(globals(), set(__all__) - {"AdjustedCollection", "PARAMETERS", "Simulation"})
+
+WAYS = {
+    "check_of": ("checking",),
+    "columns_of": ("tables",),
+    "determined": ("weakest",),
+    "document_of": ("document",),
+    "factored": ("components",),
+    "files_of": ("saved",),
+    "findings_of": ("findings",),
+    "observables": ("components",),
+    "of_network": ("snooping",),
+    "page_of": ("page",),
+    "pictured": ("pictured",),
+    "report_of": ("report",),
+    "scaled": ("components",),
+    "weighing": ("components",),
+}
+"""The files that show results and work on collections, by the names of ways: see `photogram.show.ways`."""

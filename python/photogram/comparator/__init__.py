@@ -6,7 +6,6 @@ calibration.correction.apply(xy_um)
 """
 
 from photogram.arguments.annotations import check_arguments
-from photogram.comparator import findings  # noqa: F401  (the verdict)
 from photogram.comparator.calibration import Calibration, CaseResult, PlateResult, Pointing, calibrate
 from photogram.comparator.cards import read_cards, to_cards
 from photogram.comparator.correction import Correction
@@ -81,3 +80,6 @@ check_arguments(
         "collect_cases",
     },
 )
+
+WAYS = {"findings_of": ("findings",), "page_of": ("page",)}
+"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""

@@ -27,11 +27,11 @@ from photogram.show.page import (
     fixed,
     significant,
 )
+from photogram.show.ways import page_of
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.comparator.joint import JointFit
-from photogram.show.ways import page_of
 
 __all__ = ["calibration_page"]
 

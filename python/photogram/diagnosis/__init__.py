@@ -3,3 +3,6 @@
 from photogram.diagnosis.findings import Diagnosis, Finding, Section
 
 __all__ = ["Diagnosis", "Finding", "Section"]
+
+WAYS = {"page_of": ("page",)}
+"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""

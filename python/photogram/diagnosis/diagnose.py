@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -44,8 +43,7 @@ from photogram.network.observations import Position
 from photogram.network.rays import Rays
 from photogram.results.result import Result
 from photogram.results.snooped import Snooped
-from photogram.show.page import Page
-from photogram.show.ways import page_of
+from photogram.show.ways import Way
 
 __all__ = ["Manner", "check_block", "check_of", "diagnose"]
 
@@ -55,14 +53,6 @@ HARDLY = 10.0
 """So many times the usual residual before the adjustment comes from coarse stations."""
 MOST_SETS = 5
 """Mistakes in the control as a whole that are put right one upon the other, at the most."""
-
-
-@page_of.register(Diagnosis)
-def page(found: Diagnosis) -> Page:
-    """Return the page of a diagnosis, made by what is loaded when one is asked for."""
-    from photogram.diagnosis.page import check_page
-
-    return check_page(found)
 
 
 @dataclass(frozen=True)
@@ -135,7 +125,7 @@ def diagnose(
     return check_of(network, threads)
 
 
-@singledispatch
+@Way
 def check_of(network: object, threads: int | None) -> Diagnosis:
     """Check a network; defined for each class of networks in the files above it."""
     del threads

@@ -12,6 +12,7 @@ from photogram.results.page.pictures import drawings
 from photogram.show.judgement import judged, verdict_table
 from photogram.show.page import Cell, Column, Fact, Facts, Page, Part, Remarks, Row, Table, Text
 from photogram.show.page import Section as Chapter
+from photogram.show.ways import page_of
 
 __all__ = ["check_page"]
 
@@ -23,6 +24,7 @@ NAMED = 6
 """Photos and points that a row names."""
 
 
+@page_of.register(Diagnosis)
 def check_page(found: Diagnosis) -> Page:
     """Return the report of a check for the browser."""
     grave, look = len(found.grave), len(found.findings) - len(found.grave)

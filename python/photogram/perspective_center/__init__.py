@@ -1,7 +1,6 @@
 """Perspective centre of a projector from grid measurements (USGS Computer Contribution 2, 1969)."""
 
 from photogram.arguments.annotations import check_arguments
-from photogram.perspective_center import findings  # noqa: F401  (the verdict)
 from photogram.perspective_center.batch import Run, Stop, run_deck
 from photogram.perspective_center.deck import read_deck
 from photogram.perspective_center.grid import Coordinatograph, Grid, joined, reduce
@@ -22,3 +21,6 @@ __all__ = [
 ]
 
 check_arguments(globals(), set(__all__) - {"Cycle", "PerspectiveCenter", "Run", "Stop"})
+
+WAYS = {"findings_of": ("findings",), "page_of": ("page",)}
+"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""

@@ -5,3 +5,6 @@ from photogram.planning.pattern import Pattern
 from photogram.planning.statistics import ControlQuality, PhotoQuality, PointQuality
 
 __all__ = ["ControlQuality", "Pattern", "PhotoQuality", "Plan", "PointQuality", "plan"]
+
+WAYS = {"page_of": ("page",)}
+"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""

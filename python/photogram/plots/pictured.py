@@ -9,12 +9,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import singledispatch
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats, Indices
+from photogram.show.ways import Way
 from photogram.statistics.outliers import Observations
 
 __all__ = ["Correlated", "Curve", "Curves", "Deviations", "Images", "Pictured", "Plan", "pictured"]
@@ -251,7 +251,7 @@ class Pictured(ABC):
         return []
 
 
-@singledispatch
+@Way
 def pictured(result: object) -> Pictured:
     """Return what pictures draw of a result.
 

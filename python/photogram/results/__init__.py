@@ -1,11 +1,13 @@
 """What an adjustment gives, as arrays, tables, text and JSON."""
 
-from photogram.results import (  # noqa: F401  (the ways to show a result)
-    document,
-    findings,
-    judged,
-    pictured,
-    report,
-    saved_block,
-    tables,
-)
+WAYS = {
+    "axes_of": ("components_picture",),
+    "columns_of": ("tables",),
+    "document_of": ("document",),
+    "files_of": ("saved_block",),
+    "findings_of": ("findings", "judged"),
+    "page_of": ("page",),
+    "pictured": ("pictured",),
+    "report_of": ("report",),
+}
+"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""

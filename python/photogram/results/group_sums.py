@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import singledispatch
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +29,7 @@ from photogram.results.grouping import Grouping, GroupsArgument, Observables, gr
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.show.brief import Brief
-from photogram.show.ways import Shown, columns_of, report_of
+from photogram.show.ways import Shown, Way, columns_of, report_of
 from photogram.statistics.components import balanced
 from photogram.statistics.distributions import bonferroni
 from photogram.statistics.limits import GlobalTest, global_test
@@ -273,7 +272,7 @@ def _weighted_squares(residuals: Floats, sd: Floats) -> Floats:
     return np.where((sd > 0) & np.isfinite(sd), (residuals / sd) ** 2, np.nan)
 
 
-@singledispatch
+@Way
 def observables(network: object) -> Observables:
     """Return what a block, a collection or an adjusted one has observations of."""
     raise InputError(f"no block or collection, nor the result of one: {shown(network)}")
@@ -312,7 +311,7 @@ def _(result: Result) -> Observables:
     return block_observables(result.block)
 
 
-@singledispatch
+@Way
 def factored(result: object) -> _photocore.BlockCovariances:
     """Return the factor of the normal equations of an adjusted network."""
     raise InputError(f"not the result of an adjustment: {shown(result)}")

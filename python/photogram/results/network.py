@@ -18,7 +18,6 @@ from photogram import _photocore
 from photogram.arguments.arrays import finite_rows, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
-from photogram.io.writing import write_whole
 from photogram.messages import Message
 from photogram.results.covariance import Covariances, Propagated
 from photogram.results.iteration import Iteration
@@ -403,6 +402,8 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
             A file cannot be written.
         """
         folder = Path(directory)
+        from photogram.io.writing import write_whole  # what is only adjusted is not written
+
         write_whole({folder / name: content for name, content in files_of(self).items()})
 
     def photo_table(self) -> pd.DataFrame:

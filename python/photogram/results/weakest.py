@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import singledispatch
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.network.geometry import geographic_to_geocentric, lengths_of_units
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
+from photogram.show.ways import Way
 
 __all__ = [
     "Determined",
@@ -102,7 +102,7 @@ class Determined:
     point_cofactors: Floats
 
 
-@singledispatch
+@Way
 def determined(result: AdjustedNetwork) -> Determined:
     """Return where points and photos are, and how well that is known."""
     raise NotImplementedError(type(result).__name__)

@@ -2,17 +2,17 @@
 
 A class of results holds arrays and their names, and knows no report; a report knows the class whose arrays it
 reads. `Result.report()` calls `report_of`, which `results.report` defines for `Result`. So a result is one
-class, and no file needs one that needs it. The package of a class imports the files that define its ways:
-they are there as soon as the class is.
+class, and no file needs one that needs it. `WAYS` of the package of a class says which of its files define
+its ways: they are loaded when the way is first asked for, by whichever name the class was imported.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
-from functools import cached_property, singledispatch
+from functools import cached_property, singledispatch, update_wrapper
 from importlib import import_module
-from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn
+from typing import TYPE_CHECKING, Any, BinaryIO, Generic, NoReturn, ParamSpec, TypeVar, overload
 
 from photogram.statistics.findings import Findings
 from photogram.statistics.verdict import Verdict, verdict
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Judged",
     "Shown",
+    "Way",
     "axes_of",
     "columns_of",
     "document_of",
@@ -37,25 +38,66 @@ __all__ = [
 ]
 
 
-@singledispatch
+P = ParamSpec("P")
+R = TypeVar("R")
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Way(Generic[P, R]):
+    """A function with one definition for each class of its first argument, a `functools.singledispatch`.
+
+    A package names in `WAYS` its files that define it for its classes, by the name of the function.
+    """
+
+    __name__: str
+
+    def __init__(self, function: Callable[P, R]) -> None:
+        self._function = singledispatch(function)
+        self._sought: set[type] = set()
+        update_wrapper(self, function)
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Call what is defined for the class of the first argument."""
+        return self.of(type(args[0]))(*args, **kwargs)
+
+    def of(self, kind: type) -> Callable[P, R]:
+        """Return what is defined for a class."""
+        if kind not in self._sought:
+            for each in kind.__mro__:
+                package = each.__module__.rpartition(".")[0]
+                for file in getattr(sys.modules.get(package), "WAYS", {}).get(self.__name__, ()):
+                    import_module(f"{package}.{file}")
+            self._sought.add(kind)
+        return self._function.dispatch(kind)
+
+    @overload
+    def register(self, kind: type[Any]) -> Callable[[F], F]: ...
+    @overload
+    def register(self, kind: F) -> F: ...
+    def register(self, kind: Any) -> Any:
+        """Define it for a class: that of an annotation of the first argument, or one that is given."""
+        return self._function.register(kind)
+
+
+@Way
 def report_of(result: object) -> str:
     """Return the report of a result as text."""
     _undefined(result, "report")
 
 
-@singledispatch
+@Way
 def document_of(result: object) -> bytes:
     """Return the whole result as a JSON document (UTF-8)."""
     _undefined(result, "JSON document")
 
 
-@singledispatch
+@Way
 def columns_of(result: object, what: str) -> Mapping[str, Any]:
     """Return what a result says about one kind of thing (`photo`, `point`, `image` ...) as named columns."""
     _undefined(result, f"table of {what}s")
 
 
-@singledispatch
+@Way
 def files_of(result: object) -> Mapping[str, bytes | Callable[[BinaryIO], None]]:
     """Return a result as files of a folder, by their names, from which it can be read again.
 
@@ -64,26 +106,16 @@ def files_of(result: object) -> Mapping[str, bytes | Callable[[BinaryIO], None]]
     _undefined(result, "files")
 
 
-@singledispatch
+@Way
 def axes_of(result: object, ax: Any = None) -> Any:
     """Draw a result into axes, or into a new figure; return the axes."""
     _undefined(result, "picture")
 
 
-@singledispatch
+@Way
 def page_of(result: object) -> Page:
-    """Return the report of a result for the browser, without its last section.
-
-    It is defined in the module `page` beside the class of the result, which is loaded when one is asked for.
-    """
-    for kind in type(result).__mro__:
-        package = kind.__module__.rpartition(".")[0]
-        if package and find_spec(f"{package}.page"):
-            import_module(f"{package}.page")
-    own = page_of.dispatch(type(result))
-    if own is page_of.dispatch(object):
-        _undefined(result, "page")
-    return own(result)
+    """Return the report of a result for the browser, without its last section."""
+    _undefined(result, "page")
 
 
 def html_of(result: object, run: Run | None = None) -> bytes:
@@ -95,7 +127,7 @@ def html_of(result: object, run: Run | None = None) -> bytes:
     return page_html(page.with_sections(reproducibility(run, page.phases)))
 
 
-@singledispatch
+@Way
 def findings_of(result: object) -> Findings:
     """Return what the verdict on a result rests on."""
     _undefined(result, "verdict")

@@ -1,7 +1,6 @@
 """Stellar camera calibration (NOAA Technical Report NOS 55, 1972)."""
 
 from photogram.arguments.annotations import check_arguments
-from photogram.stellar import findings, html  # noqa: F401  (verdicts and pages)
 from photogram.stellar.adjustment import calibrate
 from photogram.stellar.cameras import BrownCamera, PlateCamera, SkyCamera
 from photogram.stellar.options import Options
@@ -26,3 +25,6 @@ __all__ = [
 ]
 
 check_arguments(globals(), set(__all__) - {"Result"})
+
+WAYS = {"findings_of": ("findings",), "page_of": ("page", "night_page")}
+"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""

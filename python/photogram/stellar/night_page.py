@@ -23,6 +23,7 @@ from photogram.show.page import (
     fixed,
     significant,
 )
+from photogram.show.ways import page_of
 from photogram.stellar.night_plots import figures
 from photogram.stellar.nights import CalibratedNight
 from photogram.stellar.page import plate_pictures
@@ -36,6 +37,7 @@ LISTED = 200
 """Exposures that are listed at most."""
 
 
+@page_of.register(CalibratedNight)
 def night_page(result: CalibratedNight) -> Page:
     """Return the report of a night for the browser."""
     sections = [

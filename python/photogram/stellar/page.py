@@ -24,6 +24,7 @@ from photogram.show.page import (
     fixed,
     significant,
 )
+from photogram.show.ways import page_of
 from photogram.stellar import tables
 from photogram.stellar.curves import distortion_curves
 from photogram.stellar.outliers import studentized
@@ -37,6 +38,7 @@ WORST = 25
 """Plate coordinates in the table of the worst."""
 
 
+@page_of.register(Result)
 def plate_page(result: Result) -> Page:
     """Return the report of a plate for the browser."""
     sections = [
