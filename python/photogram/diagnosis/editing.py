@@ -13,7 +13,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.diagnosis.adjusting import Adjuster
-from photogram.diagnosis.findings import Finding, Listing, Section
+from photogram.diagnosis.findings import Finding, Listing, Section, small_unit
 from photogram.diagnosis.gross import Suspects
 from photogram.diagnosis.predictions import (
     exchange,
@@ -25,7 +25,6 @@ from photogram.diagnosis.predictions import (
 from photogram.diagnosis.rivals import ODDS, rival_images
 from photogram.diagnosis.robust import critical, mad_sd
 from photogram.diagnosis.views import View
-from photogram.diagnosis.words import small_unit
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos
