@@ -148,8 +148,15 @@ BLOCKS = {
 @pytest.mark.parametrize("state", BLOCKS)
 def test_blocks(block, state):
     make, code = BLOCKS[state]
-    verdict = see(adjust(make(block)))
+    given = make(block)
+    result = adjust(given)
+    verdict = see(result)
     assert code is None or verdict.code == code
+    found = diagnose(given, result)
+    explained = see(found)
+    assert explained == found.result.verdict
+    assert bool(found.grave) == (explained.exit != 0)
+    assert (explained.exit != 0) == (verdict.exit != 0)
 
 
 @pytest.mark.parametrize(

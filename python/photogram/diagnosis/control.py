@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.diagnosis.editing import Edited
-from photogram.diagnosis.findings import Finding, Level, Section
-from photogram.diagnosis.words import Words
+from photogram.diagnosis.findings import Finding, Level, Section, Words
 from photogram.results.result import Result
 
 __all__ = ["control"]

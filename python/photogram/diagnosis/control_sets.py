@@ -26,6 +26,7 @@ from photogram.diagnosis.hypotheses import FOOT
 from photogram.diagnosis.predictions import freed
 from photogram.diagnosis.regression import spread
 from photogram.diagnosis.robust import critical, mad_sd
+from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.observations import Control
 from photogram.network.rays import LocalAxes, local_axes
@@ -308,7 +309,7 @@ class _Similarity:
         """Return it after a step of translation, scale and rotation, about the mean of all points."""
         return _Similarity(
             self.scale * math.exp(float(np.clip(step[3], -1, 1))),
-            _rotation(step[4:]) @ self.rotation,
+            Attitudes.of("rotation_vector", step[np.newaxis, 4:]).matrices[0] @ self.rotation,
             self.shift + step[:3],
         )
 
@@ -320,17 +321,6 @@ def _closest(model: Floats, target: Floats) -> _Similarity:
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
     scale = float((sizes * signs).sum() / max((x**2).sum(), np.finfo(np.float64).tiny))
     return _Similarity(max(scale, 1e-6), (left * signs) @ right, target.mean(axis=0) - model.mean(axis=0))
-
-
-def _rotation(vector: Floats) -> Floats:
-    """Return the rotation by a vector (Rodrigues)."""
-    angle = float(np.linalg.norm(vector))
-    cross = np.array(
-        [[0.0, -vector[2], vector[1]], [vector[2], 0.0, -vector[0]], [-vector[1], vector[0], 0.0]]
-    )
-    first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / 2 / np.pi) ** 2
-    turned: Floats = np.eye(3) + first * cross + second * cross @ cross
-    return turned
 
 
 def doubtful(first: Result | None, *kinds: str) -> bool:

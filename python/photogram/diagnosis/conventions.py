@@ -35,7 +35,6 @@ from photogram.diagnosis.views import View
 from photogram.errors import AdjustmentError
 from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
-from photogram.network.directions import without_lenses
 from photogram.network.geometry import rotation_matrix
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
@@ -116,26 +115,11 @@ def hints(block: Block) -> list[Message]:
         What is no block, or has photos without a pose.
     """
     with np.errstate(all="ignore"):
-        block = _of_frames(without_lenses(checked(block)))
+        block = View.of(checked(block)).seen
         found = [Message(verdict.text) for verdict in verdicts(block)]
         bar = distances_in_millimetres(block)
         bars = [] if bar is None else [Message(bar.text)]
         return [*found, *_latitudes(block), *(_readings(block) if not found else []), *bars]
-
-
-def _of_frames(block: Block) -> Block:
-    """Return a block without the images of mounted photos, whose poses are not those that it gives."""
-    mounted = {each.photo for each in block.mounts}
-    if not mounted:
-        return block
-    own = np.array([photo not in mounted for photo in block.photo_ids])[block.image_photos]
-    return block.replace(
-        mounts=(),
-        image_photos=block.image_photos[own],
-        image_points=block.image_points[own],
-        image_xy=block.image_xy[own],
-        image_sd=block.image_sd[own],
-    )
 
 
 def verdicts(block: Block) -> list[Verdict]:

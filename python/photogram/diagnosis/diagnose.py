@@ -23,11 +23,10 @@ from photogram.diagnosis.control import control
 from photogram.diagnosis.control_sets import Explained, doubtful, explain, free_model
 from photogram.diagnosis.conventions import conventions, further
 from photogram.diagnosis.editing import _BESIDE, HOPELESS, Edited, blunder_section, edit
-from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section
+from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section, Words
 from photogram.diagnosis.gross import Suspects, disproved, gross, without
 from photogram.diagnosis.heights import two_ray_heights
-from photogram.diagnosis.key_numbers import key_numbers
-from photogram.diagnosis.left_out import disagreeing, held_values, points_left_out
+from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
 from photogram.diagnosis.lenses import half_pixel, lenses_estimated, lenses_put_right
 from photogram.diagnosis.orientation import orientation, spare_explained
 from photogram.diagnosis.positions import Wrong, wrong_positions
@@ -35,7 +34,6 @@ from photogram.diagnosis.residuals import residuals
 from photogram.diagnosis.stations import stations
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.views import View
-from photogram.diagnosis.words import Words
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos

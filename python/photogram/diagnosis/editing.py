@@ -13,7 +13,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.diagnosis.adjusting import Adjuster
-from photogram.diagnosis.findings import Finding, Listing, Section
+from photogram.diagnosis.findings import Finding, Listing, Section, small_unit
 from photogram.diagnosis.gross import Suspects
 from photogram.diagnosis.predictions import (
     exchange,
@@ -25,7 +25,6 @@ from photogram.diagnosis.predictions import (
 from photogram.diagnosis.rivals import ODDS, rival_images
 from photogram.diagnosis.robust import critical, mad_sd
 from photogram.diagnosis.views import View
-from photogram.diagnosis.words import small_unit
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos
@@ -316,26 +315,19 @@ def _snoop(
 
 def tests(result: Result) -> dict[str, Floats]:
     """Test values by kind, in standard deviations of the residuals; 0 where nothing checks."""
-    block = result.block
     images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
     others = {
-        name: np.where(kind.redundancy > TESTABLE_PRIOR, np.nan_to_num(np.abs(kind.standardized)), 0.0)
-        for name, kind in result.kinds.items()
+        "control": (result.point_redundancy, result.point_standardized),
+        "station": (result.photo_redundancy, result.photo_standardized),
+        **{f"{_BESIDE}{name}": (each.redundancy, each.standardized) for name, each in result.kinds.items()},
     }
     return {
         "image": np.nan_to_num(images),
-        "control": _prior_tests(result.point_differences, block.point_sd, result.point_redundancy),
-        "station": _prior_tests(result.photo_residuals, result.photo_given_sd, result.photo_redundancy),
-        **{f"{_BESIDE}{name}": each for name, each in others.items()},
+        **{
+            name: np.where(redundancy > TESTABLE_PRIOR, np.nan_to_num(np.abs(values)), 0.0)
+            for name, (redundancy, values) in others.items()
+        },
     }
-
-
-def _prior_tests(differences: Floats, sd: Floats, redundancy: Floats) -> Floats:
-    """Test values of observed unknowns."""
-    testable = np.isfinite(sd) & (sd > 0) & (np.nan_to_num(redundancy) > TESTABLE_PRIOR)
-    values = np.zeros(differences.shape)
-    values[testable] = np.abs(differences[testable]) / (sd[testable] * np.sqrt(redundancy[testable]))
-    return np.nan_to_num(values)
 
 
 def _largest(result: Result, spread: float) -> list[_Suspect]:

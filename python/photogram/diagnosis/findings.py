@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from photogram import _photocore
+from photogram.arguments.types import Bools
 from photogram.io import json
 from photogram.show.brief import Brief, Rows
 from photogram.show.sections import composed, headline
@@ -17,7 +18,18 @@ from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Verdict
 if TYPE_CHECKING:
     from photogram.results.result import Result
 
-__all__ = ["Diagnosis", "Figure", "Finding", "Level", "Listing", "Names", "Part", "Section"]
+__all__ = [
+    "Diagnosis",
+    "Figure",
+    "Finding",
+    "Level",
+    "Listing",
+    "Names",
+    "Part",
+    "Section",
+    "Words",
+    "small_unit",
+]
 
 Level = Literal["grave", "look"]
 CONVENTIONS = frozenset(
@@ -42,6 +54,47 @@ _ADJUST = ("Adjust: `photogram adjust`, `giant` for a GIANT project, `collection
 NAMES_ON_A_LINE = 4
 SHOWN = 40
 """Findings of one level that a section of the text shows at most; the JSON document has all."""
+
+
+def small_unit(unit: str) -> tuple[str, float]:
+    """Return the unit in which errors of images are told, and how many of it a unit of images has."""
+    return ("um", 1000.0) if unit == "mm" else (unit, 1.0)
+
+
+class Words:
+    """Words for any block; a program with words of its own has a class above this one.
+
+    Attributes
+    ----------
+    sense
+        What tells the sense of the angles.
+    order
+        What gives the order of the photos.
+    usual_um
+        Between which standard deviations of image coordinates are usual, micrometres; None where nothing is.
+    bandwidth
+        Whether the bandwidths of the normal equations in that order are of interest.
+    iterations
+        Whether every iteration is one of the key numbers, as in Appendix H of the guide.
+    """
+
+    sense: str = "`photo_to_ground`"
+    order: str = "the photos"
+    usual_um: tuple[float, float] | None = None
+    bandwidth: bool = False
+    iterations: bool = False
+
+    def unhold(self, kept: Bools) -> str:
+        """Return what is done about a control point of which only some components are to be held."""
+        axes = [name for name, held in zip(("first", "second", "third"), kept.tolist(), strict=True) if held]
+        if not axes:
+            return "hold nothing of it"
+        return f"hold its {' and '.join(axes)} coordinate{'s' if len(axes) > 1 else ''} only"
+
+    def values(self, kept: Bools) -> dict[str, float]:
+        """Return further figures of such a finding."""
+        del kept
+        return {}
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.diagnosis.findings import Finding, Section
-from photogram.diagnosis.words import Words
+from photogram.diagnosis.findings import Finding, Section, Words
 from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius, meet
 

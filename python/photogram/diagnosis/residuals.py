@@ -8,9 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.findings import Finding, Listing, Section
+from photogram.diagnosis.findings import Finding, Listing, Section, small_unit
 from photogram.diagnosis.robust import critical, normal_of_chi_square
-from photogram.diagnosis.words import small_unit
 from photogram.network.block import Block
 from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius

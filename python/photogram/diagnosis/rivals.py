@@ -51,7 +51,7 @@ def rival_images(result: Result, row: int, spread: float) -> Indices:
     if len(plain.image_xy) < len(block.image_xy):
         return rows[:0]
     rays = Rays.of(plain)
-    design = _partials(rays, rays.axes.positions(result.point_positions[[point]])[0], rows)
+    design = rays.partials(rays.axes.positions(result.point_positions[[point]]), rows)
     design = (design / block.image_sd[rows][:, :, np.newaxis]).reshape(-1, 3)
     normal = design.T @ design
     held = np.isfinite(block.point_sd[point]) & (block.point_sd[point] > 0)
@@ -63,19 +63,6 @@ def rival_images(result: Result, row: int, spread: float) -> Indices:
     value, rank = tests[int(np.flatnonzero(rows == row)[0])]
     near = [(value - other) / 2 - (rank - m) < math.log(ODDS) or other > ALIKE * value for other, m in tests]
     return np.asarray(rows[np.array(near) & (rows != row)])
-
-
-def _partials(rays: Rays, position: Floats, rows: Indices) -> Floats:
-    """(k, 2, 3) partials of images with respect to the position of their point."""
-    photos = rays.block.image_photos[rows]
-    turned = rays.cameras[photos].transpose(0, 2, 1)
-    inner = np.einsum("kij,kj->ki", turned, position - rays.centres[photos])
-    scale = rays.block.known_distances("checks")[photos] / inner[:, 2]
-    across = np.zeros((len(rows), 2, 3))
-    across[:, 0, 0] = across[:, 1, 1] = 1
-    across[:, :, 2] = -inner[:, :2] / inner[:, 2:]
-    partials: Floats = scale[:, np.newaxis, np.newaxis] * across @ turned
-    return partials
 
 
 def _test(block: Floats, residuals: Floats) -> tuple[float, int]:

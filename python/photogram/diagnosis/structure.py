@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.diagnosis.findings import Figure, Finding, Section
-from photogram.diagnosis.words import Words
+from photogram.diagnosis.findings import Figure, Finding, Section, Words
 from photogram.messages import listed
 from photogram.network.block import Block
 from photogram.network.structuring import structure

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.diagnosis.robust import mad_sd
 from photogram.messages import Message
 from photogram.results.result import Result
 from photogram.statistics import global_test
@@ -19,8 +20,6 @@ LEAST_REDUNDANCY = 10.0
 """Of a kind whose standard deviations are judged."""
 NOTABLE = 1.5
 """Standard deviations that are wrong by this factor, in the mean and in the median."""
-MEDIAN = 0.6745
-"""Of the size of a normal variable with standard deviation 1: a few blunders do not move it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +45,7 @@ def weight_hints(result: Result) -> list[Message]:
         if test is None:
             continue
         factor = math.sqrt(kind.sum_of_squares / kind.redundancy)
-        finite = kind.standardized[np.isfinite(kind.standardized)]
-        middle = float(np.median(np.abs(finite))) / MEDIAN if finite.size else math.nan
+        middle = mad_sd(kind.standardized)
         if test.rejected_high and min(factor, middle) > NOTABLE:
             found.append(_hint(kind, middle, "small"))
         elif test.rejected_low and max(factor, middle) < 1 / NOTABLE:

@@ -6,8 +6,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools
 from photogram.diagnosis.diagnose import Manner, check_block, check_of
-from photogram.diagnosis.findings import Diagnosis, Finding, Names, Section
-from photogram.diagnosis.words import Words
+from photogram.diagnosis.findings import Diagnosis, Finding, Names, Section, Words
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.limits import Limits
 from photogram.giant.project import Project

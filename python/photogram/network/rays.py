@@ -189,6 +189,18 @@ class Rays:
             scale = block.known_distances("checks")[photos] / inner[:, 2]
         return block.image_xy[which] - inner[:, :2] * scale[:, np.newaxis], inner[:, 2] < 0
 
+    def partials(self, positions: Floats, rows: Indices) -> Floats:
+        """(k, 2, 3) partials of some images with respect to (k, 3) the positions of their points."""
+        photos = self.block.image_photos[rows]
+        turned = self.cameras[photos].transpose(0, 2, 1)
+        inner = np.einsum("kij,kj->ki", turned, positions - self.centres[photos])
+        scale = self.block.known_distances("checks")[photos] / inner[:, 2]
+        across = np.zeros((len(rows), 2, 3))
+        across[:, 0, 0] = across[:, 1, 1] = 1
+        across[:, :, 2] = -inner[:, :2] / inner[:, 2:]
+        partials: Floats = scale[:, np.newaxis, np.newaxis] * across @ turned
+        return partials
+
 
 def meet(normal: Floats, constant: Floats, rays: Floats) -> Floats:
     """Solve (k, 3, 3) normal equations of `rays` rays each; NaN where they do not determine a position."""

@@ -88,7 +88,6 @@ class _Problems:
 
     problem: Indices
     rows: Indices
-    photos: Indices
     count: int
 
 
@@ -171,7 +170,6 @@ class _Fit:
         self.order = np.argsort(block.image_points, kind="stable")
         counts = np.bincount(block.image_points, minlength=len(block.point_ids))
         self.start = np.concatenate([[0], np.cumsum(counts)])
-        self.distances = block.known_distances("exchanged names")
 
     def of(self, wanted: list[tuple[int, int]]) -> list[tuple[float, int]]:
         """Return T and its dimension of points with a ray through another image of the same photo.
@@ -181,7 +179,7 @@ class _Fit:
         of_images = [np.append(self._others(image), place) for image, place in wanted]
         sizes = [len(each) for each in of_images]
         problem, rows = np.repeat(np.arange(len(wanted)), sizes), np.concatenate(of_images)
-        problems = _Problems(problem, rows, self.block.image_photos[rows], len(wanted))
+        problems = _Problems(problem, rows, len(wanted))
         points = self.block.image_points[[image for image, _ in wanted]]
         squares = self._squares(problems, points)
         held = np.isfinite(self._prior_sd(points)).sum(axis=1)
@@ -206,11 +204,9 @@ class _Fit:
 
     def _squares(self, problems: _Problems, points: Indices) -> Floats:
         """(n,) least sums of squares; infinite where rays do not meet before the cameras."""
-        block, count = self.block, problems.count
-        photos, own = problems.photos, problems.problem
-        cameras, centres = self.rays.cameras[photos], self.rays.centres[photos]
-        distances = self.distances[photos]
-        xy, sd = block.image_xy[problems.rows], block.image_sd[problems.rows]
+        block, rays, count = self.block, self.rays, problems.count
+        rows, own = problems.rows, problems.problem
+        sd = block.image_sd[rows]
 
         def total(values: Floats) -> Floats:
             flat = values.reshape(len(values), -1)
@@ -218,12 +214,10 @@ class _Fit:
             summed: Floats = np.stack(columns, axis=1).reshape(count, *values.shape[1:])
             return summed
 
-        inner = np.column_stack([xy, distances]) * -np.sign(distances)[:, np.newaxis]
-        outer = np.einsum("mij,mj->mi", cameras, inner)
-        directions = outer / np.linalg.norm(outer, axis=1, keepdims=True)
-        across = np.eye(3) - directions[:, :, np.newaxis] * directions[:, np.newaxis]
-        right = np.einsum("mij,mj->mi", across, centres)
-        position = meet(total(across), total(right), np.bincount(own, minlength=count).astype(float))
+        across, right = rays.equations()
+        position = meet(
+            total(across[rows]), total(right[rows]), np.bincount(own, minlength=count).astype(float)
+        )
         # Axes are those of the block where priors count, and a component may be unknown.
         given = block.point_positions[points] - self.rays.axes.origin
         prior_sd = self._prior_sd(points)
@@ -233,21 +227,17 @@ class _Fit:
         there = np.isfinite(position[own, 0])
         if not there.any():
             return np.full(count, np.inf)
-        reach = np.median(np.linalg.norm(position[own] - centres, axis=1)[there])
-        least = HELD * float(np.median(sd)) * reach / float(np.median(np.abs(distances)))
+        photos = block.image_photos[rows]
+        reach = np.median(np.linalg.norm(position[own] - rays.centres[photos], axis=1)[there])
+        distances = np.abs(block.known_distances("exchanged names")[photos])
+        least = HELD * float(np.median(sd)) * reach / float(np.median(distances))
         weight = np.where(held, 1 / np.maximum(np.where(held, prior_sd, 1.0), least) ** 2, 0.0)
         squares = np.full(count, np.nan)
         with np.errstate(all="ignore"):
             for _ in range(STEPS):
-                u = np.einsum("mji,mj->mi", cameras, position[own] - centres)
-                scale = distances / u[:, 2]
-                residuals = (xy - u[:, :2] * scale[:, np.newaxis]) / sd
-                ratio = u[:, :2] / u[:, 2:]
-                turned = cameras.transpose(0, 2, 1)
-                partials = scale[:, np.newaxis, np.newaxis] * (
-                    turned[:, :2] - ratio[:, :, np.newaxis] * turned[:, 2:]
-                )
-                partials /= sd[:, :, np.newaxis]
+                residuals, in_front = rays.residuals(position[own], rows)
+                residuals = residuals / sd
+                partials = rays.partials(position[own], rows) / sd[:, :, np.newaxis]
                 apart = np.where(held, given - position, 0.0)
                 squares = total((residuals**2).sum(axis=1, keepdims=True))[:, 0]
                 squares = squares + (weight * apart**2).sum(axis=1)
@@ -257,5 +247,5 @@ class _Fit:
                 sound = np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(vector).all(axis=1)
                 sound[sound] &= np.linalg.cond(normal[sound]) < 1e14
                 position[sound] += np.linalg.solve(normal[sound], vector[sound, :, np.newaxis])[..., 0]
-        behind = np.bincount(own, ~(u[:, 2] < 0), count) > 0
+        behind = np.bincount(own, ~in_front, count) > 0
         return np.where(behind | ~np.isfinite(squares), np.inf, squares)
