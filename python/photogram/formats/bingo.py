@@ -15,8 +15,8 @@ from photogram.formats.plain.settings import bare_settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import control_table
 from photogram.formats.project import Project
-from photogram.formats.reduced import Reduced, project_of, with_fitting_rotations
-from photogram.formats.reduced_writing import (
+from photogram.formats.reduced_coordinates import Reduced, project_of, with_fitting_rotations
+from photogram.formats.reduced_coordinates_writing import (
     ReducedImages,
     by_photo,
     given_control,
