@@ -4,7 +4,9 @@ An argument of a wrong kind would otherwise fail somewhere inside, as whatever P
 
 Packages that check annotations would do less here: beartype converts nothing (strings to paths, integers of
 NumPy to integers), raises errors of its own, and takes NaN, NUL and half a surrogate pair for good values;
-pydantic knows no arrays, and brings a compiled core to an install that is light.
+pydantic knows no arrays, and brings a compiled core to an install that is light; msgspec knows none either,
+names neither the words that may stand nor the nearest key, takes 1e400 for a number, and is imported in more
+time than this package.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from photogram.formats.images import from_corner, to_corner
 from photogram.formats.intersection import intersected
 from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
-from photogram.formats.plain.settings import bare_settings
+from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.plain.writing import attitude_matrices
@@ -365,14 +365,14 @@ def with_control(
     from photogram.formats.control_lists import read_control_list
     from photogram.formats.exchanged import check_systems
 
-    settings = bare_settings(
+    settings = Settings(
         path,
-        {"control": path},
         frame=project.frame,
         length=project.block.linear_unit,
         sd=sd,
-        crs=crs,
-        columns=columns,
+        tables={"control": path},
+        crs={"control": crs} if crs else {},
+        columns={"control": columns},
     )
     tables = Tables(settings, [], frozenset(project.block.point_ids))
     listed_control = read_control_list(path, project)

@@ -11,12 +11,12 @@ from photogram.errors import InputError
 from photogram.formats.cards import END, angle_unit, cards, to_radians
 from photogram.formats.format import Format, Wishes
 from photogram.formats.plain.cameras import read_cameras
-from photogram.formats.plain.settings import bare_settings
+from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import control_table
 from photogram.formats.project import Project
-from photogram.formats.reduced import Reduced, project_of, with_fitting_rotations
-from photogram.formats.reduced_writing import (
+from photogram.formats.reduced_coordinates import Reduced, project_of, with_fitting_rotations
+from photogram.formats.reduced_coordinates_writing import (
     ReducedImages,
     by_photo,
     given_control,
@@ -50,7 +50,7 @@ def read(path: Path, wishes: Wishes) -> Project:
             " and c in mm",
             file=images,
         )
-    given = read_cameras(Tables(bare_settings(images, {"cameras": table}, image="mm"), []))
+    given = read_cameras(Tables(Settings(images, tables={"cameras": table}, image="mm"), []))
     known = {each.name: each for each in given.cameras}
     found = Reduced(cameras=known)
     photo: str | None = None

@@ -10,7 +10,7 @@ from photogram.formats.collections import cannot_hold, collection_of, project_of
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import Project
 from photogram.io.files import read_lines
-from photogram.io.words import pieces
+from photogram.io.packed_numbers import pieces
 
 __all__ = ["FORMAT", "TITLE"]
 

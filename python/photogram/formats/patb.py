@@ -12,8 +12,8 @@ from photogram.formats.cards import END, Card, angle_unit, cards, names_beside, 
 from photogram.formats.format import Format, Wishes
 from photogram.formats.names import numbered
 from photogram.formats.project import Project
-from photogram.formats.reduced import Reduced, project_of, with_fitting_rotations
-from photogram.formats.reduced_writing import (
+from photogram.formats.reduced_coordinates import Reduced, project_of, with_fitting_rotations
+from photogram.formats.reduced_coordinates_writing import (
     ReducedImages,
     by_photo,
     given_control,

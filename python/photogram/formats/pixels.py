@@ -12,7 +12,7 @@ from photogram.errors import InputError
 from photogram.formats.format import Format, Wishes
 from photogram.formats.images import from_corner, to_corner
 from photogram.formats.plain.cameras import read_cameras
-from photogram.formats.plain.settings import bare_settings
+from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import camera_table, known_cameras
 from photogram.formats.project import Project, assembled
@@ -104,7 +104,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     if wishes.cameras is None:
         raise InputError("a table of pixels has no cameras: --camera FILE gives them", file=path)
     table = pixel_table(path)
-    cameras = read_cameras(Tables(bare_settings(path, {"cameras": wishes.cameras}), []))
+    cameras = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}), []))
     photos, points = table.names("photo"), table.names("point")
     which = _cameras_of(table, [each.name for each in cameras.cameras])
     of_photo = np.zeros(len(photos.names), dtype=np.int64)

@@ -17,7 +17,7 @@ from photogram.arguments.types import Floats
 from photogram.collection.collection import Collection
 from photogram.collection.formats.format import Format
 from photogram.errors import InputError
-from photogram.io.words import PIECE, at, whole
+from photogram.io.packed_numbers import PIECE, at, whole
 from photogram.memory import require
 
 __all__ = ["FORMAT"]

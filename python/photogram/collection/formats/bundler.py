@@ -19,7 +19,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
 from photogram.collection.formats.format import Format
 from photogram.errors import InputError
-from photogram.io.words import at, whole
+from photogram.io.packed_numbers import at, whole
 from photogram.memory import require
 
 __all__ = ["FORMAT"]

@@ -9,7 +9,7 @@ from pathlib import Path
 from photogram.collection.collection import Collection
 from photogram.collection.formats.format import Format
 from photogram.errors import InputError
-from photogram.io.words import packed, pieces
+from photogram.io.packed_numbers import packed, pieces
 from photogram.memory import turned
 
 __all__ = ["FORMATS", "read", "recognised", "to_bytes"]

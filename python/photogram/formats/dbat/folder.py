@@ -12,7 +12,7 @@ from photogram.formats.dbat.script import read_camera_file
 from photogram.formats.dbat.tables import take_images, take_photos, take_points, take_poses, titled
 from photogram.formats.format import Wishes
 from photogram.formats.plain.cameras import read_cameras
-from photogram.formats.plain.settings import bare_settings
+from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.xml_stream import root_of
 from photogram.io.files import read_lines
@@ -47,7 +47,7 @@ def is_measurements(path: Path) -> bool:
 def _sensors(path: Path, wishes: Wishes, messages: list[Message]) -> dict[str, Sensor]:
     """Return cameras: of a table that a user gives, else of a file of cameras in the folder."""
     if wishes.cameras is not None:
-        table = read_cameras(Tables(bare_settings(path, {"cameras": wishes.cameras}, image="mm"), messages))
+        table = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}, image="mm"), messages))
         return sensors_of_table(table.cameras, table.sizes, table.pixel_mm, wishes.cameras)
     folder = path if path.is_dir() else path.parent
     files = [each for each in sorted(folder.glob("*.xml")) if "dbat_camera_version" in root_of(each)[1]]

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any, NoReturn, cast
 
 from photogram.errors import InputError
-from photogram.formats.columns import PLAIN, Columns, columns_given
+from photogram.formats.columns import Columns, columns_given
 from photogram.formats.plain.schema import TABLES
 from photogram.formats.project import DatumName, Frame, Options
 from photogram.io.toml import TomlFile
 from photogram.messages import Message, listed, nearest
 from photogram.results.features import KINDS, Definition
 
-__all__ = ["Settings", "bare_settings", "read_settings", "unread_tables"]
+__all__ = ["Settings", "read_settings", "unread_tables"]
 
 VERSION = 1
 WITH_CRS = tuple(name for name, each in TABLES.items() if each.has_system)
@@ -64,12 +64,12 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Settings:
-    """What `project.toml` says, defaults filled in.
+    """What `project.toml` says, or tables that come without one: all that it leaves out has its default.
 
     Attributes
     ----------
     path
-        The file.
+        The file, or what errors name where there is none.
     name
         Of the project.
     frame, options
@@ -91,22 +91,26 @@ class Settings:
     """
 
     path: Path
-    name: str
-    frame: Frame
-    options: Options
-    length: str
-    angle: str
-    image: str
-    image_y: str
-    pixel_origin: str
-    attitude: str
-    rotation: str
-    photo: str
-    sd: Mapping[str, tuple[float, ...]]
-    tables: Mapping[str, Path]
-    crs: Mapping[str, str]
+    name: str = ""
+    frame: Frame = field(default_factory=Frame)
+    options: Options = field(default_factory=Options)
+    length: str = "m"
+    angle: str = "deg"
+    image: str = "px"
+    image_y: str = ""
+    pixel_origin: str = "corner"
+    attitude: str = "omega_phi_kappa"
+    rotation: str = "object_to_photo"
+    photo: str = "y_up"
+    sd: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    tables: Mapping[str, Path] = field(default_factory=dict)
+    crs: Mapping[str, str] = field(default_factory=dict)
     columns: Mapping[str, Columns] = field(default_factory=dict)
     features: Mapping[str, Definition] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.image_y:
+            object.__setattr__(self, "image_y", "down" if self.image == "px" else "up")
 
 
 def read_settings(path: Path) -> Settings:
@@ -124,7 +128,6 @@ def read_settings(path: Path) -> Settings:
     if isinstance(version, bool) or version != VERSION:
         message = "[project] format is missing" if version is None else f"has format {version!r}"
         file.fail("format", f"{message}: this is version {VERSION} of the schema, `format = {VERSION}`")
-    image = file.word("units", "image")
     return Settings(
         path=path,
         name=file.text("project", "name"),
@@ -137,10 +140,8 @@ def read_settings(path: Path) -> Settings:
         ),
         length=file.word("units", "length"),
         angle=file.word("units", "angle"),
-        image=image,
-        image_y=file.word("axes", "image_y")
-        if file.has("axes", "image_y")
-        else ("down" if image == "px" else "up"),
+        image=file.word("units", "image"),
+        image_y=file.word("axes", "image_y") if file.has("axes", "image_y") else "",
         pixel_origin=file.word("axes", "pixel_origin"),
         attitude=file.word("axes", "attitude"),
         rotation=file.word("axes", "rotation"),
@@ -150,52 +151,6 @@ def read_settings(path: Path) -> Settings:
         crs={name: file.text(name, "crs") for name in WITH_CRS if file.has(name, "crs")},
         columns={name: file.columns(name) for name in WITH_CRS if name in file.content},
         features={name: file.feature(name) for name in file.content.get("features", {})},
-    )
-
-
-def bare_settings(
-    path: Path,
-    tables: Mapping[str, Path],
-    *,
-    frame: Frame | None = None,
-    length: str = "m",
-    image: str = "px",
-    sd: Mapping[str, tuple[float, ...]] | None = None,
-    crs: str | None = None,
-    columns: Columns = PLAIN,
-) -> Settings:
-    """Return settings for tables that come without a file of them: all defaults, in pixels and degrees.
-
-    Parameters
-    ----------
-    path
-        What errors name.
-    tables
-        The tables.
-    frame, length, image, sd
-        As in :class:`Settings`.
-    crs
-        Of all these tables, where they are not in the frame.
-    columns
-        What is said of the columns of all these tables.
-    """
-    return Settings(
-        path=path,
-        name="",
-        frame=frame or Frame(),
-        options=Options(),
-        length=length,
-        angle="deg",
-        image=image,
-        image_y="down" if image == "px" else "up",
-        pixel_origin="corner",
-        attitude="omega_phi_kappa",
-        rotation="object_to_photo",
-        photo="y_up",
-        sd=sd or {},
-        tables=tables,
-        crs=dict.fromkeys(tables, crs) if crs else {},
-        columns=dict.fromkeys(tables, columns),
     )
 
 

@@ -1,4 +1,4 @@
-"""Files of words with white space between them, packed by bzip2 or gzip or not, read piece by piece."""
+"""Files of numbers with white space between them, packed by bzip2 or gzip or not, read piece by piece."""
 
 from __future__ import annotations
 
