@@ -201,7 +201,7 @@ const SENSOR: usize = 9;
 /// Photos on frames; that of the last has no images itself.
 const MOUNTED: [usize; 3] = [5, 6, 8];
 const FRAMES: [usize; 3] = [0, 1, 7];
-const MOTION: usize = 10;
+const VELOCITY: usize = 10;
 /// Photos that move while they are read: the frame of another, and one by itself. Seconds per unit of image coordinates.
 const ROLLING: [usize; 2] = [1, 3];
 const BY_XY: [f64; 2] = [0.001, -0.01];
@@ -219,7 +219,7 @@ fn truth(common: usize) -> Pose {
         CommonKind::Line => place(10),
         CommonKind::Plane => place(3),
         CommonKind::Sensor => [0.4, 0.05, -0.1],
-        CommonKind::Motion => [0.3, -0.4, 0.2],
+        CommonKind::Velocity => [0.3, -0.4, 0.2],
         CommonKind::Boresight => [0.0; 3],
     };
     let attitude = match CommonKind::ALL[common] {
@@ -231,7 +231,7 @@ fn truth(common: usize) -> Pose {
         }
         CommonKind::Plane => rotation([0.3, -0.6, 0.2]),
         CommonKind::Sensor => rotation([0.1, -0.2, 0.15]),
-        CommonKind::Motion => angle_axis_rotation(&Vector3::new(0.2, -0.1, 0.4)),
+        CommonKind::Velocity => angle_axis_rotation(&Vector3::new(0.2, -0.1, 0.4)),
         _ => Matrix3::identity(),
     };
     Pose { position: position.into(), attitude }
@@ -246,7 +246,7 @@ fn seen(photo: usize) -> Pose {
 fn seen_at(photo: usize, time: f64) -> Pose {
     let own = |k: usize| {
         let (time, Pose { position: v, attitude: turn }) =
-            (if ROLLING.contains(&k) { time } else { 0.0 }, truth(MOTION));
+            (if ROLLING.contains(&k) { time } else { 0.0 }, truth(VELOCITY));
         let (centre, a) = (position(&pose(k)), attitude(&pose(k)));
         let attitude = a * angle_axis_rotation(&(time * rotation_angle_axis(&turn)));
         Pose { position: centre + time * a * v, attitude }
@@ -292,7 +292,7 @@ fn with_commons(network: &mut Network) {
     }
     let mount = |k: usize| OnFrame { photo: MOUNTED[k], frame: FRAMES[k], sensor: SENSOR }.into();
     network.mounts = [0, 1, 2].map(mount).to_vec();
-    let moving = |photo| -> Mount { Rolling { photo, motion: MOTION, start: 0.0, by_xy: BY_XY }.into() };
+    let moving = |photo| -> Mount { Rolling { photo, velocity: VELOCITY, start: 0.0, by_xy: BY_XY }.into() };
     network.mounts.extend(ROLLING.map(moving));
     let infinite = f64::INFINITY;
     let deviations = |kind: CommonKind| match kind {
@@ -307,8 +307,8 @@ fn with_commons(network: &mut Network) {
         let small = |first: usize, size: f64| [0, 1, 2].map(|k| size * noise(1600 + 10 * common + first + k));
         let turns = kind.unknowns().iter().any(|&(_, component, _)| component > 2);
         let size = if kind == CommonKind::Drift || kind == CommonKind::Instrument { 0.001 } else { 0.01 };
-        let turns = turns && kind != CommonKind::Motion;
-        let attitude = if kind == CommonKind::Motion { Matrix3::identity() } else { attitude };
+        let turns = turns && kind != CommonKind::Velocity;
+        let attitude = if kind == CommonKind::Velocity { Matrix3::identity() } else { attitude };
         let attitude = if turns { attitude * rotation(small(3, 0.02)) } else { attitude };
         Common {
             kind,
@@ -557,8 +557,8 @@ mod dense {
                     return ([x0, y0, z0], a);
                 }
                 // Its rotation is given as none.
-                let first = self.first(MOTION) + 3;
-                let way = times(&a, &self.common(x, MOTION).1.map(|v| time * v));
+                let first = self.first(VELOCITY) + 3;
+                let way = times(&a, &self.common(x, VELOCITY).1.map(|v| time * v));
                 let turn = exponential(&std::array::from_fn(|k| time * x[first + k]));
                 ([x0 + way[0], y0 + way[1], z0 + way[2]], product(&a, &turn))
             };

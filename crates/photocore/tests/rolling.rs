@@ -100,12 +100,12 @@ fn network(seed: u64) -> Network {
         Point { coordinates: coordinates.into(), sd: [0.005; 3] }
     };
     let motion = |_| Common {
-        kind: CommonKind::Motion,
+        kind: CommonKind::Velocity,
         position: [0.0; 3],
         attitude: Matrix3::identity(),
         sd: vec![FREE; 6],
     };
-    let moves = |photo: usize| Rolling { photo, motion: photo / 4, start: START, by_xy: BY_XY }.into();
+    let moves = |photo: usize| Rolling { photo, velocity: photo / 4, start: START, by_xy: BY_XY }.into();
     Network {
         space: ObjectSpace::Rectangular,
         poses: PoseNumbers::Angles(SENSE),
@@ -165,12 +165,12 @@ fn redundancy_numbers_add_up_to_the_degrees_of_freedom() {
 #[test]
 fn a_motion_that_no_row_shows_is_named() {
     let mut network = network(200);
-    let at_once = |photo| Rolling { photo, motion: 1, start: 0.0, by_xy: [0.0; 2] }.into();
+    let at_once = |photo| Rolling { photo, velocity: 1, start: 0.0, by_xy: [0.0; 2] }.into();
     (4..PHOTOS).for_each(|photo| network.mounts[photo] = at_once(photo));
     let combination = Combination { commons: vec![1], ..Combination::default() };
     assert_eq!(adjust(&network).err(), Some(NetworkError::Undetermined(vec![combination; 6])));
     // Readings at one time are those of another pose.
-    let later = |photo| Rolling { photo, motion: 1, start: 0.1, by_xy: [0.0; 2] }.into();
+    let later = |photo| Rolling { photo, velocity: 1, start: 0.1, by_xy: [0.0; 2] }.into();
     (4..PHOTOS).for_each(|photo| network.mounts[photo] = later(photo));
     let Err(NetworkError::Undetermined(found)) = adjust(&network) else { unreachable!() };
     assert!(found.iter().all(|own| own.commons == [1] && !own.photos.is_empty()), "{found:?}");

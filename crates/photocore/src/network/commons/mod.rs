@@ -111,7 +111,7 @@ kinds! {
         ("rotation x", 3, Angle), ("rotation y", 4, Angle), ("rotation z", 5, Angle)
     ];
     /// A uniform motion in the axes of what moves: its position is the way, its rotation the turn of one second.
-    Motion = "motion", Scales, [
+    Velocity = "velocity", Scales, [
         ("x", 0, Speed), ("y", 1, Speed), ("z", 2, Speed),
         ("rotation x", 3, Rate), ("rotation y", 4, Rate), ("rotation z", 5, Rate)
     ];
@@ -268,7 +268,7 @@ pub struct CommonState {
 }
 
 impl CommonState {
-    /// Its position as a vector: of a lever arm, shift, drift, instrument, sensor or motion.
+    /// Its position as a vector: of a lever arm, shift, drift, instrument, sensor or velocity.
     pub fn vector(&self) -> Vector3 {
         self.base + self.offset
     }
@@ -278,7 +278,7 @@ impl CommonState {
         &self.attitude
     }
 
-    /// Its position and rotation: of a sensor or a motion.
+    /// Its position and rotation: of a sensor or a velocity.
     pub fn pose(&self) -> Pose {
         Pose { position: self.vector(), attitude: self.attitude }
     }

@@ -13,8 +13,8 @@ use crate::network::commons::CommonKind;
 pub struct Rolling {
     /// The photo.
     pub photo: usize,
-    /// The common unknown that is its motion.
-    pub motion: usize,
+    /// The common unknown that is its velocity.
+    pub velocity: usize,
     /// The time of an image at (0, 0), in seconds from that of the photo.
     pub start: f64,
     /// Seconds per unit of x and of y: where rows are read from above and y points up, the second is negative and the first zero.
@@ -27,11 +27,11 @@ impl MountModel for Rolling {
     }
 
     fn unknowns(&self) -> CommonKind {
-        CommonKind::Motion
+        CommonKind::Velocity
     }
 
     fn commons(&self, _: Option<When>) -> Vec<usize> {
-        vec![self.motion]
+        vec![self.velocity]
     }
 
     fn is_timed(&self) -> bool {
@@ -44,12 +44,12 @@ impl MountModel for Rolling {
             When::Image([x, y]) => self.start + self.by_xy[0] * x + self.by_xy[1] * y,
             When::Time(time) => time,
         };
-        let (motion, block) = grounds.common(self.motion);
-        let Pose { position, attitude } = motion.pose();
+        let (velocity, block) = grounds.common(self.velocity);
+        let Pose { position, attitude } = velocity.pose();
         let w = rotation_angle_axis(&attitude);
         let at = Pose { position: t * position, attitude: angle_axis_rotation(&(t * w)) };
         let by_turn = t * angle_axis_with_jacobian(&(t * w)).1.transpose() * right_jacobian_inverse(&w);
-        let own = steps(motion.steps().map(|(shift, turn)| (t * shift, by_turn * turn)));
+        let own = steps(velocity.steps().map(|(shift, turn)| (t * shift, by_turn * turn)));
         pose.lead_to(&at, block.map(|block| (block, own)));
     }
 }
@@ -61,6 +61,6 @@ mod tests {
 
     #[test]
     fn steps_agree_with_differences() {
-        agrees(Rolling { photo: 0, motion: 0, start: 0.1, by_xy: [0.02, -0.03] }.into());
+        agrees(Rolling { photo: 0, velocity: 0, start: 0.1, by_xy: [0.02, -0.03] }.into());
     }
 }
