@@ -216,12 +216,12 @@ def kind_tables(block: Block) -> dict[str, dict[str, Any]]:
         own = [each for each in block.observations if isinstance(each, kind.made)]
         if not own:
             continue
-        first: dict[str, Any] = {}
-        last: dict[str, Any] = {}
+        first, last = dict[str, Any](), dict[str, Any]()
+        common: dict[str, dict[str, Any]] = {}
         if kind.common is not None:
             commons = [getattr(each, kind.unknown) for each in own]
             if there := different(commons):
-                found[kind.common.table] = _common_columns(block, kind.common, there)
+                common = {kind.common.table: _common_columns(block, kind.common, there)}
                 needed = kind.common.column in TABLES[kind.table].required
                 (first if needed else last)[kind.common.column] = [
                     each.name if each else "" for each in commons
@@ -230,7 +230,8 @@ def kind_tables(block: Block) -> dict[str, dict[str, Any]]:
         for name, names in kind.values.items():
             values = np.array([getattr(each, name) for each in own], dtype=float)
             first |= zip(names, values.reshape(len(own), -1).T, strict=True)
-        found[kind.table] = first | _deviations(own, kind) | last
+        table = {kind.table: first | _deviations(own, kind) | last}
+        found |= table | common if last else common | table
     return found
 
 
