@@ -13,7 +13,7 @@ import typer
 from rich.markup import render
 
 import photogram
-from photogram.cli.commands import app
+from photogram.cli.commands import app, application
 from photogram.cli.simulate import simulate as simulate_command
 from photogram.giant import read_project
 from photogram.network.simulation import simulate as simulate_function
@@ -58,6 +58,13 @@ def helps(command, name="photogram"):
         yield f"{name} {parameter.name}", getattr(parameter, "help", None) or ""
     for below, inner in getattr(command, "commands", {}).items():
         yield from helps(inner, f"{name} {below}")
+
+
+def test_the_list_of_commands_says_what_their_own_helps_begin_with():
+    whole, listed = typer.main.get_command(app), typer.main.get_command(application(""))
+    assert list(whole.commands) == list(listed.commands)
+    for name, command in listed.commands.items():
+        assert whole.commands[name].help.split("\n\n")[0] == command.help
 
 
 def test_no_help_loses_words_in_brackets_which_are_taken_for_a_style():

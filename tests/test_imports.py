@@ -8,6 +8,8 @@ from pkgutil import resolve_name
 
 import pytest
 
+import photogram
+
 
 @pytest.mark.parametrize(
     ("statement", "name"),
@@ -41,6 +43,11 @@ def test_the_reference_says_names_that_there_are():
     assert len(said) > 40
     for name in said:
         assert resolve_name(name) is not None
+
+
+def test_the_top_has_no_more_names_than_can_be_read():
+    assert len(photogram.__all__) <= 60
+    assert {"Distance", "Position", "LeverArm"} <= set(photogram.__all__)
 
 
 PARTS = """

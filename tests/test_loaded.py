@@ -15,6 +15,7 @@ except SystemExit as end:
     assert not end.code, end.code
 """
 HEAVY = ("matplotlib", "jinja2", "pandas", "pyarrow", "pyproj", "geopandas", "scipy", "erfa", "tetra3rs")
+SHOWING = ("rich", "typer", "photogram.results.report", "photogram.results.html", "photogram.show.page")
 NUMERICAL = ("numpy", "orjson", "photogram._photocore")
 
 
@@ -49,4 +50,26 @@ def test_giant_does_not_wait_for_readers_of_other_formats(tmp_path):
 
 def test_adjust_and_its_block_load_no_pictures(tmp_path):
     program = "from photogram import Block, adjust, simulate\nassert adjust(simulate().block).converged"
-    assert loaded(program, HEAVY, tmp_path) == []
+    assert loaded(program, (*HEAVY, *SHOWING), tmp_path) == []
+
+
+def test_a_command_loads_no_other(tmp_path):
+    among = [f"photogram.cli.{name}" for name in ("adjust", "giant", "comparator", "stellar_camera", "plan")]
+    assert loaded(COMMAND.format(arguments=["--help"]), among, tmp_path) == []
+    assert loaded(COMMAND.format(arguments=["plan", "--help"]), among, tmp_path) == ["photogram.cli.plan"]
+
+
+@pytest.mark.parametrize(
+    ("program", "most"),
+    [
+        (COMMAND.format(arguments=["--help"]), 12),
+        ("from photogram import Block, adjust, simulate\nassert adjust(simulate().block).converged", 115),
+    ],
+    ids=["help", "adjust"],
+)
+def test_small_work_loads_few_files(program, most, tmp_path):
+    count = "\nimport sys; print(sum(each.startswith('photogram') for each in sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", program + count], check=True, capture_output=True, text=True, cwd=tmp_path
+    )
+    assert int(done.stdout.split()[-1]) <= most

@@ -37,8 +37,10 @@ if TYPE_CHECKING:
     from photogram.network.cameras import Camera
     from photogram.network.datum import InnerConstraints, MinimumConstraints
     from photogram.network.geometry import Spheroid
+    from photogram.network.observations import Distance, Position
     from photogram.network.refraction import Refraction
     from photogram.network.simulation import Simulation, simulate
+    from photogram.network.unknowns import LeverArm
     from photogram.planning import Plan, plan
     from photogram.results.components import VarianceComponents
     from photogram.results.differences import Differences, differences
@@ -60,6 +62,7 @@ __all__ = [
     "Camera",
     "Cleaned",
     "Differences",
+    "Distance",
     "Feature",
     "Features",
     "FirstValues",
@@ -67,6 +70,7 @@ __all__ = [
     "InnerConstraints",
     "InputError",
     "Iteration",
+    "LeverArm",
     "Message",
     "MinimumConstraints",
     "Orientation",
@@ -74,6 +78,7 @@ __all__ = [
     "PhotogramError",
     "Plan",
     "Pose",
+    "Position",
     "Progress",
     "RankError",
     "Refraction",
@@ -118,6 +123,7 @@ _HOMES = {
     "VarianceComponents": "results.components",
     "VarianceFunction": "results.variance_function",
     "Differences": "results.differences",
+    "Distance": "network.observations",
     "Feature": "results.features",
     "Features": "results.features",
     "FirstValues": "adjustment.first_values",
@@ -125,6 +131,7 @@ _HOMES = {
     "InnerConstraints": "network.datum",
     "InputError": "errors",
     "Iteration": "results.iteration",
+    "LeverArm": "network.unknowns",
     "Message": "messages",
     "MinimumConstraints": "network.datum",
     "Orientation": "absolute_orientation",
@@ -132,6 +139,7 @@ _HOMES = {
     "PhotogramError": "errors",
     "Plan": "planning",
     "Pose": "adjustment.resection",
+    "Position": "network.observations",
     "Progress": "adjustment.adjustment",
     "RankError": "errors",
     "Refraction": "network.refraction",

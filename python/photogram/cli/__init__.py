@@ -5,6 +5,7 @@ Nothing but what ends it cleanly is imported before that is in place.
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -33,9 +34,11 @@ def main() -> None:
     open_streams()
     code: int | str | None = 0
     try:
-        from photogram.cli.commands import app
+        from photogram.cli.commands import application
 
-        app()
+        # A shell that completes may ask for any command.
+        completing = "_PHOTOGRAM_COMPLETE" in os.environ
+        application(None if completing else " ".join(sys.argv[1:2]))()
     except SystemExit as end:
         code = end.code
     except OSError as error:

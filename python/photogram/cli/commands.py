@@ -1,38 +1,24 @@
-"""The commands: one for each program, and `plan` and `simulate`.
+"""The commands: one for each program, and what goes with blocks of any format.
 
-Results go to files and standard output, errors and progress to standard error. Heavy modules are imported by
-the commands that need them, so that `photogram --help` is quick.
+A command is loaded when it is called: of the others the command line knows no more than their help, so that
+each of them, and `photogram --help`, is quick.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+from importlib import import_module
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli import (
-    absolute_orientation,
-    adjust,
-    check,
-    check_project,
-    collection,
-    comparator,
-    convert,
-    features,
-    giant,
-    info,
-    new,
-    perspective_center,
-    plan,
-    relative_orientation,
-    simulate,
-    stellar_camera,
-)
 from photogram.cli.console import output
 from photogram.cli.groups import GroupWithMain
 from photogram.cli.panels import Command
 
-__all__ = ["app"]
+if TYPE_CHECKING:
+    app: typer.Typer
+
+__all__ = ["COMMANDS", "app", "application"]
 
 ADJUST = (
     "Examples: `photogram adjust --example`,"
@@ -40,53 +26,116 @@ ADJUST = (
     " `photogram adjust quarry --self-calibrate f,cx,cy,k1,k2 --map quarry.gpkg`"
 )
 
-app = typer.Typer(
-    name="photogram",
-    help="Photogrammetric least-squares adjustment with the covariance of every result.",
-    epilog="Exit codes: 0 converged, 1 input or output at fault, 2 usage, 3 not converged, diverged or"
-    " something grave found, 4 a result that cannot be used as it is, 129, 130, 143 ended by a signal.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-)
-giant_app = typer.Typer(name="giant", cls=GroupWithMain, help="Adjust or check a GIANT project.")
-giant_app.command("adjust", cls=Command)(giant.giant)
-giant_app.command("check", cls=Command)(check.check)
-comparator_app = typer.Typer(
-    name="comparator",
-    cls=GroupWithMain,
-    help="Calibrate a comparator, correct measurements, compare calibrations.",
-)
-comparator_app.command("calibrate", cls=Command)(comparator.comparator)
-comparator_app.command("correct", cls=Command)(comparator.correct)
-comparator_app.command("compare", cls=Command)(comparator.compare)
-orientation_app = typer.Typer(
-    name="absolute-orientation", cls=GroupWithMain, help="Orient a model absolutely, or transform its points."
-)
-orientation_app.command("orient", cls=Command)(absolute_orientation.absolute_orientation)
-orientation_app.command("transform", cls=Command)(absolute_orientation.transform)
-orientation_app.command("relative", cls=Command)(relative_orientation.relative)
-stellar_app = typer.Typer(
-    name="stellar-camera",
-    cls=GroupWithMain,
-    help="Calibrate a camera by a plate with stars, or by exposures of the sky.",
-)
-stellar_app.command("plate", cls=Command)(stellar_camera.stellar_camera)
-stellar_app.command("exposures", cls=Command)(stellar_camera.exposures)
-stellar_app.command("places", cls=Command)(stellar_camera.places)
-app.command(cls=Command, epilog=ADJUST)(adjust.adjust)
-app.command("check", cls=Command)(check_project.check_project)
-app.command(cls=Command)(info.info)
-app.command(cls=Command)(convert.convert)
-app.command(cls=Command)(features.features)
-app.command(cls=Command)(new.new)
-app.add_typer(giant_app)
-app.add_typer(orientation_app)
-app.add_typer(comparator_app)
-app.command("collection", cls=Command)(collection.collection)
-app.command("perspective-center", cls=Command)(perspective_center.perspective_center)
-app.add_typer(stellar_app)
-app.command(cls=Command)(plan.plan)
-app.command(cls=Command)(simulate.simulate)
+COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
+    "adjust": (
+        "Adjust a block in whatever files it lies: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...",
+        "adjust.adjust",
+    ),
+    "check": (
+        "Look for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.",
+        "check_project.check_project",
+    ),
+    "info": (
+        "Say what lies at a path without adjusting it: sizes, cameras, rays, units, frame, what lacks.",
+        "info.info",
+    ),
+    "convert": (
+        "Write a project in another format, and say what that has no place for.",
+        "convert.convert",
+    ),
+    "features": (
+        "Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.",
+        "features.features",
+    ),
+    "new": (
+        "Write a small real project as tables, with comments that say what may stand there.",
+        "new.new",
+    ),
+    "collection": (
+        "Adjust photos of unknown cameras by Levenberg-Marquardt steps, however far the start.",
+        "collection.collection",
+    ),
+    "perspective-center": (
+        "Determine perspective centre, attitude and distortion of projectors from grid measurements.",
+        "perspective_center.perspective_center",
+    ),
+    "plan": (
+        "Predict the accuracy of a network before it is flown: two patterns of control side by side.",
+        "plan.plan",
+    ),
+    "simulate": (
+        "Write a simulated block as a GIANT project, and the truth behind it as truth.json.",
+        "simulate.simulate",
+    ),
+    "giant": (
+        "Adjust or check a GIANT project.",
+        {"adjust": "giant.giant", "check": "check.check"},
+    ),
+    "absolute-orientation": (
+        "Orient a model absolutely, or transform its points.",
+        {
+            "orient": "absolute_orientation.absolute_orientation",
+            "transform": "absolute_orientation.transform",
+            "relative": "relative_orientation.relative",
+        },
+    ),
+    "comparator": (
+        "Calibrate a comparator, correct measurements, compare calibrations.",
+        {
+            "calibrate": "comparator.comparator",
+            "correct": "comparator.correct",
+            "compare": "comparator.compare",
+        },
+    ),
+    "stellar-camera": (
+        "Calibrate a camera by a plate with stars, or by exposures of the sky.",
+        {
+            "plate": "stellar_camera.stellar_camera",
+            "exposures": "stellar_camera.exposures",
+            "places": "stellar_camera.places",
+        },
+    ),
+}
+"""What each is for, and the file and function that do it: those of side commands, the main one first."""
+
+
+def application(word: str | None = None) -> typer.Typer:
+    """Return the command line.
+
+    Parameters
+    ----------
+    word
+        The first one that was given: only the command that it names is loaded. None: all are.
+    """
+    made = typer.Typer(
+        name="photogram",
+        help="Photogrammetric least-squares adjustment with the covariance of every result.",
+        epilog="Exit codes: 0 converged, 1 input or output at fault, 2 usage, 3 not converged, diverged or"
+        " something grave found, 4 a result that cannot be used as it is, 129, 130, 143 ended by a signal.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+    )
+    for name, (purpose, home) in COMMANDS.items():
+        if word not in (None, name):
+            made.command(name, cls=Command, help=purpose)(_not_loaded)
+        elif isinstance(home, str):
+            made.command(name, cls=Command, epilog=ADJUST if name == "adjust" else None)(_function(home))
+        else:
+            group = typer.Typer(name=name, cls=GroupWithMain, help=purpose)
+            for part, function in home.items():
+                group.command(part, cls=Command)(_function(function))
+            made.add_typer(group)
+    made.callback()(_photogram)
+    return made
+
+
+def _function(home: str) -> Any:
+    file, _, function = home.partition(".")
+    return getattr(import_module(f"photogram.cli.{file}"), function)
+
+
+def _not_loaded() -> None:
+    """Stand for a command that was not called."""
 
 
 def _version(asked: bool) -> None:
@@ -97,10 +146,16 @@ def _version(asked: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _photogram(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
     """Photogrammetric least-squares adjustment with the covariance of every result."""
+
+
+def __getattr__(name: str) -> object:
+    if name != "app":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = application()
+    return globals()[name]
