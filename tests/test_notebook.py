@@ -218,7 +218,7 @@ def made(kind):
         "check": lambda: photogram.diagnose(block),
         "plan": lambda: photogram.plan({"a": simulation.truth}),
         "adjusted camera": lambda: adjust(load("self_calibration").measured()).cameras[0],
-        "snooped collection": lambda: collection.snooping.snoop_collection(
+        "snooped collection": lambda: photogram.snoop(
             collection.simulate(outlier_share=0.01, seed=1).collection
         ),
         "project of GIANT": lambda: photogram.giant.read_project(
