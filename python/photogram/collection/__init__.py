@@ -36,5 +36,6 @@ WAYS = {
     "report_of": ("report",),
     "scaled": ("components",),
     "weighing": ("components",),
+    "terms_of": ("tables",),
 }
 """The files that show results and work on collections, by the names of ways: see `photogram.show.ways`."""

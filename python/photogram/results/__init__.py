@@ -9,5 +9,6 @@ WAYS = {
     "page_of": ("page",),
     "pictured": ("pictured",),
     "report_of": ("report",),
+    "terms_of": ("tables",),
 }
 """The files that show a result, by the names of the ways: see `photogram.show.ways`."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.show.quantity import Axis, Link, Quantity
+from photogram.show.ways import Way
 
 __all__ = [
     "Terms",
@@ -73,7 +73,7 @@ class Terms:
         return "number" if self.points.dtype.kind == "i" else "id"
 
 
-@singledispatch
+@Way
 def terms_of(result: AdjustedNetwork) -> Terms:
     """Return what the photos, points and images of a network are called and measured in."""
     raise NotImplementedError(type(result).__name__)
