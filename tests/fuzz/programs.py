@@ -47,7 +47,7 @@ class Watch:
         ("photogram", "adjust_started"),
         ("photogram", "snoop"),
         ("photogram", "orient"),
-        ("photogram.giant", "check"),
+        ("photogram.giant.checking", "check"),
         ("photogram.collection", "adjust"),
         ("photogram.perspective_center.batch", "determine"),
         ("photogram.comparator", "calibrate"),

@@ -21,9 +21,11 @@ from photogram import (
     simulate,
 )
 from photogram import collection as collections
+from photogram.arguments.annotations import check_members
 from photogram.io.seals import seal
 from photogram.network.observations import Distance, OnLevel, Position
 from photogram.network.unknowns import Level, LeverArm, Shift
+from photogram.results.cameras import AdjustedCamera
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 
@@ -404,3 +406,8 @@ def test_damage_anywhere_is_refused_or_does_no_harm(folder, name):
         except InputError:
             continue
         assert again.report() == report
+
+
+def test_a_number_does_not_stand_for_an_array():
+    with pytest.raises(InputError, match="redundancy is 3, not an array of numbers"):
+        check_members(AdjustedCamera, {"redundancy": 3})

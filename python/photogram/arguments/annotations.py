@@ -74,7 +74,9 @@ def check_members(kind: type, given: Mapping[str, Any]) -> None:
     """
     checks = _checks_of_class(kind)
     for name, value in given.items():
-        checks.get(name, _anything)(name, value)
+        made = checks.get(name, _anything)(name, value)
+        if isinstance(made, np.ndarray) and not isinstance(value, np.ndarray):
+            raise _refused(name, value, "an array of numbers")
 
 
 @cache
