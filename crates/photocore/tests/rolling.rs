@@ -93,7 +93,7 @@ fn network(seed: u64) -> Network {
         Photo { pose, observed: pose, sd: [FREE; 6], camera: 0 }
     };
     let mut point = |k: usize| {
-        if k % 4 != 0 {
+        if !k.is_multiple_of(4) {
             return Point { coordinates: [f64::NAN; 3], sd: [FREE; 3] };
         }
         let coordinates = place(k).map(|x| x + 0.005 * normal.next());
