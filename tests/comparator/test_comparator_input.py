@@ -26,6 +26,7 @@ from photogram.comparator.closeout import close_out
 from photogram.comparator.gridfile import corrected_grid
 from photogram.comparator.grouping import group, group_as_listed
 from photogram.comparator.legs import intersect_legs, reduce_legs
+from photogram.comparator.orientation import detect_orientation
 from photogram.errors import InputError
 
 
@@ -561,3 +562,10 @@ def test_a_blunder_is_remarked_on():
 def test_the_printed_data_are_complete():
     assert len(table("fig06_case2_readings.csv")) == 146
     assert (PRINTED / "README.md").exists()
+
+
+def test_coordinates_without_squares_are_refused():
+    points = np.arange(1, 5)
+    grid = Grid(1, points, np.array([[0.0, 0.0], [1e300, 0.0], [0.0, 1e300], [1e300, 1e300]]), None)
+    with pytest.raises(InputError, match=r"too large to compute with: 1e\+300 um"):
+        detect_orientation(grid, points, np.zeros((4, 2)))

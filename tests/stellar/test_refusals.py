@@ -85,6 +85,7 @@ def test_values_of_a_night(folder, old, new, message):
         ),
         ("curves = true", "curves = true\nminimum_stars = 5", "[options] minimum_stars is 5, not a list"),
         ("tolerance = 1e-10", "tolerance = nan", "[options] tolerance is nan, not a number"),
+        ("movement_time = 1.5", "movement_time = 1e308", "movement_time is 1e+308 rad; it must"),
         ("weight = [9.572663316634245, 9.572663316634245, 0.0]", "weight = [1, 2]", "has 2 values, not 3"),
         (
             "[options]",

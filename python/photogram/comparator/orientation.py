@@ -24,6 +24,8 @@ CORNERS = {1: (-1, -1), 4: (1, -1), 3: (1, 1), 2: (-1, 1)}
 TURNS = {1: 0, 4: -1, 3: 2, 2: 1}
 MATCH = 0.05
 """A turned point must meet another one within this part of the spacing."""
+_SQUARED = 1e150
+"""Micrometres beyond which squares leave the range of double precision."""
 
 
 @dataclass(frozen=True)
@@ -62,9 +64,12 @@ def detect_orientation(grid: Grid, points: Integers, xy_um: Floats) -> Orientati
     Raises
     ------
     InputError
-        The points lie in a line, or fewer than three are there.
+        The points lie in a line, or fewer than three are there; coordinates whose squares are no numbers.
     """
     plate = grid.xy_um[grid.rows_of(points)]
+    largest = np.abs([plate, xy_um]).max(initial=0.0)
+    if not largest < _SQUARED:
+        raise InputError(f"coordinates of points are too large to compute with: {largest:g} um")
     centred = plate - plate.mean(axis=0)
     matrix, _, rank, _ = np.linalg.lstsq(centred, xy_um - xy_um.mean(axis=0), rcond=1e-6)
     if rank < 2:

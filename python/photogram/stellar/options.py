@@ -11,6 +11,9 @@ from photogram.stellar.sky import Site
 
 __all__ = ["Options"]
 
+_DAYS = 20 * math.pi
+"""A time of ten days, in radians."""
+
 
 @dataclass(frozen=True)
 class Options:
@@ -90,6 +93,10 @@ class Options:
             value = getattr(self, field.name)
             if isinstance(value, float) and not math.isfinite(value):
                 raise InputError(f"{field.name} is {value}, not a number")
+        if abs(self.movement_time) > _DAYS:
+            raise InputError(
+                f"movement_time is {self.movement_time} rad; it must be a time of some days at most"
+            )
         positive = ("refraction_tolerance", "interval")
         for name in positive:
             if not getattr(self, name) > 0:
