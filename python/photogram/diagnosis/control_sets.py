@@ -22,6 +22,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.editing import tests
+from photogram.diagnosis.findings import Explained
 from photogram.diagnosis.hypotheses import FOOT
 from photogram.diagnosis.predictions import freed
 from photogram.diagnosis.regression import spread
@@ -31,9 +32,9 @@ from photogram.network.block import Block
 from photogram.network.observations import Control
 from photogram.network.rays import LocalAxes, local_axes
 from photogram.results.result import Result
-from photogram.statistics.likelihood import Judged, judged
+from photogram.statistics.likelihood import judged
 
-__all__ = ["Explained", "FreeModel", "doubtful", "explain", "free_model"]
+__all__ = ["FreeModel", "doubtful", "explain", "free_model"]
 
 MOST = 60
 """Control points that are compared."""
@@ -385,28 +386,6 @@ def _similarity_partials(turned: Floats) -> Floats:
     for axis in range(3):
         design[:, :, 4 + axis] = np.cross(np.eye(3)[axis], turned)
     return design.reshape(-1, 7)
-
-
-@dataclass(frozen=True)
-class Explained:
-    """What is wrong with the control as a whole.
-
-    Attributes
-    ----------
-    kind
-        In a word or two.
-    text
-        In a sentence.
-    judged
-        How sure it is.
-    change
-        Makes of the block what was meant.
-    """
-
-    kind: str
-    text: str
-    judged: Judged
-    change: Callable[[Block], Block]
 
 
 def explain(model: FreeModel) -> Explained | None:

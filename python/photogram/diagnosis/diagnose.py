@@ -20,16 +20,16 @@ from photogram.arguments.arrays import shown
 from photogram.diagnosis.adjusted import diagnosis_of
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.control import control
-from photogram.diagnosis.control_sets import Explained, doubtful, explain, free_model
+from photogram.diagnosis.control_sets import doubtful, explain, free_model
 from photogram.diagnosis.conventions import conventions, further
 from photogram.diagnosis.editing import _BESIDE, HOPELESS, Edited, blunder_section, edit
-from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section, Words
+from photogram.diagnosis.findings import Diagnosis, Explained, Finding, Level, Section, Words
 from photogram.diagnosis.gross import Suspects, disproved, gross, without
 from photogram.diagnosis.heights import two_ray_heights
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
 from photogram.diagnosis.lenses import half_pixel, lenses_estimated, lenses_put_right
 from photogram.diagnosis.orientation import orientation, spare_explained
-from photogram.diagnosis.positions import Wrong, wrong_positions
+from photogram.diagnosis.positions import wrong_positions
 from photogram.diagnosis.residuals import residuals
 from photogram.diagnosis.stations import stations
 from photogram.diagnosis.structure import structure_section
@@ -251,7 +251,7 @@ def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) 
     return view, changed
 
 
-def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | Wrong | None]:
+def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | None]:
     """Return the kind of finding and the mistake of a whole set, if there is one."""
     control = np.isfinite(block.point_sd).any()
     if control and doubtful(adjusted.tried(block), "control"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -16,10 +16,13 @@ from photogram.show.ways import html_of
 from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Verdict
 
 if TYPE_CHECKING:
+    from photogram.network.block import Block
     from photogram.results.result import Result
+    from photogram.statistics.likelihood import Judged
 
 __all__ = [
     "Diagnosis",
+    "Explained",
     "Figure",
     "Finding",
     "Level",
@@ -95,6 +98,28 @@ class Words:
         """Return further figures of such a finding."""
         del kept
         return {}
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What is wrong with the control, or the observed positions, as a whole.
+
+    Attributes
+    ----------
+    kind
+        In a word or two.
+    text
+        In a sentence.
+    judged
+        How sure it is.
+    change
+        Makes of the block what was meant.
+    """
+
+    kind: str
+    text: str
+    judged: Judged
+    change: Callable[[Block], Block]
 
 
 @dataclass(frozen=True)

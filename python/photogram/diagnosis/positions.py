@@ -13,7 +13,7 @@ judged by its likelihood ratio; a parameter more must gain ln f more.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations, product
 
@@ -21,6 +21,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.findings import Explained
 from photogram.diagnosis.hypotheses import FOOT
 from photogram.network.block import Block
 from photogram.network.observations import Position
@@ -28,9 +29,9 @@ from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.network.unknowns import LeverArm, Shift, Unknown
 from photogram.results.result import Result
-from photogram.statistics.likelihood import RIVAL, TESTED, Judged, judged, likelihood
+from photogram.statistics.likelihood import RIVAL, TESTED, judged, likelihood
 
-__all__ = ["Wrong", "wrong_positions"]
+__all__ = ["wrong_positions"]
 
 FEWEST = 5
 """Observed positions that can be judged as a whole."""
@@ -39,26 +40,6 @@ EQUAL = 0.15
 WORST = 1e6
 """What cannot be adjusted as it is leaves so many times what the worst hypothesis does."""
 WHAT = "observed positions of the photos"
-
-
-@dataclass(frozen=True)
-class Wrong:
-    """What is wrong with the observed positions as a whole.
-
-    Attributes
-    ----------
-    kind, text
-        In a word or two, and in a sentence.
-    judged
-        How sure it is.
-    change
-        Makes of the block what was meant.
-    """
-
-    kind: str
-    text: str
-    judged: Judged
-    change: Callable[[Block], Block]
 
 
 @dataclass(frozen=True)
@@ -79,7 +60,7 @@ class _Trial:
         return self.result.sums_of_squares.total
 
 
-def wrong_positions(block: Block, adjusted: Adjuster) -> Wrong | None:
+def wrong_positions(block: Block, adjusted: Adjuster) -> Explained | None:
     """Return what explains why the observed positions of a block do not fit, if something does.
 
     Positions with shifts or drifts that are unknown are left to these.
@@ -111,7 +92,7 @@ def wrong_positions(block: Block, adjusted: Adjuster) -> Wrong | None:
     text = f"{word} {'; or '.join(each.text for each in best)}"
     text += f": residuals of the block would be {verdict.fall:.3g} times smaller"
     meant = best[0].meant
-    return Wrong(best[0].kind, text, verdict, lambda own: _with(own, meant))
+    return Explained(best[0].kind, text, verdict, lambda own: _with(own, meant))
 
 
 def _positions(block: Block) -> list[Position]:
