@@ -59,9 +59,7 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
         held: &[usize],
         reweighting: Option<Reweighting>,
     ) -> Self {
-        let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
-        held.iter().for_each(|&unknown| fixed[unknown] = true);
-        let fixed = fixed.contains(&true).then_some(fixed);
+        let fixed = Some(problem.fixed(held)).filter(|fixed| fixed.contains(&true));
         let observation_sd = &problem.observation_sd;
         Self { problem, prepared, observation_sd, fixed, reweighting, contributions: &[] }
     }

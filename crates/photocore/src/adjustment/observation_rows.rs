@@ -29,10 +29,10 @@ impl ObservationRows {
         of_locals.into_iter().for_each(|part| all.append(part));
         equations.each_row_of_ties(|_, row| all.push(row.taken(), row.constant));
         let terms = problem.terms(values);
-        let fixed = |unknown: usize| problem.sd[unknown] == 0.0 || held.contains(&unknown);
+        let fixed = problem.fixed(held);
         for unknown in 0..values.len() {
             let (row, constant) = terms.row(unknown);
-            all.push(row.into_iter().filter(|&(column, _)| !fixed(column)), constant);
+            all.push(row.into_iter().filter(|&(column, _)| !fixed[column]), constant);
         }
         all
     }

@@ -156,6 +156,13 @@ impl<M> Problem<M> {
         self.system.layout()
     }
 
+    /// Which unknowns are fixed, or held beside those.
+    pub(super) fn fixed(&self, held: &[usize]) -> Vec<bool> {
+        let mut fixed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();
+        held.iter().for_each(|&unknown| fixed[unknown] = true);
+        fixed
+    }
+
     /// Whether an unknown counts as an observation: neither free nor fixed.
     pub fn is_weighted(&self, unknown: usize) -> bool {
         is_weighted(self.sd[unknown])

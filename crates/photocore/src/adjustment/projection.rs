@@ -68,9 +68,8 @@ struct Rows<'a, M: Model> {
 impl<'a, M: Model> Rows<'a, M> {
     fn new(linearized: &'a Linearized, problem: &'a Problem<M>, threads: &Threads) -> Self {
         let Linearized { values, held, .. } = linearized;
-        let mut fixed: Vec<bool> = problem.sd.iter().map(|&sd| sd == 0.0).collect();
-        held.iter().for_each(|&unknown| fixed[unknown] = true);
-        Self { problem, equations: linearized.equations(problem, threads), values, fixed }
+        let equations = linearized.equations(problem, threads);
+        Self { problem, equations, values, fixed: problem.fixed(held) }
     }
 
     /// The local blocks of a part.

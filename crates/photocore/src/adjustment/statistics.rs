@@ -76,13 +76,13 @@ impl<M> Problem<M> {
     where
         M: Model,
     {
-        let mut redundancy = vec![0.0; self.sd.len()];
+        let (mut redundancy, fixed) = (vec![0.0; self.sd.len()], self.fixed(held));
         let terms = self.terms(values);
         let mut terms = terms.within(0..values.len()).peekable();
         let mut finish = |block: &mut [f64], unknowns: Range<usize>| {
             let width = unknowns.len();
             for (d, unknown) in unknowns.clone().enumerate() {
-                if self.sd[unknown] == 0.0 || held.contains(&unknown) {
+                if fixed[unknown] {
                     block[d * (width + 1)] = 0.0;
                 }
             }

@@ -95,23 +95,23 @@ impl<M: Model> Problem<M> {
     /// The normal equations of the terms at the given values. A fixed or held unknown has an equation of its own, x = 0 with unit weight,
     /// and no other (see [`super::equations`]); an outer one has none here.
     pub(super) fn prior_equations(&self, values: &[f64], held: &[usize]) -> Prior {
-        let is_held = |unknown: usize| self.sd[unknown] == 0.0 || held.contains(&unknown);
-        let weight = (0..values.len()).map(|unknown| f64::from(u8::from(is_held(unknown)))).collect();
+        let fixed = self.fixed(held);
+        let weight = fixed.iter().map(|&fixed| f64::from(u8::from(fixed))).collect();
         let mut prior = Prior { weight, right: vec![0.0; values.len()], between: vec![] };
-        self.terms(values).within(0..values.len()).for_each(|term| add_term(&mut prior, &term, &is_held));
+        self.terms(values).within(0..values.len()).for_each(|term| add_term(&mut prior, &term, &fixed));
         let layout = self.layout();
         layout.unknowns_of(layout.outer()).for_each(|unknown| prior.weight[unknown] = 0.0);
         prior
     }
 }
 
-/// Adds A^T A and A^T l of a term; none is of a held unknown.
-fn add_term(prior: &mut Prior, term: &Term, is_held: &dyn Fn(usize) -> bool) {
-    for (i, unknown) in term.unknowns().enumerate().filter(|&(_, unknown)| !is_held(unknown)) {
+/// Adds A^T A and A^T l of a term; none is of a fixed unknown.
+fn add_term(prior: &mut Prior, term: &Term, fixed: &[bool]) {
+    for (i, unknown) in term.unknowns().enumerate().filter(|&(_, unknown)| !fixed[unknown]) {
         let product = |j: usize| term.rows().map(|row| row[i] * row[j]).sum::<f64>();
         prior.weight[unknown] = product(i);
         prior.right[unknown] = term.rows().zip(&term.constant).map(|(row, constant)| row[i] * constant).sum();
-        let others = (0..i).filter(|&j| !is_held(term.first + j));
+        let others = (0..i).filter(|&j| !fixed[term.first + j]);
         prior.between.extend(others.map(|j| (unknown, term.first + j, product(j))));
     }
 }
