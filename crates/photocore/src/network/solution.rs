@@ -285,7 +285,8 @@ pub(super) fn sums_of_squares(
     observations: &[Option<AdjustedObservation>],
 ) -> SumsOfSquares {
     let stations = problem.model.of_stations();
-    let squares = |range: Range<usize>| problem.terms(unknowns).sum_of_squares(range);
+    let terms = problem.terms(unknowns);
+    let squares = |range: Range<usize>| terms.sum_of_squares(range);
     let rows = problem.layout().rows();
     let of_images = &problem.observation_sd[..rows * problem.model.images.len()];
     SumsOfSquares {
