@@ -13,6 +13,7 @@ pub mod adjustment;
 pub mod geometry;
 pub mod network;
 pub mod normals;
+mod parallel;
 pub mod programs;
 mod threads;
 

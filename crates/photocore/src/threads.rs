@@ -32,7 +32,17 @@ impl Threads {
 
     /// Does work on them, and waits for it.
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
-        self.0.install(work)
+        let (mut work, mut found) = (Some(work), None);
+        self.run(&mut || found = work.take().map(|work| work()));
+        match found {
+            Some(found) => found,
+            None => unreachable!("work that has come back is done"),
+        }
+    }
+
+    /// What rayon gets is of one type, whatever the work is: all that it makes of it is compiled once.
+    fn run(&self, work: &mut (dyn FnMut() + Send)) {
+        self.0.install(work);
     }
 
     pub(crate) fn pool(&self) -> &ThreadPool {

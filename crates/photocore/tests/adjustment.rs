@@ -11,7 +11,8 @@ use std::sync::Mutex;
 use std::thread::{self, ThreadId};
 
 use photocore::adjustment::{
-    AdjustError, Adjustment, Event, Method, Model, Options, Phase, Problem, Published, Status, Stop, adjust,
+    AdjustError, Adjustment, Evaluated, Event, Method, Model, Options, Phase, Problem, Published, Status,
+    Stop, adjust,
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System};
 use photocore::{Stopped, Threads};
@@ -48,18 +49,24 @@ fn measure(point: &[f64], frame: &[f64], common: &[f64]) -> ([f64; 2], [[f64; 7]
     (values, partials)
 }
 
+struct At<'a> {
+    frames: &'a Frames,
+    values: Vec<f64>,
+}
+
 impl Model for Frames {
-    type Prepared = Vec<f64>;
-
-    fn prepare(&self, unknowns: &[f64]) -> Vec<f64> {
-        unknowns.to_vec()
+    fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
+        Box::new(At { frames: self, values: unknowns.to_vec() })
     }
+}
 
-    fn observe(&self, values: &Vec<f64>, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let frame = &values[2 * POINTS + 3 * self.frame_of[group]..][..3];
+impl Evaluated for At<'_> {
+    fn observe(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let Self { frames, values } = self;
+        let frame = &values[2 * POINTS + 3 * frames.frame_of[group]..][..3];
         let (computed, partials) = measure(&values[2 * local..][..2], frame, &values[SCALE..]);
         for row in 0..2 {
-            rows.constant[row] = self.measured[group][row] - computed[row];
+            rows.constant[row] = frames.measured[group][row] - computed[row];
             rows.local[2 * row..][..2].copy_from_slice(&partials[row][..2]);
             rows.retained[3 * row..][..3].copy_from_slice(&partials[row][2..5]);
             rows.shared[2 * row..][..2].copy_from_slice(&partials[row][5..]);
@@ -298,16 +305,21 @@ struct Witness {
     seen: Mutex<HashSet<ThreadId>>,
 }
 
+struct Witnessed<'a> {
+    frames: Box<dyn Evaluated + 'a>,
+    seen: &'a Mutex<HashSet<ThreadId>>,
+}
+
 impl Model for Witness {
-    type Prepared = Vec<f64>;
-
-    fn prepare(&self, unknowns: &[f64]) -> Vec<f64> {
-        self.frames.prepare(unknowns)
+    fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
+        Box::new(Witnessed { frames: self.frames.at(unknowns), seen: &self.seen })
     }
+}
 
-    fn observe(&self, values: &Vec<f64>, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+impl Evaluated for Witnessed<'_> {
+    fn observe(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         self.seen.lock().unwrap().insert(thread::current().id());
-        self.frames.observe(values, local, group, rows);
+        self.frames.observe(local, group, rows);
     }
 }
 

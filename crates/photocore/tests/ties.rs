@@ -7,8 +7,8 @@ use std::ops::ControlFlow;
 use faer::{Mat, Side};
 use photocore::Threads;
 use photocore::adjustment::{
-    Datum, DatumError, Leverages, Linearized, Loss, Method, Model, Motions, Options, Problem, Published,
-    Status, Stop, adjust,
+    Datum, DatumError, Evaluated, Leverages, Linearized, Loss, Method, Model, Motions, Options, Problem,
+    Published, Status, Stop, adjust,
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
 
@@ -28,31 +28,36 @@ impl Trilateration {
     }
 }
 
-impl Model for Trilateration {
-    type Prepared = Vec<f64>;
+struct At<'a> {
+    net: &'a Trilateration,
+    values: Vec<f64>,
+}
 
-    fn prepare(&self, unknowns: &[f64]) -> Vec<f64> {
-        unknowns.to_vec()
-    }
-
-    fn observe(&self, values: &Vec<f64>, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let (point, station) = (
-            self.layout.local_range(local).start,
-            self.layout.retained_range(self.layout.retained_of(group)).start,
-        );
-        let (left, partials) = self.distance(values, group, point, station);
+impl Evaluated for At<'_> {
+    fn observe(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let (net, layout) = (self.net, &self.net.layout);
+        let (point, station) =
+            (layout.local_range(local).start, layout.retained_range(layout.retained_of(group)).start);
+        let (left, partials) = net.distance(&self.values, group, point, station);
         rows.constant[0] = left;
         rows.local.copy_from_slice(&partials);
         rows.retained.copy_from_slice(&partials.map(|value| -value));
     }
 
-    fn observe_tie(&self, values: &Vec<f64>, tie: usize, rows: &mut TieRows<'_>) {
-        let retained = &self.layout.ties()[tie].retained;
-        let [from, to] = [0, 1].map(|end| self.layout.retained_range(retained[end] as usize).start);
-        let (left, partials) = self.distance(values, self.layout.groups() + tie, from, to);
+    fn observe_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+        let (net, layout) = (self.net, &self.net.layout);
+        let retained = &layout.ties()[tie].retained;
+        let [from, to] = [0, 1].map(|end| layout.retained_range(retained[end] as usize).start);
+        let (left, partials) = net.distance(&self.values, layout.groups() + tie, from, to);
         rows.constant[0] = left;
         rows.coefficients[..2].copy_from_slice(&partials);
         rows.coefficients[2..].copy_from_slice(&partials.map(|value| -value));
+    }
+}
+
+impl Model for Trilateration {
+    fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
+        Box::new(At { net: self, values: unknowns.to_vec() })
     }
 
     fn motions(&self, unknowns: &[f64]) -> Option<Motions> {

@@ -5,14 +5,11 @@
 //! are short. With r the residuals, v the step and r_vv their second derivative along it, (N + damping) a = A^T r_vv, and v + a/2 follows
 //! the valley by one order more. It takes no derivatives besides: r_vv = 2/h ((r(x + h v) - r(x)) / h + A v).
 
-use rayon::prelude::*;
-
 use super::equations::ObservationEquations;
 use super::group_step::GroupStep;
-use super::problem::Model;
 use super::walk::Buffers;
-use crate::Threads;
 use crate::normals::Equations;
+use crate::{Threads, parallel};
 
 /// The part h of the step at which residuals are compared with those that the linearized equations predict.
 pub(super) const PART: f64 = 0.1;
@@ -21,7 +18,7 @@ const PARTS: usize = 64;
 /// Local blocks of one at the least.
 const AT_LEAST: usize = 64;
 
-impl<M: Model> ObservationEquations<'_, M> {
+impl ObservationEquations<'_> {
     /// A^T r_vv over all unknowns; ties, which are few, are taken as straight.
     ///
     /// * `ahead`: r(x + h v), in the units of the observations.
@@ -59,7 +56,7 @@ impl<M: Model> ObservationEquations<'_, M> {
             (own, others)
         };
         let starts: Vec<usize> = (0..layout.locals()).step_by(each).collect();
-        let found: Vec<(Vec<f64>, Vec<f64>)> = threads.install(|| starts.into_par_iter().map(part).collect());
+        let found: Vec<(Vec<f64>, Vec<f64>)> = threads.install(|| parallel::map_each(starts, &part));
         let mut right = Vec::with_capacity(layout.unknowns());
         found.iter().for_each(|(own, _)| right.extend_from_slice(own));
         right.resize(layout.unknowns(), 0.0);

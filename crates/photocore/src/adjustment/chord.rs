@@ -11,7 +11,6 @@ use std::time::Instant;
 use super::equations::ObservationEquations;
 use super::method::NEGLIGIBLE;
 use super::options::{Iteration, Phase};
-use super::problem::Model;
 use super::result::{AdjustError, unless_stopped};
 use super::run::{Run, State, between};
 
@@ -23,11 +22,11 @@ const NOT_YET: f64 = 10.0 * NEGLIGIBLE;
 /// A step so small a part of the one before is on the way to the end, and so is a chord after it.
 const FALLING: f64 = 0.1;
 
-impl<'a, M: Model> Run<'a, '_, M> {
+impl<'a> Run<'a, '_> {
     /// The values that a step leads to, and a chord after it where that pays.
     pub(super) fn stepped(
         &mut self,
-        state: &State<'a, M>,
+        state: &State<'a>,
         step: &[f64],
         iteration: &Iteration,
     ) -> Result<Vec<f64>, AdjustError> {
@@ -37,9 +36,9 @@ impl<'a, M: Model> Run<'a, '_, M> {
             return Ok(values);
         }
         let (problem, start) = (self.problem, Instant::now());
-        let prepared = self.threads.install(|| problem.model.prepare(&values));
-        let equations = ObservationEquations::prepared(problem, prepared, &self.datum, None);
-        let prior = problem.prior_equations(&values, &self.datum);
+        let at = self.threads.install(|| problem.model.at(&values));
+        let equations = ObservationEquations::evaluated(problem, at, &self.datum, None);
+        let prior = problem.prior_equations(&problem.terms(&values), &self.datum);
         let mut between = between(&mut *self.watch, Phase::Solve, problem.layout().locals());
         let chord = problem.system.chord(self.threads, factor, &equations, &prior, &mut between);
         self.seconds.solve += start.elapsed().as_secs_f64();

@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 
 use super::method::{self, NEGLIGIBLE, Stop, leaves_cofactors};
 use super::options::{Iteration, Status};
-use super::problem::Model;
 use super::result::AdjustError;
 use super::run::{End, Run, State};
 
@@ -74,18 +73,14 @@ fn relaxed(damping: f64) -> f64 {
 }
 
 /// The next values, or the end.
-type Next<'a, M> = Result<ControlFlow<End<'a, M>, State<'a, M>>, AdjustError>;
+type Next<'a> = Result<ControlFlow<End<'a>, State<'a>>, AdjustError>;
 
-impl<'a, M: Model> Run<'a, '_, M> {
+impl<'a> Run<'a, '_> {
     /// Gauss-Newton with step control.
     ///
     /// With dx the step and N the normal matrix, dx_i^2 <= q_ii dx^T N dx (Cauchy-Schwarz), and dx^T N dx is the predicted
     /// decrease of the sum of squares: its root bounds every correction in standard deviations, without an inverse.
-    pub(super) fn damped_steps(
-        &mut self,
-        start: State<'a, M>,
-        stop: Stop,
-    ) -> Result<End<'a, M>, AdjustError> {
+    pub(super) fn damped_steps(&mut self, start: State<'a>, stop: Stop) -> Result<End<'a>, AdjustError> {
         let mut state = start;
         let mut control = Control {
             stop,
@@ -113,7 +108,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     /// Solves, and takes the step or ends with it.
-    fn step_from(&mut self, state: State<'a, M>, control: &mut Control) -> Next<'a, M> {
+    fn step_from(&mut self, state: State<'a>, control: &mut Control) -> Next<'a> {
         let damping = state.linearized.damping();
         let Some(step) = self.step(&state)? else {
             return self.refuse(state.recycle(), damping, control, vec![]);
@@ -141,10 +136,10 @@ impl<'a, M: Model> Run<'a, '_, M> {
     fn take(
         &mut self,
         iteration: Iteration,
-        state: State<'a, M>,
+        state: State<'a>,
         step: &[f64],
         control: &mut Control,
-    ) -> Next<'a, M> {
+    ) -> Next<'a> {
         let Iteration { damping, largest_change: change, .. } = iteration;
         let trial = self.stepped(&state, step, &iteration)?;
         let moved = if damping == 0.0 { state.moved(step) } else { vec![] };
@@ -201,7 +196,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         damping: f64,
         control: &mut Control,
         moved: Vec<usize>,
-    ) -> Next<'a, M> {
+    ) -> Next<'a> {
         if damping == 0.0 && self.stands_still(&mut control.refused, control.best, moved) {
             self.weak = control.refused.take().map(|(_, moved)| moved).unwrap_or_default();
             let state = self.form(unknowns, 0.0)?;
@@ -216,7 +211,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     /// Goes on in a trust region, to its end. It has converged where a full step from there is short, which damping may hide, or where the
     /// sum of squares has crept to rest along a combination that is named.
-    fn handed_over(&mut self, unknowns: Vec<f64>, stop: Stop) -> Result<End<'a, M>, AdjustError> {
+    fn handed_over(&mut self, unknowns: Vec<f64>, stop: Stop) -> Result<End<'a>, AdjustError> {
         let state = self.form(unknowns, method::FIRST_DAMPING)?;
         let end = self.in_trust_region(state, stop)?;
         if end.status != Status::Converged || !self.weak.is_empty() {
@@ -241,7 +236,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     /// Whether the next step after a full one would be negligible, by the sum of squares that this one leads to.
-    fn is_foreseen(&self, control: &Control, state: &State<'a, M>, step: &[f64]) -> bool {
+    fn is_foreseen(&self, control: &Control, state: &State<'a>, step: &[f64]) -> bool {
         let Stop::Foreseen(limit) = control.stop else { return false };
         let foreseen = control.best - state.linearized.change().powi(2);
         // A smaller difference than this one is rounding.
@@ -335,7 +330,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         last: Iteration,
         unknowns: &[f64],
         step: &[f64],
-    ) -> Result<End<'a, M>, AdjustError> {
+    ) -> Result<End<'a>, AdjustError> {
         let values = self.problem.advanced(unknowns, step);
         let sum_of_squares = self.objective(&values);
         self.accept(Iteration { sum_of_squares, ..last }, unknowns, &values)?;

@@ -18,7 +18,7 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 use thiserror::Error;
 
 use super::loss::Loss;
-use super::problem::{Model, Motions, Problem};
+use super::problem::{AnyProblem, Motions};
 use super::result::AdjustError;
 use super::transformation::Transformation;
 use crate::Threads;
@@ -102,7 +102,7 @@ pub(super) struct Basis {
 impl Basis {
     /// The right-hand sides B, over all unknowns, one after the other. Held unknowns stand in the normal equations with unit weight: their
     /// columns of Q are zero.
-    pub fn rights<M>(&self, problem: &Problem<M>, held: &[usize]) -> Vec<f64> {
+    pub fn rights(&self, problem: &AnyProblem<'_>, held: &[usize]) -> Vec<f64> {
         let (count, mut rights) = (problem.layout().unknowns(), vec![0.0; self.t.len()]);
         let free = |unknown: usize| !held.contains(&unknown) && problem.sd[unknown] != 0.0;
         let carriers = self.carriers.iter().enumerate();
@@ -141,8 +141,8 @@ impl Basis {
 /// Moves a network as a whole to where its carriers are as near to their references as they come.
 ///
 /// Gauss and Newton's method for least squares of the distances, with exact motions.
-pub(super) fn moved<M: Model>(
-    problem: &Problem<M>,
+pub(super) fn moved(
+    problem: &AnyProblem<'_>,
     adjusted: Adjusted<'_>,
     datum: &Datum,
     reference: &[f64],
@@ -187,8 +187,8 @@ pub(super) fn moved<M: Model>(
 }
 
 /// The motions that the datum does not leave, their numbers, and how many there are in all.
-fn motions_of<M: Model>(
-    problem: &Problem<M>,
+fn motions_of(
+    problem: &AnyProblem<'_>,
     unknowns: &[f64],
     datum: &Datum,
     threads: &Threads,

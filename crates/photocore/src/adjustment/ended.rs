@@ -3,14 +3,14 @@
 use super::linearized::Inverted;
 use super::loss::Loss;
 use super::options::Status;
-use super::problem::{Model, Problem};
+use super::problem::AnyProblem;
 use super::result::{Adjustment, Seconds};
 use crate::Threads;
 
 impl Adjustment {
     /// At the values that were reached, without iterations and cofactors.
-    pub(super) fn at<M: Model>(
-        problem: &Problem<M>,
+    pub(super) fn at(
+        problem: &AnyProblem<'_>,
         loss: Option<Loss>,
         unknowns: Vec<f64>,
         threads: &Threads,
@@ -50,8 +50,8 @@ impl Adjustment {
     }
 
     /// After the last step, without cofactors.
-    pub fn between<M: Model>(
-        problem: &Problem<M>,
+    pub fn between(
+        problem: &AnyProblem<'_>,
         held: &[usize],
         before: &[f64],
         reached: Vec<f64>,
@@ -68,8 +68,8 @@ impl Adjustment {
     /// Where the normal equations were inverted, without iterations.
     ///
     /// * `loss`: what has weighted the observations.
-    pub fn inverted<M: Model>(
-        problem: &Problem<M>,
+    pub fn inverted(
+        problem: &AnyProblem<'_>,
         loss: Option<Loss>,
         mut inverted: Inverted,
         threads: &Threads,
@@ -80,7 +80,7 @@ impl Adjustment {
     }
 
     /// Puts in cofactors and redundancy numbers, with one more formation that they come from.
-    pub(super) fn put<M>(&mut self, problem: &Problem<M>, inverted: Inverted) {
+    pub(super) fn put(&mut self, problem: &AnyProblem<'_>, inverted: Inverted) {
         self.redundancy = Some(inverted.cofactors.equations.iter().map(|share| 1.0 - share).collect());
         self.counts = problem.counts(&inverted.held);
         self.datum = inverted.held;

@@ -2,15 +2,15 @@
 
 use super::group_step::GroupStep;
 use super::loss::{Loss, Reweighting};
-use super::problem::{Model, Problem};
+use super::problem::{AnyProblem, Evaluated};
 use super::walk::Buffers;
 use crate::Threads;
 use crate::normals::{Contribution, Equations, GroupRows, Prior, TieRows, dot};
 
 /// The equations of a problem at given values of the unknowns: weighted to unit weight, by a loss besides, without fixed unknowns.
-pub(super) struct ObservationEquations<'a, M: Model> {
-    problem: &'a Problem<M>,
-    prepared: M::Prepared,
+pub(super) struct ObservationEquations<'a> {
+    problem: &'a AnyProblem<'a>,
+    at: Box<dyn Evaluated + 'a>,
     /// Standard deviations of the observations; infinite for those that do not take part.
     observation_sd: &'a [f64],
     /// Which unknowns are fixed or held; None where none is.
@@ -39,29 +39,29 @@ impl Row<'_> {
     }
 }
 
-impl<'a, M: Model> ObservationEquations<'a, M> {
+impl<'a> ObservationEquations<'a> {
     /// At the given values, some unknowns held there; weights are those that the loss has left.
     pub fn new(
-        problem: &'a Problem<M>,
+        problem: &'a AnyProblem<'a>,
         loss: Option<Loss>,
         values: &[f64],
         held: &[usize],
         threads: &Threads,
     ) -> Self {
         let reweighting = loss.map(|loss| Reweighting { loss, curved: false });
-        threads.install(|| Self::prepared(problem, problem.model.prepare(values), held, reweighting))
+        threads.install(|| Self::evaluated(problem, problem.model.at(values), held, reweighting))
     }
 
-    /// Of values that are prepared already.
-    pub fn prepared(
-        problem: &'a Problem<M>,
-        prepared: M::Prepared,
+    /// Of a model that is evaluated already.
+    pub fn evaluated(
+        problem: &'a AnyProblem<'a>,
+        at: Box<dyn Evaluated + 'a>,
         held: &[usize],
         reweighting: Option<Reweighting>,
     ) -> Self {
         let fixed = Some(problem.fixed(held)).filter(|fixed| fixed.contains(&true));
         let observation_sd = &problem.observation_sd;
-        Self { problem, prepared, observation_sd, fixed, reweighting, contributions: &[] }
+        Self { problem, at, observation_sd, fixed, reweighting, contributions: &[] }
     }
 
     /// The same with what systems below have left.
@@ -83,14 +83,14 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
     }
 
     /// With the columns of fixed unknowns, and without a loss.
-    pub fn of_all(problem: &'a Problem<M>, values: &[f64], threads: &Threads) -> Self {
-        let prepared = threads.install(|| problem.model.prepare(values));
+    pub fn of_all(problem: &'a AnyProblem<'a>, values: &[f64], threads: &Threads) -> Self {
+        let at = threads.install(|| problem.model.at(values));
         let observation_sd = &problem.observation_sd;
-        Self { problem, prepared, observation_sd, fixed: None, reweighting: None, contributions: &[] }
+        Self { problem, at, observation_sd, fixed: None, reweighting: None, contributions: &[] }
     }
 
     /// The problem that they are of.
-    pub fn problem(&self) -> &'a Problem<M> {
+    pub fn problem(&self) -> &'a AnyProblem<'a> {
         self.problem
     }
 
@@ -104,9 +104,9 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
         self.reweighting
     }
 
-    /// The values that the equations are of, prepared.
-    pub fn at(&self) -> &M::Prepared {
-        &self.prepared
+    /// The model at the values that the equations are of.
+    pub fn at(&self) -> &dyn Evaluated {
+        &*self.at
     }
 
     /// Hands out the rows of a local block.
@@ -182,36 +182,33 @@ impl<'a, M: Model> ObservationEquations<'a, M> {
     }
 }
 
-impl<M: Model> Equations for ObservationEquations<'_, M> {
-    #[inline(always)]
+impl Equations for ObservationEquations<'_> {
     fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let layout = self.problem.layout();
-        self.problem.model.observe(&self.prepared, local, group, rows);
+        self.at.observe(local, group, rows);
         rows.weigh(&self.observation_sd[group * layout.rows()..][..layout.rows()]);
         self.adapt(local, group, rows);
     }
 
-    #[inline(always)]
-    fn write_alike(&self, locals: &[u32], groups: impl Fn(usize) -> usize, rows: &mut GroupRows<'_>) {
-        let model = &self.problem.model;
-        let written = model.observe_alike(&self.prepared, locals, &groups, self.observation_sd, rows);
+    fn write_alike(&self, locals: &[u32], groups: &[u32], rows: &mut GroupRows<'_>) {
+        let written = self.at.observe_alike(locals, groups, self.observation_sd, rows);
         // Most equations are as they shall be; to look for the parts of each takes a division.
         if written && self.reweighting.is_none() && self.fixed.is_none() {
             return;
         }
-        for (t, &local) in locals.iter().enumerate() {
+        for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
             let mut rows = rows.part(t, locals.len());
             if written {
-                self.adapt(local as usize, groups(t), &mut rows);
+                self.adapt(local as usize, group as usize, &mut rows);
             } else {
-                self.write(local as usize, groups(t), &mut rows);
+                self.write(local as usize, group as usize, &mut rows);
             }
         }
     }
 
     fn write_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
         let layout = self.problem.layout();
-        self.problem.model.observe_tie(&self.prepared, tie, rows);
+        self.at.observe_tie(tie, rows);
         let first = layout.groups() * layout.rows();
         let sd = &self.observation_sd[first..][layout.tie_rows(tie)];
         weigh(sd, rows.constant, [&mut *rows.coefficients]);
@@ -228,7 +225,7 @@ impl<M: Model> Equations for ObservationEquations<'_, M> {
     }
 }
 
-impl<M: Model> ObservationEquations<'_, M> {
+impl ObservationEquations<'_> {
     /// Takes weight off equations of unit weight where a loss says so, and leaves out the columns of fixed unknowns.
     #[inline(always)]
     fn adapt(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {

@@ -4,7 +4,7 @@ use super::datum::{Adjusted, Datum, DatumError, moved};
 use super::equations::ObservationEquations;
 use super::linearized::{Inverted, Linearized};
 use super::options::Options;
-use super::problem::{Model, Problem};
+use super::problem::AnyProblem;
 use super::result::Adjustment;
 use crate::Threads;
 use crate::normals::{Between, FactorOptions, InvertOptions};
@@ -14,8 +14,8 @@ impl Linearized {
     ///
     /// # Errors
     /// A network that is not free, carriers that do not carry all null vectors; what ends adjustments.
-    pub fn in_datum<M: Model>(
-        problem: &Problem<M>,
+    pub fn in_datum(
+        problem: &AnyProblem<'_>,
         adjusted: Adjusted<'_>,
         datum: &Datum,
         reference: &[f64],
@@ -38,9 +38,9 @@ impl Linearized {
     ///
     /// # Errors
     /// An interruption, no memory.
-    pub fn inverted<M: Model>(
+    pub fn inverted(
         self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         threads: &Threads,
         between: Between<'_>,
     ) -> Result<Inverted, DatumError> {
@@ -58,9 +58,9 @@ impl Adjustment {
     ///
     /// # Errors
     /// A network that is not free, carriers that do not carry all null vectors, unknowns that are not determined; an interruption.
-    pub fn take_to<M: Model>(
+    pub fn take_to(
         &mut self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         options: &Options,
         datum: &Datum,
         reference: &[f64],

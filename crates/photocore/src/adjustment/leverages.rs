@@ -3,19 +3,17 @@
 //! What is left out has an infinite standard deviation: its equations stand in the normal equations with weight zero, so that pattern,
 //! order and symbolic factorisation stay, and cofactors of what is out are inside the pattern too.
 
-use nalgebra::DMatrix;
-use rayon::prelude::*;
-
 use super::equations::ObservationEquations;
 use super::linearized::{Inverted, Linearized};
 use super::options::Phase;
-use super::problem::{Model, Problem};
+use super::problem::AnyProblem;
 use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
-use crate::Threads;
 use crate::normals::{
     Cofactors, Equations, FactorOptions, InvertOptions, LocalCofactors, Prior, SelectedInverse, TieRows,
 };
+use crate::{Threads, parallel};
+use nalgebra::DMatrix;
 
 /// A problem at adjusted values, with cofactors of everything inside the pattern of its normal equations.
 #[derive(Debug)]
@@ -53,8 +51,8 @@ impl Leverages {
     ///
     /// # Errors
     /// Values that leave unknowns undetermined; an interruption, no memory.
-    pub fn at<M: Model>(
-        problem: &Problem<M>,
+    pub fn at(
+        problem: &AnyProblem<'_>,
         values: Vec<f64>,
         held: Vec<usize>,
         threads: &Threads,
@@ -73,22 +71,22 @@ impl Leverages {
     }
 
     /// Weighted sum of squares of what takes part.
-    pub fn sum_of_squares<M: Model>(&self, problem: &Problem<M>) -> f64 {
+    pub fn sum_of_squares(&self, problem: &AnyProblem<'_>) -> f64 {
         let priors = problem.terms(&self.values).sum_of_squares(0..self.values.len());
         problem.sum_of_squares(&self.residuals) + priors
     }
 
     /// Observations that take part, those of unknowns themselves among them, minus unknowns.
-    pub fn degrees_of_freedom<M>(&self, problem: &Problem<M>) -> i64 {
+    pub fn degrees_of_freedom(&self, problem: &AnyProblem<'_>) -> i64 {
         let out = problem.observation_sd.iter().filter(|sd| sd.is_infinite()).count();
         problem.counts(&self.held).degrees_of_freedom() - out as i64
     }
 
     /// Cofactors of all equations of some local blocks, with the given standard deviations; with those of their weighted unknowns, where
     /// `terms` gives these (see [`crate::normals::System::local_cofactors`]).
-    pub fn of_locals<M: Model>(
+    pub fn of_locals(
         &self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         observation_sd: &[f64],
         locals: &[usize],
         terms: impl Fn(usize) -> Vec<f64> + Sync,
@@ -99,7 +97,7 @@ impl Leverages {
             let own_terms = terms(local);
             problem.system.local_cofactors(&self.selected, &formed, &prior, &asked, local, &own_terms)
         };
-        threads.install(|| locals.par_iter().map(of).collect())
+        threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])))
     }
 
     /// What all equations of some local blocks, which take no part, have to do with each other if they did: for each two of them the
@@ -113,9 +111,9 @@ impl Leverages {
     /// * `terms`: the equations of the weighted unknowns of each, of unit weight.
     ///
     /// Empty where the local block would not be determined.
-    pub fn of_gone<M: Model>(
+    pub fn of_gone(
         &self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         (observation_sd, sd): (&[f64], &[f64]),
         locals: &[usize],
         terms: impl Fn(usize) -> Vec<f64> + Sync,
@@ -139,13 +137,13 @@ impl Leverages {
             let factor = (DMatrix::identity(rows, rows) + all - &alone).cholesky();
             factor.map_or(vec![], |factor| (factor.inverse() - alone).as_slice().to_vec())
         };
-        threads.install(|| locals.par_iter().map(of).collect())
+        threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])))
     }
 
     /// Cofactors of the equations of some ties, with the given standard deviations.
-    pub fn of_ties<M: Model>(
+    pub fn of_ties(
         &self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         observation_sd: &[f64],
         ties: &[usize],
         threads: &Threads,
@@ -157,12 +155,7 @@ impl Leverages {
         ties.iter().map(|&tie| self.of_tie(problem, &asked, tie)).collect()
     }
 
-    fn of_tie<M: Model>(
-        &self,
-        problem: &Problem<M>,
-        asked: &ObservationEquations<'_, M>,
-        tie: usize,
-    ) -> TieCofactors {
+    fn of_tie(&self, problem: &AnyProblem<'_>, asked: &ObservationEquations<'_>, tie: usize) -> TieCofactors {
         let layout = problem.layout();
         let (each, width) = (&layout.ties()[tie], layout.tie_columns(tie).count());
         let (mut constant, mut coefficients) = (vec![0.0; each.rows], vec![0.0; each.rows * width]);
@@ -202,13 +195,17 @@ impl Leverages {
     }
 
     /// The equations that take part, those that are asked for, and the weighted unknowns.
-    fn equations<'a, M: Model>(
+    fn equations<'a>(
         &self,
-        problem: &'a Problem<M>,
+        problem: &'a AnyProblem<'a>,
         observation_sd: &'a [f64],
         threads: &Threads,
-    ) -> (ObservationEquations<'a, M>, ObservationEquations<'a, M>, Prior) {
+    ) -> (ObservationEquations<'a>, ObservationEquations<'a>, Prior) {
         let at = || ObservationEquations::new(problem, None, &self.values, &self.held, threads);
-        (at(), at().with_deviations(observation_sd), problem.prior_equations(&self.values, &self.held))
+        (
+            at(),
+            at().with_deviations(observation_sd),
+            problem.prior_equations(&problem.terms(&self.values), &self.held),
+        )
     }
 }

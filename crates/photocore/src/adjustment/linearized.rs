@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::datum::Basis;
 use super::equations::ObservationEquations;
 use super::loss::{Loss, Reweighting};
-use super::problem::{Model, Problem};
+use super::problem::AnyProblem;
 use super::result::{AdjustError, Seconds, gib, unless_stopped};
 use super::transformation::Transformation;
 use crate::Threads;
@@ -75,8 +75,8 @@ impl Linearized {
     ///
     /// # Errors
     /// An interruption, no memory.
-    pub fn form<M: Model>(
-        problem: &Problem<M>,
+    pub fn form(
+        problem: &AnyProblem<'_>,
         loss: Option<Loss>,
         values: Vec<f64>,
         held: Vec<usize>,
@@ -88,8 +88,8 @@ impl Linearized {
     }
 
     /// The same of equations that are there already.
-    pub(super) fn of<M: Model>(
-        equations: &ObservationEquations<'_, M>,
+    pub(super) fn of(
+        equations: &ObservationEquations<'_>,
         values: Vec<f64>,
         held: Vec<usize>,
         options: &FactorOptions,
@@ -97,9 +97,10 @@ impl Linearized {
         between: Between<'_>,
     ) -> Result<Self, AdjustError> {
         let (start, problem) = (Instant::now(), equations.problem());
-        let prior = problem.prior_equations(&values, &held);
+        let terms = problem.terms(&values);
+        let prior = problem.prior_equations(&terms, &held);
         let factor = unless_stopped(problem.system.factor(threads, equations, &prior, options, between))?;
-        let sum_of_squares = factor.sum_of_squares + problem.terms(&values).sum_of_squares(0..values.len());
+        let sum_of_squares = factor.sum_of_squares + terms.sum_of_squares(0..values.len());
         let (took, share) = (start.elapsed().as_secs_f64(), factor.formation_share);
         let seconds = Seconds { form: took * share, factor: took * (1.0 - share), ..Seconds::default() };
         Ok(Self {
@@ -189,7 +190,7 @@ impl Linearized {
 
     /// The cofactors of every two unknowns that are not local, in the order of the layout, row by row; zero for those that are fixed or
     /// held.
-    pub fn reduced_cofactors<M>(&self, problem: &Problem<M>) -> Vec<f64> {
+    pub fn reduced_cofactors(&self, problem: &AnyProblem<'_>) -> Vec<f64> {
         let layout = problem.layout();
         let (first, count) = (layout.all_locals().end, layout.unknowns() - layout.all_locals().end);
         let mut rights = vec![0.0; count * count];
@@ -201,7 +202,7 @@ impl Linearized {
     }
 
     /// Whether an unknown is neither fixed nor held.
-    fn is_free<M>(&self, problem: &Problem<M>, unknown: usize) -> bool {
+    fn is_free(&self, problem: &AnyProblem<'_>, unknown: usize) -> bool {
         problem.sd[unknown] != 0.0 && !self.held.contains(&unknown)
     }
 
@@ -210,9 +211,9 @@ impl Linearized {
     ///
     /// # Errors
     /// More memory than there may be (None: any number of bytes); an interruption.
-    pub fn cofactors<M: Model>(
+    pub fn cofactors(
         &self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         rows: &[Function],
         columns: Option<&[Function]>,
         memory: Option<usize>,
@@ -247,7 +248,7 @@ impl Linearized {
     }
 
     /// What a function takes of unknowns that are neither held nor fixed: the cofactors of others are zero in this datum.
-    fn unmoved<M>(&self, problem: &Problem<M>, function: &Function) -> Function {
+    fn unmoved(&self, problem: &AnyProblem<'_>, function: &Function) -> Function {
         let stays = |unknown: usize| self.transformation.as_ref().is_some_and(|to| to.stays(unknown));
         let moves = |unknown: usize| self.is_free(problem, unknown) && !stays(unknown);
         function.iter().filter(|&&(unknown, _)| moves(unknown)).copied().collect()
@@ -257,9 +258,9 @@ impl Linearized {
     ///
     /// # Errors
     /// An interruption, no memory.
-    pub fn solve_for<M: Model>(
+    pub fn solve_for(
         &self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         rights: &[f64],
         threads: &Threads,
         between: Between<'_>,
@@ -269,9 +270,9 @@ impl Linearized {
     }
 
     /// The step of all unknowns, or what else the options ask for.
-    pub(super) fn solve<M: Model>(
+    pub(super) fn solve(
         &self,
-        equations: &ObservationEquations<'_, M>,
+        equations: &ObservationEquations<'_>,
         options: &SolveOptions<'_>,
         threads: &Threads,
         between: Between<'_>,
@@ -281,9 +282,9 @@ impl Linearized {
     }
 
     /// The selected inverse, in the datum that it was taken to.
-    pub(super) fn invert<M: Model>(
+    pub(super) fn invert(
         self,
-        equations: &ObservationEquations<'_, M>,
+        equations: &ObservationEquations<'_>,
         options: &InvertOptions<'_>,
         threads: &Threads,
         between: Between<'_>,
@@ -301,9 +302,9 @@ impl Linearized {
     }
 
     /// Solves for the right-hand sides of its datum, where it has one: cofactors are then those in it.
-    pub(super) fn take_to_datum<M: Model>(
+    pub(super) fn take_to_datum(
         &mut self,
-        equations: &ObservationEquations<'_, M>,
+        equations: &ObservationEquations<'_>,
         threads: &Threads,
         between: Between<'_>,
     ) -> Result<(), AdjustError> {
@@ -318,17 +319,17 @@ impl Linearized {
     }
 
     /// The observation equations again: it takes a pass over unknowns, and they are not kept.
-    pub(super) fn equations<'a, M: Model>(
+    pub(super) fn equations<'a>(
         &self,
-        problem: &'a Problem<M>,
+        problem: &'a AnyProblem<'a>,
         threads: &Threads,
-    ) -> ObservationEquations<'a, M> {
+    ) -> ObservationEquations<'a> {
         let loss = self.reweighting.map(|reweighting| reweighting.loss);
         ObservationEquations::new(problem, loss, &self.values, &self.held, threads)
     }
 
     /// Gives its memory back for the next ones; its values.
-    pub(super) fn recycle<M>(self, problem: &Problem<M>) -> Vec<f64> {
+    pub(super) fn recycle(self, problem: &AnyProblem<'_>) -> Vec<f64> {
         self.factor.recycle(&problem.system);
         self.values
     }

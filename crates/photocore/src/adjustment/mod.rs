@@ -8,7 +8,7 @@
 //! point is a fixed bench mark.
 //!
 //! ```
-//! use photocore::adjustment::{Model, Options, Problem, Status};
+//! use photocore::adjustment::{Evaluated, Model, Options, Problem, Status};
 //! use photocore::normals::{GroupRows, Layout, Ordering, System};
 //!
 //! struct Levelling {
@@ -16,16 +16,22 @@
 //!     readings: Vec<(f64, usize)>,
 //! }
 //!
+//! /// The net at given heights.
+//! struct At<'a> {
+//!     net: &'a Levelling,
+//!     heights: Vec<f64>,
+//! }
+//!
 //! impl Model for Levelling {
-//!     type Prepared = Vec<f64>;
-//!
-//!     fn prepare(&self, heights: &[f64]) -> Vec<f64> {
-//!         heights.to_vec()
+//!     fn at<'a>(&'a self, heights: &[f64]) -> Box<dyn Evaluated + 'a> {
+//!         Box::new(At { net: self, heights: heights.to_vec() })
 //!     }
+//! }
 //!
-//!     fn observe(&self, heights: &Vec<f64>, point: usize, reading: usize, rows: &mut GroupRows<'_>) {
-//!         let (value, instrument) = self.readings[reading];
-//!         rows.constant[0] = value - (heights[point] - heights[3 + instrument]);
+//! impl Evaluated for At<'_> {
+//!     fn observe(&self, point: usize, reading: usize, rows: &mut GroupRows<'_>) {
+//!         let (value, instrument) = self.net.readings[reading];
+//!         rows.constant[0] = value - (self.heights[point] - self.heights[3 + instrument]);
 //!         rows.local[0] = 1.0;
 //!         rows.retained[0] = -1.0;
 //!     }
@@ -102,7 +108,7 @@ pub use noncentral::{
 pub use observation_rows::ObservationRows;
 pub use options::{Event, Iteration, Options, Phase, Status};
 pub use part::PartError;
-pub use problem::{Model, Motions, Problem};
+pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem};
 pub use resistance::Classes;
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Seconds};

@@ -4,14 +4,12 @@
 //! of their partials changes: A g = 0. Of several candidates, the columns of G, all combinations z are found with A G z = 0, from the
 //! normal matrix of the candidates, (A G)^T (A G), which takes one pass over the observations and no factorisation.
 
-use faer::{Mat, Side};
-use rayon::prelude::*;
-
 use super::equations::{ObservationEquations, Row};
-use super::problem::{Model, Motions, Problem};
+use super::problem::{AnyProblem, Motions};
 use super::walk::Buffers;
-use crate::Threads;
 use crate::normals::{Equations, TieRows};
+use crate::{Threads, parallel};
+use faer::{Mat, Side};
 
 /// The combinations of motions that are open at some values of the unknowns.
 pub(super) struct Open {
@@ -121,16 +119,16 @@ impl<'a> Candidates<'a> {
     }
 
     /// Adds the rows of a tie, without what the motions make of the displacement that it misses by (see [`Model::carried`]).
-    pub fn add_tie<M: Model>(
+    pub fn add_tie(
         &self,
         sums: &mut Sums,
-        equations: &ObservationEquations<'_, M>,
+        equations: &ObservationEquations<'_>,
         tie: usize,
         rows: &mut TieRows<'_>,
     ) {
         equations.write_tie(tie, rows);
-        let (problem, layout) = (equations.problem(), equations.problem().layout());
-        let carried = problem.model.carried(equations.at(), tie);
+        let layout = equations.problem().layout();
+        let carried = equations.at().carried(tie);
         let first = layout.groups() * layout.rows() + layout.tie_rows(tie).start;
         let width = layout.tie_columns(tie).count();
         for (k, row) in rows.coefficients.chunks_exact(width.max(1)).enumerate() {
@@ -172,7 +170,7 @@ fn add_square(sum: &mut [f64], weight: f64, b: &[[f64; LANES]]) {
     }
 }
 
-impl<M: Model> Problem<M> {
+impl AnyProblem<'_> {
     /// Which of some motions observations and weights leave open at given values; None where it is none.
     pub(super) fn open(&self, values: &[f64], motions: &Motions, threads: &Threads) -> Option<Open> {
         self.open_without(values, motions, &[], threads)
@@ -243,9 +241,11 @@ impl<M: Model> Problem<M> {
             }
             sums
         };
-        let chunks = (0..sample.div_ceil(AT_ONCE)).into_par_iter();
         let mut sums = candidates.sums();
-        threads.install(|| chunks.map(chunk).collect::<Vec<Sums>>()).iter().for_each(|part| sums.add(part));
+        threads
+            .install(|| parallel::map(sample.div_ceil(AT_ONCE), 1, chunk))
+            .iter()
+            .for_each(|part| sums.add(part));
         sums.multiply(stride as f64);
         self.for_ties(|tie, rows| {
             candidates.add_tie(&mut sums, &equations, tie, rows);

@@ -1,10 +1,8 @@
 //! The equations of all observations as sparse rows of unit weight: what is asked of them one by one, by way of solutions.
 
-use rayon::prelude::*;
-
 use super::equations::ObservationEquations;
-use super::problem::{Model, Problem};
-use crate::Threads;
+use super::problem::AnyProblem;
+use crate::{Threads, parallel};
 
 /// Equations a x = l of unit weight: first those of observations, in the order of groups and rows, then of ties and rows; then one for each
 /// unknown, that of it as an observation of itself, empty where it is none.
@@ -18,7 +16,7 @@ pub struct ObservationRows {
 
 impl ObservationRows {
     /// At the given values, without the columns of unknowns that are fixed or held.
-    pub fn new<M: Model>(problem: &Problem<M>, values: &[f64], held: &[usize], threads: &Threads) -> Self {
+    pub fn new(problem: &AnyProblem<'_>, values: &[f64], held: &[usize], threads: &Threads) -> Self {
         let equations = ObservationEquations::new(problem, None, values, held, threads);
         let of_locals = problem.for_locals(threads, |buffers, local| {
             let mut found = Self::empty();
@@ -75,7 +73,7 @@ impl ObservationRows {
     /// A x for some rows.
     pub fn times(&self, rows: &[usize], x: &[f64], threads: &Threads) -> Vec<f64> {
         let product = |&row: &usize| self.row(row).map(|(unknown, value)| value * x[unknown]).sum::<f64>();
-        threads.install(|| rows.par_iter().with_min_len(1024).map(product).collect())
+        threads.install(|| parallel::map(rows.len(), 1024, |k| product(&rows[k])))
     }
 
     /// A^T e of one row: a right-hand side over all unknowns.

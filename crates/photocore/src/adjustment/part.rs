@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::equations::ObservationEquations;
 use super::linearized::Linearized;
 use super::options::Phase;
-use super::problem::{Model, Problem};
+use super::problem::AnyProblem;
 use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
 use crate::Threads;
@@ -36,8 +36,8 @@ impl Linearized {
     ///
     /// # Errors
     /// Contributions of other unknowns, an interruption, no memory.
-    pub fn of_part<M: Model>(
-        problem: &Problem<M>,
+    pub fn of_part(
+        problem: &AnyProblem<'_>,
         values: Vec<f64>,
         held: Vec<usize>,
         contributions: &[Contribution<'_>],
@@ -72,9 +72,9 @@ impl Linearized {
     ///
     /// # Errors
     /// An interruption, no memory; another number of outer unknowns.
-    pub fn solve_part<M: Model>(
+    pub fn solve_part(
         &self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         outer: &[f64],
         threads: &Threads,
         watch: Watch<'_>,
@@ -94,9 +94,9 @@ impl Linearized {
     ///
     /// # Errors
     /// Unknowns that are not determined, an interruption, no memory; another number of outer unknowns.
-    pub fn invert_part<M: Model>(
+    pub fn invert_part(
         self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         outer: &[f64],
         reached: Vec<f64>,
         threads: &Threads,

@@ -5,44 +5,9 @@ use crate::normals::{GroupRows, Layout, System, TieRows};
 
 /// How observations follow from unknowns.
 pub trait Model: Sync {
-    /// What several observations share, computed once for each set of values of the unknowns.
-    type Prepared: Send + Sync;
-
-    /// Prepares for the given unknowns (in the order of the layout). Called on a thread of the threads, as is [`Model::relocate`].
-    fn prepare(&self, unknowns: &[f64]) -> Self::Prepared;
-
-    /// Writes observed minus computed, and the partials of the computed values, of one group of observations of a local
-    /// block, in the units of observations and unknowns.
-    fn observe(&self, prepared: &Self::Prepared, local: usize, group: usize, rows: &mut GroupRows<'_>);
-
-    /// Writes what [`Model::observe`] does of one group each of several local blocks, one after the other, in unit weight: `groups` says
-    /// which, `sd` are the standard deviations of all observations. All have the same main block, and as much in common with others. False
-    /// where the model has no way for them together.
-    #[inline(always)]
-    fn observe_alike(
-        &self,
-        _prepared: &Self::Prepared,
-        _locals: &[u32],
-        _groups: impl Fn(usize) -> usize,
-        _sd: &[f64],
-        _rows: &mut GroupRows<'_>,
-    ) -> bool {
-        false
-    }
-
-    /// Writes observed minus computed alone, as [`Model::observe`] does; false where the model does not know how.
-    fn misclose(
-        &self,
-        _prepared: &Self::Prepared,
-        _local: usize,
-        _group: usize,
-        _constant: &mut [f64],
-    ) -> bool {
-        false
-    }
-
-    /// What [`Model::observe`] writes, of the observations of a tie. Not called where the layout has no ties.
-    fn observe_tie(&self, _prepared: &Self::Prepared, _tie: usize, _rows: &mut TieRows<'_>) {}
+    /// The model at the given unknowns (in the order of the layout): what several observations share is computed once. Called on a thread of
+    /// the threads, as is [`Model::relocate`].
+    fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a>;
 
     /// Applies a step to the unknowns. By default it is added; a model whose unknowns are not the numbers that the columns of its partials
     /// belong to (an attitude that is kept in angles and steps by a rotation) says here what a step makes of them.
@@ -73,30 +38,9 @@ pub trait Model: Sync {
         false
     }
 
-    /// Local blocks that the iterations have led to where they harm all others: what they say of one retained block is so much more than
-    /// all others say together that rounding takes what these say; and those that are on their way there. Asked after every damped
-    /// step, with the unknowns before and after it.
-    fn collapsed(&self, _before: &[f64], _after: &Self::Prepared) -> Vec<usize> {
-        vec![]
-    }
-
-    /// Local blocks that nothing keeps from leaving for infinity, and that are on their way there: what little they lower the sum of squares by
-    /// would take all iterations. Asked in a trust region after a short step, with the unknowns before and after it.
-    fn run_off(&self, _before: &[f64], _after: &Self::Prepared) -> Vec<usize> {
-        vec![]
-    }
-
     /// Motions of the whole that observations and weights may leave open at the given values. Which of them they do leave open is found by
     /// trying, and as many unknowns are held; None where it is known that they give a datum, which then costs nothing.
     fn motions(&self, _unknowns: &[f64]) -> Option<Motions> {
-        None
-    }
-
-    /// What motions make of observed minus computed of a tie, in unit weight, where that is a displacement in the space that moves: the number of
-    /// the first of the motions that can move it, then a row for each equation. A displacement turns and grows with everything else; that
-    /// changes the equations, but not what they sum up to where all directions weigh the same, and it tells nothing of the motion where
-    /// they do not.
-    fn carried(&self, _prepared: &Self::Prepared, _tie: usize) -> Option<(usize, Vec<[f64; 7]>)> {
         None
     }
 
@@ -123,6 +67,55 @@ pub trait Model: Sync {
     }
 }
 
+/// A [`Model`] at given values of the unknowns.
+pub trait Evaluated: Send + Sync {
+    /// Writes observed minus computed, and the partials of the computed values, of one group of observations of a local
+    /// block, in the units of observations and unknowns.
+    fn observe(&self, local: usize, group: usize, rows: &mut GroupRows<'_>);
+
+    /// Writes what [`Evaluated::observe`] does of one group each of several local blocks, one after the other, in unit weight: `groups` says
+    /// which, `sd` are the standard deviations of all observations. All have the same main block, and as much in common with others. False
+    /// where the model has no way for them together.
+    fn observe_alike(
+        &self,
+        _locals: &[u32],
+        _groups: &[u32],
+        _sd: &[f64],
+        _rows: &mut GroupRows<'_>,
+    ) -> bool {
+        false
+    }
+
+    /// Writes observed minus computed alone, as [`Evaluated::observe`] does; false where the model does not know how.
+    fn misclose(&self, _local: usize, _group: usize, _constant: &mut [f64]) -> bool {
+        false
+    }
+
+    /// What [`Evaluated::observe`] writes, of the observations of a tie. Not called where the layout has no ties.
+    fn observe_tie(&self, _tie: usize, _rows: &mut TieRows<'_>) {}
+
+    /// Local blocks that the iterations have led to where they harm all others: what they say of one retained block is so much more than
+    /// all others say together that rounding takes what these say; and those that are on their way there. Asked after every damped
+    /// step, with the unknowns before it.
+    fn collapsed(&self, _before: &[f64]) -> Vec<usize> {
+        vec![]
+    }
+
+    /// Local blocks that nothing keeps from leaving for infinity, and that are on their way there: what little they lower the sum of squares by
+    /// would take all iterations. Asked in a trust region after a short step, with the unknowns before it.
+    fn run_off(&self, _before: &[f64]) -> Vec<usize> {
+        vec![]
+    }
+
+    /// What motions make of observed minus computed of a tie, in unit weight, where that is a displacement in the space that moves: the number of
+    /// the first of the motions that can move it, then a row for each equation. A displacement turns and grows with everything else; that
+    /// changes the equations, but not what they sum up to where all directions weigh the same, and it tells nothing of the motion where
+    /// they do not.
+    fn carried(&self, _tie: usize) -> Option<(usize, Vec<[f64; 7]>)> {
+        None
+    }
+}
+
 /// Motions of a network as a whole, which its observations may leave open.
 #[derive(Debug, Clone)]
 pub struct Motions {
@@ -135,9 +128,7 @@ pub struct Motions {
 
 /// A model with everything that is known beforehand.
 #[derive(Debug)]
-pub struct Problem<M> {
-    /// How observations follow from unknowns.
-    pub model: M,
+pub struct Problem<M: ?Sized> {
     /// The unknowns and groups, ordered.
     pub system: System,
     /// Standard deviation of each observation, in the order of groups and rows, then of ties and rows.
@@ -148,9 +139,14 @@ pub struct Problem<M> {
     pub prior: Vec<f64>,
     /// Standard deviation of each unknown: infinite when free, zero when fixed.
     pub sd: Vec<f64>,
+    /// How observations follow from unknowns.
+    pub model: M,
 }
 
-impl<M> Problem<M> {
+/// A problem of whatever model: what is done with problems is compiled once for all of them, and a reference to one of a model is one to this.
+pub type AnyProblem<'m> = Problem<dyn Model + 'm>;
+
+impl<M: ?Sized> Problem<M> {
     /// The unknowns and groups.
     pub fn layout(&self) -> &Layout {
         self.system.layout()
@@ -170,6 +166,13 @@ impl<M> Problem<M> {
 }
 
 impl<M: Model> Problem<M> {
+    /// The problem, whatever its model.
+    pub fn any(&self) -> &AnyProblem<'_> {
+        self
+    }
+}
+
+impl AnyProblem<'_> {
     /// The unknowns after a step.
     pub(super) fn advanced(&self, unknowns: &[f64], step: &[f64]) -> Vec<f64> {
         let mut values = unknowns.to_vec();

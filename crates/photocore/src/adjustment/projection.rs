@@ -2,15 +2,13 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::equations::ObservationEquations;
 use super::linearized::Linearized;
-use super::problem::{Model, Problem};
+use super::problem::{AnyProblem, Problem};
 use super::result::AdjustError;
 use super::walk::Buffers;
-use crate::Threads;
 use crate::normals::{Between, SolveOptions};
+use crate::{Threads, parallel};
 
 /// Parts that the walk over the local blocks is made of, whatever the number of threads: so sums have the same bits.
 const PARTS: usize = 16;
@@ -18,7 +16,7 @@ const PARTS: usize = 16;
 /// What an equation takes of the unknowns.
 type Taken = Vec<(usize, f64)>;
 
-impl<M> Problem<M> {
+impl<M: ?Sized> Problem<M> {
     /// How many equations there are: those of the groups and of the ties, row by row, then one for each unknown as an observation of
     /// itself, which is empty unless it is weighted.
     pub fn equations(&self) -> usize {
@@ -32,9 +30,9 @@ impl Linearized {
     ///
     /// # Errors
     /// An interruption, no memory.
-    pub fn project<M: Model>(
+    pub fn project(
         &self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         mut columns: Vec<f64>,
         threads: &Threads,
         between: Between<'_>,
@@ -49,7 +47,7 @@ impl Linearized {
     }
 
     /// Whether each equation of [`Problem::equations`] is one: those of unknowns are where these are weighted, and not held.
-    pub fn is_equation<M>(&self, problem: &Problem<M>) -> Vec<bool> {
+    pub fn is_equation(&self, problem: &AnyProblem<'_>) -> Vec<bool> {
         let mut found = vec![true; problem.observation_sd.len()];
         found.extend((0..problem.sd.len()).map(|i| problem.is_weighted(i) && !self.held.contains(&i)));
         found
@@ -57,16 +55,16 @@ impl Linearized {
 }
 
 /// The equations at adjusted values, in unit weight.
-struct Rows<'a, M: Model> {
-    problem: &'a Problem<M>,
-    equations: ObservationEquations<'a, M>,
+struct Rows<'a> {
+    problem: &'a AnyProblem<'a>,
+    equations: ObservationEquations<'a>,
     values: &'a [f64],
     /// Which unknowns are fixed or held.
     fixed: Vec<bool>,
 }
 
-impl<'a, M: Model> Rows<'a, M> {
-    fn new(linearized: &'a Linearized, problem: &'a Problem<M>, threads: &Threads) -> Self {
+impl<'a> Rows<'a> {
+    fn new(linearized: &'a Linearized, problem: &'a AnyProblem<'a>, threads: &Threads) -> Self {
         let Linearized { values, held, .. } = linearized;
         let equations = linearized.equations(problem, threads);
         Self { problem, equations, values, fixed: problem.fixed(held) }
@@ -100,7 +98,7 @@ impl<'a, M: Model> Rows<'a, M> {
             });
             (first, width, own, shared)
         };
-        let parts: Vec<_> = (0..PARTS).into_par_iter().map(part).collect();
+        let parts: Vec<_> = parallel::map(PARTS, 1, part);
         let mut rights = vec![0.0; count * unknowns];
         for (first, width, own, shared) in parts {
             for (column, right) in rights.chunks_exact_mut(unknowns.max(1)).enumerate() {
@@ -129,7 +127,7 @@ impl<'a, M: Model> Rows<'a, M> {
             });
             found
         };
-        let parts: Vec<Vec<f64>> = (0..PARTS).into_par_iter().map(part).collect();
+        let parts: Vec<Vec<f64>> = parallel::map(PARTS, 1, part);
         let count = solutions.len() / unknowns;
         for (row, products) in parts.iter().flat_map(|part| part.chunks_exact(count.max(1))).enumerate() {
             products

@@ -2,17 +2,12 @@
 
 use super::method::Published;
 use super::options::{Iteration, Status};
-use super::problem::Model;
 use super::result::AdjustError;
 use super::run::{End, Run, State};
 
-impl<'a, M: Model> Run<'a, '_, M> {
+impl<'a> Run<'a, '_> {
     /// Full steps, whatever becomes of the sum of squares.
-    pub(super) fn full_steps(
-        &mut self,
-        start: State<'a, M>,
-        rule: Published,
-    ) -> Result<End<'a, M>, AdjustError> {
+    pub(super) fn full_steps(&mut self, start: State<'a>, rule: Published) -> Result<End<'a>, AdjustError> {
         let mut state = start;
         let mut previous: Option<f64> = None;
         for number in 1..=self.options.max_iterations {

@@ -2,7 +2,7 @@
 
 use super::equations::ObservationEquations;
 use super::motions::{Candidates, Sums};
-use super::problem::{Model, Problem};
+use super::problem::AnyProblem;
 use super::walk::Buffers;
 use crate::Threads;
 
@@ -17,7 +17,7 @@ pub struct Classes<'a> {
     pub of_unknowns: &'a [usize],
 }
 
-impl<M: Model> Problem<M> {
+impl AnyProblem<'_> {
     /// For each kind of observation the share of what a motion changes in it that remains when all unknowns move together, the greatest
     /// of all motions: one for what is fixed, and rounding where the kind leaves all of them open.
     pub fn resistance(&self, values: &[f64], classes: &Classes<'_>, threads: &Threads) -> Vec<f64> {

@@ -9,7 +9,7 @@ use super::linearized::Linearized;
 use super::loss::Reweighting;
 use super::method::{FIRST_DAMPING, Method, leaves_cofactors};
 use super::options::{Event, Iteration, Options, Phase, Status};
-use super::problem::{Model, Problem};
+use super::problem::{AnyProblem, Evaluated};
 use super::result::{AdjustError, Adjustment, Seconds};
 use crate::normals::{FactorOptions, InvertOptions, SolveOptions};
 use crate::{Stopped, Threads};
@@ -22,7 +22,7 @@ pub(crate) fn go_on(_: Event) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-impl<M: Model> Problem<M> {
+impl AnyProblem<'_> {
     /// Adjusts by least squares, on threads of its own; [`adjust`] takes those of its caller and tells what is going on.
     ///
     /// # Errors
@@ -38,8 +38,8 @@ impl<M: Model> Problem<M> {
 ///
 /// # Errors
 /// Unknowns that are not determined, observations that cannot be computed, or an interruption.
-pub fn adjust<M: Model>(
-    problem: &Problem<M>,
+pub fn adjust(
+    problem: &AnyProblem<'_>,
     options: &Options,
     threads: &Threads,
     watch: Watch<'_>,
@@ -54,8 +54,8 @@ pub fn adjust<M: Model>(
 ///
 /// # Errors
 /// Those of [`adjust`].
-pub fn adjust_in_datum<M: Model>(
-    problem: &Problem<M>,
+pub fn adjust_in_datum(
+    problem: &AnyProblem<'_>,
     options: &Options,
     datum: &Datum,
     reference: &[f64],
@@ -71,8 +71,8 @@ pub fn adjust_in_datum<M: Model>(
 /// Those of [`adjust`].
 ///
 /// [`Leverages::of`]: super::Leverages::of
-pub fn adjust_by_groups<M: Model>(
-    problem: &Problem<M>,
+pub fn adjust_by_groups(
+    problem: &AnyProblem<'_>,
     options: &Options,
     threads: &Threads,
     watch: Watch<'_>,
@@ -80,8 +80,8 @@ pub fn adjust_by_groups<M: Model>(
     adjusted(problem, options, None, threads, watch, true)
 }
 
-fn adjusted<M: Model>(
-    problem: &Problem<M>,
+fn adjusted(
+    problem: &AnyProblem<'_>,
     options: &Options,
     target: Option<Target<'_>>,
     threads: &Threads,
@@ -133,14 +133,14 @@ fn adjusted<M: Model>(
 const SHORT: f64 = 1.0;
 
 /// Where the iterations are.
-pub(super) struct State<'a, M: Model> {
-    pub equations: ObservationEquations<'a, M>,
+pub(super) struct State<'a> {
+    pub equations: ObservationEquations<'a>,
     pub linearized: Linearized,
     /// The values before the network was moved to its datum, where it was.
     before: Option<Vec<f64>>,
 }
 
-impl<M: Model> State<'_, M> {
+impl State<'_> {
     pub fn values(&self) -> &[f64] {
         &self.linearized.values
     }
@@ -162,37 +162,37 @@ impl<M: Model> State<'_, M> {
 }
 
 /// Where the iterations ended. There are no cofactors where the last values leave unknowns undetermined.
-pub(super) struct End<'a, M: Model> {
+pub(super) struct End<'a> {
     pub status: Status,
     pub unknowns: Vec<f64>,
     /// What cofactors are computed from.
-    pub state: Option<State<'a, M>>,
+    pub state: Option<State<'a>>,
     /// Why there is none.
     pub undetermined: Option<AdjustError>,
     /// The last iteration and its step, still to be applied: the cofactors hold before it.
     pub last: Option<(Iteration, Vec<f64>)>,
 }
 
-impl<'a, M: Model> End<'a, M> {
+impl<'a> End<'a> {
     /// At given values, without cofactors.
     pub fn at(status: Status, unknowns: Vec<f64>) -> Self {
         Self { status, unknowns, state: None, undetermined: None, last: None }
     }
 
     /// At values with all that their cofactors are computed from.
-    pub fn with(status: Status, state: State<'a, M>) -> Self {
+    pub fn with(status: Status, state: State<'a>) -> Self {
         let unknowns = state.values().to_vec();
         Self { state: Some(state), ..Self::at(status, unknowns) }
     }
 
     /// After one more step, with the cofactors of the equations that have given it.
-    pub fn after(status: Status, state: State<'a, M>, step: Vec<f64>, iteration: Iteration) -> Self {
+    pub fn after(status: Status, state: State<'a>, step: Vec<f64>, iteration: Iteration) -> Self {
         Self { last: Some((iteration, step)), ..Self::with(status, state) }
     }
 }
 
-pub(super) struct Run<'a, 'w, M: Model> {
-    pub problem: &'a Problem<M>,
+pub(super) struct Run<'a, 'w> {
+    pub problem: &'a AnyProblem<'a>,
     pub options: &'a Options,
     /// Whether to keep what tests of groups need.
     by_groups: bool,
@@ -221,10 +221,10 @@ pub(super) struct Run<'a, 'w, M: Model> {
     pub collapsed: Vec<usize>,
 }
 
-impl<'a, M: Model> Run<'a, '_, M> {
+impl<'a> Run<'a, '_> {
     /// Ends at the values reached, without a further step. Cofactors are those of the reweighted equations, whose weights can be
     /// reported, without second-order term.
-    pub(super) fn stay(&mut self, state: State<'a, M>, status: Status) -> Result<End<'a, M>, AdjustError> {
+    pub(super) fn stay(&mut self, state: State<'a>, status: Status) -> Result<End<'a>, AdjustError> {
         let plain = state.linearized.damping() == 0.0 && !state.linearized.is_curved();
         self.curved = false;
         let state = if plain { state } else { self.form(state.recycle(), 0.0)? };
@@ -235,7 +235,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     /// The step; None where an earlier one has led to values that leave unknowns undetermined. That the initial values do is an
     /// error: then the observations do.
-    pub(super) fn step(&mut self, state: &State<'a, M>) -> Result<Option<Vec<f64>>, AdjustError> {
+    pub(super) fn step(&mut self, state: &State<'a>) -> Result<Option<Vec<f64>>, AdjustError> {
         match state.linearized.undetermined() {
             Some(_) if !self.iterations.is_empty() => return Ok(None),
             Some(error) => return Err(error),
@@ -250,11 +250,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     /// Solves the same equations for another right-hand side.
-    pub(super) fn solve_again(
-        &mut self,
-        state: &State<'a, M>,
-        right: &[f64],
-    ) -> Result<Vec<f64>, AdjustError> {
+    pub(super) fn solve_again(&mut self, state: &State<'a>, right: &[f64]) -> Result<Vec<f64>, AdjustError> {
         let start = Instant::now();
         let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
         let options = SolveOptions { rights: Some(right), ..SolveOptions::default() };
@@ -265,12 +261,12 @@ impl<'a, M: Model> Run<'a, '_, M> {
 
     /// The weighted sum of squares, of losses where the options ask for a loss, at the given values.
     pub(super) fn objective(&self, unknowns: &[f64]) -> f64 {
-        self.objective_at(unknowns, &self.threads.install(|| self.problem.model.prepare(unknowns)))
+        self.objective_at(unknowns, &*self.threads.install(|| self.problem.model.at(unknowns)))
     }
 
-    /// The same of values that are prepared already.
-    pub(super) fn objective_at(&self, unknowns: &[f64], prepared: &M::Prepared) -> f64 {
-        let residuals = self.problem.residuals_at(self.threads, prepared);
+    /// The same of a model that is evaluated already.
+    pub(super) fn objective_at(&self, unknowns: &[f64], at: &dyn Evaluated) -> f64 {
+        let residuals = self.problem.residuals_at(self.threads, at);
         self.observed_sum(&residuals) + self.problem.terms(unknowns).sum_of_squares(0..unknowns.len())
     }
 
@@ -282,14 +278,14 @@ impl<'a, M: Model> Run<'a, '_, M> {
         }
     }
 
-    pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a, M>, AdjustError> {
+    pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a>, AdjustError> {
         let near = std::mem::take(&mut self.is_near);
         let (unknowns, basis, before) = match damping == 0.0 && near {
             true => self.at_its_target(unknowns),
             false => (unknowns, None, None),
         };
-        let prepared = self.threads.install(|| self.problem.model.prepare(&unknowns));
-        let mut state = self.formed(unknowns, prepared, damping)?;
+        let at = self.threads.install(|| self.problem.model.at(&unknowns));
+        let mut state = self.formed(unknowns, at, damping)?;
         state.linearized.basis = basis;
         Ok(State { before, ..state })
     }
@@ -316,15 +312,15 @@ impl<'a, M: Model> Run<'a, '_, M> {
         }
     }
 
-    /// The same at values that are prepared already.
+    /// The same at a model that is evaluated already.
     pub(super) fn formed(
         &mut self,
         unknowns: Vec<f64>,
-        prepared: M::Prepared,
+        at: Box<dyn Evaluated + 'a>,
         damping: f64,
-    ) -> Result<State<'a, M>, AdjustError> {
+    ) -> Result<State<'a>, AdjustError> {
         let reweighting = self.options.loss.map(|loss| Reweighting { loss, curved: self.curved });
-        let equations = ObservationEquations::prepared(self.problem, prepared, &self.datum, reweighting);
+        let equations = ObservationEquations::evaluated(self.problem, at, &self.datum, reweighting);
         let held = self.datum.clone();
         let mut linearized = {
             let mut between = between(&mut *self.watch, Phase::Form, self.problem.layout().locals());
@@ -339,7 +335,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
         Ok(State { equations, linearized, before: None })
     }
 
-    fn finish(mut self, mut end: End<'a, M>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
+    fn finish(mut self, mut end: End<'a>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
         let (problem, options) = (self.problem, self.options);
         let mut unknowns = end.unknowns.clone();
         let basis = end.state.as_ref().and_then(|state| state.linearized.basis.as_ref());
@@ -387,14 +383,14 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     /// Whether a step has led local blocks to where they harm all others; keeps them.
-    pub(super) fn has_collapsed(&mut self, before: &[f64], after: &M::Prepared) -> bool {
-        self.collapsed = self.threads.install(|| self.problem.model.collapsed(before, after));
+    pub(super) fn has_collapsed(&mut self, before: &[f64], after: &dyn Evaluated) -> bool {
+        self.collapsed = self.threads.install(|| after.collapsed(before));
         !self.collapsed.is_empty()
     }
 
     /// Whether a step has led local blocks out of the whole; keeps them.
-    pub(super) fn has_run_off(&mut self, before: &[f64], after: &M::Prepared) -> bool {
-        self.collapsed = self.threads.install(|| self.problem.model.run_off(before, after));
+    pub(super) fn has_run_off(&mut self, before: &[f64], after: &dyn Evaluated) -> bool {
+        self.collapsed = self.threads.install(|| after.run_off(before));
         !self.collapsed.is_empty()
     }
 

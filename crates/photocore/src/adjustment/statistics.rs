@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::problem::{Model, Problem};
+use super::problem::{AnyProblem, Evaluated, Problem};
 use super::terms::weighted_among;
 use crate::Threads;
 use crate::normals::{Cofactors, dot};
@@ -50,7 +50,7 @@ pub fn leading_matrix<const N: usize>(cofactors: Option<&[f64]>) -> [[f64; N]; N
     std::array::from_fn(|i| std::array::from_fn(|j| cofactors.map_or(f64::NAN, |values| values[N * i + j])))
 }
 
-impl<M> Problem<M> {
+impl<M: ?Sized> Problem<M> {
     /// Counts observations and unknowns; a datum of `held` unknowns takes as many degrees of freedom. Outer unknowns, held or not, do not
     /// count: they are free or fixed here.
     pub fn counts(&self, held: &[usize]) -> Counts {
@@ -63,7 +63,9 @@ impl<M> Problem<M> {
             unknowns: self.sd.iter().filter(|&&sd| sd != 0.0).count() - elsewhere,
         }
     }
+}
 
+impl AnyProblem<'_> {
     /// Redundancy number of each unknown as an observation of itself, 1 - a Q a^T of its equation a; zero unless it is weighted. The cofactors of
     /// fixed and held unknowns, which stand in the normal equations with unit weight, are set to zero on the way; `values` are those at
     /// which these were formed.
@@ -72,10 +74,7 @@ impl<M> Problem<M> {
         cofactors: &mut Cofactors,
         held: &[usize],
         values: &[f64],
-    ) -> Vec<f64>
-    where
-        M: Model,
-    {
+    ) -> Vec<f64> {
         let (mut redundancy, fixed) = (vec![0.0; self.sd.len()], self.fixed(held));
         let terms = self.terms(values);
         let mut terms = terms.within(0..values.len()).peekable();
@@ -107,16 +106,14 @@ impl<M> Problem<M> {
         }
         redundancy
     }
-}
 
-impl<M: Model> Problem<M> {
     /// Observed minus computed of every observation at the given values of the unknowns.
     pub(super) fn residuals(&self, threads: &Threads, values: &[f64]) -> Vec<f64> {
-        self.residuals_at(threads, &threads.install(|| self.model.prepare(values)))
+        self.residuals_at(threads, &*threads.install(|| self.model.at(values)))
     }
 
-    /// The same at values that are prepared already.
-    pub(super) fn residuals_at(&self, threads: &Threads, prepared: &M::Prepared) -> Vec<f64> {
+    /// The same of a model that is evaluated already.
+    pub(super) fn residuals_at(&self, threads: &Threads, at: &dyn Evaluated) -> Vec<f64> {
         let layout = self.layout();
         let rows = layout.rows();
         let by_stretch = self.for_stretches(threads, |buffers, locals| {
@@ -125,9 +122,9 @@ impl<M: Model> Problem<M> {
             let mut own = residuals.chunks_exact_mut(rows.max(1));
             for local in locals {
                 for (group, own) in layout.groups_of(local).zip(&mut own) {
-                    if !self.model.misclose(prepared, local, group, own) {
+                    if !at.misclose(local, group, own) {
                         let mut rows = buffers.rows(layout, group);
-                        self.model.observe(prepared, local, group, &mut rows);
+                        at.observe(local, group, &mut rows);
                         own.copy_from_slice(rows.constant);
                     }
                 }
@@ -135,7 +132,7 @@ impl<M: Model> Problem<M> {
             residuals
         });
         let by_tie = self.for_ties(|tie, rows| {
-            self.model.observe_tie(prepared, tie, rows);
+            at.observe_tie(tie, rows);
             rows.constant.to_vec()
         });
         let mut residuals = by_stretch.concat();
@@ -144,7 +141,7 @@ impl<M: Model> Problem<M> {
     }
 }
 
-impl<M> Problem<M> {
+impl<M: ?Sized> Problem<M> {
     /// Weighted sum of squares of the given residuals.
     pub fn sum_of_squares(&self, residuals: &[f64]) -> f64 {
         residuals.iter().zip(&self.observation_sd).map(|(residual, sd)| (residual / sd).powi(2)).sum()

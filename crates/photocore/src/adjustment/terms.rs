@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::problem::{Model, Problem};
+use super::problem::{AnyProblem, Model};
 use super::term::{Term, is_weighted};
 use crate::normals::Prior;
 
@@ -18,7 +18,7 @@ pub struct Terms<'a> {
 
 impl<'a> Terms<'a> {
     /// At the given values; `prior` and `sd` are observed values and standard deviations of the unknowns.
-    pub fn new<M: Model>(model: &M, values: &'a [f64], prior: &'a [f64], sd: &'a [f64]) -> Self {
+    pub fn new(model: &dyn Model, values: &'a [f64], prior: &'a [f64], sd: &'a [f64]) -> Self {
         Self { values, prior, sd, of_model: model.terms(values, prior, sd) }
     }
 
@@ -86,19 +86,19 @@ pub(super) fn weighted_among(sd: &[f64], of: Range<usize>) -> impl Iterator<Item
     stretches.filter(move |stretch| !free(stretch)).flatten().filter(|&unknown| is_weighted(sd[unknown]))
 }
 
-impl<M: Model> Problem<M> {
+impl AnyProblem<'_> {
     /// What was known beforehand of the unknowns, at given values.
     pub fn terms<'a>(&'a self, values: &'a [f64]) -> Terms<'a> {
         Terms::new(&self.model, values, &self.prior, &self.sd)
     }
 
-    /// The normal equations of the terms at the given values. A fixed or held unknown has an equation of its own, x = 0 with unit weight,
+    /// The normal equations of terms. A fixed or held unknown has an equation of its own, x = 0 with unit weight,
     /// and no other (see [`super::equations`]); an outer one has none here.
-    pub(super) fn prior_equations(&self, values: &[f64], held: &[usize]) -> Prior {
+    pub(super) fn prior_equations(&self, terms: &Terms<'_>, held: &[usize]) -> Prior {
         let fixed = self.fixed(held);
         let weight = fixed.iter().map(|&fixed| f64::from(u8::from(fixed))).collect();
-        let mut prior = Prior { weight, right: vec![0.0; values.len()], between: vec![] };
-        self.terms(values).within(0..values.len()).for_each(|term| add_term(&mut prior, &term, &fixed));
+        let mut prior = Prior { weight, right: vec![0.0; fixed.len()], between: vec![] };
+        terms.within(0..fixed.len()).for_each(|term| add_term(&mut prior, &term, &fixed));
         let layout = self.layout();
         layout.unknowns_of(layout.outer()).for_each(|unknown| prior.weight[unknown] = 0.0);
         prior

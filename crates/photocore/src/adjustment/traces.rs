@@ -1,12 +1,10 @@
 //! Sums of squares of the elements of R = I - A Q A^T over groups of equations: what tests of sums and variance components need of it.
 
-use rayon::prelude::*;
-
 use super::linearized::Linearized;
-use super::problem::{Model, Problem};
+use super::problem::AnyProblem;
 use super::result::AdjustError;
-use crate::Threads;
 use crate::normals::Between;
+use crate::{Threads, parallel};
 
 /// How sums over R are found.
 #[derive(Debug, Clone, Copy)]
@@ -144,9 +142,9 @@ impl Linearized {
     ///
     /// # Errors
     /// An interruption, no memory.
-    pub fn group_squares<M: Model>(
+    pub fn group_squares(
         &self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         groups: &EquationGroups,
         probing: &Probing,
         threads: &Threads,
@@ -168,9 +166,9 @@ impl Linearized {
     ///
     /// # Errors
     /// An interruption, no memory.
-    pub fn own_squares<M: Model>(
+    pub fn own_squares(
         &self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         groups: &EquationGroups,
         classes: usize,
         probing: &Probing,
@@ -190,9 +188,9 @@ impl Linearized {
     }
 
     /// Projects columns, and tells of the sums of each.
-    fn probe<M: Model>(
+    fn probe(
         &self,
-        problem: &Problem<M>,
+        problem: &AnyProblem<'_>,
         numbered: &Numbered<'_>,
         (columns, classes): (&[Column], usize),
         threads: &Threads,
@@ -203,12 +201,11 @@ impl Linearized {
         for together in columns.chunks((TOGETHER / height).clamp(1, COLUMNS)) {
             let mut z = vec![0.0; together.len() * height];
             threads.install(|| {
-                let pairs = z.par_chunks_mut(height).zip(together);
-                pairs.for_each(|(z, &column)| numbered.write(column, classes, z));
+                parallel::each_chunk(&mut z, height, &|k, z| numbered.write(together[k], classes, z));
             });
             let u = self.project(problem, z, threads, between)?;
             let sums: Vec<Vec<f64>> =
-                threads.install(|| u.par_chunks(height).map(|u| numbered.sums(u)).collect());
+                threads.install(|| parallel::map_each(u.chunks(height).collect(), &|u| numbered.sums(u)));
             together.iter().zip(&sums).for_each(|(&column, sums)| tell(column, sums));
         }
         Ok(())

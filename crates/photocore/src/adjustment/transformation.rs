@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use faer::Mat;
-use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 
 use crate::normals::{Cofactors, Function, Layout};
+use crate::parallel;
 
 /// Unknowns whose cofactors are taken over one after the other.
 const AT_ONCE: usize = 256;
@@ -52,8 +52,9 @@ impl Transformation {
             });
             self.blocks(blocks)
         };
-        let chunks = cofactors.local.par_chunks_mut((AT_ONCE * l * l).max(1)).enumerate();
-        let mut cancelled = chunks.map(of_locals).reduce(|| 1.0, f64::max);
+        let chunks = cofactors.local.chunks_mut((AT_ONCE * l * l).max(1)).enumerate().collect();
+        let largest = |found: Vec<f64>| found.into_iter().fold(1.0, f64::max);
+        let mut cancelled = largest(parallel::map_each(chunks, &of_locals));
         let mut others = Vec::new();
         for &pair in layout.pairs() {
             let [rows, columns] = pair.map(|block| layout.retained_range(block as usize));
@@ -69,14 +70,15 @@ impl Transformation {
             own = rest;
             others.push(Block { rows: rows.clone(), columns: rows, values });
         }
-        let of_others = others.par_chunks_mut(AT_ONCE).map(|blocks| {
-            self.blocks(blocks.iter_mut().map(|Block { rows, columns, values }| Block {
-                rows: rows.clone(),
-                columns: columns.clone(),
-                values,
-            }))
-        });
-        f64::EPSILON * self.condition * of_others.reduce(|| cancelled, f64::max)
+        let of_others =
+            parallel::map_each(others.chunks_mut(AT_ONCE).collect(), &|blocks: &mut [Block<'_>]| {
+                self.blocks(blocks.iter_mut().map(|Block { rows, columns, values }| Block {
+                    rows: rows.clone(),
+                    columns: columns.clone(),
+                    values,
+                }))
+            });
+        f64::EPSILON * self.condition * cancelled.max(largest(of_others))
     }
 
     /// Transforms blocks of Q, row by row. Returns how many times larger than a variance what has made it is, at the most.

@@ -4,7 +4,7 @@
 use super::acceleration::PART;
 use super::method::{FIRST_DAMPING, Stop};
 use super::options::{Iteration, Status};
-use super::problem::Model;
+use super::problem::Evaluated;
 use super::result::AdjustError;
 use super::run::{End, Run, State};
 
@@ -49,9 +49,9 @@ struct Damping {
 }
 
 /// A step that may fail.
-struct Trial<P> {
+struct Trial<'a> {
     unknowns: Vec<f64>,
-    prepared: P,
+    at: Box<dyn Evaluated + 'a>,
     sum_of_squares: f64,
     /// By how much the linearized equations let it lower the sum of squares.
     predicted: f64,
@@ -61,7 +61,7 @@ struct Trial<P> {
     bend: Option<f64>,
 }
 
-impl<P> Trial<P> {
+impl Trial<'_> {
     /// By how much it lowers a sum of squares, as a fraction of what was predicted.
     fn gain(&self, lowest: f64) -> f64 {
         (lowest - self.sum_of_squares) / self.predicted
@@ -83,16 +83,12 @@ impl Damping {
     }
 }
 
-impl<'a, M: Model> Run<'a, '_, M> {
+impl<'a> Run<'a, '_> {
     /// Steps damped by how well they are predicted.
     ///
     /// A step counts for the rule that stops when it is not much shortened, the damping being no larger than at first; where the
     /// predicted decrease drowns in rounding errors, any does.
-    pub(super) fn in_trust_region(
-        &mut self,
-        start: State<'a, M>,
-        stop: Stop,
-    ) -> Result<End<'a, M>, AdjustError> {
+    pub(super) fn in_trust_region(&mut self, start: State<'a>, stop: Stop) -> Result<End<'a>, AdjustError> {
         let mut state = start;
         let mut lowest = state.linearized.sum_of_squares;
         let mut damping = Damping { value: state.linearized.damping(), rise: 2.0, bends: false };
@@ -128,7 +124,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 if self.creeps(&falls, lowest, stop) {
                     return self.rest_in_valley(trial.unknowns, Status::Converged);
                 }
-                state = self.formed(trial.unknowns, trial.prepared, damping.value)?;
+                state = self.formed(trial.unknowns, trial.at, damping.value)?;
             } else if last || trial.predicted <= (ROUNDING * lowest).max(NEGLIGIBLE * NEGLIGIBLE) {
                 return self.rest(unknowns, Status::Converged);
             } else {
@@ -144,20 +140,20 @@ impl<'a, M: Model> Run<'a, '_, M> {
     /// Where the valley bends, the step is accelerated; the plain one is taken for comparison where that is not good.
     fn trial(
         &mut self,
-        state: State<'a, M>,
+        state: State<'a>,
         step: &[f64],
         lowest: f64,
         bends: bool,
-    ) -> Result<(Vec<f64>, Trial<M::Prepared>), AdjustError> {
+    ) -> Result<(Vec<f64>, Trial<'a>), AdjustError> {
         let change = state.linearized.change();
         let predicted = state.equations.decrease(self.threads, &state.linearized.prior, step);
         let term = if bends { Some(self.second_order(&state, step)?) } else { None };
         let before = state.recycle();
         let trial = |step: &[f64], bend: Option<f64>| {
             let unknowns = self.problem.advanced(&before, step);
-            let prepared = self.threads.install(|| self.problem.model.prepare(&unknowns));
-            let sum_of_squares = self.objective_at(&unknowns, &prepared);
-            Trial { unknowns, prepared, sum_of_squares, predicted, change, bend }
+            let at = self.threads.install(|| self.problem.model.at(&unknowns));
+            let sum_of_squares = self.objective_at(&unknowns, &*at);
+            Trial { unknowns, at, sum_of_squares, predicted, change, bend }
         };
         let found = match term {
             None => trial(step, None),
@@ -167,7 +163,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
                 let accelerated = trial(&along, bend);
                 let good = accelerated.gain(lowest) >= BENDS;
                 let plain = (!good).then(|| trial(step, bend));
-                let lower = |plain: &Trial<_>| accelerated.sum_of_squares < plain.sum_of_squares;
+                let lower = |plain: &Trial<'_>| accelerated.sum_of_squares < plain.sum_of_squares;
                 plain.filter(|plain| !lower(plain)).unwrap_or(accelerated)
             }
         };
@@ -175,7 +171,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     /// The second-order term a of a step (see [`super::acceleration`]), and a^T (N + damping) a.
-    fn second_order(&mut self, state: &State<'a, M>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
+    fn second_order(&mut self, state: &State<'a>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
         let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
         let ahead = self.problem.residuals(self.threads, &self.problem.advanced(state.values(), &part));
         let right = state.equations.bending(self.threads, &ahead, step);
@@ -205,21 +201,21 @@ impl<'a, M: Model> Run<'a, '_, M> {
     fn keep(
         &mut self,
         before: &[f64],
-        trial: &Trial<M::Prepared>,
+        trial: &Trial<'a>,
         damping: f64,
-    ) -> Result<Option<End<'a, M>>, AdjustError> {
+    ) -> Result<Option<End<'a>>, AdjustError> {
         let number = self.iterations.len() + 1;
         let &Trial { sum_of_squares, change: largest_change, .. } = trial;
         let iteration = Iteration { number, sum_of_squares, largest_change, damping };
         self.accept(iteration, before, &trial.unknowns)?;
-        let ends = self.has_collapsed(before, &trial.prepared)
-            || largest_change < SHORT && self.has_run_off(before, &trial.prepared);
+        let ends = self.has_collapsed(before, &*trial.at)
+            || largest_change < SHORT && self.has_run_off(before, &*trial.at);
         Ok(ends.then(|| End::at(Status::NotConverged, trial.unknowns.clone())))
     }
 
     /// Ends at the values reached, which steps go on to change, and finds what: a full step, in a datum, moves it by much more than
     /// observations show. It is none of the unknowns that are not local where local ones alone move so.
-    fn rest_in_valley(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a, M>, AdjustError> {
+    fn rest_in_valley(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a>, AdjustError> {
         if self.iterations.last().is_none_or(|last| last.largest_change > SHORT) {
             return self.rest(unknowns, status);
         }
@@ -247,7 +243,7 @@ impl<'a, M: Model> Run<'a, '_, M> {
     }
 
     /// Ends at the values reached, with a datum there.
-    fn rest(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a, M>, AdjustError> {
+    fn rest(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a>, AdjustError> {
         self.hold(&unknowns);
         if !self.options.covariance {
             return Ok(End::at(status, unknowns));

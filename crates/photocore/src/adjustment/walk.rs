@@ -2,11 +2,9 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
-use super::problem::Problem;
-use crate::Threads;
+use super::problem::AnyProblem;
 use crate::normals::{GroupRows, Layout, TieRows};
+use crate::{Threads, parallel};
 
 /// Room for the rows of one group.
 #[derive(Default)]
@@ -39,28 +37,26 @@ impl Buffers {
 /// Local blocks that a thread takes at least.
 const AT_LEAST: usize = 64;
 
-impl<M: Sync> Problem<M> {
+impl AnyProblem<'_> {
     /// What `each` makes of every local block, in their order.
     pub(super) fn for_locals<T: Send>(
         &self,
         threads: &Threads,
-        each: impl Fn(&mut Buffers, usize) -> T + Send + Sync,
+        each: impl Fn(&mut Buffers, usize) -> T + Sync,
     ) -> Vec<T> {
-        let locals = (0..self.layout().locals()).into_par_iter().with_min_len(AT_LEAST);
-        threads.install(|| locals.map_init(Buffers::default, each).collect())
+        by_parts(threads, self.layout().locals(), AT_LEAST, each)
     }
 
     /// What `each` makes of stretches of local blocks, in their order.
     pub(super) fn for_stretches<T: Send>(
         &self,
         threads: &Threads,
-        each: impl Fn(&mut Buffers, Range<usize>) -> T + Send + Sync,
+        each: impl Fn(&mut Buffers, Range<usize>) -> T + Sync,
     ) -> Vec<T> {
         let count = self.layout().locals();
-        let stretches = (0..count.div_ceil(AT_LEAST)).into_par_iter();
         let stretch = |index: usize| index * AT_LEAST..count.min((index + 1) * AT_LEAST);
         let each = |buffers: &mut Buffers, index: usize| each(buffers, stretch(index));
-        threads.install(|| stretches.map_init(Buffers::default, each).collect())
+        by_parts(threads, count.div_ceil(AT_LEAST), 1, each)
     }
 
     /// What `each` makes of every tie, in their order: there are few.
@@ -75,4 +71,17 @@ impl<M: Sync> Problem<M> {
         };
         (0..layout.ties().len()).map(visit).collect()
     }
+}
+
+fn by_parts<T: Send>(
+    threads: &Threads,
+    count: usize,
+    at_least: usize,
+    each: impl Fn(&mut Buffers, usize) -> T + Sync,
+) -> Vec<T> {
+    let part = |numbers: Range<usize>| {
+        let mut buffers = Buffers::default();
+        numbers.map(|number| each(&mut buffers, number)).collect()
+    };
+    threads.install(|| parallel::by_parts(count, at_least, &part))
 }

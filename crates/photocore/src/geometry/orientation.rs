@@ -5,7 +5,7 @@ use nalgebra::Matrix6;
 use super::angle_axis::rotation_angle_axis;
 use super::attitude::{AttitudeNumbers, RotationSense};
 use super::ellipsoid::{local_vertical, local_vertical_turns};
-use super::pose::column;
+use super::pose::{POSE, column};
 use super::space::{Lift, ObjectSpace, Point};
 use super::{Matrix3, Pose, Vector3, angle_axis_with_jacobian};
 
@@ -48,7 +48,7 @@ enum Unknowns {
 
 impl Orientation {
     /// The orientation of the given six unknowns. Of vectors the object space may only be cartesian.
-    pub fn new(numbers: PoseNumbers, space: ObjectSpace, values: &[f64; 6]) -> Self {
+    pub fn new(numbers: PoseNumbers, space: ObjectSpace, values: &[f64; POSE]) -> Self {
         let [a, b, c, d, e, f] = *values;
         match numbers {
             PoseNumbers::Angles(sense) => Self::from_angles(space, sense, [a, b, c], [d, e, f]),
@@ -135,7 +135,7 @@ impl Orientation {
     }
 
     /// The step of the pose, dC and rho (see [`Pose::step`]), that a unit of each unknown takes to first order.
-    pub fn steps(&self) -> [(Vector3, Vector3); 6] {
+    pub fn steps(&self) -> [(Vector3, Vector3); POSE] {
         let none = Vector3::zeros();
         match &self.unknowns {
             Unknowns::Position { turns, rates, .. } => {
@@ -185,7 +185,7 @@ impl Orientation {
     }
 
     /// The six numbers of the pose (see [`PoseNumbers`]).
-    pub fn numbers(&self, numbers: PoseNumbers, space: ObjectSpace) -> [f64; 6] {
+    pub fn numbers(&self, numbers: PoseNumbers, space: ObjectSpace) -> [f64; POSE] {
         let Pose { position, attitude } = self.pose;
         match numbers {
             PoseNumbers::Angles(sense) => {
@@ -220,7 +220,7 @@ impl Orientation {
     /// Partials of one image coordinate with respect to the six unknowns and to the coordinates of the point, given its gradient g
     /// with respect to u: `g . (w x u) = (u x g) . w`, and du/dP = A^T.
     #[inline(always)]
-    pub fn chain(&self, u: &Vector3, g: &Vector3, point: &Point) -> ([f64; 6], [f64; 3]) {
+    pub fn chain(&self, u: &Vector3, g: &Vector3, point: &Point) -> ([f64; POSE], [f64; 3]) {
         let by_place = self.pose.attitude * g;
         let by_photo = match &self.unknowns {
             Unknowns::Position { shifts, turns, rates } => {

@@ -5,6 +5,9 @@ use nalgebra::{Matrix6xX, Vector6};
 use super::angle_axis::angle_axis_rotation;
 use super::{Matrix3, Vector3};
 
+/// Unknowns of a pose: three of the position, three of the attitude.
+pub const POSE: usize = 6;
+
 /// A photo in cartesian object space: u = A^T (P - C) are the coordinates of a point in the photo's axes, x right, y up, z back
 /// towards the viewer. The camera looks along -z: what it sees has u3 < 0.
 ///
@@ -54,7 +57,7 @@ impl Pose {
     /// Partials of one image coordinate with respect to a step, dC and rho, and to the position of the point, given its gradient g with
     /// respect to u.
     #[inline(always)]
-    pub fn chain(&self, u: &Vector3, g: &Vector3) -> ([f64; 6], [f64; 3]) {
+    pub fn chain(&self, u: &Vector3, g: &Vector3) -> ([f64; POSE], [f64; 3]) {
         // A g row by row, for the reason given above.
         let row = |i: usize| {
             self.attitude[(i, 0)] * g.x + self.attitude[(i, 1)] * g.y + self.attitude[(i, 2)] * g.z

@@ -2,6 +2,7 @@
 
 use super::camera::{CameraModel, Image};
 use super::orientation::Orientation;
+use super::pose::POSE;
 use super::space::{Lift, Point};
 use super::{Perspective, Vector3};
 
@@ -20,7 +21,7 @@ pub struct Projection<P = [f64; 1]> {
     /// x, y in the unit of the camera.
     pub xy: [f64; 2],
     /// With respect to the six unknowns of the pose.
-    pub photo: [[f64; 6]; 2],
+    pub photo: [[f64; POSE]; 2],
     /// With respect to the parameters of the camera.
     pub camera: [P; 2],
     /// With respect to the coordinates of the point.

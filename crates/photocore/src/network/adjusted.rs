@@ -1,7 +1,6 @@
 //! Photos and points after the adjustment.
 
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 use super::model::Bundle;
 use super::problem::Assembled;
@@ -9,14 +8,15 @@ use super::selection::TOGETHER;
 use super::stations::Placed;
 use super::{Network, Point};
 use crate::adjustment::{Adjustment, Problem};
-use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers};
+use crate::geometry::{AttitudeNumbers, Matrix3, POSE, PoseNumbers};
 use crate::normals::Cofactors;
+use crate::parallel;
 
 /// An adjusted photo.
 #[derive(Debug, Clone)]
 pub struct AdjustedPhoto {
     /// The six unknowns of its pose; of a photo on a frame those that it would have, from the poses of frame and sensor.
-    pub pose: [f64; 6],
+    pub pose: [f64; POSE],
     /// The parameters of its camera.
     pub camera: Vec<f64>,
     /// Cofactors (a priori unit weight) of pose and, unless it is held or shared, camera; NaN where there are none.
@@ -56,7 +56,8 @@ pub(super) fn adjusted_photos(
     let origin = model.origin;
     let positions = if let PoseNumbers::Angles(_) = network.poses { 3 } else { 0 };
     let placed = model.placed(&unknowns[model.of_stations()]);
-    let photo = |(index, photo): (usize, &super::Photo)| {
+    let photo = |index: usize| {
+        let photo = &network.photos[index];
         let range = model.of_block(index);
         let (first, end) = (range.start, range.end);
         let values = &unknowns[range];
@@ -73,7 +74,7 @@ pub(super) fn adjusted_photos(
         let redundancy = adjustment.prior_redundancy.as_ref();
         let camera = match model.camera_block[index] {
             Some(block) => unknowns[model.of_block(block)].to_vec(),
-            None if values.len() > 6 => values[6..].to_vec(),
+            None if values.len() > POSE => values[POSE..].to_vec(),
             None => model.cameras[index].parameters(),
         };
         if model.is_carried(index) {
@@ -81,7 +82,7 @@ pub(super) fn adjusted_photos(
             let asked = model.images_on[index] > 0 || !problem.layout().contributions().is_empty();
             let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
             let (pose, cofactors) = mounted_pose(network, problem, &placed, index, cofactors);
-            let redundancy = vec![if cofactors[0].is_nan() { f64::NAN } else { 0.0 }; 6];
+            let redundancy = vec![if cofactors[0].is_nan() { f64::NAN } else { 0.0 }; POSE];
             return AdjustedPhoto { pose, camera, cofactors, redundancy, images: model.images_on[index] };
         }
         AdjustedPhoto {
@@ -96,7 +97,7 @@ pub(super) fn adjusted_photos(
             images: model.images_on[index],
         }
     };
-    network.photos.par_iter().enumerate().with_min_len(PHOTOS_TOGETHER).map(photo).collect()
+    parallel::map(network.photos.len(), PHOTOS_TOGETHER, photo)
 }
 
 /// The six numbers of the pose of a photo that is mounted, and their cofactors; NaN where there are none.
@@ -106,18 +107,18 @@ fn mounted_pose(
     Placed { photos, mounted, .. }: &Placed,
     photo: usize,
     cofactors: Option<&Cofactors>,
-) -> ([f64; 6], DMatrix<f64>) {
+) -> ([f64; POSE], DMatrix<f64>) {
     let (model, orientation) = (&problem.model, &photos[photo].orientation);
     let (mut pose, taken) = model.reported(orientation);
     let own = mounted.as_ref().and_then(|mounted| mounted.of(photo));
     let found = cofactors.zip(own).zip(taken).map(|((all, own), taken)| {
         let cofactors = model.mounted_cofactors(problem.layout(), own, all);
-        DMatrix::from_column_slice(6, 6, (taken * cofactors * taken.transpose()).as_slice())
+        DMatrix::from_column_slice(POSE, POSE, (taken * cofactors * taken.transpose()).as_slice())
     });
     if let PoseNumbers::Angles(_) = network.poses {
         (0..3).for_each(|k| pose[k] += model.origin[k]);
     }
-    (pose, found.unwrap_or_else(|| DMatrix::repeat(6, 6, f64::NAN)))
+    (pose, found.unwrap_or_else(|| DMatrix::repeat(POSE, POSE, f64::NAN)))
 }
 
 /// The angles of a photo that steps by a rotation vector; at a singular attitude kappa is zero and omega takes the sum.
@@ -184,8 +185,11 @@ pub(super) fn in_order<T: Send>(
 ) -> Vec<Option<T>> {
     let mut place = vec![u32::MAX; count];
     order.iter().zip(0..).for_each(|(&thing, own)| place[thing] = own);
-    let of = |(thing, &own): (usize, &u32)| (own != u32::MAX).then(|| each(thing, own as usize));
-    place.par_iter().enumerate().with_min_len(TOGETHER).map(of).collect()
+    let of = |thing: usize| {
+        let own = place[thing];
+        (own != u32::MAX).then(|| each(thing, own as usize))
+    };
+    parallel::map_in_place(count, TOGETHER, &of)
 }
 
 /// The correction of each unknown in the last iteration; zero where there was none.

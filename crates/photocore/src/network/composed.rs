@@ -7,7 +7,7 @@ use super::commons::CommonState;
 use super::model::Bundle;
 use super::mounts::{AT_PHOTO, Composed, Grounds, When};
 use super::stations::{Bent, Mounted, Station, Stations};
-use crate::geometry::{Orientation, Steps};
+use crate::geometry::{Orientation, POSE, Steps};
 use crate::normals::{Cofactors, GroupRows, Layout};
 
 impl Bundle {
@@ -38,7 +38,7 @@ impl Bundle {
     /// The pose of a photo that is mounted; None of others. `unknowns` are those of all stations.
     pub(super) fn composed(&self, photo: usize, unknowns: &[f64]) -> Option<Composed> {
         let own = |photo: usize| {
-            let pose = &unknowns[self.first[photo]..][..6];
+            let pose = &unknowns[self.first[photo]..][..POSE];
             self.orientation(photo, &std::array::from_fn(|k| pose[k]))
         };
         let common = |common: usize| {
@@ -87,7 +87,7 @@ impl Bundle {
     }
 
     /// The six numbers of a pose, counted from the origin, and what leads to them from its own unknowns; None where angles are singular.
-    pub(super) fn reported(&self, orientation: &Orientation) -> ([f64; 6], Option<Matrix6<f64>>) {
+    pub(super) fn reported(&self, orientation: &Orientation) -> ([f64; POSE], Option<Matrix6<f64>>) {
         let numbers = orientation.numbers(self.poses, self.space);
         let by_step = Orientation::new(self.poses, self.space, &numbers).unknowns_by_step();
         (numbers, by_step.map(|by_step| by_step * orientation.step_matrix()))

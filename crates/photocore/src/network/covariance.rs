@@ -11,7 +11,7 @@ use super::state::{InnerConstraints, NetworkDatum, State};
 use super::{Network, NetworkError, Options, Solution};
 use crate::Threads;
 use crate::adjustment::{Adjusted, Adjustment, Classes, CofactorError, Datum, Event, Linearized, Phase};
-use crate::geometry::{AttitudeNumbers, Matrix3, PoseNumbers, Steps};
+use crate::geometry::{AttitudeNumbers, Matrix3, POSE, PoseNumbers, Steps};
 use crate::normals::Function;
 
 /// Shares that are more than rounding.
@@ -188,7 +188,7 @@ impl Network {
             of_unknowns[model.of_block(block)].fill(class);
         }
         let classes = Classes { count: names.len(), of_ties: &of_ties, of_unknowns: &of_unknowns };
-        let shares = assembled.problem.resistance(&state.unknowns, &classes, threads);
+        let shares = assembled.problem.any().resistance(&state.unknowns, &classes, threads);
         let notable = names.into_iter().zip(shares).filter(|(_, share)| *share > NOTABLE);
         Ok(notable.collect())
     }
@@ -200,7 +200,7 @@ impl Network {
         let held: Vec<bool> = (0..self.photos.len()).map(unused).collect();
         free.points.iter_mut().for_each(|point| point.sd = [f64::INFINITY; 3]);
         let photos = free.photos.iter_mut().zip(held).filter(|(_, held)| !held);
-        photos.for_each(|(photo, _)| photo.sd = [f64::INFINITY; 6]);
+        photos.for_each(|(photo, _)| photo.sd = [f64::INFINITY; POSE]);
         free
     }
 
@@ -211,7 +211,7 @@ impl Network {
             return Ok(state);
         }
         let assembled = self.assembled_again(options, &state, threads)?;
-        let held = assembled.problem.to_hold(&state.unknowns, threads);
+        let held = assembled.problem.any().to_hold(&state.unknowns, threads);
         Ok(State { held, ..state })
     }
 
@@ -233,7 +233,7 @@ impl Network {
                 }
                 let model = &assembled.problem.model;
                 // A photo on a frame stands and falls with that.
-                let pose = model.of_block(model.carrier(*photo)).take(6);
+                let pose = model.of_block(model.carrier(*photo)).take(POSE);
                 let carriers = pose.map(|unknown| (unknown, 1.0)).collect();
                 Ok((assembled.relative(carriers), None))
             }
@@ -403,7 +403,7 @@ impl Covariances {
                 Ok(match model.camera_block[photo] {
                     Some(block) => themselves(model.of_block(block)).collect(),
                     None if model.has_own_camera(photo) => {
-                        themselves(model.of_block(photo)).skip(6).collect()
+                        themselves(model.of_block(photo)).skip(POSE).collect()
                     }
                     // What is held has cofactors of zero.
                     None => vec![vec![]; model.cameras[photo].parameters().len()],
@@ -427,7 +427,7 @@ impl Covariances {
             };
             parts.iter().flat_map(of).collect()
         };
-        (0..6).map(row).collect()
+        (0..POSE).map(row).collect()
     }
 
     /// What leads from the last three unknowns of a photo to its angles as they are reported, or to its rotation step; NaN for angles

@@ -345,7 +345,7 @@ impl Assembled {
         let seen =
             |point: usize| model.points[point].held() == [false; 3] || model.images_of(point).len() > 1;
         some && (0..model.points.len()).all(seen)
-            && self.problem.open_if_free(values, &controlled, threads) == controlled.len()
+            && self.problem.any().open_if_free(values, &controlled, threads) == controlled.len()
     }
 
     /// The datum in which cofactors are relative to some unknowns, scale staying as it is.

@@ -1,14 +1,17 @@
 //! What errors of single observations do to their own points and photos, and which of them cannot be told apart.
 
-use rayon::prelude::*;
+use std::ops::Range;
 
 use super::NetworkError;
 use super::predictions::OnPoint;
 use super::suspects::Home;
 use super::trial::Trial;
-use crate::Threads;
 use crate::adjustment::canonical_correlation;
 use crate::geometry::{AttitudeNumbers, Matrix3};
+use crate::{Threads, parallel};
+
+/// Points that a thread takes at least.
+const AT_LEAST: usize = 16;
 
 impl Trial {
     /// How an error of one standard deviation in each row of some suspects moves its own point and its own photo: for each row the three
@@ -116,8 +119,10 @@ impl Trial {
         threads: &Threads,
     ) -> Result<Vec<(usize, usize, f64)>, NetworkError> {
         let on_points = self.on_points(points, threads)?;
-        let pairs = |own: &OnPoint| -> Vec<(usize, usize, f64)> { self.pairs_on(own, limit) };
-        Ok(threads.install(|| on_points.par_iter().flat_map_iter(pairs).collect()))
+        let pairs = |points: Range<usize>| -> Vec<(usize, usize, f64)> {
+            on_points[points].iter().flat_map(|own| self.pairs_on(own, limit)).collect()
+        };
+        Ok(threads.install(|| parallel::by_parts(on_points.len(), AT_LEAST, &pairs)))
     }
 
     fn pairs_on(&self, own: &OnPoint, limit: f64) -> Vec<(usize, usize, f64)> {

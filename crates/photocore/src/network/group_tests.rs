@@ -1,14 +1,13 @@
 //! Tests of all groups of observations of a network that is tried.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::NetworkError;
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
-use crate::Threads;
 use crate::adjustment::{Few, GroupTest, Leverages, Terms};
 use crate::normals::GroupCofactors;
+use crate::{Threads, parallel};
 
 /// Tests of all suspects; the rows and square blocks of one stand after those of another.
 #[derive(Debug, Clone, Default)]
@@ -130,13 +129,14 @@ impl Trial {
         let terms = self.terms(&self.assembled.problem.sd, &found.values);
         let mut all = Tests::unknown(self.suspects.len(), &self.row_starts, &self.block_starts);
         let parts = all.parts(&self.row_starts, &self.block_starts);
-        let fill = |(suspects, mut part): (&[Suspect], Part<'_>)| {
+        let fill = |_, (suspects, mut part): (&[Suspect], Part<'_>)| {
             for suspect in suspects {
                 let size = suspect.rows.len();
                 part.put(size, self.test(suspect, found, groups, &terms));
             }
         };
-        threads.install(|| self.suspects.par_chunks(TOGETHER).zip(parts).for_each(fill));
+        let parts = self.suspects.chunks(TOGETHER).zip(parts).collect();
+        threads.install(|| parallel::each_of(parts, &fill));
         Ok(all)
     }
 

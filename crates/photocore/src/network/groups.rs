@@ -7,6 +7,7 @@ use super::covariance::Covariances;
 use super::model::Owner;
 use crate::Threads;
 use crate::adjustment::{AdjustError, EquationGroups, Event, GroupSquares, Phase, Probing};
+use crate::geometry::POSE;
 
 /// Groups of the observations of a network: a number for each, in the order of the network; that many groups or more for none.
 #[derive(Debug, Clone, Default)]
@@ -18,7 +19,7 @@ pub struct Groups {
     /// Of the components of every point.
     pub points: Vec<[usize; 3]>,
     /// Of the six unknowns of every photo's pose.
-    pub photos: Vec<[usize; 6]>,
+    pub photos: Vec<[usize; POSE]>,
     /// Of the parameters of every camera.
     pub cameras: Vec<usize>,
     /// Of the unknowns of every common one.

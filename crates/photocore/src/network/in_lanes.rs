@@ -3,7 +3,7 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use super::Image;
-use crate::geometry::{self, CameraModel, Orientation, Pose, Vector3};
+use crate::geometry::{self, CameraModel, Orientation, POSE, Pose, Vector3};
 use crate::normals::GroupRows;
 
 /// Images that are computed side by side.
@@ -76,7 +76,7 @@ impl Input {
 struct Columns {
     constant: Lanes,
     point: [Lanes; 3],
-    photo: [Lanes; 6],
+    photo: [Lanes; POSE],
     camera: [Lanes; PARAMETERS],
 }
 
@@ -84,7 +84,7 @@ impl Columns {
     const ZERO: Self = Self {
         constant: [0.0; LANES],
         point: [[0.0; LANES]; 3],
-        photo: [[0.0; LANES]; 6],
+        photo: [[0.0; LANES]; POSE],
         camera: [[0.0; LANES]; PARAMETERS],
     };
 
@@ -94,7 +94,7 @@ impl Columns {
         &mut self,
         t: usize,
         residual: f64,
-        (by_photo, by_point): &([f64; 6], [f64; 3]),
+        (by_photo, by_point): &([f64; POSE], [f64; 3]),
         by_camera: &[f64],
         sd: f64,
     ) {
@@ -103,7 +103,7 @@ impl Columns {
         for k in 0..3 {
             self.point[k][t] = by_point[k] * weight;
         }
-        for k in 0..6 {
+        for k in 0..POSE {
             self.photo[k][t] = by_photo[k] * weight;
         }
         for k in 0..by_camera.len() {
@@ -159,9 +159,9 @@ impl<C: CameraModel> WithSimd for Compute<'_, '_, C> {
                 let at = 2 * place + row;
                 rows.constant[at] = own.constant[t];
                 put(&mut rows.local[3 * at..][..3], &own.point, t);
-                put(&mut rows.retained[width * at..][..6], &own.photo, t);
-                if width > 6 {
-                    put(&mut rows.retained[width * at + 6..][..parameters], &own.camera, t);
+                put(&mut rows.retained[width * at..][..POSE], &own.photo, t);
+                if width > POSE {
+                    put(&mut rows.retained[width * at + POSE..][..parameters], &own.camera, t);
                 }
                 if shared > 0 {
                     put(&mut rows.shared[shared * at..][..parameters], &own.camera, t);
@@ -187,7 +187,7 @@ mod tests {
 
     /// The rows of so many images that have their camera in common with others.
     fn rows_of(count: usize, parameters: usize, fill: impl FnOnce(&mut GroupRows<'_>)) -> Vec<f64> {
-        let mut parts = [1, 3, 6, parameters].map(|width| vec![0.0; 2 * count * width]);
+        let mut parts = [1, 3, POSE, parameters].map(|width| vec![0.0; 2 * count * width]);
         let [constant, local, retained, shared] = &mut parts;
         fill(&mut GroupRows { constant, local, retained, shared });
         parts.concat()
@@ -234,7 +234,7 @@ mod tests {
                     let (at, weight) = (2 * t + row, sd[row].recip());
                     rows.constant[at] = residual[row] * weight;
                     (0..3).for_each(|k| rows.local[3 * at + k] = projection.point[row][k] * weight);
-                    (0..6).for_each(|k| rows.retained[6 * at + k] = projection.photo[row][k] * weight);
+                    (0..POSE).for_each(|k| rows.retained[POSE * at + k] = projection.photo[row][k] * weight);
                     let own = &computed.by_parameters[row];
                     (0..parameters).for_each(|k| rows.shared[parameters * at + k] = own[k] * weight);
                 }

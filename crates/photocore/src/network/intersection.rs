@@ -1,16 +1,18 @@
 //! Coordinates of points by intersection of their rays from given photos.
 
-use rayon::prelude::*;
-
 use super::median::median;
 use super::model::Bundle;
 use super::stations::Station;
 use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Point, Ray, Vector3};
+use crate::parallel;
 
 /// Determinant of the normal matrix, relative to its largest possible value, below which rays count as parallel
 /// (about a hundredth of a degree between two rays).
 const PARALLEL: f64 = 1e-8;
+
+/// Points that a thread takes at least.
+const TOGETHER: usize = 64;
 
 impl Bundle {
     /// Coordinates of all points from given photos: held components as they are, the others where the rays meet.
@@ -21,13 +23,15 @@ impl Bundle {
     /// # Errors
     /// The point whose rays give it no place.
     pub fn intersect(&self, photos: &[Station]) -> Result<Vec<[f64; 3]>, usize> {
-        let points = || (0..self.points.len()).into_par_iter().with_min_len(64);
-        let meeting = |rays: &mut Vec<Ray>, point: usize| {
-            rays.clear();
-            rays.extend(self.rays(photos, point));
-            meet(rays)
-        };
-        let met: Vec<Option<Vector3>> = points().map_init(Vec::new, meeting).collect();
+        let met: Vec<Option<Vector3>> = parallel::by_parts(self.points.len(), TOGETHER, &|points| {
+            let mut rays = Vec::new();
+            let meeting = |point: usize| {
+                rays.clear();
+                rays.extend(self.rays(photos, point));
+                meet(&rays)
+            };
+            points.map(meeting).collect()
+        });
         // Hardly ever is there one that needs it.
         let distance = if met.contains(&None) { self.median_distance(photos, &met) } else { None };
         let place = |point: usize| {
@@ -40,7 +44,7 @@ impl Bundle {
             let placed = self.hold(photos, point, start);
             if placed.iter().all(|value| value.is_finite()) { Ok(placed) } else { Err(point) }
         };
-        let placed: Vec<Result<[f64; 3], usize>> = points().map(place).collect();
+        let placed: Vec<Result<[f64; 3], usize>> = parallel::map(self.points.len(), TOGETHER, place);
         placed.into_iter().collect()
     }
 

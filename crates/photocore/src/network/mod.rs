@@ -51,6 +51,7 @@ mod covariance;
 mod datum;
 mod effects;
 mod error;
+mod evaluated;
 mod group_tests;
 mod groups;
 mod in_lanes;
@@ -84,7 +85,7 @@ mod weighted_angles;
 use nalgebra::DMatrix;
 
 use crate::adjustment;
-use crate::geometry::{self, ObjectSpace, PoseNumbers, Refraction, RotationSense};
+use crate::geometry::{self, ObjectSpace, POSE, PoseNumbers, Refraction, RotationSense};
 use crate::normals::Ordering;
 
 pub use adjust::NetworkAdjustment;
@@ -114,23 +115,23 @@ pub use weak_points::WeakPoint;
 #[derive(Debug, Clone, Copy)]
 pub struct Photo {
     /// Initial values of the six unknowns of its pose (see [`PoseNumbers`]); those of fixed ones.
-    pub pose: [f64; 6],
+    pub pose: [f64; POSE],
     /// Observed values; those count that are weighted. Angles, and longitudes, may be whole turns apart.
-    pub observed: [f64; 6],
+    pub observed: [f64; POSE],
     /// Standard deviations: infinite free, zero fixed.
-    pub sd: [f64; 6],
+    pub sd: [f64; POSE],
     /// Index of its camera.
     pub camera: usize,
 }
 
 impl Photo {
     /// Of which nothing is known: its pose is where to start from.
-    pub fn free(pose: [f64; 6], camera: usize) -> Self {
-        Self::known(pose, [f64::INFINITY; 6], camera)
+    pub fn free(pose: [f64; POSE], camera: usize) -> Self {
+        Self::known(pose, [f64::INFINITY; POSE], camera)
     }
 
     /// Of which the pose was observed, with these standard deviations.
-    pub fn known(pose: [f64; 6], sd: [f64; 6], camera: usize) -> Self {
+    pub fn known(pose: [f64; POSE], sd: [f64; POSE], camera: usize) -> Self {
         Self { pose, observed: pose, sd, camera }
     }
 }

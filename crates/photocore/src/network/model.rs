@@ -3,24 +3,19 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
-use super::in_lanes::{FEWEST, Sight, write_in_lanes};
 use super::mounts::{AT_PHOTO, Mounts, When};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
-use super::parts::{MOTIONS, Parts};
-use super::stations::{Bent, Placed, Refracted, Station, Stations, write_in_its_place};
+use super::parts::Parts;
+use super::stations::{Bent, Placed, Refracted, Station, Stations};
 use super::{Image, Minimum, Point, Screens};
-use crate::adjustment::{Model, Motions, Term};
-use crate::geometry::angle_axis::rotation_angle_axis;
-use crate::geometry::camera::{CameraModel, each_camera};
 use crate::geometry::{
-    self, AttitudeNumbers, Camera, ObjectSpace, Orientation, PoseNumbers, Refraction, RotationSense, Vector3,
+    self, AttitudeNumbers, Camera, ObjectSpace, Orientation, POSE, PoseNumbers, Refraction, RotationSense,
     Vertical,
 };
 use crate::normals::{Cofactors, GroupRows, Tie, TieRows};
+use crate::parallel;
 
 /// Images of points by photos, and other observations of these: the local blocks are the points that no such observation touches, the
 /// retained blocks the photos with their pose and, unless it is held or shared, their camera, then the cameras that several photos share,
@@ -110,7 +105,7 @@ impl Bundle {
 
     /// Whether a photo has a camera with unknown parameters that is no other's.
     pub fn has_own_camera(&self, photo: usize) -> bool {
-        self.of_block(photo).len() > 6
+        self.of_block(photo).len() > POSE
     }
 
     /// Where the coordinates of a point stand among the unknowns.
@@ -183,7 +178,7 @@ impl Bundle {
     }
 
     /// Writes the equations of an image whose point is not local.
-    fn observe_tied_image(&self, stations: &Stations, image: usize, rows: &mut TieRows<'_>) {
+    pub(super) fn observe_tied_image(&self, stations: &Stations, image: usize, rows: &mut TieRows<'_>) {
         let all = rows.coefficients.len() / 2;
         let width = self.of_block(self.carrier(self.images[image].photo)).len();
         let shared = all - 3 - width;
@@ -228,7 +223,7 @@ impl Bundle {
     /// Photos and common unknowns at given values of the unknowns of photos, shared cameras and common unknowns.
     pub fn placed(&self, unknowns: &[f64]) -> Placed {
         let photo = |photo: usize| {
-            let (pose, camera) = unknowns[self.first[photo]..self.first[photo + 1]].split_at(6);
+            let (pose, camera) = unknowns[self.first[photo]..self.first[photo + 1]].split_at(POSE);
             let pose = std::array::from_fn(|k| pose[k]);
             let shared = self.camera_block[photo].map(|block| self.first[block]..self.first[block + 1]);
             let (own, camera) = (self.cameras[photo], shared.map_or(camera, |range| &unknowns[range]));
@@ -275,7 +270,7 @@ impl Bundle {
     }
 
     /// The orientation of a photo, its pose given, with the columns of its unknowns.
-    pub fn orientation(&self, photo: usize, pose: &[f64; 6]) -> Orientation {
+    pub fn orientation(&self, photo: usize, pose: &[f64; POSE]) -> Orientation {
         let [x, y, z, omega, phi, kappa] = *pose;
         match self.turning_sense(photo) {
             Some(sense) => {
@@ -318,10 +313,9 @@ impl Bundle {
     }
 }
 
-impl Model for Bundle {
-    type Prepared = Stations;
-
-    fn prepare(&self, unknowns: &[f64]) -> Stations {
+impl Bundle {
+    /// Everything at given values of the unknowns.
+    pub fn evaluated(&self, unknowns: &[f64]) -> Stations {
         let photos = &unknowns[self.of_stations()];
         let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_stations().end..]);
         let tied = tied.as_chunks().0.to_vec();
@@ -338,146 +332,10 @@ impl Model for Bundle {
         let plain = refracted.is_none() && mounted.is_none();
         let bent = (!plain).then_some(Bent { refracted, mounted });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
-        let mut points: Vec<geometry::Point> =
-            local.as_chunks().0.par_iter().with_min_len(1024).map(place).collect();
+        let local: &[[f64; 3]] = local.as_chunks().0;
+        let mut points = parallel::map_in_place(local.len(), 1024, &|point| place(&local[point]));
         points.extend(tied.iter().map(place));
         Stations { photos: stations, points, tied, commons, bent }
-    }
-
-    /// Angles of photos that step by a rotation vector go by way of their matrix.
-    fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
-        let start = self.of_stations().start + 3;
-        let turn = |photo: usize| {
-            let (first, sense) = (start + self.first[photo], self.turning_sense(photo)?);
-            let [angles, rho] = [&*unknowns, step].map(|values| std::array::from_fn(|k| values[first + k]));
-            Some((first, sense.stepped(angles, &Vector3::from(rho))))
-        };
-        let turned: Vec<(usize, [f64; 3])> = (0..self.cameras.len()).filter_map(turn).collect();
-        unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
-        turned.into_iter().for_each(|(first, angles)| unknowns[first..first + 3].copy_from_slice(&angles));
-    }
-
-    /// Attitudes that step by a rotation vector are that apart, A^T B = Exp(rho).
-    fn step_between(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
-        let mut step: Vec<f64> = to.iter().zip(from).map(|(to, from)| to - from).collect();
-        let start = self.of_stations().start + 3;
-        for photo in 0..self.cameras.len() {
-            let Some(sense) = self.turning_sense(photo) else { continue };
-            let first = start + self.first[photo];
-            let attitude = |values: &[f64]| {
-                let angles = std::array::from_fn(|k| values[first + k]);
-                AttitudeNumbers::OmegaPhiKappa(sense).attitude(angles)
-            };
-            let turn = rotation_angle_axis(&attitude(from).tr_mul(&attitude(to)));
-            step[first..first + 3].copy_from_slice(turn.as_slice());
-        }
-        step
-    }
-
-    fn terms(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Term> {
-        let mut all = self.weighted_angles(values, prior, sd);
-        if !self.camera_priors.is_empty() {
-            all.extend(self.camera_priors.iter().map(|own| own.equations(values, prior)));
-            all.sort_by_key(|own| own.first);
-        }
-        all
-    }
-
-    /// Intersects the points anew.
-    fn relocate(&self, unknowns: &mut [f64]) -> bool {
-        let photos = self.of_stations();
-        let Ok(coordinates) = self.intersect(&self.photos(&unknowns[photos.clone()])) else { return false };
-        let (local, tied) = coordinates.split_at(self.locals);
-        unknowns[..photos.start].copy_from_slice(local.as_flattened());
-        unknowns[photos.end..].copy_from_slice(tied.as_flattened());
-        true
-    }
-
-    /// Cameras are determined together with what they are correlated with: attitudes, positions, heights.
-    fn ends_slowly(&self) -> bool {
-        !self.shared.is_empty()
-    }
-
-    #[inline(always)]
-    fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let image = &self.images[group];
-        match &stations.bent {
-            None => {
-                let Station { orientation, camera } = &stations.photos[image.photo];
-                let point = &stations.points[local];
-                each_camera!(camera, camera => write_in_its_place(orientation, camera, point, image, rows));
-            }
-            Some(bent) => self.observe_bent((stations, bent), image, local, rows),
-        }
-    }
-
-    #[inline(always)]
-    fn observe_alike(
-        &self,
-        stations: &Stations,
-        locals: &[u32],
-        groups: impl Fn(usize) -> usize,
-        sd: &[f64],
-        rows: &mut GroupRows<'_>,
-    ) -> bool {
-        let sight = |t: usize| {
-            let group = groups(t);
-            let (image, sd) = (&self.images[group], [sd[2 * group], sd[2 * group + 1]]);
-            Sight { point: &stations.points[locals[t] as usize], image, sd }
-        };
-        // The main block of an image that is not mounted is its photo.
-        stations.bent.is_none() && locals.len() >= FEWEST && {
-            let Station { orientation, camera } = &stations.photos[self.images[groups(0)].photo];
-            each_camera!(camera, camera => write_in_lanes(orientation, camera, locals.len(), &sight, rows))
-        }
-    }
-
-    fn misclose(&self, stations: &Stations, local: usize, group: usize, constant: &mut [f64]) -> bool {
-        if stations.bent.is_some() {
-            return false;
-        }
-        let image = &self.images[group];
-        let Station { orientation, camera } = &stations.photos[image.photo];
-        let u = orientation.sight(&stations.points[local]);
-        constant.copy_from_slice(&each_camera!(camera, camera => camera.compare(&u, image.xy).0));
-        true
-    }
-
-    fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut TieRows<'_>) {
-        let Some(observation) = tie.checked_sub(self.tied_images()) else {
-            return self.observe_tied_image(stations, self.start[self.locals] + tie, rows);
-        };
-        let own = &self.observations[observation];
-        self.with_tied(stations, |model| own.write(model, rows.constant, rows.coefficients));
-    }
-
-    fn collapsed(&self, before: &[f64], after: &Stations) -> Vec<usize> {
-        if self.screens.ran_into_station { self.run_into_stations(before, after) } else { vec![] }
-    }
-
-    fn run_off(&self, before: &[f64], after: &Stations) -> Vec<usize> {
-        if self.screens.ran_off { self.lead_nowhere(before, after) } else { vec![] }
-    }
-
-    /// Straight rays turn and stretch with everything else; what a frame carries may have known lengths.
-    fn groups_leave_open(&self) -> bool {
-        self.refraction.is_none() && self.mounts.is_empty()
-    }
-
-    fn motions(&self, unknowns: &[f64]) -> Option<Motions> {
-        if self.placed { None } else { self.rigid_motions(unknowns) }
-    }
-
-    fn all_motions(&self, unknowns: &[f64]) -> Option<Motions> {
-        self.rigid_motions(unknowns)
-    }
-
-    fn carried(&self, stations: &Stations, tie: usize) -> Option<(usize, Vec<[f64; MOTIONS]>)> {
-        self.carried_by_motions(stations, tie.checked_sub(self.tied_images())?)
-    }
-
-    fn move_along(&self, unknowns: &mut [f64], amounts: &[f64]) {
-        self.move_rigidly(unknowns, amounts);
     }
 }
 

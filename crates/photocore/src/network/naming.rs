@@ -72,7 +72,7 @@ impl Network {
             return error;
         }
         let problem = &assembled.problem;
-        let held = problem.to_hold(values, threads);
+        let held = problem.any().to_hold(values, threads);
         let between = &mut |_| ControlFlow::Continue(());
         let Ok(linearized) = Linearized::form(problem, None, values.to_vec(), held, threads, between) else {
             return error;

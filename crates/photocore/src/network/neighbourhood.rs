@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::Network;
 use super::selection::{PointImages, TOGETHER};
 use crate::geometry::Vector3;
+use crate::parallel;
 
 /// Cells of the curve along each axis.
 const CELLS: f64 = (1_u32 << 20) as f64;
@@ -25,8 +26,7 @@ impl Network {
             // What is not finite comes first.
             interleaved(std::array::from_fn(|k| ((mean[k] - lowest[k]) / extent * (CELLS - 1.0)) as u32))
         };
-        let points = (0..self.points.len()).into_par_iter().with_min_len(TOGETHER);
-        let mut keyed: Vec<(u64, usize)> = points.map(|point| (key(point), point)).collect();
+        let mut keyed = parallel::map(self.points.len(), TOGETHER, |point| (key(point), point));
         keyed.par_sort_unstable();
         keyed.into_iter().map(|(_, point)| point).collect()
     }

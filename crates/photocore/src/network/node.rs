@@ -76,7 +76,7 @@ impl Network {
         }
         let assembled = threads.install(|| self.assemble(options, selected, None))?;
         let problem = &assembled.problem;
-        let held = problem.to_hold(&problem.initial, threads);
+        let held = problem.any().to_hold(&problem.initial, threads);
         Ok(held.iter().filter_map(|&unknown| of_photo(problem, unknown)).collect())
     }
 

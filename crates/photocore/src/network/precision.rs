@@ -1,7 +1,5 @@
 //! Values that double precision holds too coarsely.
 
-use rayon::prelude::*;
-
 use super::error::Coarse;
 use super::median::median;
 use super::model::Bundle;
@@ -9,6 +7,7 @@ use super::selection::{Selected, TOGETHER};
 use super::stations::Station;
 use super::{Network, Start};
 use crate::geometry::PoseNumbers;
+use crate::parallel;
 
 /// The square of a larger coordinate, or the product of its partials, is not a number.
 const LARGEST: f64 = 1e100;
@@ -50,7 +49,6 @@ impl Network {
         selected: &Selected,
         uses: impl Fn(usize) -> bool,
     ) -> Result<(), Coarse> {
-        let points = selected.points.par_iter().with_min_len(TOGETHER).copied();
         let coarse =
             |values: &[f64], sd: &[f64]| values.iter().zip(sd).any(|(&value, &sd)| is_coarse(value, sd));
         let photo = |&i: &usize| {
@@ -60,7 +58,9 @@ impl Network {
         };
         let point = |&i: &usize| coarse(&self.points[i].coordinates, &self.points[i].sd);
         let photos = (0..self.photos.len()).filter(|&photo| uses(photo));
-        let points: Vec<usize> = points.filter(point).collect();
+        let points = parallel::by_parts(selected.points.len(), TOGETHER, &|some| {
+            selected.points[some].iter().copied().filter(&point).collect()
+        });
         refuse(photos.filter(photo), points.into_iter())
     }
 

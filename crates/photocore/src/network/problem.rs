@@ -4,8 +4,6 @@
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
 use super::camera_priors::CameraPrior;
 use super::commons::PlacedCommon;
 use super::layout::layout;
@@ -18,10 +16,10 @@ use super::state::State;
 use super::stations::Station;
 use super::surroundings::Surroundings;
 use super::{Camera, Image, Network, NetworkError, Options, Photo, Point, Screens, Start};
-use crate::Threads;
-use crate::adjustment::{Method, Model, Problem};
-use crate::geometry::{Matrix3, ObjectSpace, PoseNumbers, Refraction, local_vertical};
+use crate::adjustment::{Method, Problem};
+use crate::geometry::{Matrix3, ObjectSpace, POSE, PoseNumbers, Refraction, local_vertical};
 use crate::normals::{System, TieRows};
+use crate::{Threads, parallel};
 
 /// A problem, and what its parts are in the network.
 #[derive(Debug)]
@@ -148,8 +146,8 @@ impl Network {
         mut selected: Selected,
         reached: Option<&Reached>,
     ) -> Result<Assembled, NetworkError> {
-        let order = selected.images.order.par_iter().with_min_len(TOGETHER);
-        let images: Vec<Image> = order.map(|&image| self.images[image]).collect();
+        let order = &selected.images.order;
+        let images = parallel::map_in_place(order.len(), TOGETHER, &|place| self.images[order[place]]);
         let mut images_on = vec![0; self.photos.len()];
         images.iter().for_each(|image| images_on[image.photo] += 1);
         // A frame is used when a photo on it is.
@@ -172,7 +170,7 @@ impl Network {
             let turns = |photo: usize| self.turns(photo) && !unused(photo) && !model.is_carried(photo);
             model.turning = (0..self.photos.len()).map(turns).collect();
         }
-        let local = |pose: [f64; 6]| match self.poses {
+        let local = |pose: [f64; POSE]| match self.poses {
             PoseNumbers::Angles(_) => {
                 std::array::from_fn(|k| if k < 3 { pose[k] - origin[k] } else { pose[k] })
             }
@@ -197,15 +195,13 @@ impl Network {
             let (local, tied) = points.split_at(model.locals);
             [local.as_flattened(), stations, tied.as_flattened()].concat()
         };
-        let (initial, (prior, sd)) = rayon::join(
-            || unknowns(&start, &values),
-            || {
-                rayon::join(
-                    || unknowns(&of_points(|point| point.coordinates), &observed),
-                    || unknowns(&of_points(|point| point.sd), &station_sd),
-                )
-            },
-        );
+        let (mut initial, mut prior, mut sd) = (vec![], vec![], vec![]);
+        parallel::join(&mut || initial = unknowns(&start, &values), &mut || {
+            parallel::join(
+                &mut || prior = unknowns(&of_points(|point| point.coordinates), &observed),
+                &mut || sd = unknowns(&of_points(|point| point.sd), &station_sd),
+            );
+        });
         let tied = start[model.locals..].iter().map(|&at| self.space.cartesian(at));
         let centres: Vec<[f64; 3]> =
             stations.iter().map(|station| station.orientation.centre().into()).collect();
@@ -213,8 +209,12 @@ impl Network {
         let tied: Vec<[f64; 3]> = tied.map(Into::into).collect();
         let commons = model.places_of_commons(&centres, &tied);
         let places = [centres, cameras, commons, tied].concat();
-        let of_images = model.images.par_iter().with_min_len(TOGETHER).map(|image| image.sd);
-        let mut observation_sd = of_images.collect::<Vec<[f64; 2]>>().into_flattened();
+        let mut observation_sd = vec![[0.0; 2]; model.images.len()];
+        parallel::each_chunk(&mut observation_sd, TOGETHER, &|part, own| {
+            let images = &model.images[part * TOGETHER..];
+            own.iter_mut().zip(images).for_each(|(sd, image)| *sd = image.sd);
+        });
+        let mut observation_sd = observation_sd.into_flattened();
         model.observations.iter().for_each(|tied| observation_sd.extend(vec![1.0; tied.root.nrows()]));
         let held: Vec<bool> = sd.iter().map(|&sd| sd == 0.0).collect();
         let (outer, below) = selected.surroundings.blocks(&model, &selected.points)?;
@@ -237,7 +237,7 @@ impl Network {
         if model.observations.is_empty() {
             return Ok(());
         }
-        let (stations, layout) = (model.prepare(&problem.initial), problem.layout());
+        let (stations, layout) = (model.evaluated(&problem.initial), problem.layout());
         for (i, TiedObservation { index, observation, root, .. }) in model.observations.iter().enumerate() {
             let tie = model.tied_images() + i;
             let mut constant = vec![0.0; root.nrows()];
@@ -260,10 +260,10 @@ impl Network {
         middle: [f64; 3],
     ) -> Result<Bundle, NetworkError> {
         let origin = self.origin(middle);
-        let local_point = |&point: &usize| {
-            let Point { coordinates, sd } = self.points[point];
+        let points = parallel::map_in_place(selected.points.len(), TOGETHER, &|place| {
+            let Point { coordinates, sd } = self.points[selected.points[place]];
             Point { coordinates: std::array::from_fn(|k| coordinates[k] - origin[k]), sd }
-        };
+        });
         let (shared, mut first) = (self.shared_cameras(&selected.surroundings), vec![0]);
         for photo in &self.photos {
             let camera = self.camera(photo);
@@ -272,7 +272,7 @@ impl Network {
             } else {
                 camera.sd.len()
             };
-            first.push(first[first.len() - 1] + 6 + own);
+            first.push(first[first.len() - 1] + POSE + own);
         }
         for &camera in &shared {
             first.push(first[first.len() - 1] + self.cameras[camera].sd.len());
@@ -316,7 +316,7 @@ impl Network {
             mounts,
             origin,
             locals: selected.locals,
-            points: selected.points.par_iter().with_min_len(TOGETHER).map(local_point).collect(),
+            points,
             images,
             start: std::mem::take(&mut selected.images.start),
             order: std::mem::take(&mut selected.images.order),
@@ -354,7 +354,7 @@ impl Network {
     /// The same, and the photo to hold where it is not, but the position of a single one is fixed.
     fn placed(&self, selected: &Selected, mounts: &Mounts) -> (bool, Option<usize>) {
         // Angles alone leave position and scale open.
-        let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { 6 };
+        let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { POSE };
         let own = |photo: &Photo| photo.sd[..positions].iter().any(|sd| sd.is_finite());
         let carried = |index: usize| mounts.carrier(index) != index;
         let mut photos = (0..self.photos.len()).filter(|&index| !carried(index) && own(&self.photos[index]));
@@ -371,7 +371,9 @@ impl Network {
     fn first_parameter(&self, model: &Bundle, camera: usize) -> Option<usize> {
         Some(match model.shared.binary_search(&camera) {
             Ok(shared) => model.of_block(model.cameras.len() + shared).start,
-            Err(_) => model.of_block(self.photos.iter().position(|photo| photo.camera == camera)?).start + 6,
+            Err(_) => {
+                model.of_block(self.photos.iter().position(|photo| photo.camera == camera)?).start + POSE
+            }
         })
     }
 

@@ -1,10 +1,9 @@
 //! Which points take part in the adjustment.
 
-use rayon::prelude::*;
-
 use super::state::State;
 use super::surroundings::Surroundings;
 use super::{Network, NetworkError};
+use crate::parallel;
 
 /// Points that a thread takes at least.
 pub(super) const TOGETHER: usize = 1024;
@@ -92,8 +91,8 @@ impl Network {
         let all = self.point_images(loose);
         let (mut points, mut dropped) = (Vec::new(), Vec::new());
         let along = self.along_curve(&all);
-        let reasons: Vec<Option<Reason>> =
-            along.par_iter().with_min_len(TOGETHER).map(|&point| self.reason(point, all.of(point))).collect();
+        let reason = |place: usize| self.reason(along[place], all.of(along[place]));
+        let reasons: Vec<Option<Reason>> = parallel::map(along.len(), TOGETHER, reason);
         for (point, reason) in along.into_iter().zip(reasons).filter(|&(point, _)| !left_out.points[point]) {
             match reason.filter(|_| !named.contains(&point)) {
                 Some(reason) => dropped.push(Dropped { point, reason }),

@@ -285,7 +285,7 @@ pub(super) fn sums_of_squares(
     observations: &[Option<AdjustedObservation>],
 ) -> SumsOfSquares {
     let stations = problem.model.of_stations();
-    let terms = problem.terms(unknowns);
+    let terms = problem.any().terms(unknowns);
     let squares = |range: Range<usize>| terms.sum_of_squares(range);
     let rows = problem.layout().rows();
     let of_images = &problem.observation_sd[..rows * problem.model.images.len()];

@@ -4,11 +4,11 @@ use super::median::median;
 use super::model::Bundle;
 use super::surroundings::Surroundings;
 use super::{Camera, Network, Photo};
-use crate::geometry::{ObjectSpace, Orientation, PoseNumbers, Vector3, nearest_turns};
+use crate::geometry::{ObjectSpace, Orientation, POSE, PoseNumbers, Vector3, nearest_turns};
 
 impl Network {
     /// The projection centre of given six unknowns.
-    pub(super) fn centre(&self, pose: &[f64; 6]) -> Vector3 {
+    pub(super) fn centre(&self, pose: &[f64; POSE]) -> Vector3 {
         match self.poses {
             PoseNumbers::Angles(_) => self.space.cartesian([pose[0], pose[1], pose[2]]),
             PoseNumbers::Vectors => Orientation::new(self.poses, self.space, pose).centre(),
@@ -65,7 +65,7 @@ impl Network {
     }
 
     /// The values of the unknowns of photos, with the given poses, of shared cameras and common unknowns.
-    pub(super) fn station_values(&self, model: &Bundle, pose: impl Fn(&Photo) -> [f64; 6]) -> Vec<f64> {
+    pub(super) fn station_values(&self, model: &Bundle, pose: impl Fn(&Photo) -> [f64; POSE]) -> Vec<f64> {
         let mut all = Vec::new();
         for (index, photo) in self.photos.iter().enumerate() {
             all.extend(pose(photo));
@@ -80,7 +80,7 @@ impl Network {
     }
 
     /// The observed pose of a photo, as near to the initial one as whole turns bring it.
-    pub(super) fn observed_pose(&self, photo: &Photo) -> [f64; 6] {
+    pub(super) fn observed_pose(&self, photo: &Photo) -> [f64; POSE] {
         let near = nearest_turns(photo.observed, photo.pose);
         let turning = |k: usize| match self.poses {
             PoseNumbers::Angles(_) => k >= 3 || k == 0 && self.space != ObjectSpace::Rectangular,

@@ -5,7 +5,7 @@ use super::commons::CommonState;
 use super::mounts::Composed;
 use crate::geometry::camera::each_camera;
 use crate::geometry::{
-    self, Camera, CameraModel, ObjectSpace, Orientation, Ray, Refraction, Steps, Vertical,
+    self, Camera, CameraModel, ObjectSpace, Orientation, POSE, Ray, Refraction, Steps, Vertical,
 };
 use crate::normals::GroupRows;
 
@@ -95,7 +95,7 @@ impl Bent {
             (orientation, point) = (orientation.under(&lift), point.lifted(&lift));
         }
         let write = |rows: &mut GroupRows<'_>| {
-            each_camera!(camera, camera => write_in_its_place(&orientation, camera, &point, image, rows));
+            each_camera!(camera, camera => write(&orientation, camera, &point, image, rows));
         };
         match composed {
             None => write(rows),
@@ -110,11 +110,11 @@ impl Composed {
     fn write(&self, rows: &mut GroupRows<'_>, write: impl FnOnce(&mut GroupRows<'_>)) {
         let (main, common) = (rows.retained.len() / 2, rows.shared.len() / 2);
         let parts: usize = self.parts[1..].iter().map(|(_, steps)| steps.ncols()).sum();
-        let (mut pose, mut camera) = ([0.0; 12], vec![0.0; 2 * (common - parts)]);
+        let (mut pose, mut camera) = ([0.0; 2 * POSE], vec![0.0; 2 * (common - parts)]);
         let (constant, local) = (&mut *rows.constant, &mut *rows.local);
         write(&mut GroupRows { constant, local, retained: &mut pose, shared: &mut camera });
         rows.retained.fill(0.0);
-        for (row, pose) in pose.as_chunks::<6>().0.iter().enumerate() {
+        for (row, pose) in pose.as_chunks::<POSE>().0.iter().enumerate() {
             let by = |steps: &Steps, to: &mut [f64]| {
                 let columns = steps.column_iter();
                 to.iter_mut()
@@ -133,36 +133,9 @@ impl Composed {
     }
 }
 
-/// [`write`], in line or called: what is compiled at every place should be small.
-#[inline(always)]
-pub fn write_in_its_place<C: CameraModel>(
-    orientation: &Orientation,
-    camera: &C,
-    point: &geometry::Point,
-    image: &Image,
-    rows: &mut GroupRows<'_>,
-) {
-    if C::IN_LINE {
-        write(orientation, camera, point, image, rows);
-    } else {
-        write_apart(orientation, camera, point, image, rows);
-    }
-}
-
-#[inline(never)]
-fn write_apart<C: CameraModel>(
-    orientation: &Orientation,
-    camera: &C,
-    point: &geometry::Point,
-    image: &Image,
-    rows: &mut GroupRows<'_>,
-) {
-    write(orientation, camera, point, image, rows);
-}
-
 /// The two equations of an image: observed minus computed, and the partials of the computed.
-#[inline(always)]
-fn write<C: CameraModel>(
+#[inline(never)]
+pub fn write<C: CameraModel>(
     orientation: &Orientation,
     camera: &C,
     point: &geometry::Point,
@@ -176,11 +149,11 @@ fn write<C: CameraModel>(
     for row in 0..2 {
         rows.constant[row] = residual[row];
         rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
-        rows.retained[width * row..][..6].copy_from_slice(&projection.photo[row]);
+        rows.retained[width * row..][..POSE].copy_from_slice(&projection.photo[row]);
         // As many as the camera has, which is known where this is compiled.
         let camera = projection.camera[row].as_ref();
-        if width > 6 {
-            rows.retained[width * row + 6..][..camera.len()].copy_from_slice(camera);
+        if width > POSE {
+            rows.retained[width * row + POSE..][..camera.len()].copy_from_slice(camera);
         }
         if shared > 0 {
             rows.shared[shared * row..][..camera.len()].copy_from_slice(camera);

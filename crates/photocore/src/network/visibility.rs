@@ -1,11 +1,10 @@
 //! Images that no camera can have taken: of points behind it, or beyond where its lens is one-to-one.
 
-use rayon::prelude::*;
-
 use super::problem::Assembled;
 use super::selection::TOGETHER;
 use super::stations::Station;
 use super::{Image, Solution};
+use crate::parallel;
 
 impl Solution {
     /// Finds the images whose point stands behind the camera, or beyond where its lens ends; returns the squares of the distances of the
@@ -24,10 +23,11 @@ impl Solution {
         };
         let folds: Vec<f64> = photos.iter().zip(&model.camera_block).map(fold).collect();
         let (local, tied) = model.all_coordinates(unknowns);
-        let look = |(own, at): (&[usize], &[f64; 3])| {
+        let look = |point: usize| {
+            let at = local.get(point).unwrap_or_else(|| &tied[point - local.len()]);
             let position = model.space.cartesian(*at);
             let (mut nearest, mut hidden) = (f64::INFINITY, Hidden::default());
-            for image in own[0]..own[1] {
+            for image in model.start[point]..model.start[point + 1] {
                 let Image { photo, xy, .. } = model.images[image];
                 let Station { orientation, camera } = &photos[photo];
                 let u = orientation.pose().sight(&position);
@@ -41,9 +41,8 @@ impl Solution {
             }
             (nearest, hidden.boxed())
         };
-        let of_points = model.start.par_windows(2).zip(local.par_iter().chain(tied));
-        let (mut squares, mut hidden) = (vec![], vec![]);
-        of_points.with_min_len(TOGETHER).map(look).unzip_into_vecs(&mut squares, &mut hidden);
+        let of_points = parallel::map(model.points.len(), TOGETHER, look);
+        let (squares, hidden): (Vec<f64>, Vec<_>) = of_points.into_iter().unzip();
         for (&point, hidden) in points.iter().zip(hidden) {
             let Some(hidden) = hidden else { continue };
             if let Some(point) = &mut self.points[point] {

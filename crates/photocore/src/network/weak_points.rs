@@ -1,12 +1,11 @@
 //! Points that harm what hangs on them: on rays that are nearly parallel, or much nearer to a station than all others.
 
-use rayon::prelude::*;
-
 use super::median::median;
 use super::model::Bundle;
 use super::selection::TOGETHER;
 use super::{AdjustedPoint, Network};
 use crate::geometry::{self, Matrix3};
+use crate::parallel;
 
 /// The largest standard deviation of a point over its smallest, from which on its rays are nearly parallel.
 const RATIO: f64 = 1e4;
@@ -35,10 +34,11 @@ impl Network {
         squares: &[f64],
     ) -> Vec<WeakPoint> {
         let middle = median(squares.to_vec()).unwrap_or(f64::NAN).sqrt();
-        let weak = |(i, (&point, square)): (usize, (&usize, &f64))| {
+        let weak = |i: usize| {
+            let (point, square) = (points[i], squares[i]);
             let adjusted = adjusted[point].as_ref()?;
             let free = model.points[i].held() == [false; 3];
-            let near = *square < (NEAR * middle).powi(2);
+            let near = square < (NEAR * middle).powi(2);
             let cofactors = if free { self.cartesian_cofactors(adjusted) } else { Matrix3::identity() };
             (near || is_flat(&cofactors)).then(|| WeakPoint {
                 point,
@@ -46,8 +46,7 @@ impl Network {
                 distance: square.sqrt() / middle,
             })
         };
-        let all = points.par_iter().zip(squares).enumerate();
-        all.with_min_len(TOGETHER).filter_map(weak).collect()
+        parallel::by_parts(points.len(), TOGETHER, &|some| some.filter_map(&weak).collect())
     }
 
     /// The cofactors of a point in the length unit, whatever its coordinates are.

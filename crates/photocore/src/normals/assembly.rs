@@ -1,9 +1,7 @@
 //! What goes into the front of a supernode: the local blocks assembled there, ties, what systems below have left, priors.
 
-use rayon::prelude::*;
-
-use super::batch::{Batch, Gathered};
-use super::equations::Prior;
+use super::batch::Batch;
+use super::equations::{Equations, Prior};
 use super::front::Front;
 use super::incidence::Batches;
 use super::panels::Handover;
@@ -12,11 +10,12 @@ use super::tie_equations::TieEquations;
 use super::vectorised::LANES;
 use super::watch::Control;
 use super::workspace::reserved;
+use crate::parallel;
 
 /// What is formed.
 pub(super) struct Formation<'a> {
     pub system: &'a System,
-    pub equations: &'a dyn Gathered,
+    pub equations: &'a dyn Equations,
     pub prior: &'a Prior,
     pub damping: f64,
     /// Whether to cache what [`System::solve`] needs of the local blocks.
@@ -68,8 +67,9 @@ impl Formation<'_> {
         for wave in batches.parts(WAVE).into_iter().take_while(|_| !control.stopped()) {
             let runs: Vec<&[u32]> = wave.iter().collect();
             let filled = &mut filled[..runs.len()];
-            filled.par_iter_mut().zip(runs).for_each(|(batch, run)| self.fill(batch, run));
-            front.parts(&starts).into_par_iter().for_each(|mut columns| {
+            let pairs = filled.iter_mut().zip(runs).collect();
+            parallel::each_of(pairs, &|_, (batch, run): (&mut Batch, &[u32])| self.fill(batch, run));
+            parallel::each_of(front.parts(&starts), &|_, mut columns| {
                 for batch in &*filled {
                     batch.add_to(&mut columns, layout);
                 }
@@ -110,7 +110,7 @@ impl Formation<'_> {
     }
 
     fn fill(&self, batch: &mut Batch, run: &[u32]) {
-        self.equations.gather(batch, self.system, run);
+        batch.gather(self.equations, self.system, run);
         batch.eliminate(&self.system.layout, self.prior, self.damping);
         self.control.count(run.len());
     }

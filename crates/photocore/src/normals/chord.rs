@@ -2,16 +2,13 @@
 
 use std::ops::ControlFlow;
 
-use rayon::prelude::*;
-
-use super::batch::Gathered;
 use super::eliminated::Reduced;
 use super::equations::{Equations, Prior, TieRows};
 use super::factor::Factor;
 use super::system::System;
 use super::vectorised::dot;
 use super::watch::{Between, Control, watched};
-use crate::{Stopped, Threads};
+use crate::{Stopped, Threads, parallel};
 
 impl System {
     /// About N^-1 A^T l over all unknowns, in the order of the layout, A and l of equations and priors at other values of the unknowns than those
@@ -21,21 +18,19 @@ impl System {
     ///
     /// For a factor that has cached what the elimination of the local blocks has left ([`Factor::has_cached`]). What systems below a part of
     /// a larger one have left is not in it.
-    pub fn chord<E: Equations>(
+    pub fn chord(
         &self,
         threads: &Threads,
         factor: &Factor,
-        equations: &E,
+        equations: &dyn Equations,
         prior: &Prior,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, (Vec<f64>, f64)> {
-        let equations: &dyn Gathered = equations;
         watched(threads, between, |control| {
             let mut others = control.allocated(self.of_others(&prior.right))?;
             self.add_rights_of_ties(equations, &mut others);
-            let nodes = (0..factor.eliminated.len()).into_par_iter();
-            let found: Vec<Reduced<1>> =
-                nodes.map(|index| self.rights_at_node(equations, prior, index, control)).collect();
+            let at_node = |index: usize| self.rights_at_node(equations, prior, index, control);
+            let found: Vec<Reduced<1>> = parallel::map_each((0..factor.eliminated.len()).collect(), &at_node);
             // One after the other in a fixed order, whichever thread has found them.
             found.iter().for_each(|found| found.add_to(&mut others, self.symbolic.unknowns()));
             let reduced = others.clone();
@@ -53,14 +48,14 @@ impl System {
     /// equations: to form them takes less time than to read what the factor has cached.
     fn rights_at_node(
         &self,
-        equations: &dyn Gathered,
+        equations: &dyn Equations,
         prior: &Prior,
         index: usize,
         control: &Control,
     ) -> Reduced<1> {
         let (mut batch, mut found) = (self.workspace.batch(), Reduced::default());
         for run in self.incidence.batches_at(index).iter().take_while(|_| !control.stopped()) {
-            equations.gather(&mut batch, self, run);
+            batch.gather(equations, self, run);
             batch.eliminate_from_rights(&self.layout, prior);
             found.own.extend_from_slice(batch.reduced.as_chunks().0);
             let start = found.values.len();
@@ -73,7 +68,7 @@ impl System {
     }
 
     /// Adds A^T l of ties to a right-hand side in the order of elimination.
-    fn add_rights_of_ties(&self, equations: &dyn Gathered, others: &mut [f64]) {
+    fn add_rights_of_ties(&self, equations: &dyn Equations, others: &mut [f64]) {
         let (layout, symbolic) = (&self.layout, &*self.symbolic);
         let (mut constant, mut coefficients) = (Vec::new(), Vec::new());
         for (index, tie) in layout.ties().iter().enumerate() {

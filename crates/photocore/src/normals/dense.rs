@@ -7,12 +7,12 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{Accum, MatMut, MatRef, Par};
 use pulp::Simd;
-use rayon::prelude::*;
 
 use super::triangle::PIVOT_TOLERANCE;
 use super::vectorised::{Kernel, run_unsized};
 use super::watch::Control;
 use super::workspace::Workspace;
+use crate::parallel;
 
 /// Columns factored at a time.
 const STEP: usize = 48;
@@ -89,7 +89,7 @@ fn eliminate_step(
     run_unsized(Cholesky { a: &mut own, width, diagonal, given_up, first, pivots });
     top.copy_from(MatRef::from_column_major_slice(&own, width, width));
     let factor = top.rb();
-    for_tiles(control, row_tiles(below.rb_mut()), width * width * height, |_, tile| {
+    for_tiles(control, row_tiles(below.rb_mut()), width * width * height, &|_, tile| {
         solve_lower_triangular_in_place(factor, tile.transpose_mut(), Par::Seq);
     });
     for &column in &pivots.lost[before..] {
@@ -100,7 +100,7 @@ fn eliminate_step(
 /// target -= x x_top^T on and below the diagonal, x_top being the first rows of x, as many as the target has columns.
 fn subtract_square(target: MatMut<'_, f64>, x: MatRef<'_, f64>, control: &Control) {
     let work = target.nrows() * target.ncols() * x.ncols() / 2;
-    for_tiles(control, column_tiles(target), work, |first, tile| {
+    for_tiles(control, column_tiles(target), work, &|first, tile| {
         let columns = tile.ncols();
         let rows = tile.nrows();
         let lower = tile.subrows_mut(first, rows - first);
@@ -173,10 +173,10 @@ pub(super) fn invert_front(
     let mut y = MatMut::from_column_major_slice_mut(&mut y_values, below_rows, width);
     y.copy_from(below.rb());
     let factor = own.rb();
-    for_tiles(control, row_tiles(y.rb_mut()), width * width * below_rows / 2, |_, tile| {
+    for_tiles(control, row_tiles(y.rb_mut()), width * width * below_rows / 2, &|_, tile| {
         solve_upper_triangular_in_place(factor.transpose(), tile.transpose_mut(), Par::Seq);
     });
-    for_tiles(control, row_tiles(below.rb_mut()), width * below_rows * below_rows, |first, tile| {
+    for_tiles(control, row_tiles(below.rb_mut()), width * below_rows * below_rows, &|first, tile| {
         let rows = z.subrows(first, tile.nrows());
         matmul(tile, Accum::Replace, rows, y.rb(), -1.0, Par::Seq);
     });
@@ -184,7 +184,7 @@ pub(super) fn invert_front(
     let mut inverse = MatMut::from_column_major_slice_mut(&mut inverse_values, width, width);
     invert_lower_triangular(inverse.rb_mut(), factor, Par::Seq);
     let (inverse, below) = (inverse.rb(), below.rb());
-    for_tiles(control, column_tiles(own.rb_mut()), width * width * height, |first, mut tile| {
+    for_tiles(control, column_tiles(own.rb_mut()), width * width * height, &|first, mut tile| {
         let columns = tile.ncols();
         // Rows of L_J^-1 above its diagonal are zero: the product over them is left out.
         let right = inverse.subcols(first, columns).subrows(first, width - first);
@@ -227,15 +227,15 @@ fn for_tiles(
     control: &Control,
     tiles: Vec<(usize, MatMut<'_, f64>)>,
     work: usize,
-    each: impl Fn(usize, MatMut<'_, f64>) + Sync,
+    each: &(dyn Fn(usize, MatMut<'_, f64>) + Sync),
 ) {
-    let each = |(first, tile)| {
+    let each = |(first, tile): (usize, MatMut<'_, f64>)| {
         if !control.stopped() {
             each(first, tile);
         }
     };
     if tiles.len() > 1 && work as f64 > WORTH_SHARING {
-        tiles.into_par_iter().for_each(each);
+        parallel::each_of(tiles, &|_, tile| each(tile));
     } else {
         tiles.into_iter().for_each(each);
     }

@@ -4,11 +4,10 @@
 use std::ops::Range;
 
 use pulp::Simd;
-use rayon::prelude::*;
 use smallvec::SmallVec;
 
-use super::batch::{Batch, Gathered, parts_of, united};
-use super::equations::Prior;
+use super::batch::{Batch, parts_of, united};
+use super::equations::{Equations, Prior};
 use super::incidence::Batches;
 use super::layout::Layout;
 use super::panels::skip_ref;
@@ -17,6 +16,7 @@ use super::triangle::Triangle;
 use super::vectorised::{Kernel, Rows, dot_by_fours, dot_columns, run, size, subtract_rights};
 use super::watch::Control;
 use super::workspace::Eliminated;
+use crate::parallel;
 
 /// Batches that a thread takes at a time where they are eliminated again.
 const CHUNK: usize = 64;
@@ -208,7 +208,7 @@ impl<const C: usize> Reduced<C> {
 pub(super) struct Elimination<'a> {
     pub system: &'a System,
     pub cached: &'a Eliminated,
-    pub equations: &'a dyn Gathered,
+    pub equations: &'a dyn Equations,
     pub prior: &'a Prior,
     pub damping: f64,
     pub control: &'a Control,
@@ -266,7 +266,7 @@ impl Elimination<'_> {
             }
             found
         };
-        self.parts().into_par_iter().map_init(|| self.reader(), reduce).collect()
+        parallel::map_each_with(self.parts(), || self.reader(), reduce)
     }
 
     /// Solves for all local blocks, part by part as they are reduced, with the others in place: `others` are in the order of elimination, C
@@ -296,7 +296,7 @@ impl Elimination<'_> {
             }
             own
         };
-        parts.into_par_iter().zip(own).map_init(|| self.reader(), solve).collect()
+        parallel::map_each_with(parts.into_iter().zip(own).collect(), || self.reader(), solve)
     }
 }
 
@@ -326,7 +326,7 @@ impl Reader<'_> {
                 here
             }
             None => {
-                equations.gather(&mut self.batch, system, locals);
+                self.batch.gather(equations, system, locals);
                 self.batch.eliminate(&system.layout, prior, damping);
                 self.batch.eliminated(&system.layout)
             }

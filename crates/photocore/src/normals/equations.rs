@@ -12,13 +12,9 @@ pub trait Equations: Sync {
 
     /// Writes those of one group each of several local blocks, one after the other: `groups` says which. All are alike: they have the same
     /// main block, and as much in common with others.
-    #[inline(always)]
-    fn write_alike(&self, locals: &[u32], groups: impl Fn(usize) -> usize, rows: &mut GroupRows<'_>)
-    where
-        Self: Sized,
-    {
-        for (t, &local) in locals.iter().enumerate() {
-            self.write(local as usize, groups(t), &mut rows.part(t, locals.len()));
+    fn write_alike(&self, locals: &[u32], groups: &[u32], rows: &mut GroupRows<'_>) {
+        for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
+            self.write(local as usize, group as usize, &mut rows.part(t, locals.len()));
         }
     }
 

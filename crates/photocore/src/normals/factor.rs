@@ -8,17 +8,17 @@ use std::time::Instant;
 use faer::MatMut;
 
 use super::assembly::{Formation, Sums};
-use super::batch::Gathered;
 use super::dense::{Pivots, factor_front};
 use super::equations::{Equations, Prior};
 use super::front::Front;
 use super::layout::Layout;
 use super::options::FactorOptions;
-use super::panels::{Handover, Panels, lock};
+use super::panels::{Handover, Panels};
 use super::symbolic::Supernode;
 use super::system::System;
 use super::watch::{Between, Control, watched};
 use super::workspace::Eliminated;
+use crate::parallel::lock;
 use crate::{Stopped, Threads};
 
 /// The Cholesky factor L of the reduced normal equations.
@@ -76,10 +76,10 @@ impl System {
     /// threads: every value is summed by one thread, in an order that depends on the pattern only.
     ///
     /// Whether everything is determined is for the caller to ask: see [`Factor::deficient_locals`] and [`Factor::deficiency`].
-    pub fn factor<E: Equations>(
+    pub fn factor(
         &self,
         threads: &Threads,
-        equations: &E,
+        equations: &dyn Equations,
         prior: &Prior,
         options: &FactorOptions,
         between: Between<'_>,
@@ -90,7 +90,7 @@ impl System {
     fn factored(
         &self,
         threads: &Threads,
-        equations: &dyn Gathered,
+        equations: &dyn Equations,
         prior: &Prior,
         FactorOptions { damping, cached }: FactorOptions,
         between: Between<'_>,
@@ -127,7 +127,7 @@ impl Formation<'_> {
         let visited = Handover::new(symbolic.supernode_count());
         let divided = panels.divide();
         let cached = self.room();
-        self.system.tree.upward(|index| {
+        self.system.tree.upward(&|index| {
             if !self.control.stopped()
                 && let Some(found) =
                     self.visit(index, &mut lock(&divided[index]), &cached, &updates, given_up)

@@ -10,9 +10,7 @@
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
-use rayon::prelude::*;
-
-use super::batch::{Batch, Gathered};
+use super::batch::Batch;
 use super::eliminated::{Coupled, EliminatedBatch, Reduced as OfLocal};
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
@@ -23,7 +21,7 @@ use super::system::System;
 use super::vectorised::dot;
 use super::watch::{Between, Control, watched};
 use super::workspace::zeros;
-use crate::{Stopped, Threads};
+use crate::{Stopped, Threads, parallel};
 
 /// A linear function of the unknowns: unknowns that it takes, with their coefficients.
 pub type Function = Vec<(usize, f64)>;
@@ -56,16 +54,15 @@ impl System {
     ///
     /// `columns` is None where the cofactors of every two of `rows` are asked for. `equations` and `prior` must be those that the factor
     /// comes from; what is held must not be taken.
-    pub fn reduce<E: Equations>(
+    pub fn reduce(
         &self,
         threads: &Threads,
-        equations: &E,
+        equations: &dyn Equations,
         prior: &Prior,
         rows: &[Function],
         columns: Option<&[Function]>,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Functions> {
-        let equations: &dyn Gathered = equations;
         watched(threads, between, |control| {
             let places = self.symbolic.places(&self.layout);
             let work = Reduction { system: self, equations, prior, places: &places, control };
@@ -128,7 +125,7 @@ impl System {
             for (solution, function) in solutions.chunks_exact_mut(count.max(1)).zip(functions) {
                 function.entries.iter().for_each(|&(place, value)| solution[place] = value);
             }
-            solutions.par_chunks_mut(count.max(1)).for_each(|solution| {
+            parallel::each_chunk(&mut solutions, count, &|_, solution| {
                 if !control.stopped() {
                     factor.solve_columns(solution);
                 }
@@ -205,7 +202,7 @@ impl Symbolic {
 
 struct Reduction<'a> {
     system: &'a System,
-    equations: &'a dyn Gathered,
+    equations: &'a dyn Equations,
     prior: &'a Prior,
     places: &'a [usize],
     control: &'a Control,
@@ -240,15 +237,16 @@ impl Reduction<'_> {
         }
         let mut taken: Vec<(usize, Taken)> = taken.into_iter().collect();
         taken.sort_unstable_by_key(|&(local, _)| local);
-        let found: Vec<(usize, Vec<Found>)> =
-            taken.par_chunks(CHUNK).flat_map_iter(|taken| self.at_locals(taken)).collect();
-        for (local, found) in found {
+        let found = parallel::map_each(taken.chunks(CHUNK).collect(), &|taken| self.at_locals(taken));
+        for (local, found) in found.into_iter().flatten() {
             for (index, y, entries) in found {
                 reduced[index].locals.push((local, y));
                 reduced[index].entries.extend(entries);
             }
         }
-        reduced.par_iter_mut().for_each(|function| unite(&mut function.entries));
+        parallel::each_chunk(&mut reduced, TOGETHER, &|_, functions| {
+            functions.iter_mut().for_each(|function| unite(&mut function.entries));
+        });
         reduced
     }
 
@@ -256,7 +254,7 @@ impl Reduction<'_> {
         let layout = &self.system.layout;
         let (mut batch, mut coupled) = (Batch::default(), Coupled::default());
         let mut at_local = |(local, taken): &(usize, Taken)| {
-            self.equations.gather(&mut batch, self.system, &[*local as u32]);
+            batch.gather(self.equations, self.system, &[*local as u32]);
             batch.eliminate(layout, self.prior, 0.0);
             self.control.count(1);
             let batch = EliminatedBatch::new(self.system, &mut batch, &mut coupled);

@@ -1,8 +1,7 @@
 //! Which retained blocks share a local block, a tie or what a system below leaves.
 
-use rayon::prelude::*;
-
 use super::layout::Layout;
+use crate::parallel;
 
 /// Kept blocks from which on several threads look for their neighbours and try orderings.
 pub(super) const MANY: usize = 500;
@@ -51,7 +50,10 @@ impl Graph {
             let mut seen_by = unseen();
             (0..retained).map(|block| joined(&mut seen_by, block)).collect()
         } else {
-            (0..retained).into_par_iter().with_min_len(MANY / 4).map_init(unseen, joined).collect()
+            parallel::by_parts(retained, MANY / 4, &|blocks| {
+                let mut seen_by = unseen();
+                blocks.map(|block| joined(&mut seen_by, block)).collect()
+            })
         };
         let mut ptr = vec![0];
         ptr.extend(all.iter().scan(0, |end, own| {

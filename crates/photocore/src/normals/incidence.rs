@@ -8,6 +8,7 @@ use smallvec::SmallVec;
 
 use super::layout::Layout;
 use super::symbolic::Symbolic;
+use crate::parallel;
 
 /// Local blocks from which on several threads sort them, and how many of them are taken together.
 const MANY: usize = 10_000;
@@ -46,7 +47,7 @@ impl Incidence {
         let placed = |range: &Range<usize>| placed(layout, symbolic, range.clone());
         let is_many = layout.locals() >= MANY;
         let pieces: Vec<(Vec<[u32; 2]>, Vec<Keyed>)> = if is_many {
-            ranges.par_iter().map(placed).collect()
+            parallel::map_each(ranges.iter().collect(), &placed)
         } else {
             ranges.iter().map(placed).collect()
         };
@@ -75,12 +76,11 @@ impl Incidence {
             node_ptr[index] += node_ptr[index - 1];
         }
         let (numbers, group_with) = commons(layout);
-        let of_group = |&group: &u32| numbers[group as usize];
-        let commons = if numbers.is_empty() {
-            Vec::new()
-        } else {
-            groups.par_iter().with_min_len(MANY).map(of_group).collect()
-        };
+        let mut commons = vec![0; if numbers.is_empty() { 0 } else { groups.len() }];
+        parallel::each_chunk(&mut commons, MANY, &|part, commons| {
+            let groups = &groups[part * MANY..];
+            commons.iter_mut().zip(groups).for_each(|(common, &group)| *common = numbers[group as usize]);
+        });
         let (batch_ptr, sets, members) = (vec![0], Vec::new(), vec![Vec::new()]);
         let mut incidence =
             Self { groups, positions, by_node, node_ptr, batch_ptr, commons, group_with, sets, members };

@@ -7,18 +7,18 @@ use std::time::Instant;
 
 use faer::{MatMut, MatRef};
 
-use super::batch::Gathered;
 use super::cofactors::{AtNode, Cofactors, GroupCofactors};
 use super::contribution::unpack;
 use super::dense::invert_front;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::options::InvertOptions;
-use super::panels::{Handover, Panels, lock};
+use super::panels::{Handover, Panels};
 use super::selected::SelectedInverse;
 use super::symbolic::Symbolic;
 use super::system::System;
 use super::watch::{Between, Control, watched};
+use crate::parallel::lock;
 use crate::{Stopped, Threads};
 
 /// Cofactors with the selected inverse that they come from.
@@ -36,16 +36,15 @@ impl System {
     /// Computes all cofactors.
     ///
     /// `equations` and `prior` must be those that the factor comes from, and its damping zero.
-    pub fn invert<E: Equations>(
+    pub fn invert(
         &self,
         threads: &Threads,
         mut factor: Factor,
-        equations: &E,
+        equations: &dyn Equations,
         prior: &Prior,
         options: &InvertOptions<'_>,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Inversion> {
-        let equations: &dyn Gathered = equations;
         factor.forget();
         let Factor { mut panels, diagonal, .. } = factor;
         watched(threads, between, |control| {
@@ -73,7 +72,7 @@ type Front = Arc<Vec<f64>>;
 
 struct Walk<'a> {
     system: &'a System,
-    equations: &'a dyn Gathered,
+    equations: &'a dyn Equations,
     prior: &'a Prior,
     options: &'a InvertOptions<'a>,
     control: &'a Control,
@@ -88,7 +87,7 @@ impl Walk<'_> {
         let above = Handover::new(count);
         let at_node = Handover::new(count);
         let divided = panels.divide();
-        self.system.tree.downward(|index| {
+        self.system.tree.downward(&|index| {
             if !self.control.stopped()
                 && let Some(found) = self.visit(index, &mut lock(&divided[index]), &above)
             {

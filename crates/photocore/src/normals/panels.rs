@@ -1,8 +1,9 @@
 //! Block-sparse symmetric matrices, stored as the dense panels of a [`Symbolic`] pattern.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::symbolic::Symbolic;
+use crate::parallel::lock;
 
 /// The lower triangle of a symmetric matrix in the pattern of a factor: one column-major panel for each supernode.
 /// The strict upper triangle of a panel's own blocks carries no meaning.
@@ -60,9 +61,4 @@ impl<T> Handover<T> {
     pub fn into_values(self) -> impl Iterator<Item = Option<T>> {
         self.0.into_iter().map(|value| value.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
-}
-
-/// Locks what is never held while anything can panic on purpose: a panic elsewhere is passed on by the threads.
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -6,12 +6,12 @@
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
-use rayon::prelude::*;
 
 use super::factor::Factor;
 use super::symbolic::Symbolic;
 use super::watch::Control;
 use super::workspace::zeros;
+use crate::parallel;
 
 /// Right-hand sides, sorted by where they start.
 pub(super) struct Products<'a> {
@@ -99,7 +99,7 @@ impl<'a> Products<'a> {
             self.assemble(&mut front, s.height(), &columns, own, &children);
             drop(children);
             let (top, below) = factor.panel(index);
-            front.par_chunks_mut(TOGETHER * s.height()).for_each(|values| {
+            parallel::each_chunk(&mut front, TOGETHER * s.height(), &|_, values| {
                 let count = values.len() / s.height();
                 let all = MatMut::from_column_major_slice_mut(values, s.height(), count);
                 let (mut solved, coupled) = all.split_at_row_mut(s.width);
@@ -180,7 +180,7 @@ impl Tiles<'_> {
                 Some(_) => {}
             }
         }
-        targets.par_chunks_mut(TOGETHER).enumerate().for_each(|(tile, targets)| {
+        parallel::each_chunk(&mut targets, TOGETHER, &|tile, targets| {
             let begin = tile * TOGETHER;
             let (start, end) = split.map_or((0, begin + targets.len()), |_| (rows, columns.len()));
             for at in (start..end).step_by(TOGETHER) {

@@ -2,9 +2,6 @@
 
 use std::ops::ControlFlow;
 
-use rayon::prelude::*;
-
-use super::batch::Gathered;
 use super::eliminated::Elimination;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
@@ -13,7 +10,7 @@ use super::system::System;
 use super::vectorised::LANES;
 use super::watch::{Between, Control, watched};
 use super::workspace::{reserved, zeros};
-use crate::{Stopped, Threads};
+use crate::{Stopped, Threads, parallel};
 
 /// Right-hand sides that go through the factor together.
 const TOGETHER: usize = 16;
@@ -24,16 +21,15 @@ impl System {
     ///
     /// `equations` and `prior` must be those that the factor comes from. The equations are written again where the factor has not cached
     /// what the elimination of the local blocks has left; those of local blocks whose right-hand sides are all zero once only.
-    pub fn solve<E: Equations>(
+    pub fn solve(
         &self,
         threads: &Threads,
         factor: &Factor,
-        equations: &E,
+        equations: &dyn Equations,
         prior: &Prior,
         options: &SolveOptions<'_>,
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Vec<f64>> {
-        let equations: &dyn Gathered = equations;
         watched(threads, between, |control| {
             let elimination = self.elimination(factor, equations, prior, control);
             match options.rights {
@@ -56,7 +52,7 @@ impl System {
     pub(super) fn elimination<'a>(
         &'a self,
         factor: &'a Factor,
-        equations: &'a dyn Gathered,
+        equations: &'a dyn Equations,
         prior: &'a Prior,
         control: &'a Control,
     ) -> Elimination<'a> {
@@ -86,7 +82,7 @@ impl Elimination<'_> {
         let found = self.reduce::<C>(rights);
         // One after the other in a fixed order, whichever thread has found them.
         found.iter().for_each(|found| found.add_to(&mut others, count));
-        others.par_chunks_mut((TOGETHER * count).max(1)).for_each(|columns| {
+        parallel::each_chunk(&mut others, TOGETHER * count, &|_, columns| {
             if !self.control.stopped() {
                 factor.solve_columns(columns);
             }

@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::graph::{Graph, MANY};
 use super::layout::Layout;
 use super::ordering::Ordering;
+use crate::parallel;
 
 /// The order of elimination and the pattern of the factor of the reduced normal equations.
 ///
@@ -86,7 +85,7 @@ impl Symbolic {
         let tried: Vec<(Ordering, f64, Vec<usize>)> = if graph.len() < MANY {
             candidates.iter().map(try_out).collect()
         } else {
-            candidates.par_iter().map(try_out).collect()
+            parallel::map_each(candidates.iter().collect(), &try_out)
         };
         let predictions = tried.iter().map(|&(candidate, operations, _)| (candidate, operations)).collect();
         let best = tried.into_iter().min_by(|(_, a, _), (_, b, _)| a.total_cmp(b));

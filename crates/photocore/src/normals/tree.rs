@@ -50,11 +50,11 @@ impl Tree {
     }
 
     /// Visits every supernode after all those below it.
-    pub fn upward(&self, visit: impl Fn(usize) + Sync) {
+    pub fn upward(&self, visit: &(dyn Fn(usize) + Sync)) {
         let waiting: Vec<AtomicUsize> =
             self.below.iter().map(|units| AtomicUsize::new(units.len())).collect();
         let start = |unit: usize| {
-            (self.first[unit]..unit).for_each(&visit);
+            (self.first[unit]..unit).for_each(visit);
             let mut index = unit;
             visit(index);
             // The last to arrive below a supernode goes on with it.
@@ -76,11 +76,11 @@ impl Tree {
     }
 
     /// Visits every supernode before all those below it.
-    pub fn downward(&self, visit: impl Fn(usize) + Sync) {
-        rayon::scope_fifo(|scope| self.roots.iter().for_each(|&root| self.descend(scope, root, &visit)));
+    pub fn downward(&self, visit: &(dyn Fn(usize) + Sync)) {
+        rayon::scope_fifo(|scope| self.roots.iter().for_each(|&root| self.descend(scope, root, visit)));
     }
 
-    fn descend<'a>(&'a self, scope: &ScopeFifo<'a>, unit: usize, visit: &'a (impl Fn(usize) + Sync)) {
+    fn descend<'a>(&'a self, scope: &ScopeFifo<'a>, unit: usize, visit: &'a (dyn Fn(usize) + Sync)) {
         scope.spawn_fifo(move |scope| {
             let mut unit = unit;
             while self.above[unit] {

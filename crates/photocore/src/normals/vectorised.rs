@@ -6,8 +6,8 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::layout::Layout;
 
-/// Work compiled for several sizes: rows R of a group, unknowns L of a local block and D of a retained block. R and D may be zero: then
-/// the size is known at run time only.
+/// Work compiled for several sizes: rows R of a group, unknowns L of a local block and D of a retained block. Those that are zero are
+/// known at run time only.
 ///
 /// Implementations are `#[inline(always)]`, and so is all that they call, iterators with long closures excepted: what is not inlined
 /// is not compiled for the machine.
@@ -17,7 +17,12 @@ pub(super) trait Kernel {
 
 /// Runs a kernel for the sizes of a layout; `retained_dim` is that of all retained blocks concerned, where they have the same.
 pub(super) fn run(layout: &Layout, retained_dim: Option<usize>, kernel: impl Kernel) {
-    Arch::new().dispatch(Sized { layout, retained_dim, kernel });
+    Arch::new().dispatch(Sized::<_, false> { layout, retained_dim, kernel });
+}
+
+/// The same of a kernel that local blocks of any size need only once.
+pub(super) fn run_for_any_local(layout: &Layout, retained_dim: Option<usize>, kernel: impl Kernel) {
+    Arch::new().dispatch(Sized::<_, true> { layout, retained_dim, kernel });
 }
 
 /// Runs a kernel that does not depend on sizes.
@@ -31,13 +36,14 @@ pub(super) fn size<const N: usize>(at_run_time: usize) -> usize {
     if N > 0 { N } else { at_run_time }
 }
 
-struct Sized<'a, K> {
+/// `ANY`: whether one kernel is for local blocks of any size, where there is none for the sizes of all.
+struct Sized<'a, K, const ANY: bool> {
     layout: &'a Layout,
     retained_dim: Option<usize>,
     kernel: K,
 }
 
-impl<K: Kernel> WithSimd for Sized<'_, K> {
+impl<K: Kernel, const ANY: bool> WithSimd for Sized<'_, K, ANY> {
     type Output = ();
 
     #[inline(always)]
@@ -46,6 +52,7 @@ impl<K: Kernel> WithSimd for Sized<'_, K> {
         match (self.layout.rows(), self.layout.local_dim(), self.retained_dim) {
             (2, 3, Some(6)) if const { S::F64_LANES > 1 } => self.kernel.run::<S, 2, 3, 6>(simd),
             (2, 3, Some(9)) if const { S::F64_LANES > 1 } => self.kernel.run::<S, 2, 3, 9>(simd),
+            _ if const { ANY } => self.kernel.run::<S, 0, 0, 0>(simd),
             (_, 3, _) => self.kernel.run::<S, 0, 3, 0>(simd),
             (_, 2, _) => self.kernel.run::<S, 0, 2, 0>(simd),
             _ => self.kernel.run::<S, 0, 1, 0>(simd),

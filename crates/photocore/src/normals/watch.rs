@@ -67,27 +67,36 @@ pub(super) fn watched<T: Send>(
         // One of the threads must not wait for another; whoever put it to work watches.
         return control.ended(work(&control));
     }
+    let (mut work, mut result) = (Some(work), None);
+    let mut work = || result = work.take().and_then(|work| work(&control));
+    if watch(threads, between, &control, &mut work).is_break() {
+        return ControlFlow::Break(Stopped::Interrupted);
+    }
+    // The work leaves its result unless it panics, and then the scope has passed the panic on.
+    control.ended(result)
+}
+
+/// The same for all work, whatever it is and leaves: what threads and channel are made of is compiled once.
+fn watch(
+    threads: &Threads,
+    between: Between<'_>,
+    control: &Control,
+    work: &mut (dyn FnMut() + Send),
+) -> ControlFlow<()> {
     let (sender, receiver) = channel();
     let mut flow = ControlFlow::Continue(());
-    let result = threads.pool().in_place_scope(|scope| {
-        let control = &control;
-        // A receiver that is gone has nothing to hear.
-        scope.spawn(move |_| drop(sender.send(work(control))));
-        loop {
-            match receiver.recv_timeout(PERIOD) {
-                Ok(result) => return result,
-                Err(RecvTimeoutError::Disconnected) => return None,
-                Err(RecvTimeoutError::Timeout) if flow.is_continue() => {
-                    flow = between(control.done.load(Relaxed));
-                    control.stopped.fetch_or(flow.is_break(), Relaxed);
-                }
-                Err(RecvTimeoutError::Timeout) => {}
+    threads.pool().in_place_scope(|scope| {
+        scope.spawn(move |_| {
+            work();
+            // A receiver that is gone has nothing to hear.
+            let _ = sender.send(());
+        });
+        while let Err(RecvTimeoutError::Timeout) = receiver.recv_timeout(PERIOD) {
+            if flow.is_continue() {
+                flow = between(control.done.load(Relaxed));
+                control.stopped.fetch_or(flow.is_break(), Relaxed);
             }
         }
     });
-    if flow.is_break() {
-        return ControlFlow::Break(Stopped::Interrupted);
-    }
-    // The work sends its result unless it panics, and then the scope has passed the panic on.
-    control.ended(result)
+    flow
 }

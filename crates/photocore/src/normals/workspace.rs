@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use super::batch::Batch;
-use super::panels::lock;
+use crate::parallel::lock;
 
 /// For each supernode, and last for the local blocks without equations: V, v and L of every batch assembled there, one after
 /// the other; nothing where it is not cached.

@@ -9,7 +9,9 @@ use std::ops::ControlFlow;
 
 use num_complex::Complex64;
 use photocore::Threads;
-use photocore::adjustment::{AdjustError, Adjustment, Method, Model, Options, Problem, Status, Stop, adjust};
+use photocore::adjustment::{
+    AdjustError, Adjustment, Evaluated, Method, Model, Options, Problem, Status, Stop, adjust,
+};
 use photocore::normals::{GroupRows, Layout, Ordering, System};
 
 use problems::{Certified, PROBLEMS};
@@ -50,21 +52,27 @@ fn curve(name: &str, b: &[Complex64], x: f64) -> Complex64 {
     }
 }
 
+struct At<'a> {
+    model: &'a Curve<'a>,
+    parameters: Vec<f64>,
+}
+
 impl Model for Curve<'_> {
-    type Prepared = Vec<f64>;
-
-    fn prepare(&self, unknowns: &[f64]) -> Vec<f64> {
-        unknowns[FIRST..].to_vec()
+    fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
+        Box::new(At { model: self, parameters: unknowns[FIRST..].to_vec() })
     }
+}
 
-    fn observe(&self, parameters: &Vec<f64>, _: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let at: Vec<Complex64> = parameters.iter().map(|&value| value.into()).collect();
-        rows.constant[0] = self.y[group] - curve(self.name, &at, self.x[group]).re;
+impl Evaluated for At<'_> {
+    fn observe(&self, _: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let Curve { name, x, y } = self.model;
+        let at: Vec<Complex64> = self.parameters.iter().map(|&value| value.into()).collect();
+        rows.constant[0] = y[group] - curve(name, &at, x[group]).re;
         rows.local[0] = 0.0;
         for k in 0..at.len() {
             let mut beside = at.clone();
             beside[k].im = STEP;
-            rows.retained[k] = curve(self.name, &beside, self.x[group]).im / STEP;
+            rows.retained[k] = curve(name, &beside, x[group]).im / STEP;
         }
     }
 }

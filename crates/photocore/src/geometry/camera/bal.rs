@@ -36,7 +36,6 @@ impl CameraModel for Bal {
     const NAME: &'static str = "bal";
     const PARAMETERS: &'static [(&'static str, Unit)] =
         &[("f", Unit::Image), ("k1", Unit::One), ("k2", Unit::One)];
-    const IN_LINE: bool = true;
     const FORMULA: &'static str = "p = -(P1, P2) / P3, image = f (1 + k1 p^2 + k2 p^4) p";
 
     fn with_parameters([focal_length, k1, k2]: [f64; 3]) -> Self {

@@ -38,8 +38,6 @@ pub trait CameraModel: Copy {
     const LENS: LensDirection = LensDirection::Forward;
     /// Whether the second image coordinate counts downwards, as rows of pixels do.
     const DOWN: bool = false;
-    /// Whether the adjustment compiles its equations in line: for cameras of a few operations, where a call would show.
-    const IN_LINE: bool = false;
     /// Whether the adjustment computes several images side by side: for cameras without branches.
     const IN_LANES: bool = false;
 

@@ -32,7 +32,6 @@ impl CameraModel for Perspective {
 
     const NAME: &'static str = "perspective";
     const PARAMETERS: &'static [(&'static str, Unit)] = &[("c", Unit::Image)];
-    const IN_LINE: bool = true;
     const IN_LANES: bool = true;
     const FORMULA: &'static str = "image = c (P1, P2) / P3";
 

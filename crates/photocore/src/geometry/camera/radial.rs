@@ -26,7 +26,6 @@ impl CameraModel for Radial {
     const PARAMETERS: &'static [(&'static str, Unit)] =
         &[("f", Unit::Image), ("cx", Unit::Image), ("cy", Unit::Image), ("k1", Unit::One), ("k2", Unit::One)];
     const DOWN: bool = true;
-    const IN_LINE: bool = true;
     const FORMULA: &'static str = "p = (P1, -P2) / -P3, image = (cx, cy) + f (1 + k1 p^2 + k2 p^4) p";
 
     fn with_parameters([f, cx, cy, k1, k2]: [f64; 5]) -> Self {

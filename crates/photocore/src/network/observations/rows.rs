@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, SMatrix};
 
-use crate::geometry::{Matrix3, ObjectSpace, Orientation, Point, Pose, Steps, Vector3, local_vertical};
+use crate::geometry::{Matrix3, ObjectSpace, Orientation, POSE, Point, Pose, Steps, Vector3, local_vertical};
 use crate::network::commons::CommonState;
 
 /// The points, photos and common unknowns that an observation touches, each known by its place in [`super::Touches`], at given values
@@ -180,14 +180,14 @@ impl Rows<'_> {
         }
     }
 
-    fn by_pose<const N: usize>(&mut self, row: usize, photo: usize, partials: [SMatrix<f64, N, 1>; 6]) {
+    fn by_pose<const N: usize>(&mut self, row: usize, photo: usize, partials: [SMatrix<f64, N, 1>; POSE]) {
         let PhotoSite { block, parts, .. } = self.sites.photos[photo];
         if parts.is_empty() {
             for (k, partials) in partials.iter().enumerate() {
                 self.add(row, block, k, partials.iter());
             }
         }
-        let all = SMatrix::<f64, N, 6>::from_columns(&partials);
+        let all = SMatrix::<f64, N, POSE>::from_columns(&partials);
         for (block, steps) in parts {
             for (k, step) in steps.column_iter().enumerate() {
                 self.add(row, *block, k, (all * step).iter());

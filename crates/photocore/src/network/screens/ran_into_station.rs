@@ -1,7 +1,6 @@
 //! Points that run into a station while a network is adjusted.
 
 use super::leaving::{Ended, Leaves};
-use crate::adjustment::Model;
 use crate::network::Image;
 use crate::network::median::median;
 use crate::network::model::Bundle;
@@ -33,7 +32,7 @@ pub(super) fn look(ended: &Ended<'_>) -> Leaves {
 }
 
 /// A point much nearer to a station than the others.
-struct Approach {
+struct NearStation {
     point: usize,
     photo: usize,
     /// Its share in what the station learns, in those of the others in the mean.
@@ -63,9 +62,9 @@ impl Shares {
 impl Bundle {
     /// Points that have run into a station, or are on their way there: two rays that meet there ask for it.
     pub fn run_into_stations(&self, before: &[f64], after: &Stations) -> Vec<usize> {
-        let mut near = self.approaches(after);
+        let mut near = self.near_stations(after);
         if !near.is_empty() {
-            let before = self.prepare(before);
+            let before = self.evaluated(before);
             near.retain(|near| near.share > NEAR || self.is_same_place(near, &before, after));
         }
         near.dedup_by_key(|near| near.point);
@@ -76,7 +75,7 @@ impl Bundle {
     ///
     /// The image of a point turns by 1 / distance when point or station move; what its station learns from it, and loses again when
     /// the point is eliminated, is the square of that.
-    fn approaches(&self, stations: &Stations) -> Vec<Approach> {
+    fn near_stations(&self, stations: &Stations) -> Vec<NearStation> {
         let share = |point: usize, image: &Image| {
             let centre = stations.photos[image.photo].orientation.centre();
             (stations.points[point].position() - centre).norm_squared().recip()
@@ -89,17 +88,18 @@ impl Bundle {
         if !shares.iter().zip(&self.images_on).any(has_near) {
             return vec![];
         }
-        let approach = |point: usize, image: &Image| {
+        let near_station = |point: usize, image: &Image| {
             let photo = image.photo;
             let share = shares[photo].ratio(share(point, image), self.images_on[photo])?;
-            Some(Approach { point, photo, share })
+            Some(NearStation { point, photo, share })
         };
-        let of_point = |point| self.images_of(point).iter().filter_map(move |image| approach(point, image));
+        let of_point =
+            |point| self.images_of(point).iter().filter_map(move |image| near_station(point, image));
         (0..self.points.len()).flat_map(of_point).collect()
     }
 
     /// Whether nothing but its image on that photo tells a point from the station it is near to, a step having changed nothing in that.
-    fn is_same_place(&self, near: &Approach, before: &Stations, after: &Stations) -> bool {
+    fn is_same_place(&self, near: &NearStation, before: &Stations, after: &Stations) -> bool {
         let is_same = |image: &Image| {
             let images = [before, after].map(|stations| {
                 let station = stations.photos[near.photo].orientation.centre();

@@ -1,7 +1,7 @@
 //! Points that leave for infinity while a network is adjusted.
 
 use super::leaving::{Ended, FEW, Leaves};
-use crate::adjustment::{Method, Model, Status};
+use crate::adjustment::{Method, Status};
 use crate::network::Image;
 use crate::network::median::median;
 use crate::network::model::Bundle;
@@ -57,7 +57,7 @@ impl Bundle {
         if out.is_empty() {
             return out;
         }
-        let before = self.prepare(before);
+        let before = self.evaluated(before);
         let grown = (1.0 + GROWS) * (1.0 + GROWS);
         out.retain(|&point| squares[point] > grown * self.nearest(point, &before));
         if FEW * out.len() <= self.locals { out } else { vec![] }

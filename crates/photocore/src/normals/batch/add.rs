@@ -5,36 +5,47 @@ use pulp::Simd;
 use super::{Batch, Part};
 use crate::normals::front::{Columns, Strip};
 use crate::normals::layout::Layout;
-use crate::normals::vectorised::{Kernel, Rows, run, size};
+use crate::normals::vectorised::{Kernel, Rows, run_for_any_local, run_unsized, size};
 
 impl Batch {
     /// Adds what the elimination leaves to columns of the front of the node.
     pub fn add_to(&self, columns: &mut Columns<'_>, layout: &Layout) {
-        run(layout, self.retained_dim(), AddTo { batch: self, columns, rows: layout.rows() });
+        let (rows, l) = (layout.rows(), layout.local_dim());
+        run_for_any_local(layout, self.retained_dim(), AddSlots { batch: self, columns, rows, l });
+        if !self.segments.is_empty() {
+            run_unsized(AddSegments { batch: self, columns, rows, l });
+        }
     }
 
+    /// Adds what concerns main blocks alone.
     #[inline(always)]
-    fn add_sized<S: Simd, const L: usize, const D: usize>(
-        &self,
-        simd: S,
-        columns: &mut Columns<'_>,
-        rows: usize,
-    ) {
+    fn add_slots<S: Simd, const D: usize>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
         for (index, slot) in self.slots.iter().enumerate() {
             if !columns.contain(slot.row) {
                 continue;
             }
-            let v = self.slot_coupling::<L, D>(slot);
+            let v = self.slot_coupling::<D>(slot, l);
             let own = self.slot_rows::<D>(slot, rows);
             let constants = &self.constants[slot.constants..][..slot.groups.len() * self.locals.len() * rows];
             columns.add_difference(simd, own, v, self.locals.len());
             columns.add_equations(simd, own, constants);
             columns.subtract_right(simd, v, &self.reduced);
             for other in &self.slots[index + 1..] {
-                columns.add_product(simd, -1.0, self.slot_coupling::<L, D>(other), v);
+                columns.add_product(simd, -1.0, self.slot_coupling::<D>(other, l), v);
             }
+        }
+    }
+
+    /// Adds what segments that stand below their main blocks have in common with these.
+    #[inline(always)]
+    fn add_below_slots<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
+        for slot in &self.slots {
+            if !columns.contain(slot.row) {
+                continue;
+            }
+            let (v, own) = (self.slot_coupling::<0>(slot, l), self.slot_rows::<0>(slot, rows));
             for segment in self.segments.iter().filter(|segment| segment.row > slot.row) {
-                let taken = (-1.0, self.segment_coupling::<L>(segment), v);
+                let taken = (-1.0, self.segment_coupling(segment, l), v);
                 match segment.run_of(slot.groups.start) {
                     Some(run) => {
                         let shared = self.run_rows(segment, run, slot.groups.clone(), rows);
@@ -44,18 +55,14 @@ impl Batch {
                 }
             }
         }
-        if !self.segments.is_empty() {
-            self.add_parts::<S, D>(simd, columns, rows);
-            self.add_segments::<S, L, D>(simd, columns, rows);
-        }
     }
 
     /// Adds the products of what groups have in common with others, with itself and with their main blocks, that do not stand together
     /// with others.
     #[inline(always)]
-    fn add_parts<S: Simd, const D: usize>(&self, simd: S, columns: &mut Columns<'_>, rows: usize) {
+    fn add_parts<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize) {
         for slot in &self.slots {
-            let width = size::<D>(slot.dim);
+            let width = slot.dim;
             // Where each local block has one group on the main block, the equations of all of them stand one after the other.
             let together = if slot.groups.len() == 1 { self.locals.len() } else { 1 };
             let count = together * rows;
@@ -96,17 +103,12 @@ impl Batch {
 
     /// Adds what stands together in the columns of the segments, and takes off what the elimination takes there.
     #[inline(always)]
-    fn add_segments<S: Simd, const L: usize, const D: usize>(
-        &self,
-        simd: S,
-        columns: &mut Columns<'_>,
-        rows: usize,
-    ) {
+    fn add_segments<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
         for (index, segment) in self.segments.iter().enumerate() {
             if !columns.contain(segment.row) {
                 continue;
             }
-            let v = self.segment_coupling::<L>(segment);
+            let v = self.segment_coupling(segment, l);
             let taken = (-1.0, v, v);
             for (number, run) in segment.runs.iter().enumerate() {
                 let own = self.run_rows(segment, run, run.places.clone(), rows);
@@ -122,10 +124,10 @@ impl Batch {
             }
             columns.subtract_right(simd, v, &self.reduced);
             for other in &self.segments[index + 1..] {
-                columns.add_product(simd, -1.0, self.segment_coupling::<L>(other), v);
+                columns.add_product(simd, -1.0, self.segment_coupling(other, l), v);
             }
             for slot in self.slots.iter().filter(|slot| slot.row > segment.row) {
-                columns.add_product(simd, -1.0, self.slot_coupling::<L, D>(slot), v);
+                columns.add_product(simd, -1.0, self.slot_coupling::<0>(slot, l), v);
             }
         }
     }
@@ -140,15 +142,34 @@ fn add_below<S: Simd>(simd: S, columns: &mut Columns<'_>, a: Strip<'_>, b: Strip
     }
 }
 
-struct AddTo<'a, 'b> {
+struct AddSlots<'a, 'b> {
     batch: &'a Batch,
     columns: &'a mut Columns<'b>,
     rows: usize,
+    l: usize,
 }
 
-impl Kernel for AddTo<'_, '_> {
+impl Kernel for AddSlots<'_, '_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
-        self.batch.add_sized::<S, L, D>(simd, self.columns, size::<R>(self.rows));
+        self.batch.add_slots::<S, D>(simd, self.columns, size::<R>(self.rows), size::<L>(self.l));
+    }
+}
+
+/// Shared blocks have any size.
+struct AddSegments<'a, 'b> {
+    batch: &'a Batch,
+    columns: &'a mut Columns<'b>,
+    rows: usize,
+    l: usize,
+}
+
+impl Kernel for AddSegments<'_, '_> {
+    #[inline(always)]
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
+        let Self { batch, columns, rows, l } = self;
+        batch.add_below_slots(simd, columns, rows, l);
+        batch.add_parts(simd, columns, rows);
+        batch.add_segments(simd, columns, rows, l);
     }
 }

@@ -1,30 +1,18 @@
 //! The equations of a batch, gathered.
 
-use pulp::Simd;
+use smallvec::{SmallVec, smallvec};
 
 use super::{Batch, Place};
 use crate::normals::equations::{Equations, GroupRows};
 use crate::normals::system::System;
-use crate::normals::vectorised::{Kernel, run_unsized};
-
-/// Equations of any kind, gathered by one call for a whole batch: nothing else is compiled for each kind.
-pub(in crate::normals) trait Gathered: Equations {
-    /// Gathers the equations of local blocks of one pattern.
-    fn gather(&self, batch: &mut Batch, system: &System, locals: &[u32]);
-}
-
-impl<E: Equations> Gathered for E {
-    fn gather(&self, batch: &mut Batch, system: &System, locals: &[u32]) {
-        batch.place(system, locals);
-        run_unsized(Gather { batch, system, equations: self });
-    }
-}
 
 impl Batch {
-    #[inline(always)]
-    fn write(&mut self, system: &System, equations: &impl Equations) {
+    /// Gathers the equations of local blocks of one pattern.
+    pub fn gather(&mut self, equations: &dyn Equations, system: &System, locals: &[u32]) {
+        self.place(system, locals);
         let (rows, l) = (system.layout.rows(), system.layout.local_dim());
         let (depth, incidence) = (self.locals.len(), &system.incidence);
+        let mut groups: SmallVec<[u32; 32]> = smallvec![0; depth];
         for slot in &self.slots {
             // Where each local block has one group on the main block, all of them stand one after the other.
             let together = if slot.groups.len() == 1 { depth } else { 1 };
@@ -41,24 +29,12 @@ impl Batch {
                         shared: &mut self.shared_rows[shared + t * rows * width..][..count * width],
                     };
                     let locals = &self.locals[t..t + together];
-                    let group =
-                        |t: usize| incidence.groups_of(&system.layout, locals[t] as usize)[p] as usize;
-                    equations.write_alike(locals, group, &mut part);
+                    for (group, &local) in groups.iter_mut().zip(locals) {
+                        *group = incidence.groups_of(&system.layout, local as usize)[p];
+                    }
+                    equations.write_alike(locals, &groups[..together], &mut part);
                 }
             }
         }
-    }
-}
-
-struct Gather<'a, E> {
-    batch: &'a mut Batch,
-    system: &'a System,
-    equations: &'a E,
-}
-
-impl<E: Equations> Kernel for Gather<'_, E> {
-    #[inline(always)]
-    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, _: S) {
-        self.batch.write(self.system, self.equations);
     }
 }

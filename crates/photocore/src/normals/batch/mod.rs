@@ -15,7 +15,6 @@ use super::symbolic::Symbolic;
 use super::triangle::Triangle;
 use super::vectorised::{Rows, size};
 
-pub(super) use gather::Gathered;
 pub(super) use place::{parts_of, united};
 
 /// A main retained block that the local blocks are tied to.
@@ -157,18 +156,18 @@ impl Batch {
         self.slots.iter().all(|slot| slot.dim == dim).then_some(dim)
     }
 
-    /// The coupling to a main block, local block by local block.
+    /// The coupling of local blocks of l unknowns to a main block, local block by local block.
     #[inline(always)]
-    pub fn slot_coupling<const L: usize, const D: usize>(&self, slot: &Slot) -> Strip<'_> {
-        let (width, count) = (size::<D>(slot.dim), self.locals.len() * L);
+    pub fn slot_coupling<const D: usize>(&self, slot: &Slot, l: usize) -> Strip<'_> {
+        let (width, count) = (size::<D>(slot.dim), self.locals.len() * l);
         let values = &self.coupling[slot.coupling..];
         Strip { at: slot.row, rows: Rows { values, width, stride: width, count } }
     }
 
-    /// The coupling to a segment, local block by local block.
+    /// The coupling of local blocks of l unknowns to a segment, local block by local block.
     #[inline(always)]
-    pub fn segment_coupling<const L: usize>(&self, segment: &Segment) -> Strip<'_> {
-        let (width, count) = (segment.unknowns.len(), self.locals.len() * L);
+    pub fn segment_coupling(&self, segment: &Segment, l: usize) -> Strip<'_> {
+        let (width, count) = (segment.unknowns.len(), self.locals.len() * l);
         let values = &self.coupling[segment.coupling..];
         Strip { at: segment.row, rows: Rows { values, width, stride: width, count } }
     }

@@ -4,11 +4,8 @@ mod others;
 
 use std::time::Instant;
 
-use rayon::prelude::*;
-
 use self::others::Others;
-use super::batch::Gathered;
-use super::equations::Prior;
+use super::equations::{Equations, Prior};
 use super::incidence::Batches;
 use super::selected::SelectedInverse;
 use super::system::System;
@@ -16,6 +13,7 @@ use super::tie_equations::TieEquations;
 use super::vectorised::dot;
 use super::watch::Control;
 use super::workspace::zeros;
+use crate::parallel;
 
 pub(super) use others::AtNode;
 
@@ -136,7 +134,7 @@ impl AtNode {
     pub fn new(
         system: &System,
         index: usize,
-        equations: &dyn Gathered,
+        equations: &dyn Equations,
         prior: &Prior,
         control: &Control,
         front: &[f64],
@@ -150,7 +148,7 @@ impl AtNode {
         let part = |others: &mut Others, batches: Batches<'_>| {
             let (mut batch, mut part) = (system.workspace.batch(), Self::default());
             for run in batches.iter().take_while(|_| !control.stopped()) {
-                equations.gather(&mut batch, system, run);
+                batch.gather(equations, system, run);
                 batch.eliminate(layout, prior, 0.0);
                 others.gather(&batch, front, height);
                 others.cofactors(&batch, layout, &mut part);
@@ -162,7 +160,7 @@ impl AtNode {
         let mut found = if batches.locals() < MANY {
             part(&mut others(), batches)
         } else {
-            let parts: Vec<Self> = batches.parts(MANY / 16).into_par_iter().map_init(others, part).collect();
+            let parts = parallel::map_each_with(batches.parts(MANY / 16), others, part);
             parts.into_iter().fold(Self::default(), |mut all, part| {
                 all.local.extend(part.local);
                 all.equations.extend(part.equations);
@@ -182,7 +180,7 @@ impl AtNode {
 fn ties_at_node(
     system: &System,
     index: usize,
-    equations: &dyn Gathered,
+    equations: &dyn Equations,
     front: &[f64],
     height: usize,
 ) -> Vec<f64> {

@@ -40,19 +40,19 @@ pub(super) struct Others {
     by_group: bool,
 }
 
-/// Coefficients of C equations in consecutive unknowns.
+/// Coefficients of two equations in consecutive unknowns.
 #[derive(Clone, Copy)]
-struct Tied<'a, const C: usize> {
+struct Tied<'a> {
     /// The place of the first among the others.
     start: usize,
     width: usize,
     /// They go on for [`LANES`] elements at least.
-    x: [&'a [f64]; C],
+    x: [&'a [f64]; 2],
 }
 
-impl<'a, const C: usize> Tied<'a, C> {
+impl<'a> Tied<'a> {
     #[inline(always)]
-    fn coefficients(&self) -> [&'a [f64]; C] {
+    fn coefficients(&self) -> [&'a [f64]; 2] {
         self.x.map(|x| &x[..self.width])
     }
 }
@@ -126,20 +126,50 @@ impl Others {
         for (slot, &(_, start, _)) in batch.slots.iter().zip(&self.strips) {
             for (k, p) in slot.groups.clone().enumerate() {
                 let group = Group { t, slot, start, k, p, rows };
-                let diagonal = found.equations.len();
-                for row in (1..rows).step_by(2) {
-                    let leverages = self.leverages::<S, 2, L, D>(simd, batch, group, [row - 1, row], &own);
-                    found.equations.push(leverages[0][0]);
-                    found.equations.push(leverages[1][1]);
-                }
-                if rows % 2 == 1 {
-                    let [[leverage]] = self.leverages::<S, 1, L, D>(simd, batch, group, [rows - 1], &own);
-                    found.equations.push(leverage);
-                }
-                if self.by_group {
-                    self.group::<S, L, D>(simd, batch, group, &own, diagonal, found);
+                self.equations::<S, L, D>(simd, batch, group, &own, found);
+            }
+        }
+    }
+
+    /// a Q a^T of each equation of a group; where that is asked for, a Q b^T of every two of them besides.
+    #[inline(always)]
+    fn equations<S: Simd, const L: usize, const D: usize>(
+        &self,
+        simd: S,
+        batch: &Batch,
+        group: Group<'_>,
+        own: &[[f64; L]; L],
+        found: &mut AtNode,
+    ) {
+        let (rows, last) = (group.rows, group.rows - 1);
+        let (diagonal, block) = (found.equations.len(), found.leverages.len());
+        found.equations.resize(diagonal + rows, 0.0);
+        let count = if self.by_group { (rows * last / 2).max(1) } else { rows.div_ceil(2) };
+        if self.by_group {
+            found.leverages.resize(block + rows * rows, 0.0);
+        }
+        let [mut i, mut j] = [1.min(last), 0];
+        for _ in 0..count {
+            let leverages = self.leverages::<S, L, D>(simd, batch, group, [i, j], own);
+            found.equations[diagonal + i] = leverages[0][0];
+            found.equations[diagonal + j] = leverages[1][1];
+            if self.by_group {
+                for at in [i * rows + j, j * rows + i] {
+                    found.leverages[block + at] = leverages[0][1];
                 }
             }
+            [i, j] = match self.by_group {
+                true if j + 1 < i => [i, j + 1],
+                true => [i + 1, 0],
+                // Two at a time; the last of an odd number with itself.
+                false => [(j + 3).min(last), j + 2],
+            };
+        }
+        if self.by_group {
+            for i in 0..rows {
+                found.leverages[block + i * (rows + 1)] = found.equations[diagonal + i];
+            }
+            self.by_local::<L>(batch, group, found);
         }
     }
 
@@ -148,8 +178,8 @@ impl Others {
     fn reduce<const L: usize, const D: usize>(&mut self, batch: &Batch, t: usize) {
         let stride = self.stride;
         self.h.resize(L * stride, 0.0);
-        let slots = batch.slots.iter().map(|slot| batch.slot_coupling::<L, D>(slot));
-        let segments = batch.segments.iter().map(|segment| batch.segment_coupling::<L>(segment));
+        let slots = batch.slots.iter().map(|slot| batch.slot_coupling::<D>(slot, L));
+        let segments = batch.segments.iter().map(|segment| batch.segment_coupling(segment, L));
         for (v, &(_, start, _)) in slots.chain(segments).zip(&self.strips) {
             for d in 0..L {
                 let row = &v.rows.values[(t * L + d) * v.rows.width..][..v.rows.width];
@@ -231,19 +261,10 @@ impl Others {
         own
     }
 
-    /// The blocks of [`GroupCofactors`](super::GroupCofactors) of a group whose own equations are found from `diagonal` on.
+    /// What local blocks alone make of the leverages of a group (see [`GroupCofactors`](super::GroupCofactors)).
     #[inline(always)]
-    fn group<S: Simd, const L: usize, const D: usize>(
-        &self,
-        simd: S,
-        batch: &Batch,
-        group: Group<'_>,
-        own: &[[f64; L]; L],
-        diagonal: usize,
-        found: &mut AtNode,
-    ) {
+    fn by_local<const L: usize>(&self, batch: &Batch, group: Group<'_>, found: &mut AtNode) {
         let Group { t, p, rows, .. } = group;
-        let first = found.leverages.len();
         let along: SmallVec<[[f64; L]; 4]> = batch.local_rows::<L>(t, p, rows)[..rows]
             .iter()
             .map(|&(mut row)| {
@@ -251,32 +272,27 @@ impl Others {
                 row
             })
             .collect();
+        let first = found.by_local.len();
         found.by_local.resize(first + rows * rows, 0.0);
-        found.leverages.resize(first + rows * rows, 0.0);
         for i in 0..rows {
             for j in 0..=i {
-                let leverage = match i == j {
-                    true => found.equations[diagonal + i],
-                    false => self.leverages::<S, 2, L, D>(simd, batch, group, [i, j], own)[0][1],
-                };
                 for at in [first + i * rows + j, first + j * rows + i] {
                     found.by_local[at] = dot(&along[i], &along[j]);
-                    found.leverages[at] = leverage;
                 }
             }
         }
     }
 
-    /// a Q b^T of every two of some rows of a group.
+    /// a Q b^T of every two of two rows of a group.
     #[inline(always)]
-    fn leverages<S: Simd, const C: usize, const L: usize, const D: usize>(
+    fn leverages<S: Simd, const L: usize, const D: usize>(
         &self,
         simd: S,
         batch: &Batch,
         group: Group<'_>,
-        picked: [usize; C],
+        picked: [usize; 2],
         own: &[[f64; L]; L],
-    ) -> [[f64; C]; C] {
+    ) -> [[f64; 2]; 2] {
         let Group { t, slot, start, k, p, rows } = group;
         let dim = size::<D>(slot.dim);
         let local = batch.local_rows::<L>(t, p, rows);
@@ -284,23 +300,20 @@ impl Others {
         let at = (t * slot.groups.len() + k) * rows;
         let coefficients = &batch.slot_rows::<D>(slot, rows).rows.values[at * dim..];
         let retained = Tied { start, width: dim, x: picked.map(|row| &coefficients[row * dim..]) };
-        let mut form = [[simd.splat_f64s(0.0); C]; C];
+        let mut form = [[simd.splat_f64s(0.0); 2]; 2];
         self.tied(simd, &mut form, local, &[], retained);
-        match batch.parts(p) {
-            [] => {}
-            [part] => self.tied(simd, &mut form, local, &[retained], self.shared(batch, group, picked, part)),
-            parts => {
-                let mut before: SmallVec<[_; 4]> = smallvec![retained];
-                for part in parts {
-                    let shared = self.shared(batch, group, picked, part);
-                    self.tied(simd, &mut form, local, &before, shared);
-                    before.push(shared);
-                }
+        let parts = batch.parts(p);
+        if !parts.is_empty() {
+            let mut before: SmallVec<[_; 4]> = smallvec![retained];
+            for part in parts {
+                let shared = self.shared(batch, group, picked, part);
+                self.tied(simd, &mut form, local, &before, shared);
+                before.push(shared);
             }
         }
-        let mut found = [[0.0; C]; C];
-        for i in 0..C {
-            for j in 0..C {
+        let mut found = [[0.0; 2]; 2];
+        for i in 0..2 {
+            for j in 0..2 {
                 found[i][j] = 0.5 * simd.reduce_sum_f64s(simd.add_f64s(form[i][j], form[j][i]));
                 for d in 0..L {
                     found[i][j] += local[i][d] * dot(&own[d], local[j]);
@@ -312,13 +325,13 @@ impl Others {
 
     /// The coefficients of a part of what a group has in common with others, in some of its rows.
     #[inline(always)]
-    fn shared<'s, const C: usize>(
+    fn shared<'s>(
         &self,
         batch: &'s Batch,
         Group { t, p, rows, .. }: Group<'_>,
-        picked: [usize; C],
+        picked: [usize; 2],
         part: &Part,
-    ) -> Tied<'s, C> {
+    ) -> Tied<'s> {
         let Rows { values, width, stride, .. } = batch.part_rows(p, part, t * rows..(t + 1) * rows).rows;
         let start = self.strips[batch.slots.len() + part.segment].1 + part.shift;
         Tied { start, width, x: picked.map(|row| &values[row * stride..]) }
@@ -327,19 +340,19 @@ impl Others {
     /// Adds what coefficients x of further unknowns make of a Q a^T: (x Q + 2 y Q - 2 a H Q) x^T, a those of the local unknowns, and y
     /// those that were added before; in lanes. What they make of a Q b^T is the mean of two elements.
     #[inline(always)]
-    fn tied<S: Simd, const C: usize, const L: usize>(
+    fn tied<S: Simd, const L: usize>(
         &self,
         simd: S,
-        form: &mut [[S::f64s; C]; C],
-        a: [&[f64; L]; C],
-        before: &[Tied<'_, C>],
-        own: Tied<'_, C>,
+        form: &mut [[S::f64s; 2]; 2],
+        a: [&[f64; L]; 2],
+        before: &[Tied<'_>],
+        own: Tied<'_>,
     ) {
         let (stride, two) = (self.stride, simd.splat_f64s(2.0));
         for first in (0..own.width).step_by(LANES) {
             let column = own.start + first;
             let rows = |start: usize| &self.inverse[start * stride + column..];
-            let [mut local, mut others, mut along] = [[[simd.splat_f64s(0.0); LANES]; C]; 3];
+            let [mut local, mut others, mut along] = [[[simd.splat_f64s(0.0); LANES]; 2]; 3];
             add_rows(simd, &mut local, &self.hq[column..], stride, a.map(|a| &a[..]));
             for tied in before {
                 add_rows(simd, &mut others, rows(tied.start), stride, tied.coefficients());
@@ -348,10 +361,10 @@ impl Others {
             for k in 0..LANES / S::F64_LANES {
                 let places = S::as_simd_f64s(&PLACES).0[k];
                 let within = simd.less_than_f64s(places, simd.splat_f64s((own.width - first) as f64));
-                for j in 0..C {
+                for j in 0..2 {
                     let x = S::as_simd_f64s(&own.x[j][first..][..LANES]).0[k];
                     let x = simd.select_f64s(within, x, simd.splat_f64s(0.0));
-                    for i in 0..C {
+                    for i in 0..2 {
                         let twice = simd.mul_f64s(simd.sub_f64s(others[i][k], local[i][k]), two);
                         let sum = simd.add_f64s(along[i][k], twice);
                         form[i][j] = simd.mul_add_f64s(sum, x, form[i][j]);
@@ -365,18 +378,12 @@ impl Others {
 /// The places of the lanes.
 const PLACES: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
-/// Adds the sum over rows of x[row] times the start of the row, for each of C x, to sums.
+/// Adds the sum over rows of x[row] times the start of the row, for each of two x, to sums.
 #[inline(always)]
-fn add_rows<S: Simd, const C: usize>(
-    simd: S,
-    sums: &mut [[S::f64s; LANES]; C],
-    rows: &[f64],
-    stride: usize,
-    x: [&[f64]; C],
-) {
+fn add_rows<S: Simd>(simd: S, sums: &mut [[S::f64s; LANES]; 2], rows: &[f64], stride: usize, x: [&[f64]; 2]) {
     for (i, row) in rows.windows(LANES).step_by(stride).take(x[0].len()).enumerate() {
         let vectors = S::as_simd_f64s(row).0;
-        for c in 0..C {
+        for c in 0..2 {
             let factor = simd.splat_f64s(x[c][i]);
             for k in 0..LANES / S::F64_LANES {
                 sums[c][k] = simd.mul_add_f64s(vectors[k], factor, sums[c][k]);

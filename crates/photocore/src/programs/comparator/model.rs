@@ -2,7 +2,7 @@
 
 use super::Measurement;
 use super::measure::{Basis, Comparator, Placement};
-use crate::adjustment::Model;
+use crate::adjustment::{Evaluated, Model};
 use crate::normals::GroupRows;
 
 /// Plates compared with a comparator.
@@ -18,8 +18,8 @@ pub struct Comparison {
 }
 
 /// Points, cases and comparator at given values of the unknowns.
-#[derive(Debug)]
-pub struct Prepared {
+struct At<'a> {
+    comparison: &'a Comparison,
     points: Vec<[f64; 2]>,
     cases: Vec<Placement>,
     comparator: Comparator,
@@ -37,24 +37,25 @@ impl Comparison {
 }
 
 impl Model for Comparison {
-    type Prepared = Prepared;
-
-    fn prepare(&self, unknowns: &[f64]) -> Prepared {
+    fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
         let cases = unknowns.len() - 3 - 2 * self.basis.functions();
         let points = cases - 3 * self.left_handed.len();
-        Prepared {
+        Box::new(At {
+            comparison: self,
             points: unknowns[..points].as_chunks().0.to_vec(),
             cases: unknowns[points..cases].as_chunks().0.iter().map(|&case| Placement::from(case)).collect(),
             comparator: Comparator::from_unknowns(self.basis, &unknowns[cases..]),
-        }
+        })
     }
+}
 
-    fn observe(&self, prepared: &Prepared, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let Measurement { case, xy, .. } = self.measurements[group];
-        let swap = self.left_handed[case];
-        let [first, second] = prepared.points[local];
+impl Evaluated for At<'_> {
+    fn observe(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let Measurement { case, xy, .. } = self.comparison.measurements[group];
+        let swap = self.comparison.left_handed[case];
+        let [first, second] = self.points[local];
         let point = if swap { [second, first] } else { [first, second] };
-        let measured = prepared.comparator.measure(point, &prepared.cases[case]);
+        let measured = self.comparator.measure(point, &self.cases[case]);
         let width = measured.comparator[0].len();
         for row in 0..2 {
             rows.constant[row] = xy[row] - measured.xy[row];

@@ -32,7 +32,7 @@ impl Search<'_> {
         // Photos that failed, with the number of points they failed at.
         let mut failed = vec![0; self.given.photos.len()];
         let mut since = 0;
-        let mut settled = true;
+        let mut at_rest = true;
         loop {
             let next = (0..self.given.photos.len())
                 .filter(|&photo| model.poses[photo].is_none() && admitted(photo))
@@ -40,12 +40,12 @@ impl Search<'_> {
                 .filter(|&(known, photo)| known >= RESECTED && known > failed[photo])
                 .max_by_key(|&(known, photo)| (known, std::cmp::Reverse(photo)));
             let Some((known, photo)) = next else {
-                if settled {
+                if at_rest {
                     return Ok(());
                 }
                 // What an adjustment moves into place may start others.
                 self.adjust(model)?;
-                (settled, since) = (true, 0);
+                (at_rest, since) = (true, 0);
                 continue;
             };
             match self.resected(model, photo)? {
@@ -54,7 +54,7 @@ impl Search<'_> {
                     model.poses[photo] = Some((pose, Source::Resected));
                     self.place_points_of(model, photo);
                     since += 1;
-                    settled = false;
+                    at_rest = false;
                     if since >= 5.max(model.count() / 6) {
                         self.adjust(model)?;
                         since = 0;

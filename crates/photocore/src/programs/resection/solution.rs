@@ -1,10 +1,9 @@
 //! The adjusted photo.
 
 use super::degenerate::{Degeneracy, outside_cylinder};
-use super::model::SinglePhoto;
+use super::model::{At, SinglePhoto};
 use super::{Pose, Resection, Solved};
-use crate::adjustment::{Adjustment, Model, leading_matrix, standardized};
-use crate::geometry::Point;
+use crate::adjustment::{Adjustment, leading_matrix, standardized};
 
 /// A control point after the adjustment.
 #[derive(Debug, Clone, Copy)]
@@ -180,7 +179,7 @@ fn images(
 ) -> Vec<AdjustedImage> {
     let residuals = std::mem::take(&mut adjustment.residuals);
     let redundancy = adjustment.redundancy.take().unwrap_or_else(|| vec![f64::NAN; sd.len()]);
-    let (photo, points): (_, Vec<Point>) = model.prepare(unknowns);
+    let At { photo, points, .. } = model.evaluated(unknowns);
     let image = |index: usize| {
         let of = |values: &[f64]| [values[2 * index], values[2 * index + 1]];
         let (residual, redundancy, sd) = (of(&residuals), of(&redundancy), of(sd));

@@ -2,7 +2,7 @@
 
 use super::Station;
 use super::transform::Similarity;
-use crate::adjustment::Model;
+use crate::adjustment::{Evaluated, Model};
 use crate::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
 use crate::normals::GroupRows;
 
@@ -22,8 +22,8 @@ pub struct AsControl {
 }
 
 /// The unknowns, and the rotation with its partials.
-#[derive(Debug)]
-pub struct Prepared {
+struct At<'a> {
+    model: &'a AsControl,
     control: Vec<Vector3>,
     similarity: Similarity,
     /// Partials of A with respect to the three changes.
@@ -55,16 +55,15 @@ impl AsControl {
 }
 
 impl Model for AsControl {
-    type Prepared = Prepared;
-
-    fn prepare(&self, unknowns: &[f64]) -> Prepared {
+    fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
         let (control, changes) = unknowns.split_at(3 * self.observed.len());
         let (_, by_change) = rotation_with_partials([changes[0], changes[1], changes[2]]);
-        Prepared {
+        Box::new(At {
+            model: self,
             control: control.as_chunks().0.iter().map(|&x: &[f64; 3]| x.into()).collect(),
             similarity: self.similarity(changes),
             partials: by_change.map(|partial| partial * self.start.rotation),
-        }
+        })
     }
 
     /// Carries free control coordinates over from the model.
@@ -79,15 +78,16 @@ impl Model for AsControl {
         }
         true
     }
+}
 
-    #[inline(always)]
-    fn observe(&self, prepared: &Prepared, local: usize, _group: usize, rows: &mut GroupRows<'_>) {
-        let Similarity { rotation, scale, shift, .. } = prepared.similarity;
-        let control = &prepared.control[local];
+impl Evaluated for At<'_> {
+    fn observe(&self, local: usize, _group: usize, rows: &mut GroupRows<'_>) {
+        let Similarity { rotation, scale, shift, .. } = self.similarity;
+        let control = &self.control[local];
         let turned = rotation * control;
-        let by_change = prepared.partials.map(|partial| partial * control);
+        let by_change = self.partials.map(|partial| partial * control);
         for row in 0..3 {
-            rows.constant[row] = self.observed[local][row] - scale * turned[row] - shift[row];
+            rows.constant[row] = self.model.observed[local][row] - scale * turned[row] - shift[row];
             (0..3).for_each(|k| rows.local[3 * row + k] = scale * rotation[(row, k)]);
             let retained = &mut rows.retained[CHANGES * row..][..CHANGES];
             retained.fill(0.0);

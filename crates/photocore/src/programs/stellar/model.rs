@@ -1,11 +1,10 @@
 //! The observation equations of stars, with exact partials.
 
-use rayon::prelude::*;
-
 use super::{Attitude, COMMON, Calibration, Camera, INTERIOR, Image, PlateImage, StellarError, TAU, Weights};
-use crate::adjustment::Model;
+use crate::adjustment::{Evaluated, Model};
 use crate::geometry::Standard;
 use crate::normals::{GroupRows, Tie, TieRows};
+use crate::parallel;
 
 /// Root R, upper triangular, of a weight matrix P = R^T R.
 pub type Root = [[f64; 2]; 2];
@@ -269,17 +268,22 @@ impl Calibration {
 /// Images that a thread takes at least.
 const AT_LEAST: usize = 256;
 
-impl Model for StarImages<'_> {
-    type Prepared = Sight;
+/// The star images at given values of the unknowns.
+struct At<'a> {
+    model: &'a StarImages<'a>,
+    sight: Sight,
+}
 
-    fn prepare(&self, unknowns: &[f64]) -> Sight {
+impl Model for StarImages<'_> {
+    fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
         let mut sight = self.sight(unknowns);
         if let Partials::Exact = self.partials {
             // Normal equations are formed and solved with the same ones.
-            let images = self.calibration.images.par_iter().with_min_len(AT_LEAST);
-            sight.seen = images.map(|image| sight.standard(self.calibration, image)).collect();
+            let images = &self.calibration.images;
+            let standard = |image: usize| sight.standard(self.calibration, &images[image]);
+            sight.seen = parallel::map(images.len(), AT_LEAST, standard);
         }
-        sight
+        Box::new(At { model: self, sight })
     }
 
     /// Computes directions that are not known afresh from their first images.
@@ -294,10 +298,13 @@ impl Model for StarImages<'_> {
         }
         true
     }
+}
 
-    fn observe(&self, sight: &Sight, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let found = self.image(sight, self.images[group]);
-        let (root, shear) = (self.roots[group], self.shear(self.stars[local]));
+impl Evaluated for At<'_> {
+    fn observe(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let Self { model, sight } = self;
+        let found = model.image(sight, model.images[group]);
+        let (root, shear) = (model.roots[group], model.shear(model.stars[local]));
         for (row, root) in root.iter().enumerate() {
             let mix = |a: f64, b: f64| root[0] * a + root[1] * b;
             let [ra, dec] = [0, 1].map(|k| mix(found.star[0][k], found.star[1][k]));
@@ -312,12 +319,14 @@ impl Model for StarImages<'_> {
         }
     }
 
-    fn observe_tie(&self, sight: &Sight, tie: usize, rows: &mut TieRows<'_>) {
-        let (tied, Tie { retained, .. }) = &self.ties[tie];
+    fn observe_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+        let Self { model, sight } = self;
+        let calibration = model.calibration;
+        let (tied, Tie { retained, .. }) = &model.ties[tie];
         rows.coefficients.fill(0.0);
         match tied {
             Tied::Axis(root) => {
-                let Some(found) = sight.axis(self.calibration) else { return rows.constant.fill(0.0) };
+                let Some(found) = sight.axis(calibration) else { return rows.constant.fill(0.0) };
                 let columns = rows.coefficients.as_chunks_mut::<{ 3 + COMMON }>().0;
                 for ((root, constant), columns) in root.iter().zip(&mut *rows.constant).zip(columns) {
                     let mix = |a: f64, b: f64| root[0] * a + root[1] * b;
@@ -327,10 +336,10 @@ impl Model for StarImages<'_> {
                 }
             }
             Tied::Parameters(row) => {
-                rows.constant[0] = self.calibration.off_given(sight, *row);
-                for (parameter, _, element) in self.calibration.weighted(*row) {
+                rows.constant[0] = calibration.off_given(sight, *row);
+                for (parameter, _, element) in calibration.weighted(*row) {
                     // Every block but the last has three unknowns.
-                    let attitude = (parameter / 3).min(self.calibration.pointings.len());
+                    let attitude = (parameter / 3).min(calibration.pointings.len());
                     let before = retained.iter().take_while(|&&block| (block as usize) < attitude).count();
                     rows.coefficients[3 * before + parameter - 3 * attitude] = element;
                 }

@@ -1,0 +1,168 @@
+//! The bundle as a model of the adjustment, and at given values of its unknowns.
+
+use super::in_lanes::{FEWEST, Sight, write_in_lanes};
+use super::model::Bundle;
+use super::parts::MOTIONS;
+use super::stations::{Station, Stations, write};
+use crate::adjustment::{Evaluated, Model, Motions, Term};
+use crate::geometry::angle_axis::rotation_angle_axis;
+use crate::geometry::camera::{CameraModel, each_camera};
+use crate::geometry::{AttitudeNumbers, Vector3};
+use crate::normals::{GroupRows, TieRows};
+
+/// A bundle at given values of the unknowns.
+pub(super) struct At<'a> {
+    pub bundle: &'a Bundle,
+    pub stations: Stations,
+}
+
+impl Bundle {
+    /// The equations of an image.
+    pub(super) fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        let image = &self.images[group];
+        match &stations.bent {
+            None => {
+                let Station { orientation, camera } = &stations.photos[image.photo];
+                let point = &stations.points[local];
+                each_camera!(camera, camera => write(orientation, camera, point, image, rows));
+            }
+            Some(bent) => self.observe_bent((stations, bent), image, local, rows),
+        }
+    }
+
+    /// The equations of a tie.
+    pub(super) fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut TieRows<'_>) {
+        let Some(observation) = tie.checked_sub(self.tied_images()) else {
+            return self.observe_tied_image(stations, self.start[self.locals] + tie, rows);
+        };
+        let own = &self.observations[observation];
+        self.with_tied(stations, |model| own.write(model, rows.constant, rows.coefficients));
+    }
+}
+
+impl Model for Bundle {
+    fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
+        Box::new(At { bundle: self, stations: self.evaluated(unknowns) })
+    }
+
+    /// Angles of photos that step by a rotation vector go by way of their matrix.
+    fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
+        let start = self.of_stations().start + 3;
+        let turn = |photo: usize| {
+            let (first, sense) = (start + self.first[photo], self.turning_sense(photo)?);
+            let [angles, rho] = [&*unknowns, step].map(|values| std::array::from_fn(|k| values[first + k]));
+            Some((first, sense.stepped(angles, &Vector3::from(rho))))
+        };
+        let turned: Vec<(usize, [f64; 3])> = (0..self.cameras.len()).filter_map(turn).collect();
+        unknowns.iter_mut().zip(step).for_each(|(x, dx)| *x += dx);
+        turned.into_iter().for_each(|(first, angles)| unknowns[first..first + 3].copy_from_slice(&angles));
+    }
+
+    /// Attitudes that step by a rotation vector are that apart, A^T B = Exp(rho).
+    fn step_between(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
+        let mut step: Vec<f64> = to.iter().zip(from).map(|(to, from)| to - from).collect();
+        let start = self.of_stations().start + 3;
+        for photo in 0..self.cameras.len() {
+            let Some(sense) = self.turning_sense(photo) else { continue };
+            let first = start + self.first[photo];
+            let attitude = |values: &[f64]| {
+                let angles = std::array::from_fn(|k| values[first + k]);
+                AttitudeNumbers::OmegaPhiKappa(sense).attitude(angles)
+            };
+            let turn = rotation_angle_axis(&attitude(from).tr_mul(&attitude(to)));
+            step[first..first + 3].copy_from_slice(turn.as_slice());
+        }
+        step
+    }
+
+    fn terms(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Term> {
+        let mut all = self.weighted_angles(values, prior, sd);
+        if !self.camera_priors.is_empty() {
+            all.extend(self.camera_priors.iter().map(|own| own.equations(values, prior)));
+            all.sort_by_key(|own| own.first);
+        }
+        all
+    }
+
+    /// Intersects the points anew.
+    fn relocate(&self, unknowns: &mut [f64]) -> bool {
+        let photos = self.of_stations();
+        let Ok(coordinates) = self.intersect(&self.photos(&unknowns[photos.clone()])) else { return false };
+        let (local, tied) = coordinates.split_at(self.locals);
+        unknowns[..photos.start].copy_from_slice(local.as_flattened());
+        unknowns[photos.end..].copy_from_slice(tied.as_flattened());
+        true
+    }
+
+    /// Cameras are determined together with what they are correlated with: attitudes, positions, heights.
+    fn ends_slowly(&self) -> bool {
+        !self.shared.is_empty()
+    }
+
+    /// Straight rays turn and stretch with everything else; what a frame carries may have known lengths.
+    fn groups_leave_open(&self) -> bool {
+        self.refraction.is_none() && self.mounts.is_empty()
+    }
+
+    fn motions(&self, unknowns: &[f64]) -> Option<Motions> {
+        if self.placed { None } else { self.rigid_motions(unknowns) }
+    }
+
+    fn all_motions(&self, unknowns: &[f64]) -> Option<Motions> {
+        self.rigid_motions(unknowns)
+    }
+
+    fn move_along(&self, unknowns: &mut [f64], amounts: &[f64]) {
+        self.move_rigidly(unknowns, amounts);
+    }
+}
+
+impl Evaluated for At<'_> {
+    fn observe(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+        self.bundle.observe(&self.stations, local, group, rows);
+    }
+
+    fn observe_alike(&self, locals: &[u32], groups: &[u32], sd: &[f64], rows: &mut GroupRows<'_>) -> bool {
+        let Self { bundle, stations } = self;
+        let sight = |t: usize| {
+            let group = groups[t] as usize;
+            let (image, sd) = (&bundle.images[group], [sd[2 * group], sd[2 * group + 1]]);
+            Sight { point: &stations.points[locals[t] as usize], image, sd }
+        };
+        // The main block of an image that is not mounted is its photo.
+        stations.bent.is_none() && locals.len() >= FEWEST && {
+            let Station { orientation, camera } = &stations.photos[bundle.images[groups[0] as usize].photo];
+            each_camera!(camera, camera => write_in_lanes(orientation, camera, locals.len(), &sight, rows))
+        }
+    }
+
+    fn misclose(&self, local: usize, group: usize, constant: &mut [f64]) -> bool {
+        let Self { bundle, stations } = self;
+        if stations.bent.is_some() {
+            return false;
+        }
+        let image = &bundle.images[group];
+        let Station { orientation, camera } = &stations.photos[image.photo];
+        let u = orientation.sight(&stations.points[local]);
+        constant.copy_from_slice(&each_camera!(camera, camera => camera.compare(&u, image.xy).0));
+        true
+    }
+
+    fn observe_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+        self.bundle.observe_tie(&self.stations, tie, rows);
+    }
+
+    fn collapsed(&self, before: &[f64]) -> Vec<usize> {
+        let Self { bundle, stations } = self;
+        if bundle.screens.ran_into_station { bundle.run_into_stations(before, stations) } else { vec![] }
+    }
+
+    fn run_off(&self, before: &[f64]) -> Vec<usize> {
+        let Self { bundle, stations } = self;
+        if bundle.screens.ran_off { bundle.lead_nowhere(before, stations) } else { vec![] }
+    }
+
+    fn carried(&self, tie: usize) -> Option<(usize, Vec<[f64; MOTIONS]>)> {
+        self.bundle.carried_by_motions(&self.stations, tie.checked_sub(self.bundle.tied_images())?)
+    }
+}
