@@ -53,11 +53,11 @@ def _module(path: Path, crate: Path) -> Module:
 
 
 def _code(path: Path) -> str:
-    """Return the text of a file without comments, visibilities and tests."""
+    """Return the text of a file without comments, texts, visibilities and tests."""
     if path.name in ("tests.rs", "golden.rs"):
         return ""
     text = re.split(r"#\[cfg\(test\)\]\s*mod \w+ \{", path.read_text(encoding="utf-8"))[0]
-    return re.sub(r"//[^\n]*|\(in [\w:]+\)", "", text)
+    return re.sub(r'//[^\n]*|\(in [\w:]+\)|"(?:[^"\\]|\\.)*"', "", text)
 
 
 def _flat(tree: str) -> list[str]:

@@ -109,7 +109,7 @@ def _inside(folder):
     return {file: {other for other in arrows if other in graph} for file, arrows in graph.items()}
 
 
-@pytest.mark.parametrize("folder", ["normals", "adjustment", "network"])
+@pytest.mark.parametrize("folder", ["normals", "adjustment", "network", "geometry", "programs"])
 def test_files_of_the_engine_name_each_other_in_no_circle(folder):
     inside = _inside(folder)
     assert len(inside) > 20

@@ -9,7 +9,7 @@ use super::linearized::Linearized;
 use super::loss::Reweighting;
 use super::method::{FIRST_DAMPING, Method, leaves_cofactors};
 use super::options::{Event, Iteration, Options, Phase, Status};
-use super::problem::{AnyProblem, Evaluated};
+use super::problem::{AnyProblem, Evaluated, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
 use crate::normals::{FactorOptions, InvertOptions, SolveOptions};
 use crate::{Stopped, Threads};
@@ -22,13 +22,13 @@ pub(crate) fn go_on(_: Event) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-impl AnyProblem<'_> {
+impl<M: Model> Problem<M> {
     /// Adjusts by least squares, on threads of its own; [`adjust`] takes those of its caller and tells what is going on.
     ///
     /// # Errors
     /// Unknowns that are not determined, or observations that cannot be computed; threads that cannot be started.
     pub fn adjust(&self, options: &Options) -> Result<Adjustment, AdjustError> {
-        adjust(self, options, &Threads::new(options.threads)?, &mut go_on)
+        adjust(self.any(), options, &Threads::new(options.threads)?, &mut go_on)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Rotations as one vector: its direction is the axis, its length the angle in radians.
 
-use super::{Matrix3, Vector3};
+use super::axes::{Matrix3, Vector3};
 
 /// Square of the angle below which the closed forms of (a - sin a) / a^3 and of 1/a^2 - cot(a/2) / (2a) lose digits, and their
 /// series do not.

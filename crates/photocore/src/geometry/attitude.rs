@@ -8,8 +8,8 @@
 use std::f64::consts::PI;
 
 use super::angle_axis::{angle_axis_rotation, right_jacobian_inverse, rotation_angle_axis};
+use super::axes::{Matrix3, Vector3};
 use super::rotation::{nearest_turns, rotation, rotation_angles};
-use super::{Matrix3, Vector3};
 
 /// The sense of omega, phi, kappa.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

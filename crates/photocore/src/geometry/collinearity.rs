@@ -5,9 +5,10 @@
 //! coordinates in geographic space, where omega, phi, kappa refer to the local vertical frame at the station.
 
 use super::attitude::RotationSense;
+use super::camera::Perspective;
+use super::orientation::Orientation;
 use super::projection::{Projection, View};
 use super::space::{ObjectSpace, Point};
-use super::{Orientation, Perspective};
 
 impl View {
     /// The photo at `position` (coordinates of the object space) with `attitude` omega, phi, kappa and the

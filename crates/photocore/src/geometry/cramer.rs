@@ -1,6 +1,6 @@
 //! Three linear equations.
 
-use super::{Matrix3, Vector3};
+use super::axes::{Matrix3, Vector3};
 
 /// x of A x = b by Cramer's rule; None when the determinant is below `tolerance` times its largest possible value (the product of
 /// the lengths of the columns), whatever the units of the columns.

@@ -3,8 +3,8 @@
 //! Geographic positions are (longitude east positive, latitude, height): radians, radians, the linear unit of
 //! the semi-axes.
 
-use super::GeometryError;
-use super::{Matrix3, Vector3};
+use super::axes::{Matrix3, Vector3};
+use super::error::GeometryError;
 
 /// An ellipsoid of revolution, never prolate.
 #[derive(Debug, Clone, Copy, PartialEq)]

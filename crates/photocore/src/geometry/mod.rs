@@ -33,10 +33,12 @@
 pub mod angle_axis;
 pub mod atmosphere;
 pub mod attitude;
+mod axes;
 pub mod camera;
 pub mod collinearity;
 pub mod cramer;
 pub mod ellipsoid;
+mod error;
 pub mod lens;
 pub mod nearest;
 pub mod orientation;
@@ -51,8 +53,10 @@ pub mod space;
 
 pub use angle_axis::{angle_axis_rotation, angle_axis_with_jacobian};
 pub use attitude::{AttitudeNumbers, RotationSense};
+pub use axes::{Matrix3, Vector3};
 pub use camera::{Bal, Brown, Camera, CameraModel, Image, Perspective, Unit};
 pub use ellipsoid::{Ellipsoid, local_vertical};
+pub use error::GeometryError;
 pub use lens::{Displacement, Distortion, Undistorted};
 pub use nearest::nearest;
 pub use orientation::{Orientation, PoseNumbers};
@@ -64,31 +68,3 @@ pub use refraction::{AirModel, Refraction, Vertical, Water, WaterModel};
 pub use rotation::{nearest_turns, rotation, rotation_angles, rotation_with_partials};
 pub use sky::{Air, Standard, Station};
 pub use space::{Lift, ObjectSpace, Point};
-
-/// Three components in cartesian axes.
-pub type Vector3 = nalgebra::Vector3<f64>;
-/// A matrix in cartesian axes.
-pub type Matrix3 = nalgebra::Matrix3<f64>;
-
-/// What geometry refuses.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum GeometryError {
-    /// Semi-axes that are not finite, or not 0 < b <= a.
-    #[error("a spheroid needs finite semi-axes with 0 < b <= a, not a = {a}, b = {b}")]
-    Semiaxes {
-        /// The semi-major axis as given.
-        a: f64,
-        /// The semi-minor axis as given.
-        b: f64,
-    },
-    /// A water level or refractive index that cannot be.
-    #[error(
-        "water needs a finite level and a finite refractive index of at least 1, not {level} and {index}"
-    )]
-    Water {
-        /// The level as given.
-        level: f64,
-        /// The index as given.
-        index: f64,
-    },
-}

@@ -2,12 +2,14 @@
 
 use nalgebra::Matrix6;
 
+use super::angle_axis::angle_axis_with_jacobian;
 use super::angle_axis::rotation_angle_axis;
 use super::attitude::{AttitudeNumbers, RotationSense};
+use super::axes::{Matrix3, Vector3};
 use super::ellipsoid::{local_vertical, local_vertical_turns};
+use super::pose::Pose;
 use super::pose::{POSE, column};
 use super::space::{Lift, ObjectSpace, Point};
-use super::{Matrix3, Pose, Vector3, angle_axis_with_jacobian};
 
 /// What the six unknowns of a photo's pose are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

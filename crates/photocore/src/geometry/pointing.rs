@@ -1,6 +1,6 @@
 //! The attitude alpha, omega, kappa of a camera under the sky (NOAA TR NOS 55, equation 19).
 
-use super::{Matrix3, Vector3};
+use super::axes::{Matrix3, Vector3};
 
 /// The matrix from north, east, zenith (left-handed) to x, y and axis of a diapositive; its determinant is -1.
 ///

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6xX, Vector6};
 
 use super::angle_axis::angle_axis_rotation;
-use super::{Matrix3, Vector3};
+use super::axes::{Matrix3, Vector3};
 
 /// Unknowns of a pose: three of the position, three of the attitude.
 pub const POSE: usize = 6;

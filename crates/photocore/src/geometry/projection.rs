@@ -1,10 +1,11 @@
 //! Projection: camera after pose after point, with the chain rule.
 
+use super::axes::Vector3;
+use super::camera::Perspective;
 use super::camera::{CameraModel, Image};
 use super::orientation::Orientation;
 use super::pose::POSE;
 use super::space::{Lift, Point};
-use super::{Perspective, Vector3};
 
 /// An orientation and its camera: everything of one photo that its image points share.
 #[derive(Debug, Clone, Copy)]

@@ -4,11 +4,12 @@
 //! frame at the camera by dZ = (K_a + K_w) D.D / dZ0, dZ0 = -up . D, which turns its ray by (K_a + K_w) tan alpha away from
 //! the nadir. The rigorous ray through water lifts it along the up at the point. `docs/refraction.md` derives both.
 
-use super::GeometryError;
 use super::atmosphere::{Air, SCALE_HEIGHT};
+use super::axes::{Matrix3, Vector3};
 use super::ellipsoid::local_vertical;
+use super::error::GeometryError;
+use super::orientation::Orientation;
 use super::space::{Lift, ObjectSpace, Point};
-use super::{Matrix3, Orientation, Vector3};
 
 /// Refractivity n - 1 of air at sea level (Saastamoinen 1974).
 const REFRACTIVITY: f64 = 277.0e-6;

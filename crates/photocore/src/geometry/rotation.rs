@@ -1,6 +1,6 @@
 //! Sequential rotations M = M_kappa M_phi M_omega (GIANT guide, section 5 of its specification).
 
-use super::{Matrix3, Vector3};
+use super::axes::{Matrix3, Vector3};
 
 /// The rotation matrix M(omega, phi, kappa), angles in radians.
 ///

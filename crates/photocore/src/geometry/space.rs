@@ -1,7 +1,7 @@
 //! The object space: coordinates of points and photos, and the cartesian positions that they stand for.
 
+use super::axes::{Matrix3, Vector3};
 use super::ellipsoid::Ellipsoid;
-use super::{Matrix3, Vector3};
 
 /// The coordinates in which positions of photos and points are given and adjusted.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,8 @@
 //! Backward cameras: what is measured is corrected, and compared with the central perspective.
 
 use super::inverse::{Matrix2, RadialLimit, inverted, times};
-use super::{CameraModel, Image, LensDirection, Perspective, Unit};
+use super::model::{CameraModel, Image, LensDirection, Unit};
+use super::perspective::Perspective;
 use crate::geometry::Vector3;
 
 /// A measured position as a lens corrects it, with the partials of that; the first index is x or y.

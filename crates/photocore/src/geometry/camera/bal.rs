@@ -1,7 +1,7 @@
 //! The camera of Bundler and of "Bundle Adjustment in the Large" (Agarwal, Snavely, Seitz and Szeliski 2010).
 
 use super::inverse::{RadialFactor, RadialLimit};
-use super::{CameraModel, Image, Unit};
+use super::model::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
 /// Radial distortion, forward: a function of ideal coordinates.

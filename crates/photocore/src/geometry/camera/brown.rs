@@ -1,6 +1,6 @@
 //! The camera of photogrammetric calibration certificates: Brown (1971), on measured coordinates.
 
-use super::Unit;
+use super::model::Unit;
 use super::backward::{BackwardModel, Corrected};
 use super::inverse::{RadialFactor, RadialLimit, from_radial};
 use super::radial_tangential::{Bent, RadialTangential, Terms, power_of};

@@ -3,7 +3,9 @@
 use super::brown::BrownTerms;
 use super::inverse::{RadialLimit, from_radial, times};
 use super::radial_tangential::Bent;
-use super::{CameraModel, Image, Matrix2, Perspective, Unit};
+use super::inverse::Matrix2;
+use super::model::{CameraModel, Image, Unit};
+use super::perspective::Perspective;
 use crate::geometry::Vector3;
 
 /// Radial terms that may be balanced, tangential ones, affinity and shear, forward: functions of ideal coordinates.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::{CameraModel, Image, Unit};
+use super::model::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
 /// EQUIRECTANGULAR of COLMAP: longitude and latitude in a picture of w by h pixels, which are never unknowns.

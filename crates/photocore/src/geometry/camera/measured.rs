@@ -2,7 +2,10 @@
 
 use super::backward::BackwardModel;
 use super::inverse::RadialLimit;
-use super::{Brown, BrownAffinityAfter, CameraModel, Ebner, Gruen, Image, LensDirection, OnComparator, Unit};
+use super::brown::{Brown, BrownAffinityAfter};
+use super::model::{CameraModel, Image, LensDirection, Unit};
+use super::on_comparator::OnComparator;
+use super::orthogonal::{Ebner, Gruen};
 use crate::geometry::Vector3;
 
 /// A backward camera that is compared where it is measured: residual = measured - the image that it has of u.

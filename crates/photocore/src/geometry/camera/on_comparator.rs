@@ -1,6 +1,6 @@
 //! Brown's camera whose plates are measured on a comparator that is calibrated itself (NOAA TR NOS 57, equations 34 and 63).
 
-use super::Unit;
+use super::model::Unit;
 use super::backward::{BackwardModel, Corrected};
 use super::brown::BrownTerms;
 use super::inverse::{Matrix2, RadialLimit, from_radial, inverted, times, way_back};

@@ -1,7 +1,8 @@
 //! The camera of OpenCV whose sensor is tilted (Scheimpflug).
 
 use super::inverse::{Matrix2, RadialLimit};
-use super::{CameraModel, Image, OpencvPinhole, Unit};
+use super::model::{CameraModel, Image, Unit};
+use super::vision::OpencvPinhole;
 use crate::geometry::{Matrix3, Vector3};
 
 /// [`OpencvPinhole`] with a sensor that is turned by `tau_x`, `tau_y` against the plane of the lens, as the documents of OpenCV have it:

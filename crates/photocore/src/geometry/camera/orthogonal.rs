@@ -1,6 +1,6 @@
 //! Corrections that are orthogonal over the format of the image: the 12 of Ebner (1976) and the 44 of Gruen (1978).
 
-use super::Unit;
+use super::model::Unit;
 use super::backward::{BackwardModel, Corrected};
 use super::inverse::{RadialLimit, way_back};
 

@@ -1,6 +1,6 @@
 //! The central perspective without distortion.
 
-use super::{CameraModel, Image, Unit};
+use super::model::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
 /// x = c u1/u3, y = c u2/u3, measured from the principal point. With either sign of c the camera looks along its -z axis (GIANT

@@ -1,7 +1,7 @@
 //! The camera of a star plate (NOAA TR NOS 55, equations 38 to 41), as blocks take it.
 
 use super::inverse::{RadialFactor, RadialLimit, from_radial};
-use super::{CameraModel, Image, Unit};
+use super::model::{CameraModel, Image, Unit};
 use crate::geometry::plate_lens::{Decentering, Form, Kind, PlateLens, Plated};
 use crate::geometry::{Displacement, Vector3};
 

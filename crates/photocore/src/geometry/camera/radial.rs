@@ -1,6 +1,8 @@
 //! RADIAL of COLMAP: radial distortion about a principal point, in pixels.
 
-use super::{Bal, CameraModel, Image, RadialLimit, Unit};
+use super::bal::Bal;
+use super::inverse::RadialLimit;
+use super::model::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
 /// Radial distortion, forward, in axes of computer vision: x right, y down, z forward.

@@ -9,7 +9,7 @@ use super::projections::{
     RayProjection, Seen, Stereographic as StereographicRays,
 };
 use super::radial_tangential::{Bent, Profile, RadialTangential, Terms};
-use super::{CameraModel, Image, Unit};
+use super::model::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
 /// What a parameter is.

@@ -20,9 +20,11 @@
 //! ```
 
 mod five_points;
+mod oriented;
 mod planar;
 
 pub use five_points::five_points;
+pub use oriented::Oriented;
 pub use planar::over_plane;
 
 use super::sampling::Samples;
@@ -32,25 +34,12 @@ use crate::geometry::{Matrix3, Vector3};
 const SAMPLES: usize = 80;
 /// Pairs by which a pose is judged at the most, evenly taken.
 const JUDGES: usize = 120;
-/// The part of the pairs that must fit: with a quarter of the images wrong, nearly half of the pairs are.
-const JUDGED: f64 = 0.4;
-/// A rival stays that fits at most this much worse,
+/// A rival stays that fits at most this much worse, unless it is like a better one.
 const RIVAL: f64 = 3.0;
-/// unless its direction cosines are as near as this to those of a better one.
-const SAME: f64 = 0.02;
 /// Rivals at the most.
 const MOST: usize = 3;
 /// Steps of a decomposition at the most.
 const STEPS: usize = 1000;
-
-/// The pose of the second photo in the axes of the first.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Oriented {
-    /// From the first projection centre to the second, of unit length.
-    pub base: Vector3,
-    /// A, second photo to first.
-    pub attitude: Matrix3,
-}
 
 /// A pose, and how well it fits.
 #[derive(Debug, Clone, Copy)]
@@ -59,43 +48,6 @@ pub struct Candidate {
     pub oriented: Oriented,
     /// What two fifths of the pairs of rays do not miss each other by, radians.
     pub misfit: f64,
-}
-
-impl Oriented {
-    /// Distances along two rays to where they pass each other, in bases.
-    pub fn distances(&self, [first, second]: &[Vector3; 2]) -> [f64; 2] {
-        let turned = self.attitude * second;
-        let normal = first.cross(&turned);
-        let square = normal.norm_squared();
-        [self.base.cross(&turned).dot(&normal) / square, self.base.cross(first).dot(&normal) / square]
-    }
-
-    /// The angle by which two rays miss each other, radians; 1 where they meet behind a photo.
-    pub fn misfit(&self, pair: &[Vector3; 2]) -> f64 {
-        let [first, second] = pair;
-        let turned = self.attitude * second;
-        let (in_first, in_second) = (self.base.cross(&turned), first.cross(&self.base));
-        let size = (in_first.norm_squared() + in_second.norm_squared()).sqrt();
-        if size == 0.0 || self.distances(pair).iter().any(|&distance| distance < 0.0) {
-            return 1.0;
-        }
-        first.dot(&in_first).abs() / size
-    }
-
-    /// The angle at which two rays meet, radians.
-    pub fn angle(&self, [first, second]: &[Vector3; 2]) -> f64 {
-        first.angle(&(self.attitude * second))
-    }
-
-    fn score(&self, pairs: &[[Vector3; 2]]) -> f64 {
-        let mut misfits: Vec<f64> = pairs.iter().map(|pair| self.misfit(pair)).collect();
-        let judge = (JUDGED * misfits.len() as f64) as usize;
-        *misfits.select_nth_unstable_by(judge, f64::total_cmp).1
-    }
-
-    fn is_like(&self, other: &Self) -> bool {
-        (self.attitude - other.attitude).amax() < SAME && (self.base - other.base).amax() < 5.0 * SAME
-    }
 }
 
 /// Poses of the second photo that explain pairs of unit rays, each in the axes of its photo: the best, and rivals that fit nearly as

@@ -5,7 +5,7 @@
 
 use nalgebra::SMatrix;
 
-use super::Oriented;
+use super::oriented::Oriented;
 use crate::geometry::{Matrix3, Vector3};
 
 /// Steps of the decompositions at the most.

@@ -2,7 +2,8 @@
 
 use super::degenerate::{Degeneracy, outside_cylinder};
 use super::model::{At, SinglePhoto};
-use super::{Pose, Resection, Solved};
+use super::solved::{Solved, absolute};
+use super::{Pose, Resection};
 use crate::adjustment::{Adjustment, leading_matrix, standardized};
 
 /// A control point after the adjustment.
@@ -162,12 +163,6 @@ impl Resection {
         let turned = |k: usize| (a.attitude[k] - b.attitude[k]).sin().abs() < SAME;
         (0..3).all(|k| turned(k) && (first[k] - second[k]).abs() < SAME * distance)
     }
-}
-
-/// A pose counted from the origin of the object space again.
-pub(super) fn absolute(values: &[f64], origin: [f64; 3]) -> Pose {
-    let local = Pose::from_unknowns(values);
-    local.counted_from(origin.map(|value| -value))
 }
 
 /// Residuals, test values and partials, image by image.

@@ -1,13 +1,12 @@
 //! Whether the control determines the seven parameters, and if not, why.
 
-use std::fmt;
-
 use nalgebra::DMatrix;
 
+use super::Station;
+use super::error::{Cause, SimilarityError};
 use super::model::{CHANGES, SCALE};
 use super::moments::EIGEN_STEPS;
 use super::transform::Similarity;
-use super::{SimilarityError, Station};
 use crate::geometry::{Matrix3, Vector3};
 
 /// A combination of parameters is not determined when a change of it moves the stations, in the known components, by less than this
@@ -17,48 +16,6 @@ const UNDETERMINED: f64 = 1e-6;
 const IN_LINE: f64 = 1e-5;
 /// And nearly so with this fraction.
 const NEARLY_IN_LINE: f64 = 1e-2;
-
-/// Why control does not determine the orientation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
-    /// The horizontal stations coincide in plan.
-    Coincident,
-    /// The stations with elevations are in a straight line in plan.
-    ElevationsInLine,
-    /// All stations are in a straight line in space.
-    StationsInLine,
-    /// Another deficiency of the geometry.
-    Singular,
-}
-
-impl Cause {
-    /// A name for it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Coincident => "coincident",
-            Self::ElevationsInLine => "elevations in line",
-            Self::StationsInLine => "stations in line",
-            Self::Singular => "singular",
-        }
-    }
-}
-
-impl fmt::Display for Cause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Coincident => {
-                "the stations with horizontal coordinates coincide in plan, so that kappa and the scale are open"
-            }
-            Self::ElevationsInLine => {
-                "the stations with elevations are in a straight line in plan, so that the tilt about it is open"
-            }
-            Self::StationsInLine => {
-                "the stations are in a straight line, so that the rotation about it is open"
-            }
-            Self::Singular => "the normal equations are singular",
-        })
-    }
-}
 
 /// Counts known components: seven at least, of these four horizontal (both X and Y among them) and three elevations. That is two
 /// horizontal pairs where they come in pairs (TB 19, section 6), but each coordinate counts by itself. A scale that is held takes the

@@ -4,10 +4,10 @@
 //! missing, and there is a limit of cycles.
 
 use super::crout::{Normal, gauss_crout};
-use super::determinacy::Cause;
+use super::error::{Cause, SimilarityError};
 use super::model::SCALE;
 use super::transform::{Parameters, Similarity};
-use super::{Method, Options, SimilarityError, Station};
+use super::{Method, Options, Station};
 use crate::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
 
 /// The cycles end when all three corrections of angles are at most this, in radians.

@@ -1,12 +1,12 @@
 //! The oriented model.
 
-use super::determinacy::Cause;
+use super::error::{Cause, SimilarityError};
 use super::model::AsControl;
 use super::published::{Cycles, Trace};
 use super::start::{Chosen, Started};
 use super::transform::{Matrix7, Similarity};
 use super::weights::Weighted;
-use super::{SimilarityError, Station, determinacy, misclosures};
+use super::{Station, determinacy, misclosures};
 use crate::adjustment::{Adjustment, Iteration, Problem, Status, leading_matrix};
 use crate::geometry::{Matrix3, Vector3};
 

@@ -57,6 +57,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod adjust;
 mod camera;
 mod cycle;
 mod hypotheses;
@@ -64,16 +65,12 @@ mod model;
 mod published;
 mod solution;
 
-use std::ops::ControlFlow;
-
 use thiserror::Error;
 
-use crate::adjustment::{self, AdjustError, Event, Linearized, Phase, Problem};
+use crate::Stopped;
+use crate::adjustment;
 use crate::geometry::Station;
-use crate::normals::{Layout, LayoutError, Ordering, System};
-use crate::{Stopped, Threads};
-
-use model::{Partials, StarImages};
+use crate::normals::LayoutError;
 
 pub use camera::{Attitude, Camera, Decentering, Form, INTERIOR, Kind, PlateImage};
 pub use hypotheses::{Agreement, Similarity, best_voted, hypotheses};
@@ -201,188 +198,4 @@ pub enum StellarError {
     /// More than can be numbered.
     #[error(transparent)]
     Layout(#[from] LayoutError),
-}
-
-impl Calibration {
-    /// Adjusts by least squares with exact partials, on threads of its own.
-    ///
-    /// # Errors
-    /// Those of [`Calibration::adjust_on`]; threads that cannot be started.
-    pub fn adjust(&self, options: &Options) -> Result<Solution, StellarError> {
-        self.adjust_on(options, &Threads::new(options.adjustment.threads)?, &mut adjustment::go_on)
-    }
-
-    /// The same on threads of the caller.
-    ///
-    /// `watch` is called on the calling thread; when it breaks, the adjustment stops.
-    ///
-    /// # Errors
-    /// A calibration that contradicts itself or leaves unknowns undetermined; an interruption.
-    pub fn adjust_on(
-        &self,
-        options: &Options,
-        threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Solution, StellarError> {
-        let problem = threads.install(|| self.problem(options.unit, Partials::Exact))?;
-        let adjusted = adjustment::adjust(&problem, &options.adjustment, threads, watch)
-            .map_err(|error| self.named(&problem, error, threads))?;
-        let mut whole = None;
-        if options.whole && adjusted.cofactors.is_some() {
-            let total = problem.layout().locals();
-            let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
-            let values = adjusted.unknowns.clone();
-            let normal = Linearized::form(&problem, None, values, vec![], threads, &mut between);
-            whole = of_parameters(&normal.map_err(|error| self.named(&problem, error, threads))?, &problem);
-        }
-        Solution::new(self, options, &problem, adjusted, whole)
-    }
-
-    /// The parameters that no image, no weight and not the axis touches at the initial values, fixed ones excepted: the centre of a
-    /// distortion that is zero.
-    ///
-    /// # Errors
-    /// A calibration that contradicts itself; stars without images at the initial values.
-    pub fn without_effect(&self, threads: &Threads) -> Result<Vec<usize>, StellarError> {
-        let problem = threads.install(|| self.problem(1.0, Partials::Exact))?;
-        let normal = self.formed(&problem, vec![], threads)?;
-        Ok(parameters_of(&problem, normal.without_effect(problem.layout())))
-    }
-
-    /// The normal equations at the initial values, some unknowns held.
-    fn formed(
-        &self,
-        problem: &Problem<StarImages<'_>>,
-        held: Vec<usize>,
-        threads: &Threads,
-    ) -> Result<Linearized, StellarError> {
-        let failed = |error| self.named(problem, error, threads);
-        let normal = Linearized::form(problem, None, problem.initial.clone(), held, threads, &mut go_on)
-            .map_err(failed)?;
-        if normal.sum_of_squares().is_finite() { Ok(normal) } else { Err(failed(AdjustError::NotFinite)) }
-    }
-
-    /// Says of which stars and parameters an error of the engine tells.
-    fn named(
-        &self,
-        problem: &Problem<StarImages<'_>>,
-        error: AdjustError,
-        threads: &Threads,
-    ) -> StellarError {
-        match error {
-            AdjustError::UndeterminedLocals(locals) => {
-                let mut stars: Vec<usize> = locals.iter().map(|&local| problem.model.stars[local]).collect();
-                stars.dedup();
-                StellarError::UndeterminedStars(stars)
-            }
-            // The initial values are those that leave parameters undetermined.
-            AdjustError::Undetermined(_) => {
-                let initial = problem.initial.clone();
-                let normal = Linearized::form(problem, None, initial, vec![], threads, &mut go_on);
-                let found = normal.map_or(vec![], |normal| normal.undetermined_unknowns(problem.layout()));
-                let named = found.into_iter().map(|unknowns| parameters_of(problem, unknowns));
-                StellarError::Undetermined(named.collect())
-            }
-            AdjustError::NotFinite => {
-                let sight = self.initial();
-                let rows: Vec<Rows> =
-                    (0..self.images.len()).map(|image| problem.model.image(&sight, image)).collect();
-                StellarError::NotFinite(self.unseen(&rows))
-            }
-            AdjustError::Stopped(stopped) => StellarError::Stopped(stopped),
-        }
-    }
-
-    /// The stars that have no image in the equations of all images.
-    fn unseen(&self, rows: &[Rows]) -> Vec<usize> {
-        let images = self.images.iter().zip(rows);
-        let lost = images.filter(|(_, rows)| rows.constant.iter().any(|value| !value.is_finite()));
-        let mut stars: Vec<usize> = lost.map(|(image, _)| image.star).collect();
-        stars.sort_unstable();
-        stars.dedup();
-        stars
-    }
-
-    /// Number of parameters: attitudes and common ones.
-    pub fn parameters(&self) -> usize {
-        3 * self.pointings.len() + COMMON
-    }
-
-    fn check(&self) -> Result<(), StellarError> {
-        let counts = (self.stars.len(), self.pointings.len());
-        if let Some(i) = self.images.iter().position(|i| i.star >= counts.0 || i.pointing >= counts.1) {
-            return Err(StellarError::Index(format!("image {i}")));
-        }
-        if self.axis.is_some_and(|axis| axis.pointing >= counts.1) {
-            return Err(StellarError::Index("the axis".into()));
-        }
-        if self.kind.lens.is_some_and(|lens| lens.parameter_names().len() > INTERIOR) {
-            return Err(StellarError::Lens);
-        }
-        let Weights { parameters, values, root } = &self.weights;
-        let count = parameters.len();
-        let known = parameters.iter().all(|&parameter| parameter < self.parameters());
-        if !known
-            || values.len() != count
-            || root.len() != count * count
-            || self.fixed.len() != self.parameters()
-        {
-            return Err(StellarError::Index("a weight".into()));
-        }
-        Ok(())
-    }
-
-    /// The least-squares problem: a local block for each star that is not held, and for each image of one that is; the catalogue
-    /// places are weights of decorrelated coordinates of the stars.
-    fn problem(&self, unit: f64, partials: Partials) -> Result<Problem<StarImages<'_>>, StellarError> {
-        self.check()?;
-        let model = StarImages::new(self, partials)?;
-        let layout = self.layout(&model)?;
-        let parameters = || self.pointings.iter().flatten().chain(&self.common).copied();
-        let locals = |place: fn(&Star) -> [f64; 2]| {
-            let unknowns = |&star: &usize| model.decorrelated(star, place(&self.stars[star]));
-            model.stars.iter().flat_map(unknowns).chain(parameters()).collect::<Vec<f64>>()
-        };
-        let free = |fixed: bool| if fixed { 0.0 } else { f64::INFINITY };
-        let of_star = |&star: &usize| match model.catalogue[star] {
-            Some([[first, _], [_, second]]) => [unit / first, unit / second],
-            None => [free(self.stars[star].fixed); 2],
-        };
-        let scale = self.kind.common_scale.then(|| 3 * self.pointings.len() + self.kind.scales()[1]);
-        let held = self.fixed.iter().enumerate().map(|(k, &fixed)| free(fixed || Some(k) == scale));
-        Ok(Problem {
-            observation_sd: vec![unit; layout.equations()],
-            sd: model.stars.iter().flat_map(of_star).chain(held).collect(),
-            prior: locals(|star| star.catalogue),
-            initial: locals(|star| star.place),
-            system: System::new(layout, Ordering::Auto)?,
-            model,
-        })
-    }
-
-    fn layout(&self, model: &StarImages<'_>) -> Result<Layout, LayoutError> {
-        let retained = model.images.iter().map(|&image| self.images[image].pointing as u32).collect();
-        let (count, common) = (model.images.len(), self.pointings.len() as u32);
-        let dims: Vec<usize> = self.pointings.iter().map(|_| 3).chain([COMMON]).collect();
-        Layout::new(2, 2, &dims, model.start.clone(), retained)?
-            .with_shared((0..=count).collect(), vec![common; count])?
-            .with_ties(model.ties.iter().map(|(_, tie)| tie.clone()).collect())?
-            .with_pairs((0..common).map(|pointing| [pointing, common]).collect())
-    }
-}
-
-/// Natural logarithm of the determinant of the normal equations reduced to the parameters, and the cofactors of every two parameters;
-/// None where some are not determined.
-fn of_parameters(normal: &Linearized, problem: &Problem<StarImages<'_>>) -> Option<(f64, Vec<f64>)> {
-    normal.log_determinant().map(|log_determinant| (log_determinant, normal.reduced_cofactors(problem)))
-}
-
-/// The parameters among unknowns.
-fn parameters_of(problem: &Problem<StarImages<'_>>, unknowns: Vec<usize>) -> Vec<usize> {
-    let first = problem.layout().all_locals().end;
-    unknowns.into_iter().map(|unknown| unknown - first).collect()
-}
-
-fn go_on(_: usize) -> ControlFlow<()> {
-    ControlFlow::Continue(())
 }

@@ -3,8 +3,9 @@
 //! Distortion is that of the image undistorted from the measurement, so that discrepancies live on the undistorted plate; the
 //! change of refraction with direction is neglected in the partials.
 
+use super::adjust::{of_parameters, parameters_of};
 use super::model::{Partials, Rows, Sight, Tolerances};
-use super::{Attitude, COMMON, Calibration, Camera, StellarError, of_parameters, parameters_of};
+use super::{Attitude, COMMON, Calibration, Camera, StellarError};
 use crate::Threads;
 use crate::adjustment::AdjustError;
 use crate::geometry::Displacement;

@@ -1,0 +1,144 @@
+//! The adjustment of a calibration.
+
+use std::ops::{ControlFlow, Range};
+
+use super::measure::Placement;
+use super::model::Comparison;
+use super::{Calibration, CalibrationError, Measurement, Solution};
+use crate::Threads;
+use crate::adjustment::{self, AdjustError, Adjustment, Event, Problem, leading_matrix};
+use crate::normals::{Layout, Ordering, System};
+
+impl Calibration {
+    /// Adjusts everything together by least squares. `watch` is called on the calling thread; when it breaks, the adjustment stops, on threads of its own.
+    ///
+    /// # Errors
+    /// Those of [`Calibration::adjust_on`]; threads that cannot be started.
+    pub fn adjust(&self, options: &adjustment::Options) -> Result<Solution, CalibrationError> {
+        self.adjust_on(options, &Threads::new(options.threads)?, &mut adjustment::go_on)
+    }
+
+    /// The same on threads of the caller.
+    ///
+    /// # Errors
+    /// A calibration that contradicts itself or leaves unknowns undetermined; an interruption.
+    pub fn adjust_on(
+        &self,
+        options: &adjustment::Options,
+        threads: &Threads,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Solution, CalibrationError> {
+        self.check()?;
+        let problem = threads.install(|| self.problem())?;
+        let cases = self.cases.len();
+        let adjusted =
+            adjustment::adjust(&problem, options, threads, watch).map_err(|error| match error {
+                AdjustError::UndeterminedLocals(points) => CalibrationError::UndeterminedPoints(points),
+                AdjustError::Undetermined(combinations) => CalibrationError::Undetermined(
+                    combinations
+                        .into_iter()
+                        .map(|blocks| {
+                            let (cases, comparator): (Vec<_>, Vec<_>) =
+                                blocks.into_iter().partition(|&block| block < cases);
+                            (cases, !comparator.is_empty())
+                        })
+                        .collect(),
+                ),
+                AdjustError::NotFinite => CalibrationError::NotFinite,
+                AdjustError::Stopped(stopped) => CalibrationError::Stopped(stopped),
+            })?;
+        Ok(Solution::new(&problem, adjusted))
+    }
+
+    fn check(&self) -> Result<(), CalibrationError> {
+        let expected = self.comparator.basis.functions();
+        let lengths = self.comparator.coefficients.iter().chain(&self.coefficient_sd).map(Vec::len);
+        if let Some(found) = lengths.into_iter().find(|&found| found != expected) {
+            return Err(CalibrationError::Coefficients { expected, found });
+        }
+        let outside = |m: &Measurement| m.case >= self.cases.len() || m.point >= self.points.len();
+        match self.measurements.iter().position(outside) {
+            Some(measurement) => Err(CalibrationError::Index(measurement)),
+            None => Ok(()),
+        }
+    }
+
+    /// The least-squares problem: grid points are local blocks of two, cases retained blocks of three, the comparator one that all share.
+    fn problem(&self) -> Result<Problem<Comparison>, CalibrationError> {
+        let mut order: Vec<usize> = (0..self.measurements.len()).collect();
+        order.sort_by_key(|&i| self.measurements[i].point);
+        let measurements: Vec<Measurement> = order.iter().map(|&i| self.measurements[i]).collect();
+        let start =
+            (0..=self.points.len()).map(|point| measurements.partition_point(|m| m.point < point)).collect();
+        let comparator = self.comparator.unknowns();
+        let dims: Vec<usize> = self.cases.iter().map(|_| 3).chain([comparator.len()]).collect();
+        let case_of = measurements.iter().map(|m| m.case as u32).collect();
+        let shared = vec![self.cases.len() as u32; measurements.len()];
+        let layout = Layout::new(2, 2, &dims, start, case_of)?
+            .with_shared((0..=measurements.len()).collect(), shared)?;
+        let points = self.points.iter().flat_map(|point| point.xy);
+        let cases = self.cases.iter().flat_map(|case| {
+            let Placement { rotation, translation: [x, y] } = case.placement;
+            [rotation, x, y]
+        });
+        let initial: Vec<f64> = points.chain(cases).chain(comparator).collect();
+        let free = vec![f64::INFINITY; 3 * self.cases.len() + 3];
+        let sd = self.points.iter().flat_map(|point| point.sd).chain(free);
+        Ok(Problem {
+            observation_sd: measurements.iter().flat_map(|m| m.sd).collect(),
+            system: System::new(layout, Ordering::Auto)?,
+            prior: initial.clone(),
+            initial,
+            sd: sd.chain(self.coefficient_sd.iter().flatten().copied()).collect(),
+            model: Comparison {
+                basis: self.comparator.basis,
+                left_handed: self.cases.iter().map(|case| case.left_handed).collect(),
+                measurements,
+                order,
+            },
+        })
+    }
+}
+
+impl Solution {
+    fn new(problem: &Problem<Comparison>, mut adjustment: Adjustment) -> Self {
+        let unknowns = std::mem::take(&mut adjustment.unknowns);
+        let layout = problem.layout();
+        let cofactors = adjustment.cofactors.take();
+        let prior_redundancy = adjustment.prior_redundancy.take();
+        let residuals = std::mem::take(&mut adjustment.residuals);
+        let redundancy = adjustment.redundancy.take();
+        let sum_of_squares = problem.sum_of_squares(&residuals)
+            + problem.any().terms(&unknowns).sum_of_squares(0..unknowns.len());
+        let cases = problem.model.left_handed.len();
+        let (placements, comparator) =
+            (layout.all_retained().start..layout.retained_range(cases).start, layout.retained_range(cases));
+        let missing = || vec![f64::NAN; comparator.len().pow(2)];
+        let (case_cofactors, comparator_cofactors) = match &cofactors {
+            Some(all) => (Some(&all.retained[..9 * cases]), all.retained[9 * cases..].to_vec()),
+            None => (None, missing()),
+        };
+        Self {
+            comparator: unknowns[comparator].to_vec(),
+            comparator_cofactors,
+            cases: unknowns[placements].as_chunks().0.iter().map(|&v| Placement::from(v)).collect(),
+            case_cofactors: squares(case_cofactors, cases),
+            points: unknowns[layout.all_locals()].as_chunks().0.to_vec(),
+            point_cofactors: squares(cofactors.as_ref().map(|all| &all.local[..]), layout.locals()),
+            point_redundancy: pairs(prior_redundancy.as_deref(), 0..layout.locals()),
+            residuals: problem.model.in_given_order(pairs(Some(&residuals), 0..layout.groups())),
+            redundancy: problem.model.in_given_order(pairs(redundancy.as_deref(), 0..layout.groups())),
+            sum_of_squares,
+            degrees_of_freedom: adjustment.counts.degrees_of_freedom(),
+            adjustment,
+        }
+    }
+}
+
+fn pairs(values: Option<&[f64]>, range: Range<usize>) -> Vec<[f64; 2]> {
+    range.map(|i| values.map_or([f64::NAN; 2], |values| [values[2 * i], values[2 * i + 1]])).collect()
+}
+
+fn squares<const N: usize>(values: Option<&[f64]>, count: usize) -> Vec<[[f64; N]; N]> {
+    (0..count).map(|k| leading_matrix(values.map(|all| &all[N * N * k..]))).collect()
+}

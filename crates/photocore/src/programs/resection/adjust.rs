@@ -1,0 +1,142 @@
+//! The adjustment of a photo.
+
+use std::ops::ControlFlow;
+
+use super::degenerate::Degeneracy;
+use super::model::SinglePhoto;
+use super::solution::Solution;
+use super::solved::Solved;
+use super::{ControlPoint, Pose, Resection, ResectionError};
+use crate::Threads;
+use crate::adjustment::{self, AdjustError, Event, Options, Problem};
+use crate::geometry::{ObjectSpace, rotation, rotation_angles};
+use crate::normals::{Layout, LayoutError, Ordering, System};
+
+impl Resection {
+    /// Adjusts the photo by least squares, on threads of its own.
+    ///
+    /// # Errors
+    /// Those of [`Resection::adjust_on`]; threads that cannot be started.
+    pub fn adjust(&self, options: &Options) -> Result<Solution, ResectionError> {
+        self.adjust_on(options, &Threads::new(options.threads)?, &mut adjustment::go_on)
+    }
+
+    /// The same on threads of the caller.
+    ///
+    /// Without initial values, every distinct pose that a direct method finds is adjusted. The one with the least sum of squares
+    /// is the solution; the others that fit about as well are told too (see [`Alternative`]).
+    ///
+    /// # Errors
+    /// A configuration that determines no pose, or an interruption by `watch`.
+    pub fn adjust_on(
+        &self,
+        options: &Options,
+        threads: &Threads,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Solution, ResectionError> {
+        let starts = match self.start {
+            Some(start) => {
+                // Rounding may hide from the adjustment that the points determine nothing.
+                if self.position.sd.iter().chain(&self.attitude.sd).all(|sd| sd.is_infinite()) {
+                    self.enough_points()?;
+                }
+                vec![start]
+            }
+            None => self.starts()?,
+        };
+        let mut solved: Vec<Solved> = Vec::new();
+        let mut failure = ResectionError::NoPlacement;
+        let mut undetermined = None;
+        for start in starts {
+            let mut adjusted = self.adjust_from(start, options, threads, watch);
+            if let (None, Some(turned)) = (self.start, adjusted.as_ref().ok().and_then(|a| self.upright(a))) {
+                adjusted = self.adjust_from(turned, options, threads, watch);
+            }
+            match adjusted {
+                Ok(adjusted) if self.start.is_none() && !adjusted.behind().is_empty() => {}
+                Ok(adjusted) => solved.push(adjusted),
+                Err(stop @ ResectionError::Stopped(_)) => return Err(stop),
+                Err(other) => {
+                    if let ResectionError::Undetermined(why) = other {
+                        undetermined = Some(why);
+                    }
+                    failure = other;
+                }
+            }
+        }
+        solved.sort_by(|a, b| {
+            b.converged().cmp(&a.converged()).then(a.sum_of_squares().total_cmp(&b.sum_of_squares()))
+        });
+        Solution::new(self, solved, undetermined).ok_or(failure)
+    }
+
+    fn adjust_from(
+        &self,
+        start: Pose,
+        options: &Options,
+        threads: &Threads,
+        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    ) -> Result<Solved, ResectionError> {
+        let origin = self.origin(&start);
+        let problem = threads.install(|| self.problem(&start, origin))?;
+        let adjusted = adjustment::adjust(&problem, options, threads, watch);
+        let adjustment = adjusted.map_err(|error| match error {
+            AdjustError::Stopped(stopped) => ResectionError::Stopped(stopped),
+            AdjustError::NotFinite => ResectionError::NotFinite,
+            AdjustError::Undetermined(_) | AdjustError::UndeterminedLocals(_) => {
+                ResectionError::Undetermined(self.degeneracy(&start))
+            }
+        })?;
+        Ok(Solved { problem, adjustment, start, origin })
+    }
+
+    /// The same pose with |phi| <= 90 degrees, where the iteration has led beyond and nothing is known of the angles.
+    fn upright(&self, solved: &Solved) -> Option<Pose> {
+        let Pose { position, attitude } = solved.pose();
+        let beyond = attitude[1].abs() > std::f64::consts::FRAC_PI_2;
+        let free = self.attitude.sd.iter().all(|sd| sd.is_infinite());
+        (beyond && free).then(|| Pose { position, attitude: rotation_angles(&rotation(attitude)) })
+    }
+
+    /// What is degenerate about the points seen from a pose.
+    fn degeneracy(&self, pose: &Pose) -> Degeneracy {
+        Degeneracy::of(&self.sight().points, &self.space.cartesian(pose.position))
+    }
+
+    /// Coordinates are counted from here while the photo is adjusted, so that no digits are lost in large ones.
+    fn origin(&self, start: &Pose) -> [f64; 3] {
+        match self.space {
+            ObjectSpace::Rectangular => start.position.map(f64::round),
+            ObjectSpace::Geographic(_) => [0.0; 3],
+        }
+    }
+
+    /// The least-squares problem: points are local blocks of three, the photo is the retained block of six.
+    fn problem(&self, start: &Pose, origin: [f64; 3]) -> Result<Problem<SinglePhoto>, LayoutError> {
+        let count = self.points.len();
+        let shifted = |point: &ControlPoint| ControlPoint {
+            coordinates: std::array::from_fn(|k| point.coordinates[k] - origin[k]),
+            ..*point
+        };
+        let points: Vec<ControlPoint> = self.points.iter().map(shifted).collect();
+        let layout = Layout::new(2, 3, &[6], (0..=count).collect(), vec![0; count])?;
+        let known = Pose { position: self.position.value, attitude: self.attitude.value };
+        let own: Vec<f64> = points.iter().flat_map(|point| point.coordinates).collect();
+        let with_photo = |pose: &Pose| [&own[..], &pose.counted_from(origin).unknowns()].concat();
+        let photo_sd = [self.position.sd, self.attitude.sd].concat();
+        Ok(Problem {
+            system: System::new(layout, Ordering::Input)?,
+            observation_sd: points.iter().flat_map(|point| point.xy_sd).collect(),
+            initial: with_photo(start),
+            prior: with_photo(&known),
+            sd: points.iter().flat_map(|point| point.sd).chain(photo_sd).collect(),
+            model: SinglePhoto {
+                space: self.space,
+                sense: self.sense,
+                principal_distance: self.principal_distance,
+                partials: self.partials,
+                points,
+            },
+        })
+    }
+}
