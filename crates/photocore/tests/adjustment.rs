@@ -187,7 +187,7 @@ fn a_bad_start_is_damped_and_a_good_one_is_not() {
     hold(&mut problem, &DATUM, 0.0);
     let near = run(&problem, &STRICT).unwrap();
     assert!(near.iterations.iter().all(|iteration| iteration.damping == 0.0));
-    assert_eq!(near.formations, near.iterations.len());
+    assert_eq!(near.effort.formations, near.iterations.len());
     for frame in 0..FRAMES {
         problem.initial[2 * POINTS + 3 * frame + 2] += 1.2 * noise(3 * frame + 1);
     }

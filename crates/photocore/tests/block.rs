@@ -141,7 +141,7 @@ fn a_photo_far_off_takes_no_digits_from_the_others() {
 fn points_behind_a_camera_are_told() {
     let block = sound();
     let seen = adjust(&block).unwrap();
-    assert!(seen.behind.is_empty());
+    assert!(seen.unseen.behind.is_empty());
     let mut upward = block.clone();
     for (photo, adjusted) in upward.photos.iter_mut().zip(&seen.photos) {
         (photo.pose, photo.sd) = (adjusted.pose, [0.0; 6]);
@@ -153,7 +153,7 @@ fn points_behind_a_camera_are_told() {
     }
     let expected: Vec<usize> =
         (0..block.images.len()).filter(|&image| block.images[image].photo == 2).collect();
-    assert_eq!(adjust(&upward).unwrap().behind, expected);
+    assert_eq!(adjust(&upward).unwrap().unseen.behind, expected);
 }
 
 #[test]
@@ -172,9 +172,9 @@ fn what_is_hardly_determined_is_named_and_ends() {
     }
     let solution = adjust(&block).unwrap();
     assert!(solution.adjustment.iterations.len() < 30);
-    let weak: Vec<usize> = solution.weak.iter().map(|&(photo, _)| photo).collect();
+    let weak: Vec<usize> = solution.weak.photos.iter().map(|&(photo, _)| photo).collect();
     assert!(
-        solution.weak.iter().any(|&(_, unknown)| unknown == 3),
+        solution.weak.photos.iter().any(|&(_, unknown)| unknown == 3),
         "omega: {weak:?} {:?}",
         solution.undetermined
     );

@@ -98,7 +98,7 @@ fn a_block_around_an_object_does_not_depend_on_its_axes() {
         let regular = adjust(&around(sense, &quarter, SD, 0.1)).unwrap();
         for solution in [&singular, &regular] {
             assert_eq!(solution.adjustment.status, Status::Converged);
-            assert!(solution.weak.is_empty() && solution.undetermined.is_none());
+            assert!(solution.weak.photos.is_empty() && solution.undetermined.is_none());
             assert!(solution.adjustment.iterations.len() < 12, "{:?}", solution.adjustment.iterations);
         }
         let ratio = singular.sums_of_squares.total() / regular.sums_of_squares.total();

@@ -50,7 +50,7 @@ fn a_file_of_bundle_adjustment_in_the_large_is_adjusted() {
     let text = fs::read_to_string(file).expect("the example of the Python package");
     let solution = collection::adjusted(&collection::read(&text).unwrap()).unwrap();
     assert_eq!(solution.adjustment.status, Status::Converged);
-    assert_eq!(solution.datum.len(), 7);
+    assert_eq!(solution.datum.held.len(), 7);
     assert!(solution.photos.iter().all(|photo| photo.camera[0] > 0.0 && photo.cofactors[60] > 0.0));
     assert!(collection::read("8 60 379 0 0").is_err());
 }

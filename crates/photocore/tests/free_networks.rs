@@ -155,8 +155,8 @@ fn a_network_without_control_is_adjusted_by_any_method() {
         let found = adjust(&network, method).unwrap();
         assert_eq!(found.adjustment.status, Status::Converged, "{method:?}");
         // The second photo has most images; no coordinate of another differs more than the fourth's X.
-        assert_eq!(found.datum[..6], [0, 1, 2, 3, 4, 5].map(|unknown| (1, unknown)));
-        assert_eq!(found.datum[6..], [(3, 0)]);
+        assert_eq!(found.datum.held[..6], [0, 1, 2, 3, 4, 5].map(|unknown| (1, unknown)));
+        assert_eq!(found.datum.held[6..], [(3, 0)]);
         let freedom = 2 * network.images.len() as i64 - (3 * POINTS + 6 * PHOTOS) as i64 + 7;
         assert_eq!(found.degrees_of_freedom, freedom);
         let redundancy: f64 = redundancies(&found).iter().sum();
@@ -294,7 +294,11 @@ fn cofactors_of_everything_go_over_to_any_datum() {
         assert!(
             there.variance_of_unit_weight.unwrap() / minimal.variance_of_unit_weight.unwrap() - 1.0 < 1e-9
         );
-        assert!(there.relative_error > 0.0 && there.relative_error < 1e-9, "{:e}", there.relative_error);
+        assert!(
+            there.datum.relative_error > 0.0 && there.datum.relative_error < 1e-9,
+            "{:e}",
+            there.datum.relative_error
+        );
     }
 }
 
@@ -394,7 +398,7 @@ fn known_attitudes_leave_place_and_scale_open() {
     let mut network = around();
     network.photos.iter_mut().for_each(|photo| photo.sd[3..].fill(0.01));
     let found = adjust(&network, FINE).unwrap();
-    assert_eq!(found.datum, [(1, 0), (1, 1), (1, 2), (3, 0)]);
+    assert_eq!(found.datum.held, [(1, 0), (1, 1), (1, 2), (3, 0)]);
     let redundancy: f64 = redundancies(&found).iter().sum();
     let of_angles: f64 = found.photos.iter().flat_map(|photo| &photo.redundancy).sum();
     assert!((redundancy + of_angles - found.degrees_of_freedom as f64).abs() < 1e-6);
@@ -428,7 +432,7 @@ fn geographic_networks_are_free_to_move_too() {
     }
     // Geocentric coordinates are good to a nanometre.
     let minimal = adjust(&network, Method::default()).unwrap();
-    assert_eq!((minimal.adjustment.status, minimal.datum.len()), (Status::Converged, 7));
+    assert_eq!((minimal.adjustment.status, minimal.datum.held.len()), (Status::Converged, 7));
     let inner = InnerConstraints {
         points: (0..POINTS).collect(),
         photos: (0..PHOTOS).collect(),

@@ -157,8 +157,8 @@ fn common_unknowns_move_with_a_free_network() {
     let mut go = |_| ControlFlow::Continue(());
     let minimal = adjust(&network).unwrap();
     assert_eq!(minimal.adjustment.status, Status::Converged);
-    assert_eq!(minimal.datum.len(), 6, "{:?}", minimal.datum);
-    assert!(minimal.datum.iter().all(|&(photo, _)| photo < 5), "frames are held, not photos on them");
+    assert_eq!(minimal.datum.held.len(), 6, "{:?}", minimal.datum.held);
+    assert!(minimal.datum.held.iter().all(|&(photo, _)| photo < 5), "frames are held, not photos on them");
 
     let datum = |points: std::ops::Range<usize>| {
         NetworkDatum::Inner(InnerConstraints { points: points.collect(), ..Default::default() })
@@ -212,13 +212,13 @@ fn common_unknowns_move_with_a_free_network() {
 fn the_base_of_a_rig_gives_the_scale() {
     let mut network = free(1.0);
     network.observations.push(base());
-    assert_eq!(adjust(&network).unwrap().datum.len(), 6);
+    assert_eq!(adjust(&network).unwrap().datum.held.len(), 6);
     // Three points at one height give the tilts.
     let mut upright = network.clone();
     upright.commons.push(common(CommonKind::Level, Vector3::zeros(), Matrix3::identity()));
     let level = |point: usize| OnLevel { point, level: 3, difference: noise(point), sd: 1e-3 }.into();
     upright.observations.extend([9, 10, 11].map(level));
-    assert_eq!(adjust(&upright).unwrap().datum.len(), 4);
+    assert_eq!(adjust(&upright).unwrap().datum.held.len(), 4);
 }
 
 /// Residuals of points on lines turn with the network where the axes of the lines do not: exact points, no residuals.
@@ -233,7 +233,7 @@ fn points_on_lines_that_are_exact() {
     let on_line = |point: usize| OnLine { point, line: 3, precision: deviations(&[1e-3, 2e-3]) }.into();
     network.observations.extend((6..9).map(on_line));
     let (found, mut at_the_end) = from_the_end(&network);
-    assert_eq!(adjust(&at_the_end).unwrap().datum.len(), 7);
+    assert_eq!(adjust(&at_the_end).unwrap().datum.held.len(), 7);
     let (first, second) = (None, SENSOR);
     let length = Vector3::from(found.commons[SENSOR].position).norm();
     at_the_end.observations.push(Base { first, second, length, sd: 1e-3 }.into());
@@ -241,7 +241,7 @@ fn points_on_lines_that_are_exact() {
     at_the_end.commons.push(common(CommonKind::PlumbLine, Vector3::new(x, y, z), Matrix3::identity()));
     let plumb = OnPlumbLine { point: 9, line: 4, precision: deviations(&[1e-3; 2]) };
     at_the_end.observations.push(plumb.into());
-    assert_eq!(adjust(&at_the_end).unwrap().datum.len(), 6, "one point on a plumb line says nothing");
+    assert_eq!(adjust(&at_the_end).unwrap().datum.held.len(), 6, "one point on a plumb line says nothing");
 }
 
 /// A strip along X, as uniform as asked for, with positions whose shift and drift are unknown.
@@ -275,8 +275,8 @@ fn strip(wiggle: f64) -> Network {
 
 #[test]
 fn positions_with_shift_and_drift_give_a_straight_strip_no_datum() {
-    assert_eq!(adjust(&strip(0.0)).unwrap().datum.len(), 7);
-    let held = adjust(&strip(0.4)).unwrap().datum.len();
+    assert_eq!(adjust(&strip(0.0)).unwrap().datum.held.len(), 7);
+    let held = adjust(&strip(0.4)).unwrap().datum.held.len();
     assert_eq!(held, 3, "shifts alone: the form of the line gives the rest");
 }
 
@@ -331,7 +331,7 @@ fn from_the_end(network: &Network) -> (Solution, Network) {
 
 /// What is open of a network without errors.
 fn open_of_exact(network: &Network) -> usize {
-    adjust(&from_the_end(network).1).unwrap().datum.len()
+    adjust(&from_the_end(network).1).unwrap().datum.held.len()
 }
 
 #[test]

@@ -441,7 +441,7 @@ fn redundancy_numbers_of_a_free_network_add_up() {
     network.points.iter_mut().for_each(|point| point.sd = [FREE; 3]);
     network.observations.clear();
     let solution = adjust(&network, Method::TrustRegion(Stop::Decrease(1e-10))).unwrap();
-    assert_eq!(solution.datum.len(), 7);
+    assert_eq!(solution.datum.held.len(), 7);
     let parameters = 3 + 2 + 3 + 1 + 9;
     let weighted = 1 + 2 + 2;
     let unknowns = (6 * PHOTOS + parameters + 3 * POINTS - 7) as i64;

@@ -256,7 +256,7 @@ fn a_star_that_is_held_ties_no_attitudes() {
         image.star = STARS + index;
     }
     let [shared, apart] = [shared, apart].map(|calibration| adjusted(&calibration).unwrap());
-    let work = |solution: &Solution| solution.adjustment.operations.factor;
+    let work = |solution: &Solution| solution.adjustment.effort.operations.factor;
     assert_eq!(work(&shared), work(&apart));
     let tied = adjusted(&night(false)).unwrap();
     assert!(work(&tied) > 1.5 * work(&shared), "{} {}", work(&tied), work(&shared));

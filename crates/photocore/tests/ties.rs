@@ -185,11 +185,11 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
     let threads = threads();
     let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
     assert_eq!(found.status, Status::Converged);
-    let (redundancy, formed) = (found.redundancy.take().unwrap(), found.formations);
+    let (redundancy, formed) = (found.redundancy.take().unwrap(), found.effort.formations);
     let all = (0..problem.layout().unknowns()).map(|unknown| (unknown, 1.0)).collect();
     let datum = Datum { carriers: all, left: vec![], relative: false };
     found.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go).unwrap();
-    assert_eq!(found.formations, formed + 1);
+    assert_eq!(found.effort.formations, formed + 1);
     let (free, cofactors) = (&found, found.cofactors.as_ref().unwrap());
     let a = design(&problem, &free.unknowns);
     let q = pseudo_inverse(&a);
@@ -228,10 +228,10 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
     // Without cofactors it is moved all the same, and nothing is factored.
     let bare = Options { covariance: false, ..options() };
     let mut moved = adjust(&problem, &bare, &threads, &mut go).unwrap();
-    let formations = moved.formations;
+    let formations = moved.effort.formations;
     moved.take_to(&problem, &bare, &datum, &problem.initial, &threads, &mut go).unwrap();
     assert!(moved.cofactors.is_none() && moved.redundancy.is_none());
-    assert_eq!(moved.formations, formations);
+    assert_eq!(moved.effort.formations, formations);
     let apart = moved.unknowns.iter().zip(&free.unknowns).map(|(x, other)| (x - other).abs());
     assert!(apart.fold(0.0, f64::max) < 1e-9);
 }

@@ -24,7 +24,7 @@ pub fn status_name(status: Status) -> &'static str {
 /// Predicted multiply-adds of a factorisation in each ordering that was tried.
 pub fn predictions<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    for (ordering, operations) in &adjustment.predictions {
+    for (ordering, operations) in &adjustment.effort.predictions {
         dict.set_item(ordering.name(), operations)?;
     }
     Ok(dict)
@@ -32,7 +32,7 @@ pub fn predictions<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bo
 
 /// Predicted multiply-adds of each phase.
 pub fn operations<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
-    let operations = adjustment.operations;
+    let operations = adjustment.effort.operations;
     let dict = PyDict::new(py);
     dict.set_item("reduction", operations.reduction)?;
     dict.set_item("factor", operations.factor)?;
@@ -42,7 +42,7 @@ pub fn operations<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bou
 
 /// Seconds spent in each phase.
 pub fn seconds<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
-    let seconds = adjustment.seconds;
+    let seconds = adjustment.effort.seconds;
     let dict = PyDict::new(py);
     dict.set_item("form", seconds.form)?;
     dict.set_item("factor", seconds.factor)?;

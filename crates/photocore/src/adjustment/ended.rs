@@ -4,7 +4,7 @@ use super::linearized::Inverted;
 use super::loss::Loss;
 use super::options::Status;
 use super::problem::AnyProblem;
-use super::result::{Adjustment, Seconds};
+use super::result::{Adjustment, Effort, Seconds};
 use crate::Threads;
 
 impl Adjustment {
@@ -40,12 +40,14 @@ impl Adjustment {
             datum: vec![],
             weak: vec![],
             collapsed: vec![],
-            operations: symbolic.operations(problem.layout()),
-            formations: 0,
-            seconds: Seconds::default(),
-            ordering: symbolic.ordering(),
-            predictions: symbolic.predictions().to_vec(),
-            order: symbolic.order().to_vec(),
+            effort: Effort {
+                operations: symbolic.operations(problem.layout()),
+                formations: 0,
+                seconds: Seconds::default(),
+                ordering: symbolic.ordering(),
+                predictions: symbolic.predictions().to_vec(),
+                order: symbolic.order().to_vec(),
+            },
         }
     }
 
@@ -88,8 +90,8 @@ impl Adjustment {
         self.cofactors = Some(inverted.cofactors);
         self.prior_redundancy = Some(inverted.prior_redundancy);
         self.lost = inverted.lost;
-        self.formations += 1;
-        self.seconds.add(&inverted.seconds);
+        self.effort.formations += 1;
+        self.effort.seconds.add(&inverted.seconds);
     }
 
     /// Sum of all redundancy numbers minus the degrees of freedom.

@@ -111,7 +111,7 @@ pub use part::PartError;
 pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem};
 pub use resistance::Classes;
 pub(crate) use result::gib;
-pub use result::{AdjustError, Adjustment, Seconds};
+pub use result::{AdjustError, Adjustment, Effort, Seconds};
 pub(crate) use run::go_on;
 pub use run::{Watch, adjust, adjust_by_groups, adjust_in_datum};
 pub use statistics::{Counts, Observed, leading_matrix, standardized};

@@ -35,6 +35,23 @@ impl Seconds {
     }
 }
 
+/// What an adjustment has taken, and in what order it has eliminated.
+#[derive(Debug, Clone)]
+pub struct Effort {
+    /// Predicted multiply-adds of each phase, once.
+    pub operations: Operations,
+    /// Formations and factorisations carried out.
+    pub formations: usize,
+    /// Time by phase.
+    pub seconds: Seconds,
+    /// The ordering in force.
+    pub ordering: Ordering,
+    /// The orderings that were compared, each with the predicted multiply-adds of a factorisation.
+    pub predictions: Vec<(Ordering, f64)>,
+    /// Retained blocks in the order of their elimination.
+    pub order: Vec<usize>,
+}
+
 /// The adjusted unknowns and how good they are.
 #[derive(Debug)]
 pub struct Adjustment {
@@ -80,18 +97,8 @@ pub struct Adjustment {
     pub redundancy_excess: Option<f64>,
     /// Counts for the degrees of freedom.
     pub counts: Counts,
-    /// Predicted multiply-adds of each phase, once.
-    pub operations: Operations,
-    /// Formations and factorisations carried out.
-    pub formations: usize,
-    /// Time by phase.
-    pub seconds: Seconds,
-    /// The ordering in force.
-    pub ordering: Ordering,
-    /// The orderings that were compared, each with the predicted multiply-adds of a factorisation.
-    pub predictions: Vec<(Ordering, f64)>,
-    /// Kept blocks in the order of their elimination.
-    pub order: Vec<usize>,
+    /// What it has taken.
+    pub effort: Effort,
 }
 
 impl Adjustment {
@@ -115,8 +122,8 @@ impl Adjustment {
         self.iterations.splice(0..0, before.iterations);
         self.history.splice(0..1, before.history);
         self.initial_sum_of_squares = before.initial_sum_of_squares;
-        self.formations += before.formations;
-        self.seconds.add(&before.seconds);
+        self.effort.formations += before.effort.formations;
+        self.effort.seconds.add(&before.effort.seconds);
     }
 
     /// Residuals and test values of a group of observations with the given standard deviations a priori.

@@ -364,7 +364,8 @@ impl<'a> Run<'a, '_> {
             adjustment.put(problem, linearized.invert(&equations, &what, self.threads, &mut between)?);
             adjustment.redundancy_excess = options.loss.is_none().then(|| adjustment.excess());
         }
-        self.seconds.add(&adjustment.seconds);
+        adjustment.effort.seconds.add(&self.seconds);
+        adjustment.effort.formations = self.formations;
         Ok(Adjustment {
             status: end.status,
             initial_sum_of_squares,
@@ -376,8 +377,6 @@ impl<'a> Run<'a, '_> {
             datum: self.datum,
             weak: self.weak,
             collapsed: self.collapsed,
-            formations: self.formations,
-            seconds: self.seconds,
             ..adjustment
         })
     }

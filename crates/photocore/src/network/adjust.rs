@@ -179,9 +179,9 @@ impl Network {
         let undetermined = solution.undetermined.take();
         solution.undetermined =
             undetermined.map(|error| self.name(error, &assembled, &solution.state.unknowns, threads));
-        solution.minimal_control = minimal;
+        solution.datum.minimal_control = minimal;
         solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
-        solution.relative_error = lost;
+        solution.datum.relative_error = lost;
         solution.dropped.extend(leaving.harmful);
         solution.dropped.sort_unstable_by_key(|dropped| dropped.point);
         solution.converged =

@@ -72,7 +72,7 @@ pub(super) fn adjusted_photos(
         let asked = model.images_on[index] > 0 || problem.sd[first..end].iter().any(|&sd| sd != 0.0);
         let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
         let redundancy = adjustment.prior_redundancy.as_ref();
-        let camera = match model.camera_block[index] {
+        let camera = match model.blocks.of_camera[index] {
             Some(block) => unknowns[model.of_block(block)].to_vec(),
             None if values.len() > POSE => values[POSE..].to_vec(),
             None => model.cameras[index].parameters(),

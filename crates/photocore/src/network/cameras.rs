@@ -74,7 +74,7 @@ impl Network {
                 camera.inform(problem, own.start + 6..own.end, adjustment);
             }
         }
-        for (shared, &index) in model.shared.iter().enumerate() {
+        for (shared, &index) in model.blocks.shared.iter().enumerate() {
             let block = model.cameras.len() + shared;
             cameras[index].take_block(model, block, adjustment, unknowns);
             cameras[index].inform(problem, model.of_block(block), adjustment);
@@ -91,8 +91,8 @@ impl Network {
 impl Bundle {
     /// The places of the shared cameras: the medians of those of their photos.
     pub(super) fn places_of_cameras(&self, photos: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let mut of_cameras: Vec<Vec<[f64; 3]>> = vec![Vec::new(); self.shared.len()];
-        for (place, block) in photos.iter().zip(&self.camera_block) {
+        let mut of_cameras: Vec<Vec<[f64; 3]>> = vec![Vec::new(); self.blocks.shared.len()];
+        for (place, block) in photos.iter().zip(&self.blocks.of_camera) {
             block.iter().for_each(|block| of_cameras[block - self.cameras.len()].push(*place));
         }
         of_cameras.into_iter().map(|places| middle(&places)).collect()
@@ -111,7 +111,7 @@ impl Bundle {
                 points.chain(touches.photos.iter().map(|&photo| photos[photo])).collect();
             touches.commons.iter().for_each(|&(common, _)| of_commons[common].extend(&places));
         }
-        let own = of_commons.iter().zip(&self.common_block).filter(|(_, block)| block.is_some());
+        let own = of_commons.iter().zip(&self.blocks.of_common).filter(|(_, block)| block.is_some());
         own.map(|(places, _)| middle(places)).collect()
     }
 }

@@ -24,7 +24,7 @@ impl Bundle {
     /// The retained blocks that a pose is made of: that of the carrier of its photo, then those of common unknowns that are not known.
     pub(super) fn blocks_of_pose(&self, photo: usize, when: When) -> impl Iterator<Item = usize> {
         let commons = self.mounts.commons(photo, Some(when)).into_iter();
-        std::iter::once(self.carrier(photo)).chain(commons.filter_map(|common| self.common_block[common]))
+        std::iter::once(self.carrier(photo)).chain(commons.filter_map(|common| self.blocks.of_common[common]))
     }
 
     fn grounds<'a>(
@@ -38,13 +38,14 @@ impl Bundle {
     /// The pose of a photo that is mounted; None of others. `unknowns` are those of all stations.
     pub(super) fn composed(&self, photo: usize, unknowns: &[f64]) -> Option<Composed> {
         let own = |photo: usize| {
-            let pose = &unknowns[self.first[photo]..][..POSE];
+            let pose = &unknowns[self.blocks.first[photo]..][..POSE];
             self.orientation(photo, &std::array::from_fn(|k| pose[k]))
         };
         let common = |common: usize| {
-            let block = self.common_block[common];
-            let own =
-                block.map_or(&[] as &[f64], |block| &unknowns[self.first[block]..self.first[block + 1]]);
+            let block = self.blocks.of_common[common];
+            let own = block.map_or(&[] as &[f64], |block| {
+                &unknowns[self.blocks.first[block]..self.blocks.first[block + 1]]
+            });
             (self.commons[common].at(own), block)
         };
         self.grounds(&own, &common).composed(photo, AT_PHOTO)
@@ -58,7 +59,7 @@ impl Bundle {
         let own: Vec<Orientation> = photos.iter().map(|photo| photo.orientation).collect();
         let composed = {
             let photo = |photo: usize| own[photo];
-            let common = |common: usize| (commons[common].clone(), self.common_block[common]);
+            let common = |common: usize| (commons[common].clone(), self.blocks.of_common[common]);
             let grounds = self.grounds(&photo, &common);
             (0..own.len()).map(|photo| grounds.composed(photo, AT_PHOTO)).collect::<Vec<_>>()
         };
@@ -80,7 +81,8 @@ impl Bundle {
         let timed =
             bent.mounted.as_ref().filter(|_| self.mounts.are_timed(image.photo)).and_then(|mounted| {
                 let photo = |photo: usize| mounted.own[photo];
-                let common = |common: usize| (stations.commons[common].clone(), self.common_block[common]);
+                let common =
+                    |common: usize| (stations.commons[common].clone(), self.blocks.of_common[common]);
                 self.grounds(&photo, &common).composed(image.photo, When::Image(image.xy))
             });
         bent.write(self.space, stations, timed.as_ref(), image, local, rows);

@@ -150,7 +150,7 @@ impl Network {
         let left_out = state.collapsed.clone();
         let mut solution = threads.install(|| Solution::new(self, options, &assembled, adjustment, left_out));
         solution.state.datum = Some(datum.clone());
-        solution.relative_error = lost;
+        solution.datum.relative_error = lost;
         Ok(solution)
     }
 
@@ -386,7 +386,7 @@ impl Covariances {
             Of::Common(common) => {
                 let own = model.commons.get(common).ok_or(NetworkError::NoCommon(common))?;
                 let width = own.kind.unknowns().len();
-                let Some(block) = model.common_block[common] else { return Ok(vec![vec![]; width]) };
+                let Some(block) = model.blocks.of_common[common] else { return Ok(vec![vec![]; width]) };
                 let range = model.of_block(block);
                 let by_unknowns = own.at(&self.linearized.values()[range.clone()]).about_own_axes();
                 let row = |i: usize| range.clone().zip(by_unknowns.row(i).iter().copied()).collect();
@@ -400,7 +400,7 @@ impl Covariances {
             Of::Camera(camera) => {
                 let photo = *self.photo_of_camera.get(camera).ok_or(NetworkError::CameraIndex(camera))?;
                 let Some(photo) = photo else { return Ok(vec![]) };
-                Ok(match model.camera_block[photo] {
+                Ok(match model.blocks.of_camera[photo] {
                     Some(block) => themselves(model.of_block(block)).collect(),
                     None if model.has_own_camera(photo) => {
                         themselves(model.of_block(photo)).skip(POSE).collect()

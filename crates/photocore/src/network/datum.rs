@@ -10,7 +10,7 @@ use super::model::Bundle;
 use super::parts::{Joined, MOST_PARTS, MOTIONS, Part, Parts};
 use super::problem::Assembled;
 use super::state::InnerConstraints;
-use super::stations::{Placed, Stations};
+use super::stations::{Placed, Station, Stations};
 use super::{Network, NetworkError};
 use crate::Threads;
 use crate::adjustment::{Datum, Motions};
@@ -60,7 +60,8 @@ impl Bundle {
                 joined.join([of_point(point), self.carrier(image.photo)]);
             }
         }
-        let moves = |common: &usize| self.commons[*common].moves() && self.common_block[*common].is_some();
+        let moves =
+            |common: &usize| self.commons[*common].moves() && self.blocks.of_common[*common].is_some();
         for touches in self.observations.iter().map(|tied| &tied.touches) {
             let commons = touches.commons.iter().map(|&(common, _)| common).filter(moves).map(of_common);
             let own = touches.photos.iter().map(|&photo| self.carrier(photo));
@@ -76,7 +77,7 @@ impl Bundle {
         for photo in (0..photos).filter(|&photo| images_on[photo] > 0) {
             by_root[joined.root(photo)].push(photo);
         }
-        let asked = self.minimum.map(|minimum| self.carrier(minimum.photo)).or(self.anchor);
+        let asked = self.datum.minimum.map(|minimum| self.carrier(minimum.photo)).or(self.datum.anchor);
         let mut found: Vec<(usize, Vec<usize>)> =
             by_root.into_iter().enumerate().filter(|(_, photos)| !photos.is_empty()).collect();
         let has_asked = |photos: &[usize]| asked.is_some_and(|asked| photos.contains(&asked));
@@ -143,10 +144,16 @@ impl Bundle {
                 self.move_commons(&placed, &motion, |common, state| common.change(state, &motion), vector);
             });
         }
+        let preferred = self.preferred(parts, photos, &origins);
+        Some(Motions { vectors, preferred })
+    }
+
+    /// What is held first, part by part: the pose of its central photo, then coordinates of others along which these are far from it.
+    fn preferred(&self, parts: &Parts, photos: &[Station], origins: &[Vector3]) -> Vec<usize> {
         let mut preferred = vec![];
-        for (Part { photos: own, central }, origin) in parts.all.iter().zip(&origins) {
+        for (Part { photos: own, central }, origin) in parts.all.iter().zip(origins) {
             preferred.extend(self.of_block(*central).take(6));
-            let asked = self.minimum.filter(|minimum| self.carrier(minimum.photo) == *central);
+            let asked = self.datum.minimum.filter(|minimum| self.carrier(minimum.photo) == *central);
             let coordinate = asked.and_then(|minimum| minimum.coordinate);
             preferred
                 .extend(coordinate.map(|(photo, number)| self.of_block(self.carrier(photo)).start + number));
@@ -163,7 +170,7 @@ impl Bundle {
             shifts.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
             preferred.extend(shifts.into_iter().map(|(_, _, unknown)| unknown));
         }
-        Some(Motions { vectors, preferred })
+        preferred
     }
 
     /// The first of the motions of an observation's part, and what each makes of the displacement that it misses by (see [`Model::carried`]).
@@ -192,7 +199,7 @@ impl Bundle {
         moved: impl FnOnce(&mut [f64]),
     ) {
         let others = (0..self.commons.len()).filter(|&common| parts.of_common[common] != Some(part));
-        let ranges = others.filter_map(|common| Some(self.of_block(self.common_block[common]?)));
+        let ranges = others.filter_map(|common| Some(self.of_block(self.blocks.of_common[common]?)));
         let retained: Vec<_> = ranges.map(|range| (range.clone(), unknowns[range].to_vec())).collect();
         moved(unknowns);
         retained.into_iter().for_each(|(range, values)| unknowns[range].copy_from_slice(&values));

@@ -33,7 +33,7 @@ impl Bundle {
     /// The equations of a tie.
     pub(super) fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut TieRows<'_>) {
         let Some(observation) = tie.checked_sub(self.tied_images()) else {
-            return self.observe_tied_image(stations, self.start[self.locals] + tie, rows);
+            return self.observe_tied_image(stations, self.point_images.start[self.locals] + tie, rows);
         };
         let own = &self.observations[observation];
         self.with_tied(stations, |model| own.write(model, rows.constant, rows.coefficients));
@@ -49,7 +49,7 @@ impl Model for Bundle {
     fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
         let start = self.of_stations().start + 3;
         let turn = |photo: usize| {
-            let (first, sense) = (start + self.first[photo], self.turning_sense(photo)?);
+            let (first, sense) = (start + self.blocks.first[photo], self.turning_sense(photo)?);
             let [angles, rho] = [&*unknowns, step].map(|values| std::array::from_fn(|k| values[first + k]));
             Some((first, sense.stepped(angles, &Vector3::from(rho))))
         };
@@ -64,7 +64,7 @@ impl Model for Bundle {
         let start = self.of_stations().start + 3;
         for photo in 0..self.cameras.len() {
             let Some(sense) = self.turning_sense(photo) else { continue };
-            let first = start + self.first[photo];
+            let first = start + self.blocks.first[photo];
             let attitude = |values: &[f64]| {
                 let angles = std::array::from_fn(|k| values[first + k]);
                 AttitudeNumbers::OmegaPhiKappa(sense).attitude(angles)
@@ -96,7 +96,7 @@ impl Model for Bundle {
 
     /// Cameras are determined together with what they are correlated with: attitudes, positions, heights.
     fn ends_slowly(&self) -> bool {
-        !self.shared.is_empty()
+        !self.blocks.shared.is_empty()
     }
 
     /// Straight rays turn and stretch with everything else; what a frame carries may have known lengths.
@@ -105,7 +105,7 @@ impl Model for Bundle {
     }
 
     fn motions(&self, unknowns: &[f64]) -> Option<Motions> {
-        if self.placed { None } else { self.rigid_motions(unknowns) }
+        if self.datum.placed { None } else { self.rigid_motions(unknowns) }
     }
 
     fn all_motions(&self, unknowns: &[f64]) -> Option<Motions> {

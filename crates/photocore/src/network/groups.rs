@@ -84,7 +84,7 @@ impl Covariances {
         if width == 0 || !columns.len().is_multiple_of(width) {
             return Err(NetworkError::Partials { unknowns: width, numbers: columns.len() });
         }
-        let order = &problem.model.order;
+        let order = &problem.model.point_images.order;
         let mut z = vec![0.0; columns.len() / width * height];
         for (z, column) in z.chunks_exact_mut(height).zip(columns.chunks_exact(width)) {
             for (row, &image) in order.iter().enumerate() {
@@ -119,7 +119,7 @@ impl Covariances {
             return Err(NetworkError::State);
         }
         let mut of = Vec::with_capacity(problem.equations());
-        of.extend(model.order.iter().flat_map(|&image| groups.images[image]));
+        of.extend(model.point_images.order.iter().flat_map(|&image| groups.images[image]));
         for tied in &model.observations {
             of.extend(std::iter::repeat_n(groups.observations[tied.index], tied.root.nrows()));
         }

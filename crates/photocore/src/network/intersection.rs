@@ -57,7 +57,7 @@ impl Bundle {
         let distance = |(&first, met): (&usize, &Option<Vector3>)| {
             Some((met.as_ref()? - photos[self.images[first].photo].orientation.centre()).norm())
         };
-        median(self.start.iter().zip(met).filter_map(distance).collect())
+        median(self.point_images.start.iter().zip(met).filter_map(distance).collect())
     }
 
     /// Puts the held components in place and moves the others to where the rays then pass nearest: least squares of the distances

@@ -7,20 +7,21 @@ use crate::normals::Layout;
 
 /// The blocks of a model, at the given places, and what ties them.
 pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, NetworkError> {
-    let (groups, tied) = (model.start[model.locals], model.points.len() - model.locals);
-    let widths = model.first.windows(2).map(|pair| pair[1] - pair[0]);
+    let (groups, tied) = (model.point_images.start[model.locals], model.points.len() - model.locals);
+    let widths = model.blocks.first.windows(2).map(|pair| pair[1] - pair[0]);
     let widths: Vec<usize> = widths.chain(vec![3; tied]).collect();
     let images = &model.images[..groups];
     let photo_of = images.iter().map(|image| model.carrier(image.photo) as u32).collect();
-    let mut layout = Layout::new(2, 3, &widths, model.start[..=model.locals].to_vec(), photo_of)?;
-    if !(model.shared.is_empty() && model.mounts.is_empty()) {
-        let (mut shared_ptr, mut further) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
+    let mut layout =
+        Layout::new(2, 3, &widths, model.point_images.start[..=model.locals].to_vec(), photo_of)?;
+    if !(model.blocks.shared.is_empty() && model.mounts.is_empty()) {
+        let (mut shared_ptr, mut shared) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
         shared_ptr.push(0);
         for image in images {
-            further.extend(model.blocks_of_image(image).skip(1).map(|block| block as u32));
-            shared_ptr.push(further.len());
+            shared.extend(model.blocks_of_image(image).skip(1).map(|block| block as u32));
+            shared_ptr.push(shared.len());
         }
-        layout = layout.with_shared(shared_ptr, further)?;
+        layout = layout.with_shared(shared_ptr, shared)?;
     }
     Ok(layout.with_places(places)?.with_ties(model.ties())?.with_pairs(model.pairs())?)
 }
@@ -40,9 +41,9 @@ impl Surroundings {
             let found = match block {
                 BlockOf::Photo(photo) => Some(photo),
                 BlockOf::Camera(camera) => {
-                    model.shared.binary_search(&camera).ok().map(|shared| photos + shared)
+                    model.blocks.shared.binary_search(&camera).ok().map(|shared| photos + shared)
                 }
-                BlockOf::Common(common) => model.common_block[common],
+                BlockOf::Common(common) => model.blocks.of_common[common],
                 BlockOf::Point(point) => {
                     tied.iter().position(|&own| own == point).map(|place| model.stations() + place)
                 }

@@ -42,6 +42,8 @@
 
 mod adjust;
 mod adjusted;
+mod blocks;
+mod bundle;
 mod camera_priors;
 mod cameras;
 mod check;
@@ -104,7 +106,7 @@ pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use predictions::{OnPoint, Prediction};
 pub use responses::{Moved, UnknownOf};
 pub use selection::{Dropped, Reason};
-pub use solution::{Redundancies, Solution, SumsOfSquares};
+pub use solution::{DatumInForce, Redundancies, Solution, SumsOfSquares, Unseen, Weak};
 pub use state::{InnerConstraints, NetworkDatum, State};
 pub use surroundings::{BlockOf, Surroundings};
 pub use suspects::Subject;

@@ -3,11 +3,13 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
+use super::blocks::Blocks;
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
 use super::mounts::{AT_PHOTO, Mounts, When};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::parts::Parts;
+use super::selection::PointImages;
 use super::stations::{Bent, Placed, Refracted, Station, Stations};
 use super::{Image, Minimum, Point, Screens};
 use crate::geometry::{
@@ -28,23 +30,12 @@ pub struct Bundle {
     pub refraction: Option<Refraction>,
     /// Of each photo, with the parameters that it starts from.
     pub cameras: Vec<Camera>,
-    /// The unknowns of retained block i are `first[i]..first[i + 1]` of the retained ones: photos (six of the pose, then those of a camera of
-    /// their own; six that are held where it is on a frame), then shared cameras, then common unknowns.
-    pub first: Vec<usize>,
-    /// Where the cofactors of each of these blocks start among those of all retained ones.
-    pub squares: Vec<usize>,
-    /// The cameras that several photos share, as the network numbers them.
-    pub shared: Vec<usize>,
-    /// The retained block of each photo's camera where that is shared.
-    pub camera_block: Vec<Option<usize>>,
+    /// Where the unknowns of photos, shared cameras and common unknowns are.
+    pub blocks: Blocks,
     /// What was observed of cameras with a covariance matrix.
     pub camera_priors: Vec<CameraPrior>,
     /// The common unknowns.
     pub commons: Vec<PlacedCommon>,
-    /// The retained block of each, unless it is known.
-    pub common_block: Vec<Option<usize>>,
-    /// How many observations and images that take part are of each.
-    pub uses_of_commons: Vec<usize>,
     /// Which photos are on a frame, or move.
     pub mounts: Mounts,
     /// What coordinates are counted from.
@@ -55,26 +46,31 @@ pub struct Bundle {
     pub locals: usize,
     /// The images, point by point: the groups of observations, then the first ties.
     pub images: Vec<Image>,
-    /// The images of point i are `images[start[i]..start[i + 1]]`.
-    pub start: Vec<usize>,
-    /// Index of each of them in the network.
-    pub order: Vec<usize>,
+    /// Which of them are of each point, and their indices in the network.
+    pub point_images: PointImages,
     /// How many images each photo has.
     pub images_on: Vec<usize>,
     /// Which photos step by a rotation vector about their own axes: those without a fixed angle.
     pub turning: Vec<bool>,
     /// What else was observed.
     pub observations: Vec<TiedObservation>,
+    /// What network and user say of the datum.
+    pub datum: GivenDatum,
+    /// What may leave while it is adjusted.
+    pub screens: Screens,
+    /// What hangs together, once it was asked for: it depends on all above.
+    pub parts: OnceLock<Parts>,
+}
+
+/// What is known of the datum before anything is computed.
+#[derive(Debug)]
+pub struct GivenDatum {
     /// Whether the position of anything is weighted, or of more than one photo fixed: then the datum is the user's.
     pub placed: bool,
     /// The only photo whose position is fixed, where nothing else is placed: the user has chosen what to hold.
     pub anchor: Option<usize>,
     /// What the user wants to be held where nothing else gives a datum.
     pub minimum: Option<Minimum>,
-    /// What may leave while it is adjusted.
-    pub screens: Screens,
-    /// What hangs together, once it was asked for: it depends on all above.
-    pub parts: OnceLock<Parts>,
 }
 
 /// What a retained block belongs to: indices into the network.
@@ -89,18 +85,18 @@ impl Bundle {
     /// The unknowns that are those of photos, shared cameras and common unknowns, of all.
     pub fn of_stations(&self) -> Range<usize> {
         let start = 3 * self.locals;
-        start..start + self.first[self.stations()]
+        start..start + self.blocks.first[self.stations()]
     }
 
     /// Number of photos, shared cameras and common unknowns: the first retained blocks.
     pub fn stations(&self) -> usize {
-        self.first.len() - 1
+        self.blocks.first.len() - 1
     }
 
     /// The unknowns of a photo, shared camera or common unknown, of all.
     pub fn of_block(&self, block: usize) -> Range<usize> {
         let start = 3 * self.locals;
-        start + self.first[block]..start + self.first[block + 1]
+        start + self.blocks.first[block]..start + self.blocks.first[block + 1]
     }
 
     /// Whether a photo has a camera with unknown parameters that is no other's.
@@ -128,12 +124,13 @@ impl Bundle {
 
     /// The ties: images of points that are not local, then observations.
     pub fn ties(&self) -> Vec<Tie> {
-        let images = self.images[self.start[self.locals]..].iter().enumerate().map(|(tie, image)| {
-            let point = self.point_of(self.start[self.locals] + tie);
-            let others = self.blocks_of_image(image);
-            let blocks = std::iter::once(self.block_of_point(point)).chain(others);
-            Tie { rows: 2, retained: blocks.map(|block| block as u32).collect() }
-        });
+        let images =
+            self.images[self.point_images.start[self.locals]..].iter().enumerate().map(|(tie, image)| {
+                let point = self.point_of(self.point_images.start[self.locals] + tie);
+                let others = self.blocks_of_image(image);
+                let blocks = std::iter::once(self.block_of_point(point)).chain(others);
+                Tie { rows: 2, retained: blocks.map(|block| block as u32).collect() }
+            });
         let observations = self.observations.iter().map(|tied| Tie {
             rows: tied.root.nrows(),
             retained: tied.blocks.iter().map(|&block| block as u32).collect(),
@@ -153,14 +150,14 @@ impl Bundle {
 
     /// The retained blocks of an image: those of its pose, then the camera where that is shared.
     pub fn blocks_of_image(&self, image: &Image) -> impl Iterator<Item = usize> {
-        self.blocks_of_pose(image.photo, When::Image(image.xy)).chain(self.camera_block[image.photo])
+        self.blocks_of_pose(image.photo, When::Image(image.xy)).chain(self.blocks.of_camera[image.photo])
     }
 
     /// The retained blocks of what an observation touches, each once; points as the model numbers them.
     pub fn blocks_of(&self, touches: &Touches) -> Vec<usize> {
         let points = touches.points.iter().map(|&point| self.block_of_point(point));
         let photos = touches.photos.iter().flat_map(|&photo| self.blocks_of_pose(photo, AT_PHOTO));
-        let commons = touches.commons.iter().filter_map(|&(common, _)| self.common_block[common]);
+        let commons = touches.commons.iter().filter_map(|&(common, _)| self.blocks.of_common[common]);
         let mut blocks: Vec<usize> = points.chain(photos).chain(commons).collect();
         blocks.sort_unstable();
         blocks.dedup();
@@ -169,12 +166,12 @@ impl Bundle {
 
     /// How many ties are images.
     pub fn tied_images(&self) -> usize {
-        self.images.len() - self.start[self.locals]
+        self.images.len() - self.point_images.start[self.locals]
     }
 
     /// The point of an image.
     fn point_of(&self, image: usize) -> usize {
-        self.start.partition_point(|&start| start <= image) - 1
+        self.point_images.start.partition_point(|&start| start <= image) - 1
     }
 
     /// Writes the equations of an image whose point is not local.
@@ -208,8 +205,10 @@ impl Bundle {
                 PhotoSite { orientation: &own.orientation, block: self.carrier(photo), parts: &own.parts }
             }
         };
-        let common =
-            |common: usize| CommonSite { state: &stations.commons[common], block: self.common_block[common] };
+        let common = |common: usize| CommonSite {
+            state: &stations.commons[common],
+            block: self.blocks.of_common[common],
+        };
         take(&TiedModel {
             space: self.space,
             origin: self.origin,
@@ -223,9 +222,11 @@ impl Bundle {
     /// Photos and common unknowns at given values of the unknowns of photos, shared cameras and common unknowns.
     pub fn placed(&self, unknowns: &[f64]) -> Placed {
         let photo = |photo: usize| {
-            let (pose, camera) = unknowns[self.first[photo]..self.first[photo + 1]].split_at(POSE);
+            let (pose, camera) =
+                unknowns[self.blocks.first[photo]..self.blocks.first[photo + 1]].split_at(POSE);
             let pose = std::array::from_fn(|k| pose[k]);
-            let shared = self.camera_block[photo].map(|block| self.first[block]..self.first[block + 1]);
+            let shared = self.blocks.of_camera[photo]
+                .map(|block| self.blocks.first[block]..self.blocks.first[block + 1]);
             let (own, camera) = (self.cameras[photo], shared.map_or(camera, |range| &unknowns[range]));
             Station {
                 orientation: self.orientation(photo, &pose),
@@ -246,27 +247,33 @@ impl Bundle {
     /// The common unknowns at given values of the same unknowns.
     pub fn common_states(&self, unknowns: &[f64]) -> Vec<CommonState> {
         let values = |block: Option<usize>| {
-            block.map_or(&[] as &[f64], |block| &unknowns[self.first[block]..self.first[block + 1]])
+            block.map_or(&[] as &[f64], |block| {
+                &unknowns[self.blocks.first[block]..self.blocks.first[block + 1]]
+            })
         };
-        self.commons.iter().zip(&self.common_block).map(|(common, &block)| common.at(values(block))).collect()
+        self.commons
+            .iter()
+            .zip(&self.blocks.of_common)
+            .map(|(common, &block)| common.at(values(block)))
+            .collect()
     }
 
     /// What a photo's, shared camera's or common unknown's block belongs to.
     pub fn owner(&self, block: usize) -> Owner {
-        let (photos, cameras) = (self.cameras.len(), self.shared.len());
+        let (photos, cameras) = (self.cameras.len(), self.blocks.shared.len());
         if block < photos {
             Owner::Photo(block)
         } else if block < photos + cameras {
-            Owner::Camera(self.shared[block - photos])
+            Owner::Camera(self.blocks.shared[block - photos])
         } else {
-            let own = self.common_block.iter().position(|&own| own == Some(block));
+            let own = self.blocks.of_common.iter().position(|&own| own == Some(block));
             Owner::Common(own.unwrap_or_default())
         }
     }
 
     /// The cofactors of such a block.
     pub fn cofactors_of_block<'a>(&self, all: &'a Cofactors, block: usize) -> &'a [f64] {
-        &all.retained[self.squares[block]..self.squares[block + 1]]
+        &all.retained[self.blocks.squares[block]..self.blocks.squares[block + 1]]
     }
 
     /// The orientation of a photo, its pose given, with the columns of its unknowns.
@@ -292,7 +299,7 @@ impl Bundle {
             if self.is_carried(photo) {
                 self.space.coordinates(station.orientation.centre())
             } else {
-                std::array::from_fn(|k| unknowns[self.first[photo] + k])
+                std::array::from_fn(|k| unknowns[self.blocks.first[photo] + k])
             }
         };
         let places = photos.iter().enumerate().map(place);
@@ -309,7 +316,7 @@ impl Bundle {
 
     /// The images of a point.
     pub fn images_of(&self, point: usize) -> &[Image] {
-        &self.images[self.start[point]..self.start[point + 1]]
+        &self.images[self.point_images.start[point]..self.point_images.start[point + 1]]
     }
 }
 

@@ -117,7 +117,7 @@ impl Network {
             let own = (first + 6..model.of_block(index).end).map(share);
             camera.iter_mut().zip(own).for_each(|(sum, share)| *sum += share);
         }
-        for (place, &camera) in model.shared.iter().enumerate() {
+        for (place, &camera) in model.blocks.shared.iter().enumerate() {
             let own = model.of_block(model.cameras.len() + place).map(share);
             parameters[camera].iter_mut().zip(own).for_each(|(sum, share)| *sum += share);
         }

@@ -115,7 +115,7 @@ impl Bundle {
     ) -> Option<f64> {
         let distances: Vec<f64> = match coordinates {
             Some(coordinates) => {
-                let first = coordinates.iter().zip(&self.start);
+                let first = coordinates.iter().zip(&self.point_images.start);
                 let distance = |(&at, &first): (&[f64; 3], &usize)| {
                     let image = self.images.get(first)?;
                     Some((self.space.cartesian(at) - photos[image.photo].orientation.centre()).norm())

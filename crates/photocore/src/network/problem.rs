@@ -1,23 +1,17 @@
 //! The least-squares problem of a network: points are local blocks of three, photos retained blocks of six and their own cameras', cameras
 //! that several photos share and common unknowns blocks of their own; points that observations touch are retained blocks of three.
 
-use std::collections::HashMap;
-use std::sync::OnceLock;
-
-use super::camera_priors::CameraPrior;
-use super::commons::PlacedCommon;
 use super::layout::layout;
 use super::median::median;
 use super::model::Bundle;
-use super::mounts::{Mounts, When};
-use super::observations::{Fault, Observation, TiedObservation, Touches};
+use super::observations::{Fault, TiedObservation};
 use super::selection::{Dropped, LeftOut, Selected, TOGETHER};
 use super::state::State;
 use super::stations::Station;
 use super::surroundings::Surroundings;
-use super::{Camera, Image, Network, NetworkError, Options, Photo, Point, Screens, Start};
+use super::{Image, Network, NetworkError, Options, Point, Start};
 use crate::adjustment::{Method, Problem};
-use crate::geometry::{Matrix3, ObjectSpace, POSE, PoseNumbers, Refraction, local_vertical};
+use crate::geometry::{POSE, PoseNumbers};
 use crate::normals::{System, TieRows};
 use crate::{Threads, parallel};
 
@@ -72,7 +66,7 @@ impl Assembled {
                 |image: &Image| photos[image.photo].orientation.pose().sight(&position).norm_squared();
             model.images[images[0]..images[1]].iter().map(square).fold(f64::INFINITY, f64::min)
         };
-        model.coordinates(unknowns).zip(model.start.windows(2)).map(of_point).collect()
+        model.coordinates(unknowns).zip(model.point_images.start.windows(2)).map(of_point).collect()
     }
 
     /// Begins where an adjustment has ended.
@@ -150,10 +144,7 @@ impl Network {
         let images = parallel::map_in_place(order.len(), TOGETHER, &|place| self.images[order[place]]);
         let mut images_on = vec![0; self.photos.len()];
         images.iter().for_each(|image| images_on[image.photo] += 1);
-        // A frame is used when a photo on it is.
-        let mut used: Vec<bool> = images_on.iter().map(|&images| images > 0).collect();
-        let on_frames = self.mounts.iter().filter_map(|mount| Some((mount.frame()?, mount.photo())));
-        on_frames.for_each(|(frame, photo)| used[frame] |= images_on[photo] > 0);
+        let used = self.used(&images_on);
         let loose = selected.loose.clone();
         let unused =
             |photo: usize| !used[photo] && (options.hold_unused || loose.binary_search(&photo).is_ok());
@@ -162,8 +153,8 @@ impl Network {
         }
         let middle = selected.surroundings.middle.unwrap_or_else(|| self.middle());
         let origin = self.origin(middle);
-        let mut model = self.bundle(&mut selected, images, images_on.clone(), middle)?;
-        model.minimum = options.minimum;
+        let mut model = self.bundle(&mut selected, images, images_on, middle)?;
+        model.datum.minimum = options.minimum;
         model.screens = options.screens;
         // The programs of their time stepped in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
@@ -202,20 +193,8 @@ impl Network {
                 &mut || sd = unknowns(&of_points(|point| point.sd), &station_sd),
             );
         });
-        let tied = start[model.locals..].iter().map(|&at| self.space.cartesian(at));
-        let centres: Vec<[f64; 3]> =
-            stations.iter().map(|station| station.orientation.centre().into()).collect();
-        let cameras = model.places_of_cameras(&centres);
-        let tied: Vec<[f64; 3]> = tied.map(Into::into).collect();
-        let commons = model.places_of_commons(&centres, &tied);
-        let places = [centres, cameras, commons, tied].concat();
-        let mut observation_sd = vec![[0.0; 2]; model.images.len()];
-        parallel::each_chunk(&mut observation_sd, TOGETHER, &|part, own| {
-            let images = &model.images[part * TOGETHER..];
-            own.iter_mut().zip(images).for_each(|(sd, image)| *sd = image.sd);
-        });
-        let mut observation_sd = observation_sd.into_flattened();
-        model.observations.iter().for_each(|tied| observation_sd.extend(vec![1.0; tied.root.nrows()]));
+        let places = self.places(&model, &stations, &start[model.locals..]);
+        let observation_sd = observation_sd(&model);
         let held: Vec<bool> = sd.iter().map(|&sd| sd == 0.0).collect();
         let (outer, below) = selected.surroundings.blocks(&model, &selected.points)?;
         let layout = layout(&model, places)?.with_held(&held).as_part(outer, below)?;
@@ -229,6 +208,24 @@ impl Network {
         };
         self.check_observations(&problem)?;
         Ok(Assembled { problem, points: selected.points, dropped: selected.dropped, loose: selected.loose })
+    }
+
+    /// Which photos take part: a frame does when a photo on it does.
+    fn used(&self, images_on: &[usize]) -> Vec<bool> {
+        let mut used: Vec<bool> = images_on.iter().map(|&images| images > 0).collect();
+        let on_frames = self.mounts.iter().filter_map(|mount| Some((mount.frame()?, mount.photo())));
+        on_frames.for_each(|(frame, photo)| used[frame] |= images_on[photo] > 0);
+        used
+    }
+
+    /// Where the retained blocks are, for an ordering by place; `tied` are the points that are not local.
+    fn places(&self, model: &Bundle, stations: &[Station], tied: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let centres: Vec<[f64; 3]> =
+            stations.iter().map(|station| station.orientation.centre().into()).collect();
+        let cameras = model.places_of_cameras(&centres);
+        let tied: Vec<[f64; 3]> = tied.iter().map(|&at| self.space.cartesian(at).into()).collect();
+        let commons = model.places_of_commons(&centres, &tied);
+        [centres, cameras, commons, tied].concat()
     }
 
     /// Refuses observations that cannot be computed from the initial values.
@@ -250,162 +247,6 @@ impl Network {
             }
         }
         Ok(())
-    }
-
-    fn bundle(
-        &self,
-        selected: &mut Selected,
-        images: Vec<Image>,
-        images_on: Vec<usize>,
-        middle: [f64; 3],
-    ) -> Result<Bundle, NetworkError> {
-        let origin = self.origin(middle);
-        let points = parallel::map_in_place(selected.points.len(), TOGETHER, &|place| {
-            let Point { coordinates, sd } = self.points[selected.points[place]];
-            Point { coordinates: std::array::from_fn(|k| coordinates[k] - origin[k]), sd }
-        });
-        let (shared, mut first) = (self.shared_cameras(&selected.surroundings), vec![0]);
-        for photo in &self.photos {
-            let camera = self.camera(photo);
-            let own = if camera.is_held() || shared.binary_search(&photo.camera).is_ok() {
-                0
-            } else {
-                camera.sd.len()
-            };
-            first.push(first[first.len() - 1] + POSE + own);
-        }
-        for &camera in &shared {
-            first.push(first[first.len() - 1] + self.cameras[camera].sd.len());
-        }
-        let mut common_block = vec![None; self.commons.len()];
-        for (index, common) in self.commons.iter().enumerate().filter(|(_, common)| !common.is_held()) {
-            common_block[index] = Some(first.len() - 1);
-            first.push(first[first.len() - 1] + common.sd.len());
-        }
-        let mut squares = vec![0];
-        first
-            .windows(2)
-            .for_each(|ends| squares.push(squares[squares.len() - 1] + (ends[1] - ends[0]).pow(2)));
-        let vertical = self.vertical(middle);
-        let place = |common| PlacedCommon::new(common, self.space, origin, &vertical);
-        let block = |photo: &Photo| Some(self.photos.len() + shared.binary_search(&photo.camera).ok()?);
-        let mounts = Mounts::new(&self.mounts, self.photos.len());
-        let mut uses_of_commons = vec![0; self.commons.len()];
-        let of_image = |image: &Image| mounts.commons(image.photo, Some(When::Image(image.xy)));
-        images.iter().flat_map(of_image).for_each(|common| uses_of_commons[common] += 1);
-        let commons_of = |&observation: &usize| self.observations[observation].touches().commons;
-        let touched = selected.observations.iter().flat_map(commons_of);
-        touched.for_each(|(common, _)| uses_of_commons[common] += 1);
-        let (placed, anchor) = self.placed(selected, &mounts);
-        let mut bundle = Bundle {
-            space: self.space,
-            poses: self.poses,
-            // Coordinates are counted from the origin; heights are not.
-            refraction: self
-                .refraction
-                .map(|refraction| Refraction { datum: refraction.datum + origin[2], ..refraction }),
-            cameras: self.photos.iter().map(|photo| self.camera(photo).camera).collect(),
-            first,
-            camera_block: self.photos.iter().map(block).collect(),
-            shared,
-            squares,
-            camera_priors: vec![],
-            commons: self.commons.iter().map(place).collect(),
-            common_block,
-            uses_of_commons,
-            mounts,
-            origin,
-            locals: selected.locals,
-            points,
-            images,
-            start: std::mem::take(&mut selected.images.start),
-            order: std::mem::take(&mut selected.images.order),
-            turning: vec![false; self.photos.len()],
-            images_on,
-            observations: vec![],
-            placed,
-            anchor,
-            minimum: None,
-            screens: Screens::default(),
-            parts: OnceLock::new(),
-        };
-        let prior = |(index, camera): (usize, &Camera)| {
-            camera.covariance.as_ref()?;
-            CameraPrior::of(camera, self.first_parameter(&bundle, index)?)
-        };
-        bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();
-        bundle.observations = self.tied_observations(selected, &bundle)?;
-        Ok(bundle)
-    }
-
-    /// The axes amid the photos, as rows, that shifts and drifts are told in: X, Y, Z or, in geographic space, east, north and up.
-    fn vertical(&self, middle: [f64; 3]) -> Matrix3 {
-        match self.space {
-            ObjectSpace::Rectangular => Matrix3::identity(),
-            ObjectSpace::Geographic(_) => local_vertical(middle[0], middle[1]),
-        }
-    }
-
-    /// Whether the datum is the user's.
-    pub(super) fn is_placed(&self, selected: &Selected) -> bool {
-        self.placed(selected, &Mounts::new(&self.mounts, self.photos.len())).0
-    }
-
-    /// The same, and the photo to hold where it is not, but the position of a single one is fixed.
-    fn placed(&self, selected: &Selected, mounts: &Mounts) -> (bool, Option<usize>) {
-        // Angles alone leave position and scale open.
-        let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { POSE };
-        let own = |photo: &Photo| photo.sd[..positions].iter().any(|sd| sd.is_finite());
-        let carried = |index: usize| mounts.carrier(index) != index;
-        let mut photos = (0..self.photos.len()).filter(|&index| !carried(index) && own(&self.photos[index]));
-        let fixed = |index: usize| self.photos[index].sd[..positions].iter().all(|&sd| sd == 0.0);
-        match (photos.next(), photos.next()) {
-            _ if selected.points.iter().any(|&point| self.points[point].held() != [false; 3]) => (true, None),
-            (None, _) => (false, None),
-            (first, None) if first.is_some_and(fixed) => (false, first),
-            _ => (true, None),
-        }
-    }
-
-    /// The unknown that the first parameter of a camera is; None where no photo has it.
-    fn first_parameter(&self, model: &Bundle, camera: usize) -> Option<usize> {
-        Some(match model.shared.binary_search(&camera) {
-            Ok(shared) => model.of_block(model.cameras.len() + shared).start,
-            Err(_) => {
-                model.of_block(self.photos.iter().position(|photo| photo.camera == camera)?).start + POSE
-            }
-        })
-    }
-
-    /// The observations that take part.
-    fn tied_observations(
-        &self,
-        selected: &Selected,
-        model: &Bundle,
-    ) -> Result<Vec<TiedObservation>, NetworkError> {
-        let Selected { points, locals, observations, .. } = selected;
-        let place: HashMap<usize, usize> =
-            points[*locals..].iter().enumerate().map(|(i, &point)| (point, locals + i)).collect();
-        let tied = |&index: &usize| {
-            let observation: &Observation = &self.observations[index];
-            let touches = observation.touches();
-            let points = touches.points.iter().map(|point| place[point]).collect();
-            let touches = Touches { points, ..touches };
-            let blocks = model.blocks_of(&touches);
-            let root = match blocks.len() {
-                0 => Err(Fault::NothingUnknown),
-                _ => observation.precision().root(observation.rows()),
-            };
-            let kind = observation.kind();
-            Ok(TiedObservation {
-                index,
-                touches,
-                blocks,
-                root: root.map_err(|fault| NetworkError::Observation { index, kind, fault })?,
-                observation: observation.clone(),
-            })
-        };
-        observations.iter().map(tied).collect()
     }
 
     /// Where points start from.
@@ -433,4 +274,16 @@ impl Network {
         }
         Ok(met)
     }
+}
+
+/// Standard deviations of all observations; rows of those beside images are weighted already.
+fn observation_sd(model: &Bundle) -> Vec<f64> {
+    let mut of_images = vec![[0.0; 2]; model.images.len()];
+    parallel::each_chunk(&mut of_images, TOGETHER, &|part, own| {
+        let images = &model.images[part * TOGETHER..];
+        own.iter_mut().zip(images).for_each(|(sd, image)| *sd = image.sd);
+    });
+    let mut all = of_images.into_flattened();
+    model.observations.iter().for_each(|tied| all.extend(vec![1.0; tied.root.nrows()]));
+    all
 }

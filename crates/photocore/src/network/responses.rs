@@ -184,13 +184,13 @@ impl Trial {
         let (model, points) = (&self.assembled.problem.model, &self.assembled.points);
         let stations = model.of_stations();
         if let Some(retained) = stations.contains(&unknown).then(|| unknown - stations.start) {
-            let block = model.first.partition_point(|&start| start <= retained) - 1;
+            let block = model.blocks.first.partition_point(|&start| start <= retained) - 1;
             let of = match model.owner(block) {
                 Owner::Photo(photo) => UnknownOf::Photo(photo),
                 Owner::Camera(camera) => UnknownOf::Camera(camera),
                 Owner::Common(common) => UnknownOf::Common(common),
             };
-            return (of, retained - model.first[block]);
+            return (of, retained - model.blocks.first[block]);
         }
         let among = if unknown < stations.start { unknown } else { unknown - stations.len() };
         (UnknownOf::Point(points[among / 3]), among % 3)

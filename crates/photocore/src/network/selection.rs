@@ -197,6 +197,7 @@ pub(super) struct Selected {
 }
 
 /// The images of the points that take part, point by point: those of the i-th are `order[start[i]..start[i + 1]]`.
+#[derive(Debug, Default)]
 pub(super) struct PointImages {
     pub start: Vec<usize>,
     pub order: Vec<usize>,

@@ -62,6 +62,40 @@ impl Redundancies {
     }
 }
 
+/// Images that no camera can have taken, ascending.
+#[derive(Debug, Default)]
+pub struct Unseen {
+    /// Those whose point stands behind the camera.
+    pub behind: Vec<usize>,
+    /// Those beyond where the lens of their camera is one-to-one: they may belong to another direction.
+    pub folded: Vec<usize>,
+}
+
+/// What is determined weakly: what a combination of unknowns moves that no step could follow to its end, and points.
+#[derive(Debug, Default)]
+pub struct Weak {
+    /// Photo and unknown (0 to 5: pose, then camera); none where the adjustment ended otherwise, as in the next two.
+    pub photos: Vec<(usize, usize)>,
+    /// The same for cameras that several photos share, camera and parameter.
+    pub cameras: Vec<(usize, usize)>,
+    /// The same for common unknowns, common unknown and its number.
+    pub commons: Vec<(usize, usize)>,
+    /// The points on nearly parallel rays, or at a station's own place.
+    pub points: Vec<WeakPoint>,
+}
+
+/// The datum that an adjusted network is in.
+#[derive(Debug, Default)]
+pub struct DatumInForce {
+    /// What was held to give a datum where nothing else does: photo and unknown. In the datum of inner constraints, what they were
+    /// taken from.
+    pub held: Vec<(usize, usize)>,
+    /// Relative error, by rounding, of the variances in a datum that they were taken to, about; zero otherwise.
+    pub relative_error: f64,
+    /// Whether control and weights of poses are exactly what a datum takes: they check nothing, and another datum may be chosen.
+    pub minimal_control: bool,
+}
+
 /// An adjusted network, photo by photo, point by point, image by image, as in the input.
 #[derive(Debug)]
 pub struct Solution {
@@ -79,30 +113,16 @@ pub struct Solution {
     pub images: Vec<Option<Observed<2>>>,
     /// The other observations; None for those of points that were left out.
     pub observations: Vec<Option<AdjustedObservation>>,
-    /// These by kind.
-    pub kinds: Vec<KindSums>,
-    /// The images whose point stands behind the camera, ascending.
-    pub behind: Vec<usize>,
-    /// The images beyond where the lens of their camera is one-to-one, ascending: they may belong to another direction.
-    pub folded: Vec<usize>,
+    /// The images that no camera can have taken.
+    pub unseen: Unseen,
     /// Why there are no cofactors although they were asked for: what the adjusted values leave undetermined.
     pub undetermined: Option<NetworkError>,
-    /// What a combination of unknowns moves that is determined so weakly that no step could follow it to its end, photo and
-    /// unknown (0 to 5: pose, then camera); none where the adjustment ended otherwise.
-    pub weak: Vec<(usize, usize)>,
-    /// The same for cameras that several photos share, camera and parameter.
-    pub weak_cameras: Vec<(usize, usize)>,
-    /// The same for common unknowns, common unknown and its number.
-    pub weak_commons: Vec<(usize, usize)>,
-    /// What was held to give a datum where nothing else does: photo and unknown. In the datum of inner constraints, what they were
-    /// taken from.
-    pub datum: Vec<(usize, usize)>,
-    /// The points that were left out at first.
+    /// What is determined weakly.
+    pub weak: Weak,
+    /// The datum that it is in.
+    pub datum: DatumInForce,
+    /// The points that were left out, at first or because of the adjustment.
     pub dropped: Vec<Dropped>,
-    /// The points that were left out because they ran into a station, or their rays do not determine them, ascending.
-    pub collapsed: Vec<usize>,
-    /// The points on nearly parallel rays, or at a station's own place.
-    pub weak_points: Vec<WeakPoint>,
     /// Weighted sums of squares.
     pub sums_of_squares: SumsOfSquares,
     /// Sums of redundancy numbers; None where there are no cofactors.
@@ -114,10 +134,6 @@ pub struct Solution {
     pub variance_of_unit_weight: Option<f64>,
     /// Where the adjustment has ended: what covariances are computed from, and other datums.
     pub state: State,
-    /// Relative error, by rounding, of the variances in a datum that they were taken to, about; zero otherwise.
-    pub relative_error: f64,
-    /// Whether control and weights of poses are exactly what a datum takes: they check nothing, and another datum may be chosen.
-    pub minimal_control: bool,
     /// Where the adjustment has converged, the problem with its cofactors: tests of it form nothing again.
     pub converged: Option<Box<Converged>>,
     /// Status, iterations, counts, operations and times.
@@ -134,6 +150,11 @@ impl Solution {
     /// The same of the unknowns of a photo: its pose and, unless it is held or shared, its camera.
     pub fn covariance_of_photo(&self, photo: usize) -> Option<DMatrix<f64>> {
         Some(&self.photos.get(photo)?.cofactors * self.variance_of_unit_weight?)
+    }
+
+    /// The observations beside images by kind; `network` is the one that was adjusted.
+    pub fn kinds(&self, network: &Network) -> Vec<KindSums> {
+        KindSums::all(&network.observations, &self.observations)
     }
 
     /// Puts the pieces of an adjustment back into the order of the network. Called on a thread of the threads.
@@ -161,19 +182,18 @@ impl Solution {
         let sums_of_squares = sums_of_squares(problem, &adjustment, &unknowns, &observations);
         let redundancies = redundancies(problem, &adjustment, &observations);
         let degrees_of_freedom = degrees_of_freedom(options.unit_variance, problem, &adjustment);
-        let over_freedom = |sum: f64| (degrees_of_freedom > 0).then(|| sum / degrees_of_freedom as f64);
         let variance_of_unit_weight = match options.unit_variance {
             UnitVariance::Unity => Some(1.0),
-            UnitVariance::Free => over_freedom(sums_of_squares.measured()),
-            UnitVariance::Constrained => over_freedom(sums_of_squares.total()),
+            UnitVariance::Free => over(sums_of_squares.measured(), degrees_of_freedom),
+            UnitVariance::Constrained => over(sums_of_squares.total(), degrees_of_freedom),
             UnitVariance::Redundancy => redundancies
                 .map(|own| own.measured())
                 .filter(|&own| own > LEAST_REDUNDANCY)
                 .map(|own| sums_of_squares.measured() / own),
         };
         let observed = |image: usize, group: usize| adjustment.observed(group, network.images[image].sd);
-        let images = in_order(network.images.len(), &problem.model.order, observed);
-        let photos_end = problem.model.first[network.photos.len()];
+        let images = in_order(network.images.len(), &problem.model.point_images.order, observed);
+        let photos_end = problem.model.blocks.first[network.photos.len()];
         let of_photo = |&unknown: &usize| of_photo(problem, unknown);
         let photos = adjusted_photos(network, assembled, &adjustment, &unknowns);
         let mut solution = Self {
@@ -183,30 +203,30 @@ impl Solution {
             photo_corrections: adjustment.corrections().map(|all| all[..photos_end].to_vec()).collect(),
             points: adjusted_points(network, assembled, &adjustment, &unknowns),
             images,
-            kinds: KindSums::all(&network.observations, &observations),
             observations,
-            behind: vec![],
-            folded: vec![],
-            weak_points: vec![],
+            unseen: Unseen::default(),
             undetermined: adjustment.undetermined.take().map(|error| NetworkError::new(error, assembled)),
-            weak: adjustment.weak.iter().filter_map(of_photo).collect(),
-            weak_cameras: adjustment.weak.iter().filter_map(|&unknown| of_camera(problem, unknown)).collect(),
-            weak_commons: adjustment.weak.iter().filter_map(|&unknown| of_common(problem, unknown)).collect(),
-            datum: adjustment.datum.iter().filter_map(of_photo).collect(),
+            weak: Weak {
+                photos: adjustment.weak.iter().filter_map(of_photo).collect(),
+                cameras: adjustment.weak.iter().filter_map(|&unknown| of_camera(problem, unknown)).collect(),
+                commons: adjustment.weak.iter().filter_map(|&unknown| of_common(problem, unknown)).collect(),
+                points: vec![],
+            },
+            datum: DatumInForce {
+                held: adjustment.datum.iter().filter_map(of_photo).collect(),
+                ..DatumInForce::default()
+            },
             dropped: dropped.clone(),
             state: State {
                 unknowns: vec![],
                 held: adjustment.datum.clone(),
-                collapsed: collapsed.clone(),
+                collapsed,
                 loose: assembled.loose.clone(),
-                ordering: adjustment.ordering,
+                ordering: adjustment.effort.ordering,
                 datum: None,
                 released: false,
             },
-            relative_error: 0.0,
-            minimal_control: false,
             converged: None,
-            collapsed,
             sums_of_squares,
             redundancies,
             degrees_of_freedom,
@@ -215,7 +235,7 @@ impl Solution {
         };
         let squares = solution.find_behind(assembled, &unknowns);
         let (model, points) = (&problem.model, &assembled.points[..]);
-        solution.weak_points = network.weak_points(model, points, &solution.points, &squares);
+        solution.weak.points = network.weak_points(model, points, &solution.points, &squares);
         let found = Leverages::of(&mut solution.adjustment, &unknowns);
         let found = found.filter(|_| solution.adjustment.holds_after_last_step());
         solution.state.unknowns = unknowns;
@@ -223,6 +243,11 @@ impl Solution {
         solution.adjustment.release_observations();
         (solution, found)
     }
+}
+
+/// A sum of squares over the degrees of freedom, where there are any.
+fn over(sum: f64, degrees_of_freedom: i64) -> Option<f64> {
+    (degrees_of_freedom > 0).then(|| sum / degrees_of_freedom as f64)
 }
 
 /// The photo and the number of one of its unknowns; None for unknowns of anything else.
@@ -253,8 +278,8 @@ fn of_common(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)
 fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(Owner, usize)> {
     let all = model.of_stations();
     let retained = all.contains(&unknown).then(|| unknown - all.start)?;
-    let block = model.first.partition_point(|&start| start <= retained) - 1;
-    Some((model.owner(block), retained - model.first[block]))
+    let block = model.blocks.first.partition_point(|&start| start <= retained) - 1;
+    Some((model.owner(block), retained - model.blocks.first[block]))
 }
 
 /// The observations beside images.

@@ -53,12 +53,13 @@ impl Network {
             let held = unused(index) || model.is_carried(index);
             all.extend(photo.sd.iter().chain(own).map(|&sd| if held { 0.0 } else { sd }));
         }
-        for &camera in &model.shared {
+        for &camera in &model.blocks.shared {
             all.extend(self.cameras[camera].sd.iter().map(|&sd| if used[camera] { sd } else { 0.0 }));
         }
-        for (common, own) in self.commons.iter().enumerate().filter(|&(i, _)| model.common_block[i].is_some())
+        for (common, own) in
+            self.commons.iter().enumerate().filter(|&(i, _)| model.blocks.of_common[i].is_some())
         {
-            let is_used = model.uses_of_commons[common] > 0 || elsewhere.contains(&common);
+            let is_used = model.commons[common].uses > 0 || elsewhere.contains(&common);
             all.extend(own.sd.iter().map(|&sd| if is_used { sd } else { 0.0 }));
         }
         all
@@ -73,7 +74,7 @@ impl Network {
                 all.extend(self.camera(photo).camera.parameters());
             }
         }
-        all.extend(model.shared.iter().flat_map(|&camera| self.cameras[camera].camera.parameters()));
+        all.extend(model.blocks.shared.iter().flat_map(|&camera| self.cameras[camera].camera.parameters()));
         // They count from what is given.
         all.resize(model.of_stations().len(), 0.0);
         all

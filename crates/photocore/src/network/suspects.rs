@@ -112,8 +112,9 @@ fn images(assembled: &Assembled, count: usize) -> Vec<Suspect> {
     let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
     let groups = layout.groups();
     let mut of_image = vec![None; count];
-    for (point, images) in model.start.windows(2).enumerate() {
-        (images[0]..images[1]).for_each(|place| of_image[model.order[place]] = Some((place, point)));
+    for (point, images) in model.point_images.start.windows(2).enumerate() {
+        (images[0]..images[1])
+            .for_each(|place| of_image[model.point_images.order[place]] = Some((place, point)));
     }
     let suspect = |(image, taken): (usize, Option<(usize, usize)>)| {
         let (place, point) = taken?;

@@ -328,7 +328,7 @@ impl Trial {
         for place in out.points.iter().filter_map(|&point| self.place[point]) {
             let model = &problem.model;
             problem.sd[model.of_point(place)].fill(0.0);
-            let images = 2 * model.start[place]..2 * model.start[place + 1];
+            let images = 2 * model.point_images.start[place]..2 * model.point_images.start[place + 1];
             problem.observation_sd[images].fill(f64::INFINITY);
         }
         for &photo in out.photos {

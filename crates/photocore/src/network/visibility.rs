@@ -2,6 +2,7 @@
 
 use super::problem::Assembled;
 use super::selection::TOGETHER;
+use super::solution::Unseen;
 use super::stations::Station;
 use super::{Image, Solution};
 use crate::parallel;
@@ -21,50 +22,43 @@ impl Solution {
             None => station.camera.fold(),
             Some(block) => *of_shared[block].get_or_insert_with(|| station.camera.fold()),
         };
-        let folds: Vec<f64> = photos.iter().zip(&model.camera_block).map(fold).collect();
+        let folds: Vec<f64> = photos.iter().zip(&model.blocks.of_camera).map(fold).collect();
         let (local, tied) = model.all_coordinates(unknowns);
         let look = |point: usize| {
             let at = local.get(point).unwrap_or_else(|| &tied[point - local.len()]);
             let position = model.space.cartesian(*at);
-            let (mut nearest, mut hidden) = (f64::INFINITY, Hidden::default());
-            for image in model.start[point]..model.start[point + 1] {
+            let (mut nearest, mut unseen) = (f64::INFINITY, Unseen::default());
+            for image in model.point_images.start[point]..model.point_images.start[point + 1] {
                 let Image { photo, xy, .. } = model.images[image];
                 let Station { orientation, camera } = &photos[photo];
                 let u = orientation.pose().sight(&position);
                 nearest = nearest.min(u.norm_squared());
                 if !camera.faces(&u) {
-                    hidden.behind.push(model.order[image]);
+                    unseen.behind.push(model.point_images.order[image]);
                 }
                 if folds[photo].is_finite() && camera.radius(&u, xy) > folds[photo] {
-                    hidden.folded.push(model.order[image]);
+                    unseen.folded.push(model.point_images.order[image]);
                 }
             }
-            (nearest, hidden.boxed())
+            (nearest, unseen.boxed())
         };
         let of_points = parallel::map(model.points.len(), TOGETHER, look);
-        let (squares, hidden): (Vec<f64>, Vec<_>) = of_points.into_iter().unzip();
-        for (&point, hidden) in points.iter().zip(hidden) {
-            let Some(hidden) = hidden else { continue };
+        let (squares, unseen): (Vec<f64>, Vec<_>) = of_points.into_iter().unzip();
+        for (&point, unseen) in points.iter().zip(unseen) {
+            let Some(unseen) = unseen else { continue };
             if let Some(point) = &mut self.points[point] {
-                point.behind = hidden.behind.len();
+                point.behind = unseen.behind.len();
             }
-            self.behind.extend(hidden.behind);
-            self.folded.extend(hidden.folded);
+            self.unseen.behind.extend(unseen.behind);
+            self.unseen.folded.extend(unseen.folded);
         }
-        self.behind.sort_unstable();
-        self.folded.sort_unstable();
+        self.unseen.behind.sort_unstable();
+        self.unseen.folded.sort_unstable();
         squares
     }
 }
 
-/// The images of a point that have it behind the camera, and those beyond where their lens is one-to-one.
-#[derive(Default)]
-struct Hidden {
-    behind: Vec<usize>,
-    folded: Vec<usize>,
-}
-
-impl Hidden {
+impl Unseen {
     /// None where there are none, as of nearly all points.
     fn boxed(self) -> Option<Box<Self>> {
         (!(self.behind.is_empty() && self.folded.is_empty())).then(|| Box::new(self))

@@ -81,14 +81,15 @@ impl Symbolic {
             let order = candidate.order(&graph, layout);
             (candidate, predicted_operations(layout, &graph, &order), order)
         };
-        let candidates = ordering.candidates();
-        let tried: Vec<(Ordering, f64, Vec<usize>)> = if graph.len() < MANY {
-            candidates.iter().map(try_out).collect()
+        let orderings = ordering.candidates();
+        let candidates: Vec<(Ordering, f64, Vec<usize>)> = if graph.len() < MANY {
+            orderings.iter().map(try_out).collect()
         } else {
-            parallel::map_each(candidates.iter().collect(), &try_out)
+            parallel::map_each(orderings.iter().collect(), &try_out)
         };
-        let predictions = tried.iter().map(|&(candidate, operations, _)| (candidate, operations)).collect();
-        let best = tried.into_iter().min_by(|(_, a, _), (_, b, _)| a.total_cmp(b));
+        let predictions =
+            candidates.iter().map(|&(candidate, operations, _)| (candidate, operations)).collect();
+        let best = candidates.into_iter().min_by(|(_, a, _), (_, b, _)| a.total_cmp(b));
         let (ordering, order) =
             best.map_or((Ordering::Input, Vec::new()), |(candidate, _, order)| (candidate, order));
         Self { predictions, ..Self::with_order(layout, &graph, ordering, &order) }
@@ -162,7 +163,7 @@ impl Symbolic {
         self.ordering
     }
 
-    /// The orderings that were tried, each with the predicted multiply-adds of a factorisation.
+    /// The orderings that were candidates, each with the predicted multiply-adds of a factorisation.
     pub fn predictions(&self) -> &[(Ordering, f64)] {
         &self.predictions
     }

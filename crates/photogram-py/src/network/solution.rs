@@ -191,7 +191,7 @@ macro_rules! solution_class {
 
             #[getter]
             fn ordering(&self) -> &'static str {
-                self.solution.adjustment.ordering.name()
+                self.solution.adjustment.effort.ordering.name()
             }
 
             #[getter]
@@ -206,7 +206,7 @@ macro_rules! solution_class {
 
             #[getter]
             fn formations(&self) -> usize {
-                self.solution.adjustment.formations
+                self.solution.adjustment.effort.formations
             }
 
             #[getter]
@@ -221,17 +221,17 @@ macro_rules! solution_class {
 
             #[getter]
             fn datum(&self) -> Vec<(usize, usize)> {
-                self.solution.datum.clone()
+                self.solution.datum.held.clone()
             }
 
             #[getter]
             fn weak(&self) -> Vec<(usize, usize)> {
-                self.solution.weak.clone()
+                self.solution.weak.photos.clone()
             }
 
             #[getter]
             fn weak_points(&self) -> Vec<(usize, f64, f64)> {
-                self.solution.weak_points.iter().map(|weak| (weak.point, weak.ratio, weak.distance)).collect()
+                self.solution.weak.points.iter().map(|weak| (weak.point, weak.ratio, weak.distance)).collect()
             }
 
             $($own)*
@@ -244,12 +244,12 @@ solution_class! {
     BlockSolution, "block", {
         #[getter]
         fn relative_error(&self) -> f64 {
-            self.solution.relative_error
+            self.solution.datum.relative_error
         }
 
         #[getter]
         fn minimal_control(&self) -> bool {
-            self.solution.minimal_control
+            self.solution.datum.minimal_control
         }
 
         #[getter]
@@ -286,12 +286,12 @@ solution_class! {
 
         #[getter]
         fn images_behind<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-            PyArray1::from_vec(py, self.solution.behind.iter().map(|&image| image as i64).collect())
+            PyArray1::from_vec(py, self.solution.unseen.behind.iter().map(|&image| image as i64).collect())
         }
 
         #[getter]
         fn images_folded<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-            PyArray1::from_vec(py, self.solution.folded.iter().map(|&image| image as i64).collect())
+            PyArray1::from_vec(py, self.solution.unseen.folded.iter().map(|&image| image as i64).collect())
         }
 
         #[getter]
@@ -301,7 +301,7 @@ solution_class! {
 
         #[getter]
         fn weak_unknowns(&self) -> Vec<(usize, usize)> {
-            self.solution.weak_commons.clone()
+            self.solution.weak.commons.clone()
         }
 
         #[getter]
@@ -311,7 +311,7 @@ solution_class! {
 
         #[getter]
         fn weak_cameras(&self) -> Vec<(usize, usize)> {
-            self.solution.weak_cameras.clone()
+            self.solution.weak.cameras.clone()
         }
 
         #[getter]
@@ -342,7 +342,7 @@ solution_class! {
 
         #[getter]
         fn photo_order<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-            let order = &self.solution.adjustment.order;
+            let order = &self.solution.adjustment.effort.order;
             // A camera, a point that stays or a mount is no photo.
             let photos = order.iter().filter(|&&block| block < self.solution.photos.len());
             PyArray1::from_vec(py, photos.map(|&photo| photo as i64).collect())

@@ -1,8 +1,8 @@
 //! The camera of photogrammetric calibration certificates: Brown (1971), on measured coordinates.
 
-use super::model::Unit;
 use super::backward::{BackwardModel, Corrected};
 use super::inverse::{RadialFactor, RadialLimit, from_radial};
+use super::model::Unit;
 use super::radial_tangential::{Bent, RadialTangential, Terms, power_of};
 
 /// Radial and tangential corrections, affinity and shear, backward: functions of measured coordinates, which they are added to.

@@ -1,11 +1,11 @@
 //! Brown's terms on ideal coordinates, as AICON has them.
 
 use super::brown::BrownTerms;
-use super::inverse::{RadialLimit, from_radial, times};
-use super::radial_tangential::Bent;
 use super::inverse::Matrix2;
+use super::inverse::{RadialLimit, from_radial, times};
 use super::model::{CameraModel, Image, Unit};
 use super::perspective::Perspective;
+use super::radial_tangential::Bent;
 use crate::geometry::Vector3;
 
 /// Radial terms that may be balanced, tangential ones, affinity and shear, forward: functions of ideal coordinates.

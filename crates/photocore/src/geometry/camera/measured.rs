@@ -1,8 +1,8 @@
 //! Backward cameras whose residuals lie in the measured image: errors of measured coordinates have the weights that they are given.
 
 use super::backward::BackwardModel;
-use super::inverse::RadialLimit;
 use super::brown::{Brown, BrownAffinityAfter};
+use super::inverse::RadialLimit;
 use super::model::{CameraModel, Image, LensDirection, Unit};
 use super::on_comparator::OnComparator;
 use super::orthogonal::{Ebner, Gruen};

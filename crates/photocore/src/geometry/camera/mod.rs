@@ -8,6 +8,7 @@ mod inverse;
 mod model;
 mod projections;
 mod radial_tangential;
+mod table;
 
 use super::axes::Vector3;
 

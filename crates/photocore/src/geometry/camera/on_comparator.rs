@@ -1,9 +1,9 @@
 //! Brown's camera whose plates are measured on a comparator that is calibrated itself (NOAA TR NOS 57, equations 34 and 63).
 
-use super::model::Unit;
 use super::backward::{BackwardModel, Corrected};
 use super::brown::BrownTerms;
 use super::inverse::{Matrix2, RadialLimit, from_radial, inverted, times, way_back};
+use super::model::Unit;
 
 /// Exponents of the terms of a polynomial, the constant behind them: x^4, y^4, x^3, y^3, x^2, y^2, x, y.
 const DEGREES: [i32; 8] = [4, 4, 3, 3, 2, 2, 1, 1];

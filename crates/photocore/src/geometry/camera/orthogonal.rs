@@ -1,8 +1,8 @@
 //! Corrections that are orthogonal over the format of the image: the 12 of Ebner (1976) and the 44 of Gruen (1978).
 
-use super::model::Unit;
 use super::backward::{BackwardModel, Corrected};
 use super::inverse::{RadialLimit, way_back};
+use super::model::Unit;
 
 /// P_0 to P_4 of one coordinate, and their derivatives.
 type Basis = [(f64, f64); 5];

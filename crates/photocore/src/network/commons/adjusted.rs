@@ -46,9 +46,9 @@ impl Network {
                 attitude: common.attitude,
                 cofactors: DMatrix::repeat(width, width, missing),
                 redundancy: vec![missing; width],
-                observations: model.uses_of_commons[index],
+                observations: model.commons[index].uses,
             };
-            let Some(block) = model.common_block[index] else { return found };
+            let Some(block) = model.blocks.of_common[index] else { return found };
             let range = model.of_block(block);
             found.change = unknowns[range.clone()].to_vec();
             (found.position, found.attitude) = model.commons[index].reported(state);

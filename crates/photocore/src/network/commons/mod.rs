@@ -183,6 +183,8 @@ pub(super) struct PlacedCommon {
     given: Pose,
     /// The axes that its rotation is given in, as rows.
     axes: Matrix3,
+    /// How many observations and images that take part are of it.
+    pub uses: usize,
 }
 
 impl PlacedCommon {
@@ -201,7 +203,7 @@ impl PlacedCommon {
             (*position, (*position).into(), axes)
         };
         let given = Pose { position, attitude: axes.tr_mul(attitude) };
-        Self { kind: *kind, space, origin, coordinates, given, axes }
+        Self { kind: *kind, space, origin, coordinates, given, axes, uses: 0 }
     }
 
     /// Position and rotation, as in [`Common`], at given values.

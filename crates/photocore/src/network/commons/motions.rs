@@ -98,7 +98,7 @@ impl Bundle {
         each: impl Fn(&PlacedCommon, &CommonState) -> Vec<f64>,
         unknowns: &mut [f64],
     ) {
-        let all = self.commons.iter().zip(&placed.commons).zip(&self.common_block);
+        let all = self.commons.iter().zip(&placed.commons).zip(&self.blocks.of_common);
         for ((common, state), &block) in all.filter(|((common, _), _)| !common.moves_against()) {
             if let Some(block) = block {
                 unknowns[self.of_block(block)].copy_from_slice(&each(common, state));
@@ -107,7 +107,7 @@ impl Bundle {
         for (pair, antennas) in self.antennas(placed) {
             let displaced = antennas.iter().map(|&(place, time)| ((motion.displacement)(&place), time));
             for (common, moved) in pair.into_iter().zip(line(displaced, pair.map(|own| own.is_some()))) {
-                let Some((common, block)) = common.and_then(|own| Some((own, self.common_block[own]?)))
+                let Some((common, block)) = common.and_then(|own| Some((own, self.blocks.of_common[own]?)))
                 else {
                     continue;
                 };

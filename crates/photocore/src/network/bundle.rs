@@ -1,0 +1,154 @@
+//! A network as observation equations.
+
+use std::collections::HashMap;
+use std::sync::OnceLock;
+
+use super::blocks::Blocks;
+use super::camera_priors::CameraPrior;
+use super::commons::PlacedCommon;
+use super::model::{Bundle, GivenDatum};
+use super::mounts::{Mounts, When};
+use super::observations::{Fault, Observation, TiedObservation, Touches};
+use super::selection::{Selected, TOGETHER};
+use super::{Camera, Image, Network, NetworkError, Photo, Point, Screens};
+use crate::geometry::{Matrix3, ObjectSpace, POSE, PoseNumbers, Refraction, local_vertical};
+use crate::parallel;
+
+impl Network {
+    /// The observation equations of what takes part: `images` are those of its points, `images_on` how many are on each photo.
+    pub(super) fn bundle(
+        &self,
+        selected: &mut Selected,
+        images: Vec<Image>,
+        images_on: Vec<usize>,
+        middle: [f64; 3],
+    ) -> Result<Bundle, NetworkError> {
+        let origin = self.origin(middle);
+        let points = parallel::map_in_place(selected.points.len(), TOGETHER, &|place| {
+            let Point { coordinates, sd } = self.points[selected.points[place]];
+            Point { coordinates: std::array::from_fn(|k| coordinates[k] - origin[k]), sd }
+        });
+        let mounts = Mounts::new(&self.mounts, self.photos.len());
+        let mut bundle = Bundle {
+            space: self.space,
+            poses: self.poses,
+            // Coordinates are counted from the origin; heights are not.
+            refraction: self
+                .refraction
+                .map(|refraction| Refraction { datum: refraction.datum + origin[2], ..refraction }),
+            cameras: self.photos.iter().map(|photo| self.camera(photo).camera).collect(),
+            blocks: Blocks::new(self, self.shared_cameras(&selected.surroundings)),
+            camera_priors: vec![],
+            commons: self.placed_commons(selected, &mounts, &images, middle),
+            datum: self.given_datum(selected, &mounts),
+            mounts,
+            origin,
+            locals: selected.locals,
+            points,
+            images,
+            point_images: std::mem::take(&mut selected.images),
+            turning: vec![false; self.photos.len()],
+            images_on,
+            observations: vec![],
+            screens: Screens::default(),
+            parts: OnceLock::new(),
+        };
+        let prior = |(index, camera): (usize, &Camera)| {
+            camera.covariance.as_ref()?;
+            CameraPrior::of(camera, self.first_parameter(&bundle, index)?)
+        };
+        bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();
+        bundle.observations = self.tied_observations(selected, &bundle)?;
+        Ok(bundle)
+    }
+
+    /// The common unknowns, with how many observations and images that take part are of each.
+    fn placed_commons(
+        &self,
+        selected: &Selected,
+        mounts: &Mounts,
+        images: &[Image],
+        middle: [f64; 3],
+    ) -> Vec<PlacedCommon> {
+        let (origin, vertical) = (self.origin(middle), self.vertical(middle));
+        let place = |common| PlacedCommon::new(common, self.space, origin, &vertical);
+        let mut placed: Vec<PlacedCommon> = self.commons.iter().map(place).collect();
+        let of_image = |image: &Image| mounts.commons(image.photo, Some(When::Image(image.xy)));
+        images.iter().flat_map(of_image).for_each(|common| placed[common].uses += 1);
+        let of_observation = |&observation: &usize| self.observations[observation].touches().commons;
+        let touched = selected.observations.iter().flat_map(of_observation);
+        touched.for_each(|(common, _)| placed[common].uses += 1);
+        placed
+    }
+
+    /// The axes amid the photos, as rows, that shifts and drifts are told in: X, Y, Z or, in geographic space, east, north and up.
+    fn vertical(&self, middle: [f64; 3]) -> Matrix3 {
+        match self.space {
+            ObjectSpace::Rectangular => Matrix3::identity(),
+            ObjectSpace::Geographic(_) => local_vertical(middle[0], middle[1]),
+        }
+    }
+
+    /// Whether the datum is the user's.
+    pub(super) fn is_placed(&self, selected: &Selected) -> bool {
+        self.given_datum(selected, &Mounts::new(&self.mounts, self.photos.len())).placed
+    }
+
+    /// What the network itself says of the datum.
+    fn given_datum(&self, selected: &Selected, mounts: &Mounts) -> GivenDatum {
+        // Angles alone leave position and scale open.
+        let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { POSE };
+        let own = |photo: &Photo| photo.sd[..positions].iter().any(|sd| sd.is_finite());
+        let carried = |index: usize| mounts.carrier(index) != index;
+        let mut photos = (0..self.photos.len()).filter(|&index| !carried(index) && own(&self.photos[index]));
+        let fixed = |index: usize| self.photos[index].sd[..positions].iter().all(|&sd| sd == 0.0);
+        let (placed, anchor) = match (photos.next(), photos.next()) {
+            _ if selected.points.iter().any(|&point| self.points[point].held() != [false; 3]) => (true, None),
+            (None, _) => (false, None),
+            (first, None) if first.is_some_and(fixed) => (false, first),
+            _ => (true, None),
+        };
+        GivenDatum { placed, anchor, minimum: None }
+    }
+
+    /// The unknown that the first parameter of a camera is; None where no photo has it.
+    fn first_parameter(&self, model: &Bundle, camera: usize) -> Option<usize> {
+        Some(match model.blocks.shared.binary_search(&camera) {
+            Ok(shared) => model.of_block(model.cameras.len() + shared).start,
+            Err(_) => {
+                model.of_block(self.photos.iter().position(|photo| photo.camera == camera)?).start + POSE
+            }
+        })
+    }
+
+    /// The observations that take part.
+    fn tied_observations(
+        &self,
+        selected: &Selected,
+        model: &Bundle,
+    ) -> Result<Vec<TiedObservation>, NetworkError> {
+        let Selected { points, locals, observations, .. } = selected;
+        let place: HashMap<usize, usize> =
+            points[*locals..].iter().enumerate().map(|(i, &point)| (point, locals + i)).collect();
+        let tied = |&index: &usize| {
+            let observation: &Observation = &self.observations[index];
+            let touches = observation.touches();
+            let points = touches.points.iter().map(|point| place[point]).collect();
+            let touches = Touches { points, ..touches };
+            let blocks = model.blocks_of(&touches);
+            let root = match blocks.len() {
+                0 => Err(Fault::NothingUnknown),
+                _ => observation.precision().root(observation.rows()),
+            };
+            let kind = observation.kind();
+            Ok(TiedObservation {
+                index,
+                touches,
+                blocks,
+                root: root.map_err(|fault| NetworkError::Observation { index, kind, fault })?,
+                observation: observation.clone(),
+            })
+        };
+        observations.iter().map(tied).collect()
+    }
+}

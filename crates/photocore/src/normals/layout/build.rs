@@ -1,0 +1,188 @@
+//! A system described, block by block, and what contradicts itself refused.
+
+use std::ops::Range;
+
+use super::{Layout, LayoutError, Tie};
+
+impl Layout {
+    /// Describes a system of main blocks alone.
+    ///
+    /// * `rows`: equations in each group (2 for an image point);
+    /// * `local_dim`: unknowns of a local block, 1 to 3;
+    /// * `retained_dims`: unknowns of each retained block;
+    /// * `group_ptr`: the groups of local block `i` are `group_ptr[i]..group_ptr[i + 1]`;
+    /// * `group_retained`: the retained block of each group.
+    pub fn new(
+        rows: usize,
+        local_dim: usize,
+        retained_dims: &[usize],
+        group_ptr: Vec<usize>,
+        group_retained: Vec<u32>,
+    ) -> Result<Self, LayoutError> {
+        if !(1..=3).contains(&local_dim) {
+            return Err(LayoutError::LocalDimension(local_dim));
+        }
+        let in_retained = retained_dims.iter().fold(0, |sum: usize, &dim| sum.saturating_add(dim));
+        let unknowns = group_ptr.len().saturating_mul(local_dim).saturating_add(in_retained);
+        [retained_dims.len(), group_retained.len(), unknowns].into_iter().try_for_each(numbered)?;
+        let rising = group_ptr.is_sorted() && group_ptr.first() == Some(&0);
+        if !rising || group_ptr.last() != Some(&group_retained.len()) {
+            return Err(LayoutError::GroupPointers(group_retained.len()));
+        }
+        if let Some(group) =
+            group_retained.iter().position(|&retained| retained as usize >= retained_dims.len())
+        {
+            let retained = group_retained[group] as usize;
+            return Err(LayoutError::Retained { group, retained, blocks: retained_dims.len() });
+        }
+        let mut retained_offset = Vec::with_capacity(retained_dims.len() + 1);
+        let mut offset = (group_ptr.len() - 1) * local_dim;
+        for dim in retained_dims {
+            retained_offset.push(offset);
+            offset += dim;
+        }
+        retained_offset.push(offset);
+        let locals = group_ptr.len() - 1;
+        Ok(Self {
+            rows,
+            local_dim,
+            locals,
+            retained_offset,
+            group_ptr,
+            group_retained,
+            shared_ptr: Vec::new(),
+            shared: Vec::new(),
+            ties: Vec::new(),
+            tie_ptr: vec![0],
+            block_ptr: vec![0],
+            places: None,
+            free: Vec::new(),
+            pairs: Vec::new(),
+            pair_ptr: vec![0],
+            outer: Vec::new(),
+            contributions: Vec::new(),
+        })
+    }
+
+    /// Adds the place of each retained block in some cartesian space: nested dissection cuts across it.
+    pub fn with_places(mut self, places: Vec<[f64; 3]>) -> Result<Self, LayoutError> {
+        if places.len() != self.retained() {
+            return Err(LayoutError::Places { places: places.len(), blocks: self.retained() });
+        }
+        self.places = Some(places);
+        Ok(self)
+    }
+
+    /// Adds shared blocks: group `g` touches `blocks[ptr[g]..ptr[g + 1]]` besides its main one, in an order of its own, in which
+    /// its coefficients are written.
+    pub fn with_shared(mut self, ptr: Vec<usize>, blocks: Vec<u32>) -> Result<Self, LayoutError> {
+        let rising = ptr.is_sorted() && ptr.first() == Some(&0) && ptr.last() == Some(&blocks.len());
+        if !rising || ptr.len() != self.groups() + 1 {
+            return Err(LayoutError::SharedPointers(blocks.len()));
+        }
+        let mut possible = vec![true; self.retained()];
+        self.group_retained.iter().for_each(|&main| possible[main as usize] = false);
+        for group in 0..self.groups() {
+            let own = &blocks[ptr[group]..ptr[group + 1]];
+            for (k, &retained) in own.iter().enumerate() {
+                if possible.get(retained as usize) != Some(&true) || own[..k].contains(&retained) {
+                    return Err(LayoutError::Shared { group, retained: retained as usize });
+                }
+            }
+        }
+        if !blocks.is_empty() {
+            (self.shared_ptr, self.shared) = (ptr, blocks);
+        }
+        Ok(self)
+    }
+
+    /// Adds ties.
+    pub fn with_ties(mut self, ties: Vec<Tie>) -> Result<Self, LayoutError> {
+        numbered(ties.len())?;
+        let sound = |tie: &Tie| {
+            let mut retained = tie.retained.clone();
+            retained.sort_unstable();
+            let exist = retained.last().is_some_and(|&last| (last as usize) < self.retained());
+            let once = retained.windows(2).all(|pair| pair[0] < pair[1]);
+            tie.rows > 0 && exist && once
+        };
+        if let Some(tie) = ties.iter().position(|tie| !sound(tie)) {
+            return Err(LayoutError::Tie { tie });
+        }
+        self.tie_ptr.truncate(1);
+        self.block_ptr.truncate(1);
+        for tie in &ties {
+            self.tie_ptr.push(self.tie_ptr[self.tie_ptr.len() - 1] + tie.rows);
+            self.block_ptr.push(self.block_ptr[self.block_ptr.len() - 1] + tie.rows.pow(2));
+        }
+        self.ties = ties;
+        Ok(self)
+    }
+
+    /// Says which unknowns are held whatever their equations are asked for: `held` of all unknowns. Their coefficients, which must be zero,
+    /// are left out of the products of what groups have in common with others.
+    pub fn with_held(mut self, held: &[bool]) -> Self {
+        let of_retained = held.get(self.all_retained()).unwrap_or_default();
+        if of_retained.contains(&true) {
+            self.free =
+                (0..self.retained()).map(|block| free_ranges(&held[self.retained_range(block)])).collect();
+        }
+        self
+    }
+
+    /// Asks for the cofactors of pairs of retained blocks, the first of which have the rows; those are found that some equations touch
+    /// together.
+    pub fn with_pairs(mut self, mut pairs: Vec<[u32; 2]>) -> Result<Self, LayoutError> {
+        pairs.sort_unstable();
+        pairs.dedup();
+        self.pair_ptr.truncate(1);
+        for (index, pair) in pairs.iter().enumerate() {
+            let [rows, columns] = pair.map(|block| block as usize);
+            if rows.max(columns) >= self.retained() {
+                return Err(LayoutError::Pair(pair.map(|block| block as usize)));
+            }
+            let size = self.retained_dim(rows) * self.retained_dim(columns);
+            self.pair_ptr.push(self.pair_ptr[index] + size);
+        }
+        self.pairs = pairs;
+        Ok(self)
+    }
+
+    /// Makes the system a part of a larger one: a node of its elimination tree.
+    ///
+    /// * `outer`: retained blocks that stay, in an order of their own: a system above eliminates them;
+    /// * `contributions`: for each system below the retained blocks that it leaves something for, in its order.
+    pub fn as_part(mut self, outer: Vec<u32>, contributions: Vec<Vec<u32>>) -> Result<Self, LayoutError> {
+        numbered(contributions.len())?;
+        let sound = |blocks: &[u32]| {
+            let mut seen = vec![false; self.retained()];
+            let fresh = |&block: &u32| {
+                seen.get_mut(block as usize).is_some_and(|seen| !std::mem::replace(seen, true))
+            };
+            blocks.iter().all(fresh)
+        };
+        let all_sound = std::iter::once(&outer).chain(&contributions).all(|blocks| sound(blocks));
+        if !all_sound {
+            return Err(LayoutError::Outer);
+        }
+        (self.outer, self.contributions) = (outer, contributions);
+        Ok(self)
+    }
+}
+
+/// Refuses more than 32 bits number; the greatest of their numbers stands for none.
+fn numbered(count: usize) -> Result<(), LayoutError> {
+    if count < u32::MAX as usize { Ok(()) } else { Err(LayoutError::TooMany(count)) }
+}
+
+/// The runs of what is not held.
+fn free_ranges(held: &[bool]) -> Vec<Range<usize>> {
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for k in (0..held.len()).filter(|&k| !held[k]) {
+        match ranges.last_mut().filter(|last| last.end == k) {
+            Some(last) => last.end += 1,
+            None => ranges.push(k..k + 1),
+        }
+    }
+    ranges
+}
