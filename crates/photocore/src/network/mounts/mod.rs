@@ -115,9 +115,15 @@ impl Mounts {
     }
 
     /// The common unknowns that a pose is made of, each once; None for all of a photo.
+    #[inline]
     pub fn commons(&self, photo: usize, when: Option<When>) -> Vec<usize> {
+        // It is asked of every image.
+        if self.is_empty() { vec![] } else { self.commons_of_mounts(photo, when) }
+    }
+
+    fn commons_of_mounts(&self, photo: usize, when: Option<When>) -> Vec<usize> {
         let carrier = self.carrier(photo);
-        let mut all = if carrier == photo { vec![] } else { self.commons(carrier, when) };
+        let mut all = if carrier == photo { vec![] } else { self.commons_of_mounts(carrier, when) };
         for common in self.of(photo).iter().flat_map(|mount| mount.commons(when)) {
             if !all.contains(&common) {
                 all.push(common);

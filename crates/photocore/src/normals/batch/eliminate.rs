@@ -113,8 +113,9 @@ impl Batch {
         let depth = self.locals.len();
         for slot in &self.slots {
             let dim = size::<D>(slot.dim);
-            let couplings = self.coupling[slot.coupling..].chunks_mut((L * dim).max(1));
-            for (t, (triangle, coupling)) in self.triangles.iter().zip(couplings).enumerate() {
+            // Not zipped: in a kernel that is a call for each main block.
+            for (t, triangle) in self.triangles.iter().enumerate() {
+                let coupling = &mut self.coupling[slot.coupling + t * L * dim..][..L * dim];
                 for first in (0..dim).step_by(LANES) {
                     let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
                     for (k, p) in slot.groups.clone().enumerate() {
@@ -143,8 +144,8 @@ impl Batch {
                 run.places.clone().map(group)
             });
             let groups: SmallVec<[Group; 8]> = groups.collect();
-            let couplings = self.coupling[segment.coupling..].chunks_mut((L * width).max(1));
-            for (t, (triangle, coupling)) in self.triangles.iter().zip(couplings).enumerate() {
+            for (t, triangle) in self.triangles.iter().enumerate() {
+                let coupling = &mut self.coupling[segment.coupling + t * L * width..][..L * width];
                 for first in (0..width).step_by(LANES) {
                     let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
                     for &Group { local, shared, stride } in &groups {
