@@ -1,6 +1,7 @@
 """The fuzzer's command line.
 
 python -m tests.fuzz --inputs 1000000 --seed 12 --page docs/reliability.md
+python -m tests.fuzz --inputs 50000 --first 250000 --seed 14 --account tests/fuzz/account.json
 python -m tests.fuzz --replay 12:345 --keep damaged
 """
 
@@ -11,6 +12,7 @@ import sys
 from pathlib import Path
 
 from . import programs, run
+from .account import add_to
 from .case import Outcome
 from .page import lines, table, write_section
 from .run import fuzz, replay
@@ -36,6 +38,9 @@ def main() -> int:
     parser.add_argument(
         "--logs", type=Path, help="directory of logs: the same command goes on where it stopped"
     )
+    parser.add_argument(
+        "--account", type=Path, help="JSON file that the figures are added to: a run in parts, on any machine"
+    )
     parser.add_argument("--page", type=Path, help="page whose section on the fuzzer gets the figures")
     parser.add_argument(
         "--pages", type=float, default=0.0, help="part of them that have a report for the browser (0)"
@@ -51,7 +56,10 @@ def main() -> int:
         print(f"{outcome.format}: {outcome.ending}\n{outcome.fault or outcome.warned or ''}")
         return int(outcome.fault is not None)
     figures = fuzz(asked.seed, asked.inputs, asked.jobs, first=asked.first, logs=asked.logs, told=True)
-    print("\n".join([*lines(figures), "", *table(figures)]))
+    numbers = [range(asked.first, asked.first + asked.inputs)]
+    if asked.account:
+        figures, numbers = add_to(asked.account, figures, numbers[0])
+    print("\n".join([*lines(figures, numbers), "", *table(figures)]))
     told: dict[str, list[int]] = {}
     for number, outcome in figures.faults:
         told.setdefault(cause(outcome), []).append(number)
@@ -61,7 +69,7 @@ def main() -> int:
     for warning, count in figures.warnings.most_common():
         print(f"{count} warnings: {warning}")
     if asked.page:
-        write_section(asked.page, "fuzz", [*lines(figures), "", *table(figures)])
+        write_section(asked.page, "fuzz", [*lines(figures, numbers), "", *table(figures)])
     return int(bool(figures.faults))
 
 

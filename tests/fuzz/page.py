@@ -29,11 +29,12 @@ def machine() -> str:
     )
 
 
-def lines(figures: Figures) -> list[str]:
-    """Say what a run was, and what it found."""
+def lines(figures: Figures, numbers: list[range]) -> list[str]:
+    """Say which inputs were run, and what was found."""
     reached = sum(figures.reached.values())
+    which = " and ".join(f"{own.start:,} to {own.stop - 1:,}" for own in numbers)
     return [
-        f"{figures.inputs:,} inputs of seed {figures.seed}: {reached:,}"
+        f"{figures.inputs:,} inputs of seed {figures.seed}, numbers {which}: {reached:,}"
         f" ({100 * reached / figures.inputs:.0f} %) reached the computation, {len(figures.faults):,} failed.",
         f"{figures.cpu_seconds / 60:.0f} minutes of processor time"
         f" ({1000 * figures.cpu_seconds / figures.inputs:.1f} ms an input) on {machine()}.",

@@ -10,6 +10,7 @@ from random import Random
 import pytest
 
 from fuzz import case, run
+from fuzz.account import add_to
 from fuzz.case import ENDINGS, Fuzzer, Outcome
 from fuzz.damage import damaged
 from fuzz.page import write_section
@@ -156,3 +157,14 @@ def test_the_section_of_a_page_is_replaced(tmp_path):
     assert page.read_text() == "above\n<!-- fuzz -->\n\nnew\n\n<!-- /fuzz -->\nbelow\n"
     with pytest.raises(ValueError, match="no section"):
         write_section(page, "other", [])
+
+
+def test_parts_of_a_run_add_up(tmp_path):
+    whole = run.fuzz(14, 30)
+    account = tmp_path / "account.json"
+    for numbers in (range(10), range(20, 30), range(10, 20)):
+        found, done = add_to(account, run.fuzz(14, len(numbers), first=numbers.start), numbers)
+    assert done == [range(30)]
+    assert (found.endings, found.reached, found.faults) == (whole.endings, whole.reached, whole.faults)
+    with pytest.raises(ValueError, match="some of the inputs from 25 to 40 already"):
+        add_to(account, run.fuzz(14, 15, first=25), range(25, 40))
