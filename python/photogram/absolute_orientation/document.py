@@ -12,10 +12,12 @@ import orjson
 from photogram import _photocore
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.similarity import Similarity
+from photogram.absolute_orientation.tables import left_out, stations
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
+from photogram.show.quantity import records
 from photogram.show.ways import document_of
 from photogram.statistics.limits import GlobalTest
 
@@ -92,8 +94,8 @@ def _head(result: Orientation) -> dict[str, Any]:
         },
         "condition": result.condition,
         "centres": {"control": similarity.control_centre, "model": similarity.model_centre},
-        "control": list(_control(result)),
-        "rejected": list(_rejected(result)),
+        "control": records(stations(result)),
+        "rejected": records(left_out(result)),
     }
 
 
@@ -125,28 +127,6 @@ def _units(result: Orientation) -> dict[str, str]:
         "position": ground,
         "position_covariance": f"{ground}^2",
     }
-
-
-def _control(result: Orientation) -> Iterator[dict[str, Any]]:
-    for row in np.flatnonzero(result.took_part).tolist():
-        yield {
-            "id": result.stations.ids[row],
-            "residual": result.residuals[row],
-            "residual_ground": result.residuals_ground[row],
-            "residual_model": result.model_residuals[row],
-            "redundancy": result.redundancy[row],
-            "standardized": result.standardized[row],
-            "studentized": result.studentized[row],
-            "adjusted": result.adjusted_control[row],
-            "covariance": result.control_covariances[row],
-        }
-
-
-def _rejected(result: Orientation) -> Iterator[dict[str, Any]]:
-    left_out = result.stations.given & ~result.used
-    differences = np.where(left_out, result.differences, np.nan)
-    for row in np.flatnonzero(left_out.any(axis=1)).tolist():
-        yield {"id": result.stations.ids[row], "residual_ground": differences[row]}
 
 
 def read_similarity(path: Path, *, usable: bool = False) -> Similarity:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +13,10 @@ from photogram.arguments.types import Floats
 from photogram.show.angles import degrees_minutes_seconds
 from photogram.show.quantity import Axis, Quantity
 
-__all__ = ["Field", "field", "stacked", "table_lines"]
+if TYPE_CHECKING:
+    from photogram.show.page import Fact
+
+__all__ = ["Field", "fact_lines", "field", "marks", "stacked", "table_lines"]
 
 
 @dataclass(frozen=True)
@@ -35,23 +39,26 @@ def field(
     width
         Of each.
     form
-        How numbers are written, `.3f`; those that are not finite are `-` unless the quantity has a word for
-        them.
+        How numbers are written, `.3f`, or `.3g` where they are too long; those that are not finite are `-`
+        unless the quantity has a word for them. How components are, `{name}` or `{name} {unit}`.
     head
-        `{name}` and `{unit}` stand for those of the component.
+        `{name}` and `{unit}` stand for those of the component; where each row has one, for their common unit.
     gap
         What stands before each.
     """
     if quantity.kind == "name":
         plain = [*map(str, np.asarray(quantity.values).tolist())]
         if quantity.of is not None:
-            components = [f"{axis.name} {axis.small}".rstrip() for axis in quantity.axes]
+            written = form or "{name} {unit}"
+            components = [written.format(name=axis.name, unit=axis.small).rstrip() for axis in quantity.axes]
             plain = [components[k] for k in quantity.of.tolist()]
         texts = [f"{gap}{text:<{width}}" for text in plain]
-        return [Field(f"{gap}{head:<{width}}", texts)]
+        return [Field(f"{gap}{head.format(name='', unit='').strip():<{width}}", texts)]
     values = quantity.outward()
     if quantity.single:
-        axis = Axis("")
+        units = {unit_of(quantity, axis) for axis in quantity.axes}
+        common = units.pop() if len(units) == 1 else ""
+        axis = Axis("", common, small=common)
         return [_numbers(quantity, axis, values, width, form, head, gap)]
     return [
         _numbers(quantity, axis, column, width, form, head, gap)
@@ -67,10 +74,14 @@ def _numbers(
     if quantity.kind == "value" and axis.angle == "dms":
         texts = [degrees_written(value, 5) if math.isfinite(value) else "-" for value in values.tolist()]
         return Field(named, [f"{gap}{text:>{width}}" for text in texts])
-    if quantity.kind == "value" and axis.angle == "deg":
-        values = np.degrees(values)
     whole = f"{gap}%{width}{form}"
     texts = [whole % value for value in values.tolist()]
+    if any(len(text) > width + len(gap) for text in texts):
+        short = f"{gap}%{width}.{max(width - 8, 1)}g"
+        texts = [
+            text if len(text) <= width + len(gap) else short % value
+            for text, value in zip(texts, values.tolist(), strict=True)
+        ]
     words: Mapping[float, str] = quantity.words or {}
     odd = ~np.isfinite(values)
     for number in words:
@@ -96,6 +107,22 @@ def degrees_written(angle: float, decimals: int) -> str:
     return f"{'-' if angle < 0 else ''}{degrees} {minutes:02d} {seconds:0{width}.{decimals}f}"
 
 
+def marks(quantity: Quantity, mark: str) -> Field:
+    """Return what stands behind the rows whose number is marked."""
+    rows = np.zeros(len(quantity.values), dtype=bool) if quantity.marked is None else quantity.marked
+    return Field("", [mark if row else "" for row in rows.tolist()])
+
+
+def fact_lines(facts: Sequence[Fact]) -> list[str]:
+    """Return named figures, one under the other, with their units and, in brackets, what is said of them."""
+    lines = []
+    for each in facts:
+        said = f" ({each.note})" if each.note else ""
+        name = each.name[:1].lower() + each.name[1:]
+        lines.append(f"{name:<36}{f'{each.value} {each.unit}'.rstrip()}{said}")
+    return lines
+
+
 def table_lines(*rows: Sequence[Field]) -> list[str]:
     """Return a table: heads, then of each thing a line for each of the given rows; nothing without things.
 
@@ -103,8 +130,8 @@ def table_lines(*rows: Sequence[Field]) -> list[str]:
     """
     if not rows[0][0].texts:
         return []
-    heads = ["".join(each.head for each in row) for row in rows]
-    found = [head for head in heads if head.strip()]
+    heads = ["".join(each.head for each in row).rstrip() for row in rows]
+    found = [head for head in heads if head]
     texts = [map("".join, zip(*(each.texts for each in row), strict=True)) for row in rows]
     for of_one in zip(*texts, strict=True):
         found += of_one
