@@ -19,7 +19,7 @@ __all__ = ["LISTED", "long_table", "page_table", "unit_written"]
 
 LISTED = 120
 """Rows of a table with a row for each component at most."""
-_SIGNS = {"arcsec": "″", "deg": "°", "um": "µm"}
+_SIGNS = {"arcsec": "″", "arcmin": "′", "deg": "°", "um": "µm", "um2": "µm²"}
 _MOST_OF_DEGREES = 9
 
 Written = Cell | str | float | None
@@ -65,10 +65,10 @@ def page_table(caption: str, table: Quantities, note: str = "", by: Floats | Non
             cells.append(_cells(each))
         else:
             own_counts = [None] * len(each.axes) if by is None else _decimals(each, by)
-            values = each.outward().T
+            values = np.reshape(each.outward(), (-1, len(each.axes))).T
             for k, (axis, count, own) in enumerate(zip(each.axes, own_counts, values, strict=True)):
                 columns.append(_column(each, each.head.format(axis.name), _unit(each, axis), count))
-                marked = None if each.marked is None else each.marked[:, k]
+                marked = None if each.marked is None else np.reshape(each.marked, (-1, len(each.axes)))[:, k]
                 cells.append(_numbers(each, own, [axis] * len(own), [count], marked))
     return Table(caption, columns, [*zip(*cells, strict=True)], note)
 

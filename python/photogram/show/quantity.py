@@ -90,7 +90,7 @@ class Quantity:
     Attributes
     ----------
     values
-        (n,), or (n, k) with k axes.
+        (n,), or (n, k) with k axes; (n,), too, with the one axis of all of them.
     axes
         The components; also of what has one of them in each row, as `of` says.
     kind
@@ -138,7 +138,7 @@ class Quantity:
     @property
     def single(self) -> bool:
         """Whether each thing has one value."""
-        return not self.axes or self.of is not None
+        return not self.axes or self.of is not None or np.ndim(self.values) == 1
 
     def outward(self) -> Floats:
         """Return the numbers that people see, in the units in which they read them.
@@ -185,10 +185,10 @@ def _picked(part: Any, places: Any) -> Any:
 def long(table: Table, places: Indices) -> list[Quantity]:
     """Return a table with a row for each of some components: (r, 2) of which thing, and of which axis."""
     rows, axis = places[:, 0], places[:, 1]
-    axes = next(each.axes for each in table if each.axes)
-    found = [*chosen([each for each in table if not each.axes], rows), *component(axes, axis)]
+    axes = next(each.axes for each in table if not each.single)
+    found = [*chosen([each for each in table if each.single], rows), *component(axes, axis)]
     for each in table:
-        if each.axes:
+        if not each.single:
             seen, marked = _picked(each.seen, (rows, axis)), _picked(each.marked, (rows, axis))
             found.append(replace(each, values=each.values[rows, axis], seen=seen, marked=marked, of=axis))
     return found
