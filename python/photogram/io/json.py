@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import orjson
 
 __all__ = ["to_json"]
@@ -12,6 +13,14 @@ _FORM = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS | orjson.OPT_INDENT
 def to_json(document: object) -> bytes:
     """Return a document as JSON: UTF-8, two blanks a level, numbers to the last bit, a line end at its end.
 
-    Arrays of NumPy are lists, numbers as keys are text, and what is not a number is null.
+    Arrays of NumPy are lists, data classes what their fields are, numbers as keys text, and what is not a
+    number is null.
     """
-    return orjson.dumps(document, option=_FORM)
+    return orjson.dumps(document, default=_rows, option=_FORM)
+
+
+def _rows(value: object) -> object:
+    """Return the rows of an array that does not lie in memory row by row, or holds what is no number."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} has no place in a document")

@@ -19,7 +19,16 @@ __all__ = ["LISTED", "long_table", "page_table", "unit_written"]
 
 LISTED = 120
 """Rows of a table with a row for each component at most."""
-_SIGNS = {"arcsec": "″", "arcmin": "′", "deg": "°", "um": "µm", "um2": "µm²"}
+_SIGNS = {
+    "arc seconds": "″",
+    "arcsec": "″",
+    "arcmin": "′",
+    "deg": "°",
+    "percent": "%",
+    "um": "µm",
+    "um/m": "µm/m",
+    "um2": "µm²",
+}
 _MOST_OF_DEGREES = 9
 
 Written = Cell | str | float | None
@@ -62,7 +71,7 @@ def page_table(caption: str, table: Quantities, note: str = "", by: Floats | Non
             cells.append(_numbers(each, each.outward(), [each.axes[k] for k in rows], counts, each.marked))
         elif not each.axes:
             columns.append(_column(each, each.head, "", None))
-            cells.append(_cells(each))
+            cells.append(_with_marks(_cells(each), each.marked))
         else:
             own_counts = [None] * len(each.axes) if by is None else _decimals(each, by)
             values = np.reshape(each.outward(), (-1, len(each.axes))).T
@@ -126,12 +135,14 @@ def _decimals(each: Quantity, by: Floats) -> list[int | None]:
 
     None where nothing tells: in a column of several components whose deviation is not known.
     """
+    if each.kind == "number" or each.decimals is not None:
+        return [each.decimals] * len(each.axes)
     found: list[int | None] = []
     alone = each.of is not None and _mixed(each)
     for axis, column in zip(each.axes, np.reshape(by, (-1, len(each.axes))).T, strict=True):
         count = decimals_of(column * axis.factor)
-        if each.kind == "number" or (alone and not (column > 0).any()):
-            found.append(each.decimals)
+        if alone and not (column > 0).any():
+            found.append(None)
             continue
         if each.kind == "value":
             count = min(count + (4 if axis.angle == "deg" else 0), _MOST_OF_DEGREES)
@@ -170,9 +181,7 @@ def _numbers(
         words[value] if value in words else _number(each, value, axis, count, own=own)
         for value, axis, count in zip(values.tolist(), axes, counts, strict=False)
     ]
-    if marked is None:
-        return found
-    return [_marked(cell) if mark else cell for cell, mark in zip(found, marked.tolist(), strict=True)]
+    return _with_marks(found, marked)
 
 
 def _number(each: Quantity, value: float, axis: Axis, decimals: int | None, *, own: bool) -> Written:
@@ -185,5 +194,8 @@ def _number(each: Quantity, value: float, axis: Axis, decimals: int | None, *, o
     return Cell(significant(value, each.figures) if decimals is None else fixed(value, decimals), sorts=value)
 
 
-def _marked(cell: Written) -> Cell:
-    return replace(cell, tone="look") if isinstance(cell, Cell) else Cell(cell, tone="look")
+def _with_marks(cells: list[Written], marked: Bools | None) -> list[Written]:
+    if marked is None:
+        return cells
+    whole = [cell if isinstance(cell, Cell) else Cell(cell) for cell in cells]
+    return [replace(cell, tone="look") if mark else cell for cell, mark in zip(whole, marked, strict=True)]

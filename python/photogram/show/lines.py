@@ -28,7 +28,11 @@ class Field:
 
 
 def field(
-    quantity: Quantity, width: int, form: str = "", head: str = "{name} {unit}", gap: str = ""
+    quantity: Quantity,
+    width: int,
+    form: str | Sequence[str] = "",
+    head: str = "{name} {unit}",
+    gap: str = "",
 ) -> list[Field]:
     """Return a quantity as fields, one for each of its components.
 
@@ -39,8 +43,9 @@ def field(
     width
         Of each.
     form
-        How numbers are written, `.3f`, or `.3g` where they are too long; those that are not finite are `-`
-        unless the quantity has a word for them. How components are, `{name}` or `{name} {unit}`.
+        How numbers are written, `.3f`, all of them or those of each component; with fewer digits where they
+        are too long; those that are not finite are `-` unless the quantity has a word for them. How
+        components are, `{name}` or `{name} {unit}`.
     head
         `{name}` and `{unit}` stand for those of the component; where each row has one, for their common unit.
     gap
@@ -49,38 +54,46 @@ def field(
     if quantity.kind == "name":
         plain = [*map(str, np.asarray(quantity.values).tolist())]
         if quantity.of is not None:
-            written = form or "{name} {unit}"
+            written = form if form and isinstance(form, str) else "{name} {unit}"
             components = [written.format(name=axis.name, unit=axis.small).rstrip() for axis in quantity.axes]
             plain = [components[k] for k in quantity.of.tolist()]
         texts = [f"{gap}{text:<{width}}" for text in plain]
         return [Field(f"{gap}{head.format(name='', unit='').strip():<{width}}", texts)]
     values = quantity.outward()
+    forms = [form] * max(len(quantity.axes), 1) if isinstance(form, str) else form
     if quantity.single:
         units = {unit_of(quantity, axis) for axis in quantity.axes}
         common = units.pop() if len(units) == 1 else ""
-        axis = Axis("", common, small=common)
-        return [_numbers(quantity, axis, values, width, form, head, gap)]
+        axis = quantity.axes[0] if len(quantity.axes) == 1 else Axis("", common, small=common)
+        of = [0] * len(values) if quantity.of is None else quantity.of.tolist()
+        return [_numbers(quantity, axis, values, width, [forms[k] for k in of], head, gap)]
     return [
-        _numbers(quantity, axis, column, width, form, head, gap)
-        for axis, column in zip(quantity.axes, values.T, strict=True)
+        _numbers(quantity, axis, column, width, [own] * len(column), head, gap)
+        for axis, column, own in zip(quantity.axes, values.T, forms, strict=True)
     ]
 
 
 def _numbers(
-    quantity: Quantity, axis: Axis, values: Floats, width: int, form: str, head: str, gap: str
+    quantity: Quantity,
+    axis: Axis,
+    values: Floats,
+    width: int,
+    forms: Sequence[str],
+    head: str,
+    gap: str,
 ) -> Field:
     unit = unit_of(quantity, axis)
     named = f"{gap}{head.format(name=axis.name, unit=unit).strip():>{width}}"
     if quantity.kind == "value" and axis.angle == "dms":
         texts = [degrees_written(value, 5) if math.isfinite(value) else "-" for value in values.tolist()]
         return Field(named, [f"{gap}{text:>{width}}" for text in texts])
-    whole = f"{gap}%{width}{form}"
-    texts = [whole % value for value in values.tolist()]
+    plain = values.tolist()
+    texts = [f"{gap}%{width}{form}" % value for form, value in zip(forms, plain, strict=True)]
     if any(len(text) > width + len(gap) for text in texts):
         short = f"{gap}%{width}.{max(width - 8, 1)}g"
         texts = [
             text if len(text) <= width + len(gap) else short % value
-            for text, value in zip(texts, values.tolist(), strict=True)
+            for text, value in zip(texts, plain, strict=True)
         ]
     words: Mapping[float, str] = quantity.words or {}
     odd = ~np.isfinite(values)

@@ -27,8 +27,12 @@ __all__ = [
     "joined",
     "labelled",
     "long",
+    "of_each",
     "records",
 ]
+
+
+Kind = Literal["value", "deviation", "difference", "number", "name"]
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,7 @@ class Quantity:
 
     values: Any
     axes: tuple[Axis, ...] = ()
-    kind: Literal["value", "deviation", "difference", "number", "name"] = "number"
+    kind: Kind = "number"
     name: str | None = None
     member: str | Mapping[str, slice] = ""
     about: str = ""
@@ -156,6 +160,15 @@ class Quantity:
 
 Table = Sequence[Quantity]
 """Quantities of the same things."""
+
+
+def of_each(
+    things: Sequence[Any], attribute: str, axes: tuple[Axis, ...] = (), kind: Kind = "number", **more: Any
+) -> Quantity:
+    """Return an attribute of n things; JSON documents call it as it is called, unless `member` says else."""
+    found = [getattr(each, attribute) for each in things]
+    values = np.array(found, dtype=object if kind == "name" else None)
+    return Quantity(values, axes, kind, **{"member": attribute, **more})
 
 
 def labelled(table: Table, label: str) -> Quantity:

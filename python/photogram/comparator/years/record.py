@@ -16,7 +16,7 @@ import orjson
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.calibration import Calibration
 from photogram.comparator.correction import Correction
-from photogram.comparator.document import to_document
+from photogram.comparator.document import to_json
 from photogram.comparator.grid import Grid
 from photogram.errors import InputError
 from photogram.io.files import read_bytes
@@ -129,8 +129,7 @@ class RecordedCalibration:
     @classmethod
     def of(cls, calibration: Calibration, name: str) -> RecordedCalibration:
         """Return a calibration as its document says it."""
-        # What the writer makes numbers of (names of members) is taken as a file would have it.
-        return cls.from_document(orjson.loads(orjson.dumps(to_document(calibration), option=_PLAIN)), name)
+        return cls.from_document(orjson.loads(to_json(calibration)), name)
 
     @classmethod
     def from_document(cls, document: Any, name: str) -> RecordedCalibration:
@@ -147,9 +146,6 @@ class RecordedCalibration:
             raise InputError(f"holds no calibration of a comparator: {error} is missing") from None
         except (ValueError, TypeError, AttributeError, IndexError) as error:
             raise InputError(f"holds no calibration of a comparator: {error}") from None
-
-
-_PLAIN = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS
 
 
 def day_of(text: str) -> date:
