@@ -144,12 +144,9 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
     InputError
         The file cannot be read, is no such document, or holds an orientation that is not to be used.
     """
-    try:
+    with json.holding("result of an absolute orientation", path):
         found = orjson.loads(read_bytes(path))
-    except orjson.JSONDecodeError as error:
-        raise InputError(f"is no JSON document: {error}", file=path) from None
-    try:
-        if usable and not found.get("usable", found["status"] == "converged"):
+        if usable and not found["usable"]:
             reasons = "; ".join(map(str, found["messages"])) or found["status"]
             raise InputError(f"holds an orientation that is not to be used: {reasons}")
         centres = found["centres"]
@@ -160,12 +157,8 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
             _known(found["covariance"]),
             control_centre=centres["control"],
             model_centre=centres["model"],
-            deviation_factor=found.get("deviation_factor", 1.0),
+            deviation_factor=found["deviation_factor"],
         )
-    except InputError as error:
-        raise InputError(error.message, file=path) from None
-    except (AttributeError, KeyError, TypeError, ValueError):
-        raise InputError("is no result of an absolute orientation", file=path) from None
 
 
 def _known(covariance: list[list[Any]] | None) -> list[list[Any]] | None:
