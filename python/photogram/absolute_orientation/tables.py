@@ -33,11 +33,9 @@ def stations(result: Orientation) -> list[Quantity]:
     """Return the stations that took part: residuals, redundancy numbers, test values, adjusted control."""
     ground, model = _axes("XYZ", result.stations.ground_unit), _axes("XYZ", result.stations.model_unit)
     test = "w" if result.decided_by_w else "t"
-    beyond = np.zeros(result.used.shape, dtype=bool)
-    beyond[tuple(np.array(result.outliers, dtype=np.intp).reshape(-1, 2).T)] = True
     decides = {
         "seen": result.redundancy >= TESTABLE,
-        "marked": beyond,
+        "marked": np.abs(result.tested) > result.limit,
         "head": f"Test value {test}",
         "decimals": 2,
     }

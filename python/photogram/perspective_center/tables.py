@@ -38,9 +38,7 @@ def unknowns(result: PerspectiveCenter) -> list[Quantity]:
 
 def points(result: PerspectiveCenter) -> list[Quantity]:
     """Return the points of the grid: readings, means, residuals, distortion, tests."""
-    grid, beyond = result.grid, np.zeros(result.studentized.shape, dtype=bool)
-    for place in result.outliers:
-        beyond[place] = True
+    grid, beyond = result.grid, np.abs(result.studentized) > result.limit
     outward = Axis("", "mm", small="um", factor=1000.0)
     return [
         Quantity(np.array(grid.ids, dtype=object), kind="name", member="id", head="Point"),
