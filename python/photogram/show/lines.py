@@ -41,7 +41,7 @@ def field(
     quantity
         Numbers are set to the right, names to the left.
     width
-        Of each.
+        Of each; 0 for as many characters as it takes.
     form
         How numbers are written, `.3f`, all of them or those of each component; with fewer digits where they
         are too long; those that are not finite are `-` unless the quantity has a word for them. How
@@ -89,7 +89,7 @@ def _numbers(
         return Field(named, [f"{gap}{text:>{width}}" for text in texts])
     plain = values.tolist()
     texts = [f"{gap}%{width}{form}" % value for form, value in zip(forms, plain, strict=True)]
-    if any(len(text) > width + len(gap) for text in texts):
+    if width and any(len(text) > width + len(gap) for text in texts):
         short = f"{gap}%{width}.{max(width - 8, 1)}g"
         texts = [
             text if len(text) <= width + len(gap) else short % value
