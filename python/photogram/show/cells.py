@@ -52,34 +52,35 @@ def page_table(caption: str, table: Quantities, note: str = "", by: Floats | Non
     by
         Deviations (r, k) that say how many decimals the components have: two figures of the median.
     """
-    columns: list[Column] = []
-    cells: list[list[Written]] = []
-    for each in table:
-        if not each.head:
-            continue
-        if each.of is not None and each.kind == "name":
-            columns.append(Column(each.head, text=True))
-            mixed = _mixed(each)
-            cells.append([_component(each.axes[k], mixed) for k in each.of.tolist()])
-        elif each.of is not None:
-            decimals = [] if by is None or each.kind == "deviation" else _decimals(each, by)
-            unit = "" if _mixed(each) else _unit(each, each.axes[0])
-            known = [count for count in decimals if count is not None]
-            columns.append(_column(each, each.head, unit, max(known, default=None)))
-            rows = each.of.tolist()
-            counts = [decimals[k] for k in rows] if decimals else []
-            cells.append(_numbers(each, each.outward(), [each.axes[k] for k in rows], counts, each.marked))
-        elif not each.axes:
-            columns.append(_column(each, each.head, "", None))
-            cells.append(_with_marks(_cells(each), each.marked))
-        else:
-            own_counts = [None] * len(each.axes) if by is None else _decimals(each, by)
-            values = np.reshape(each.outward(), (-1, len(each.axes))).T
-            for k, (axis, count, own) in enumerate(zip(each.axes, own_counts, values, strict=True)):
-                columns.append(_column(each, each.head.format(axis.name), _unit(each, axis), count))
-                marked = None if each.marked is None else np.reshape(each.marked, (-1, len(each.axes)))[:, k]
-                cells.append(_numbers(each, own, [axis] * len(own), [count], marked))
-    return Table(caption, columns, [*zip(*cells, strict=True)], note)
+    written = [pair for each in table if each.head for pair in _columns(each, by)]
+    rows = zip(*(cells for _, cells in written), strict=True)
+    return Table(caption, [column for column, _ in written], [*rows], note)
+
+
+def _columns(each: Quantity, by: Floats | None) -> list[tuple[Column, list[Written]]]:
+    """Return the columns of a quantity with their cells."""
+    if each.of is not None and each.kind == "name":
+        mixed = _mixed(each)
+        return [(Column(each.head, text=True), [_component(each.axes[k], mixed) for k in each.of.tolist()])]
+    if not each.axes:
+        return [(_column(each, each.head, "", None), _with_marks(_cells(each), each.marked))]
+    if each.of is not None:
+        decimals = [] if by is None or each.kind == "deviation" else _decimals(each, by)
+        known = [count for count in decimals if count is not None]
+        unit = "" if _mixed(each) else _unit(each, each.axes[0])
+        rows = each.of.tolist()
+        counts, axes = [decimals[k] for k in rows] if decimals else [], [each.axes[k] for k in rows]
+        cells = _numbers(each, each.outward(), axes, counts, each.marked)
+        return [(_column(each, each.head, unit, max(known, default=None)), cells)]
+    values = np.reshape(each.outward(), (-1, len(each.axes)))
+    marked = None if each.marked is None else np.reshape(each.marked, values.shape)
+    found = []
+    own = [None] * len(each.axes) if by is None else _decimals(each, by)
+    for k, (axis, count) in enumerate(zip(each.axes, own, strict=True)):
+        column = _column(each, each.head.format(axis.name), _unit(each, axis), count)
+        marks = None if marked is None else marked[:, k]
+        found.append((column, _numbers(each, values[:, k], [axis] * len(values), [count], marks)))
+    return found
 
 
 def long_table(
