@@ -11,7 +11,9 @@ import numpy as np
 from photogram import _photocore
 from photogram.io import json
 from photogram.show.angles import ARCSEC
+from photogram.show.quantity import records
 from photogram.stellar.lens_tests import LensTest
+from photogram.stellar.night_tables import images, stars
 from photogram.stellar.nights import CalibratedNight
 from photogram.stellar.pointing import axis_of
 
@@ -58,11 +60,11 @@ def to_json(result: CalibratedNight) -> bytes:
                 "model": result.camera.facts.model,
                 "formula": result.camera.facts.formula,
                 "common_scale": result.camera.common_scale,
-                "tried": [asdict(fit) for fit in result.lenses],
+                "tried": result.lenses,
                 "scale_test": _test(result.scale_test),
                 "term_tests": [_test(test) for test in result.term_tests],
             },
-            "effects": asdict(night.site.effects),
+            "effects": night.site.effects,
             "standstill": None if result.standstill is None else _standstill(result),
             "messages": [str(message) for message in result.messages],
             "parameters": {
@@ -77,8 +79,8 @@ def to_json(result: CalibratedNight) -> bytes:
             "correlated": [{"parameters": [a, b], "correlation": r} for a, b, r in result.correlated()],
             "significance": result.significance(),
             "exposures": _exposures(result),
-            "stars": _stars(result),
-            "images": _images(result),
+            "stars": records(stars(result)),
+            "images": records(images(result)),
         }
     )
 
@@ -151,47 +153,4 @@ def _exposures(result: CalibratedNight) -> list[dict[str, Any]]:
             result.log_odds.tolist(),
             strict=True,
         )
-    ]
-
-
-def _stars(result: CalibratedNight) -> list[dict[str, Any]]:
-    """List the stars that were estimated."""
-    found, ids = result.calibration, result.night.catalogue.ids
-    rows = zip(
-        found.catalogue.tolist(),
-        (found.star_residuals / ARCSEC).tolist(),
-        found.star_redundancy.tolist(),
-        found.star_standardized.tolist(),
-        strict=True,
-    )
-    return [
-        {"id": ids[star], "residual": residual, "redundancy": redundancy, "standardized": standardized}
-        for star, residual, redundancy, standardized in rows
-        if not math.isnan(residual[0])
-    ]
-
-
-def _images(result: CalibratedNight) -> list[dict[str, Any]]:
-    found, ids = result.calibration, result.night.catalogue.ids
-    rows = zip(
-        found.exposures.tolist(),
-        found.stars.tolist(),
-        found.xy.tolist(),
-        found.residuals.tolist(),
-        found.redundancy.tolist(),
-        found.standardized.tolist(),
-        result.star_probabilities.tolist(),
-        strict=True,
-    )
-    return [
-        {
-            "exposure": result.names[exposure],
-            "star": ids[star],
-            "xy_px": xy,
-            "residual_px": residual,
-            "redundancy": redundancy,
-            "standardized": standardized,
-            "probability": probability,
-        }
-        for exposure, star, xy, residual, redundancy, standardized, probability in rows
     ]
