@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from typing import Any
 
@@ -13,9 +12,8 @@ from photogram.io import json
 from photogram.show.angles import ARCSEC
 from photogram.show.quantity import records
 from photogram.stellar.lens_tests import LensTest
-from photogram.stellar.night_tables import images, stars
+from photogram.stellar.night_tables import exposures, images, stars
 from photogram.stellar.nights import CalibratedNight
-from photogram.stellar.pointing import axis_of
 
 __all__ = ["to_json"]
 
@@ -78,7 +76,7 @@ def to_json(result: CalibratedNight) -> bytes:
             "covariance": {"order": result.camera.names, "matrix": result.camera.covariance},
             "correlated": [{"parameters": [a, b], "correlation": r} for a, b, r in result.correlated()],
             "significance": result.significance(),
-            "exposures": _exposures(result),
+            "exposures": records(exposures(result)),
             "stars": records(stars(result)),
             "images": records(images(result)),
         }
@@ -100,57 +98,3 @@ def _standstill(result: CalibratedNight) -> dict[str, Any]:
         "turn_arcsec": test.turns / ARCSEC,
         "moved": [result.names[k] for k in test.moved],
     }
-
-
-def _exposures(result: CalibratedNight) -> list[dict[str, Any]]:
-    found = result.calibration
-    return [
-        {
-            "name": name,
-            "utc": exposure.utc,
-            "alpha_omega_kappa_rad": attitude,
-            "covariance": covariance,
-            "covariance_with_camera": cross,
-            "azimuth_deg": math.degrees(axis_of(attitude)[0]),
-            "elevation_deg": math.degrees(axis_of(attitude)[1]),
-            "images": len(exposure.xy),
-            "identified": identified,
-            "rejected": rejected,
-            "icrs": {
-                "quaternion": inertial.quaternion,
-                "quaternion_covariance": inertial.quaternion_covariance,
-                "covariance": inertial.covariance,
-                "right_ascension_deg": math.degrees(inertial.axis[0]),
-                "declination_deg": math.degrees(inertial.axis[1]),
-            },
-            "expected_chance_matches": odds,
-            "probability": probability,
-            "log_odds": log_odds,
-        }
-        for (
-            name,
-            exposure,
-            attitude,
-            covariance,
-            cross,
-            inertial,
-            identified,
-            rejected,
-            odds,
-            probability,
-            log_odds,
-        ) in zip(
-            result.names,
-            result.exposures,
-            found.attitudes,
-            found.attitude_covariances,
-            found.cross_covariances,
-            result.inertial,
-            result.identified.tolist(),
-            result.rejected.tolist(),
-            result.odds.tolist(),
-            result.probabilities.tolist(),
-            result.log_odds.tolist(),
-            strict=True,
-        )
-    ]

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from photogram.show.angles import ARCSEC
 from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.page import (
@@ -24,12 +23,20 @@ from photogram.show.page import (
     fixed,
     significant,
 )
+from photogram.show.quantity import chosen
 from photogram.show.ways import page_of
 from photogram.stellar.night_plots import figures
-from photogram.stellar.night_tables import facts, largest, lens_tests, lenses
+from photogram.stellar.night_tables import (
+    attitudes,
+    facts,
+    fit,
+    inertial,
+    largest,
+    lens_tests,
+    lenses,
+)
 from photogram.stellar.nights import CalibratedNight
 from photogram.stellar.page import plate_pictures
-from photogram.stellar.pointing import axis_of
 
 __all__ = ["night_page"]
 
@@ -134,58 +141,16 @@ def _camera(result: CalibratedNight) -> list[Part]:
 
 
 def _exposures(result: CalibratedNight) -> list[Part]:
-    found = result.calibration
-    fit: list[Row] = []
-    attitudes: list[Row] = []
-    for i, (name, exposure) in enumerate(zip(result.names[:LISTED], result.exposures, strict=False)):
-        azimuth, elevation = (math.degrees(angle) for angle in axis_of(found.attitudes[i]))
-        errors = np.sqrt(np.diag(found.attitude_covariances[i])) / ARCSEC
-        own = found.exposures == i
-        rms = math.sqrt(float(np.mean(found.residuals[own] ** 2)))
-        certain = result.star_probabilities[own]
-        least = float(np.nanmin(certain)) if np.isfinite(certain).any() else None
-        fit.append(
-            [
-                name,
-                exposure.utc,
-                len(exposure.xy),
-                int(result.identified[i]),
-                int(result.rejected[i]),
-                rms,
-                float(result.log_odds[i]),
-                least,
-            ]
-        )
-        ra, dec = (math.degrees(angle) for angle in result.inertial[i].axis)
-        attitudes.append([name, azimuth, elevation, ra, dec, *map(float, errors)])
-    text = Column("Exposure", text=True)
-    fit_columns = (
-        text,
-        Column("UTC", text=True),
-        Column("Images"),
-        Column("Identified"),
-        Column("Left out"),
-        Column("rms", "px", decimals=3),
-        Column("Log odds", decimals=1),
-        Column("Least certain star", figures=6),
-    )
-    attitude_columns = (
-        text,
-        Column("Azimuth", "° from south, positive west", decimals=5),
-        Column("Elevation", "°", decimals=5),
-        Column("Right ascension", "° ICRS", decimals=6),
-        Column("Declination", "° ICRS", decimals=6),
-        *(Column(f"sd {angle}", "″", decimals=2) for angle in ("alpha", "omega", "kappa")),
-    )
-    note = (
-        ""
-        if len(result.names) <= LISTED
-        else f"The first {LISTED} of {len(result.names)}; exposures.csv has all."
-    )
-    tables = [
-        Table("Identification and fit", fit_columns, fit, note),
-        Table("Attitudes", attitude_columns, attitudes, note),
-    ]
+    count = len(result.names)
+    note = f"The first {LISTED} of {count}; exposures.csv has all." if count > LISTED else ""
+    names, azimuth, elevation, _, errors, *_ = attitudes(result)
+    _, ra, dec, *_ = inertial(result)
+    both = {
+        "Identification and fit": fit(result),
+        "Attitudes": [names, azimuth, elevation, ra, dec, errors],
+    }
+    rows = np.arange(min(count, LISTED))
+    tables = [page_table(caption, chosen(table, rows), note) for caption, table in both.items()]
     return [Layers("exposure-layers", tables)]
 
 

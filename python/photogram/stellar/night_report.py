@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
-from photogram.show.angles import ARCSEC
 from photogram.show.lines import Field, fact_lines, field, table_lines
 from photogram.show.quantity import Table, chosen
 from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE
-from photogram.stellar.night_tables import facts, images, largest, lens_tests, lenses, stars
+from photogram.stellar.night_tables import (
+    attitudes,
+    facts,
+    fit,
+    images,
+    inertial,
+    largest,
+    lens_tests,
+    lenses,
+    stars,
+)
 from photogram.stellar.nights import SIGNIFICANT, CalibratedNight
 from photogram.stellar.odds import ACCEPTED, LOG_ODDS
 from photogram.stellar.parameters import GRAD
-from photogram.stellar.pointing import axis_of
 
 __all__ = ["report", "summary"]
 
@@ -78,41 +88,29 @@ def _shown(value: float, error: float) -> str:
 
 
 def _exposures(result: CalibratedNight) -> list[str]:
-    found = result.calibration
-    lines = [
-        f"{'name':<10}{'utc':<26}{'images':>7}{'found':>7}{'left out':>9}{'azimuth':>11}{'elevation':>11}"
-        f"{'alpha':>13}{'omega':>13}{'kappa':>13}{'mean errors arcsec':>26}{'rms px':>8}"
-    ]
-    for i, (name, exposure) in enumerate(zip(result.names, result.exposures, strict=True)):
-        attitude = found.attitudes[i]
-        azimuth, elevation = (math.degrees(angle) for angle in axis_of(attitude))
-        errors = np.sqrt(np.diag(found.attitude_covariances[i])) / ARCSEC
-        rms = math.sqrt(float(np.mean(found.residuals[found.exposures == i] ** 2)))
-        lines.append(
-            f"{name:<10}{exposure.utc:<26}{len(exposure.xy):7d}{result.identified[i]:7d}{result.rejected[i]:9d}"
-            f"{azimuth:11.5f}{elevation:11.5f}"
-            + "".join(f"{angle / GRAD:13.6f}" for angle in attitude)
-            + f"{errors[0]:10.2f}{errors[1]:8.2f}{errors[2]:8.2f}{rms:8.3f}"
-        )
-    return [
-        *lines,
-        "azimuth from south, positive west, and elevation in degrees; alpha, omega, kappa in grads",
-    ]
+    names, utc, count, identified, rejected, rms, *_ = fit(result)
+    _, azimuth, elevation, angles, errors, *_ = attitudes(result)
+    grads = replace(angles, values=angles.values / GRAD, kind="number")
+    row = [*field(names, 10, head="name"), *field(utc, 26, head="utc"), *field(count, 7, ".0f", "images")]
+    row += [*field(identified, 7, ".0f", "found"), *field(rejected, 9, ".0f", "left out")]
+    row += [*field(azimuth, 11, ".5f", "azimuth"), *field(elevation, 11, ".5f", "elevation")]
+    row += [*field(grads, 13, ".6f", "{name}"), *field(errors, 10, ".2f", "sd {name}")]
+    said = "azimuth from south, positive west, and elevation in degrees; angles in grads, sd in arcsec"
+    return [*table_lines([*row, *field(rms, 8, ".3f", "rms {unit}")]), said]
 
 
 def _identification(result: CalibratedNight) -> list[str]:
     """List the odds of exposures, and of the stars that are least certain."""
-    lines = [
-        f"{'exposure':<10}{'by chance':>12}{'probability':>16}{'log odds':>11}{'least certain star':>20}"
-    ]
-    of = result.calibration.exposures
-    for i, name in enumerate(result.names):
-        own = result.star_probabilities[of == i]
-        named = math.isnan(result.odds[i])
-        least = "" if named else _probability(float(np.nanmin(own)))
-        odds = "" if named else f"{result.log_odds[i]:.1f}"
-        probability = "" if named else _probability(float(result.probabilities[i]))
-        lines.append(f"{name:<10}{_odds(result.odds[i]):>12}{probability:>16}{odds:>11}{least:>20}")
+    names, *_, odds, probabilities, log_odds, least = fit(result)
+    lines = table_lines(
+        [
+            *field(names, 10, head="exposure"),
+            _right("by chance", 12, map(_odds, odds.values)),
+            _right("probability", 16, map(_probability, probabilities.values)),
+            *field(log_odds, 11, ".1f", "log odds"),
+            _right("least certain star", 20, map(_probability, least.values)),
+        ]
+    )
     lines += [
         f"{name:<10}{_odds(expected):>12}{'doubtful':>16}" for name, expected in result.doubtful.items()
     ]
@@ -124,28 +122,23 @@ def _identification(result: CalibratedNight) -> list[str]:
     ]
 
 
+def _right(head: str, width: int, texts: Iterable[str]) -> Field:
+    return Field(f"{head:>{width}}", [f"{text:>{width}}" for text in texts])
+
+
 def _probability(value: float) -> str:
-    """Write a probability near 1 by what it misses."""
+    """Write a probability near 1 by what it misses; nothing for named stars."""
+    if math.isnan(value):
+        return ""
     return f"1 - {1 - value:.0E}" if 1e-15 < 1 - value < 0.01 else f"{value:.6f}"
 
 
 def _inertial(result: CalibratedNight) -> list[str]:
-    lines = [
-        f"{'exposure':<10}{'ra deg':>12}{'dec deg':>12}{'w':>14}{'x':>14}{'y':>14}{'z':>14}"
-        f"{'mean errors arcsec, about x, y, z':>36}"
-    ]
-    for name, attitude in zip(result.names, result.inertial, strict=True):
-        ra, dec = (math.degrees(angle) for angle in attitude.axis)
-        errors = np.sqrt(np.diag(attitude.covariance)) / ARCSEC
-        lines.append(
-            f"{name:<10}{ra:12.6f}{dec:12.6f}"
-            + "".join(f"{value:14.9f}" for value in attitude.quaternion)
-            + f"{errors[0]:16.2f}{errors[1]:10.2f}{errors[2]:10.2f}"
-        )
-    return [
-        *lines,
-        "quaternion w, x, y, z from ICRS to the camera: x right, y down, z along the axis",
-    ]
+    names, ra, dec, quaternions, errors, *_ = inertial(result)
+    row = [*field(names, 10, head="exposure"), *field(ra, 12, ".6f", "ra {unit}")]
+    row += [*field(dec, 12, ".6f", "dec {unit}"), *field(quaternions, 14, ".9f", "{name}")]
+    said = "quaternion w, x, y, z from ICRS to the camera: x right, y down, z along the axis; sd in arcsec"
+    return [*table_lines([*row, *field(errors, 12, ".2f", "sd {name}")]), said]
 
 
 def _lens_tests(result: CalibratedNight) -> list[str]:
@@ -191,7 +184,6 @@ def _correlations(result: CalibratedNight) -> list[str]:
 
 def _images(table: Table) -> list[str]:
     exposures, stars_, xy, residuals, _, tests, probabilities = table
-    certain = [_star(each) for each in probabilities.values.tolist()]
     return table_lines(
         [
             *field(exposures, 10, head="exposure"),
@@ -199,7 +191,7 @@ def _images(table: Table) -> list[str]:
             *field(xy, 11, ".3f"),
             *field(residuals, 9, ".3f", "v{name} {unit}"),
             *field(tests, 8, ".2f", "w {name}"),
-            Field(f"{'probability':>14}", [f"{each:>14}" for each in certain]),
+            _right("probability", 14, map(_star, probabilities.values)),
         ]
     )
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
 from photogram.show.page import Fact
 from photogram.show.quantity import Axis, Quantity, chosen, frame, of_each
@@ -17,10 +18,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
+    "attitudes",
     "exposure_table",
+    "exposures",
     "facts",
+    "fit",
     "image_table",
     "images",
+    "inertial",
     "largest",
     "lens_tests",
     "lenses",
@@ -40,36 +45,91 @@ def exposure_table(result: CalibratedNight) -> pd.DataFrame:
     """
     import pandas as pd
 
-    rows = []
-    for i, (name, exposure, attitude) in enumerate(
-        zip(result.names, result.exposures, result.inertial, strict=True)
-    ):
-        azimuth, elevation = axis_of(result.calibration.attitudes[i])
-        ra, dec = attitude.axis
-        rows.append(
-            {
-                "exposure": name,
-                "utc": exposure.utc,
-                "images": len(exposure.xy),
-                "identified": int(result.identified[i]),
-                "left_out": int(result.rejected[i]),
-                "by_chance": result.odds[i],
-                "probability": result.probabilities[i],
-                "log_odds": result.log_odds[i],
-                "azimuth_deg": math.degrees(azimuth),
-                "elevation_deg": math.degrees(elevation),
-                "ra_deg": math.degrees(ra),
-                "dec_deg": math.degrees(dec),
-                **dict(zip(("qw", "qx", "qy", "qz"), attitude.quaternion.tolist(), strict=True)),
-                **{
-                    f"cov_{a}{b}": attitude.covariance[j, k]
-                    for j, a in enumerate("xyz")
-                    for k, b in enumerate("xyz")
-                    if j <= k
-                },
-            }
-        )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(frame(exposures(result)))
+
+
+def exposures(result: CalibratedNight) -> list[Quantity]:
+    """Return the exposures that take part: how they fit, their attitudes here and in ICRS."""
+    return [*fit(result), *attitudes(result)[1:], *inertial(result)[1:]]
+
+
+def fit(result: CalibratedNight) -> list[Quantity]:
+    """Return how many images of each exposure have stars, how they fit, and how certain the stars are."""
+    found, count = result.calibration, len(result.names)
+    own = [found.exposures == i for i in range(count)]
+    rms = np.array([np.sqrt(np.mean(found.residuals[rows] ** 2)) for rows in own])
+    certain = [result.star_probabilities[rows] for rows in own]
+    least = np.array([np.nanmin(each) if np.isfinite(each).any() else np.nan for each in certain])
+    images_ = [len(each.xy) for each in result.exposures]
+    return [
+        _exposure(result),
+        of_each(result.exposures, "utc", kind="name", name="utc", head="UTC"),
+        Quantity(images_, name="images", member="images", head="Images"),
+        Quantity(result.identified, name="identified", member="identified", head="Identified"),
+        Quantity(result.rejected, name="left_out", member="rejected", head="Left out"),
+        Quantity(rms, _PIXELS[:1], "deviation", head="rms", decimals=3),
+        Quantity(result.odds, name="by_chance", member="expected_chance_matches"),
+        Quantity(result.probabilities, name="probability", member="probability"),
+        Quantity(result.log_odds, name="log_odds", member="log_odds", head="Log odds", decimals=1),
+        Quantity(least, head="Least certain star", figures=6),
+    ]
+
+
+def attitudes(result: CalibratedNight) -> list[Quantity]:
+    """Return the attitudes in the system of the station: axis, angles, mean errors, covariances."""
+    found = result.calibration
+    azimuth, elevation = np.degrees([axis_of(each) for each in found.attitudes]).T
+    errors = np.sqrt(np.diagonal(found.attitude_covariances, axis1=1, axis2=2))
+    angles = tuple(map(Axis.turned, ("alpha", "omega", "kappa")))
+    south = "Azimuth from south, positive west"
+    return [
+        _exposure(result),
+        _degrees(azimuth, "azimuth_deg", south, 5, "azimuth_deg"),
+        _degrees(elevation, "elevation_deg", "Elevation", 5, "elevation_deg"),
+        Quantity(found.attitudes, angles, "value", member="alpha_omega_kappa_rad"),
+        Quantity(errors, angles, "deviation", head="sd {}", decimals=2),
+        Quantity(found.attitude_covariances, member="covariance"),
+        Quantity(found.cross_covariances, member="covariance_with_camera"),
+    ]
+
+
+def inertial(result: CalibratedNight) -> list[Quantity]:
+    """Return the attitudes in ICRS: axis, quaternion, mean errors and covariances of turns of the camera."""
+    found = result.inertial
+    ra, dec = np.degrees([each.axis for each in found]).T
+    covariances = np.array([each.covariance for each in found])
+    turns = tuple(Axis("about " + name, "rad", small="arcsec", factor=1 / ARCSEC) for name in "xyz")
+    upper = tuple(Axis(f"{a}{b}") for k, a in enumerate("xyz") for b in "xyz"[k:])
+    members = [
+        {
+            "quaternion": each.quaternion,
+            "quaternion_covariance": each.quaternion_covariance,
+            "covariance": each.covariance,
+            "right_ascension_deg": right_ascension,
+            "declination_deg": declination,
+        }
+        for each, right_ascension, declination in zip(found, ra.tolist(), dec.tolist(), strict=True)
+    ]
+    quaternions = np.array([each.quaternion for each in found])
+    return [
+        _exposure(result),
+        _degrees(ra, "ra_deg", "Right ascension in ICRS", 6),
+        _degrees(dec, "dec_deg", "Declination in ICRS", 6),
+        Quantity(quaternions, tuple(map(Axis, ("qw", "qx", "qy", "qz"))), name=""),
+        Quantity(np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)), turns, "deviation"),
+        Quantity(covariances[:, *np.triu_indices(3)], upper, name="cov"),
+        Quantity(members, member="icrs"),
+    ]
+
+
+def _exposure(result: CalibratedNight) -> Quantity:
+    names = np.array(result.names, dtype=object)
+    return Quantity(names, kind="name", name="exposure", member="name", head="Exposure")
+
+
+def _degrees(values: Floats, name: str, head: str, decimals: int, member: str = "") -> Quantity:
+    axis = (Axis.of("", "deg"),)
+    return Quantity(values, axis, "value", name=name, member=member, head=head, decimals=decimals)
 
 
 def image_table(result: CalibratedNight) -> pd.DataFrame:
