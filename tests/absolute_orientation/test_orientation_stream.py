@@ -169,9 +169,9 @@ def test_files_that_cannot_be_read(oriented, tmp_path):
     (tmp_path / "latin.csv").write_bytes("id,x,y,z\n\xe4,1,2,3\n".encode("latin-1"))
     with pytest.raises(InputError, match="utf-8"):
         transform_file(oriented.similarity, tmp_path / "latin.csv", tmp_path / "out.csv")
-    for text, message in (("{", "no JSON"), ('{"scale": 1}', "no result"), ("[]", "no result")):
+    for text in ("{", '{"scale": 1}', "[]"):
         (tmp_path / "bad.json").write_text(text)
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(InputError, match="holds no result"):
             read_similarity(tmp_path / "bad.json")
 
 

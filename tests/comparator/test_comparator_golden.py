@@ -8,8 +8,8 @@ from plates import case_2, document, printed_correction, printed_polynomial, tab
 
 from photogram.comparator import built_in_grid
 from photogram.comparator.averages import LocationAverages, PlateAverages
-from photogram.comparator.correction_table import table_nodes
 from photogram.comparator.gridsigma import listed_grid_sigma
+from photogram.comparator.listing.correction import table_nodes
 from photogram.comparator.orientation import exchanged
 from photogram.comparator.rigid import fit_rigid
 from photogram.comparator.variance import AxisSigma, difference

@@ -17,11 +17,10 @@ from photogram.comparator import (
     simulate_calibration,
     to_json,
 )
-from photogram.comparator.correction_table import table_nodes, table_values
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.gridsigma import listed_grid_sigma, text_grid_sigma
 from photogram.comparator.joint import Weights, adjust_jointly
-from photogram.comparator.listing.correction import correction_table
+from photogram.comparator.listing.correction import correction_table, table_nodes
 from photogram.comparator.orientation import exchanged
 from photogram.comparator.significance import _f_max_tail, compare_case_variances
 from photogram.comparator.variance import AxisSigma, difference
@@ -45,7 +44,7 @@ def test_feature_18_the_table_of_the_listing():
     assert [len(row) for row in rows] == [9, 5, 9, 5, 9, 5, 9, 5, 9]
     assert rows[0][0].tolist() == [225_000.0, 225_000.0]
     assert rows[-1][-1].tolist() == [25_000.0, 25_000.0]
-    values = table_values(printed_correction().polynomial, rows)
+    values = [printed_correction().polynomial.evaluate(row) for row in rows]
     assert values[1][0] == pytest.approx(printed_correction().polynomial.evaluate(rows[1][:1])[0])
 
 

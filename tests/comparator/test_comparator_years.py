@@ -188,7 +188,7 @@ def test_dates_are_those_of_the_report_or_of_today():
             day_of(text)
 
 
-def test_damaged_documents_are_refused_with_what_is_wrong():
+def test_damaged_documents_are_refused_with_what_is_wrong(tmp_path):
     good = json.loads(to_json(year(0)))
     for member, value, words in (
         (("joint", "sigma_random_um"), 0.0, "0 is not positive"),
@@ -201,5 +201,6 @@ def test_damaged_documents_are_refused_with_what_is_wrong():
         for name in member[:-1]:
             place = place[name]
         place[member[-1]] = value
+        (tmp_path / "bad.json").write_text(json.dumps(bad))
         with pytest.raises(InputError, match=words):
-            RecordedCalibration.from_document(bad, "bad")
+            RecordedCalibration.read(tmp_path / "bad.json")

@@ -47,7 +47,7 @@ def test_every_exposure_and_every_star_has_its_probability(result):
     assert table["cov_xy"][1] == result.inertial[1].covariance[0, 1]
     images = image_table(result)
     assert images["probability"].tolist() == result.star_probabilities.tolist()
-    assert images["x_residual_px"].tolist() == result.calibration.residuals[:, 0].tolist()
+    assert images["residual_x_px"].tolist() == result.calibration.residuals[:, 0].tolist()
 
 
 def test_the_probability_of_a_star_by_hand():

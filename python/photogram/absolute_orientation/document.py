@@ -12,10 +12,12 @@ import orjson
 from photogram import _photocore
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.similarity import Similarity
+from photogram.absolute_orientation.tables import left_out, stations
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
+from photogram.show.quantity import records
 from photogram.show.ways import document_of
 from photogram.statistics.limits import GlobalTest
 
@@ -92,8 +94,8 @@ def _head(result: Orientation) -> dict[str, Any]:
         },
         "condition": result.condition,
         "centres": {"control": similarity.control_centre, "model": similarity.model_centre},
-        "control": list(_control(result)),
-        "rejected": list(_rejected(result)),
+        "control": records(stations(result)),
+        "rejected": records(left_out(result)),
     }
 
 
@@ -127,28 +129,6 @@ def _units(result: Orientation) -> dict[str, str]:
     }
 
 
-def _control(result: Orientation) -> Iterator[dict[str, Any]]:
-    for row in np.flatnonzero(result.took_part).tolist():
-        yield {
-            "id": result.stations.ids[row],
-            "residual": result.residuals[row],
-            "residual_ground": result.residuals_ground[row],
-            "residual_model": result.model_residuals[row],
-            "redundancy": result.redundancy[row],
-            "standardized": result.standardized[row],
-            "studentized": result.studentized[row],
-            "adjusted": result.adjusted_control[row],
-            "covariance": result.control_covariances[row],
-        }
-
-
-def _rejected(result: Orientation) -> Iterator[dict[str, Any]]:
-    left_out = result.stations.given & ~result.used
-    differences = np.where(left_out, result.differences, np.nan)
-    for row in np.flatnonzero(left_out.any(axis=1)).tolist():
-        yield {"id": result.stations.ids[row], "residual_ground": differences[row]}
-
-
 def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
     """Read the parameters, with their covariance, out of a JSON document.
 
@@ -164,12 +144,9 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
     InputError
         The file cannot be read, is no such document, or holds an orientation that is not to be used.
     """
-    try:
+    with json.holding("result of an absolute orientation", path):
         found = orjson.loads(read_bytes(path))
-    except orjson.JSONDecodeError as error:
-        raise InputError(f"is no JSON document: {error}", file=path) from None
-    try:
-        if usable and not found.get("usable", found["status"] == "converged"):
+        if usable and not found["usable"]:
             reasons = "; ".join(map(str, found["messages"])) or found["status"]
             raise InputError(f"holds an orientation that is not to be used: {reasons}")
         centres = found["centres"]
@@ -180,12 +157,8 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
             _known(found["covariance"]),
             control_centre=centres["control"],
             model_centre=centres["model"],
-            deviation_factor=found.get("deviation_factor", 1.0),
+            deviation_factor=found["deviation_factor"],
         )
-    except InputError as error:
-        raise InputError(error.message, file=path) from None
-    except (AttributeError, KeyError, TypeError, ValueError):
-        raise InputError("is no result of an absolute orientation", file=path) from None
 
 
 def _known(covariance: list[list[Any]] | None) -> list[list[Any]] | None:

@@ -286,7 +286,3 @@ class Orientation(Shown, Brief):
         """
         drawn: Axes = axes_of(self, ax)
         return drawn
-
-
-OrientedModel = Orientation
-"""The name that its arrays had when they were a class of their own."""

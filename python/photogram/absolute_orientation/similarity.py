@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import number, numbers, shaped
+from photogram.arguments.arrays import is_covariance, number, numbers, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.geometry import rotation_angles
@@ -20,8 +20,6 @@ __all__ = ["Similarity"]
 
 ORTHOGONAL = 1e-6
 """Elements of A A^T - I that a matrix read from a file may have."""
-INDEFINITE = 1e-6
-"""By how much a matrix of correlations may be unsymmetric, or its least eigenvalue negative: rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +128,7 @@ class Similarity:
         with np.errstate(all="ignore"):
             back = np.linalg.inv(self.parameter_partials)
             tangent: Floats = back @ given @ back.T
-        if not (_is_covariance(given) and np.isfinite(tangent).all()):
+        if not (is_covariance(given, singular=True) and np.isfinite(tangent).all()):
             raise InputError("the covariance of the similarity is none")
         return replace(self, tangent_covariance=tangent)
 
@@ -207,22 +205,6 @@ class Similarity:
             self.control_centre.tolist(),
             self.model_centre.tolist(),
         )
-
-
-def _is_covariance(matrix: Floats) -> bool:
-    """Whether variances are not negative, and no combination's is but for rounding."""
-    variances = np.diag(matrix)
-    if not (np.isfinite(matrix).all() and (variances >= 0).all()):
-        return False
-    unit = np.sqrt(np.where(variances > 0, variances, 1.0))
-    with np.errstate(over="ignore", invalid="ignore"):
-        correlations = matrix / unit / unit[:, np.newaxis]
-        asymmetry = np.abs(correlations - correlations.T).max()
-    return bool(
-        asymmetry < INDEFINITE
-        and np.isfinite(correlations).all()
-        and np.linalg.eigvalsh(correlations)[0] > -INDEFINITE
-    )
 
 
 def _rows(name: str, values: ArrayLike) -> Floats:

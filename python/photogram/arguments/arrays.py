@@ -36,6 +36,8 @@ __all__ = [
 ]
 
 _SYMMETRIC = 1e-9
+_ROUNDING = 1e-6
+"""Of correlations that were written with all digits and read again, with room to spare."""
 """What a covariance matrix may be unsymmetric by, relative to its diagonal."""
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
@@ -286,14 +288,23 @@ def shown(value: object) -> str:
         return f"a {type(value).__name__}"
 
 
-def is_covariance(matrix: NDArray[np.float64]) -> bool:
-    """Whether a square matrix is one of covariances: symmetric, positive definite."""
+def is_covariance(matrix: NDArray[np.float64], *, singular: bool = False) -> bool:
+    """Whether a square matrix is one of covariances: symmetric, positive definite.
+
+    A singular one may have rows of zeros, and what is left of it may be indefinite by rounding.
+    """
     variances = np.diag(matrix)
-    if not (np.isfinite(matrix).all() and (variances > 0).all()):
+    known = variances > 0
+    if not np.isfinite(matrix).all() or matrix[~known].any() or not (singular or known.all()):
         return False
-    correlations = matrix / np.sqrt(np.outer(variances, variances))
-    symmetric = np.abs(correlations - correlations.T).max() <= _SYMMETRIC
-    return bool(symmetric and np.linalg.eigvalsh(correlations).min() > 0)
+    deviations = np.sqrt(variances[known])
+    with np.errstate(over="ignore", invalid="ignore"):
+        correlations = matrix[np.ix_(known, known)] / deviations / deviations[:, np.newaxis]
+        asymmetry = np.abs(correlations - correlations.T).max(initial=0.0)
+    # A correlation that is not finite is no smaller than anything.
+    if not asymmetry <= (_ROUNDING if singular else _SYMMETRIC):
+        return False
+    return bool(np.linalg.eigvalsh(correlations).min(initial=1.0) > (-_ROUNDING if singular else 0.0))
 
 
 def chosen(which: NDArray[np.bool_]) -> NDArray[np.bool_] | slice:

@@ -14,12 +14,11 @@ from photogram.comparator.document import to_json
 from photogram.comparator.grid import Grid, built_in_grid, find_grid, read_grid
 from photogram.comparator.identity import Identity
 from photogram.comparator.listing import listing
+from photogram.comparator.measurements import read, read_csv, to_csv
 from photogram.comparator.options import Options
 from photogram.comparator.polynomial import Frame, Polynomial
 from photogram.comparator.readings import Case, Reading, Session, collect_cases
 from photogram.comparator.simulation import Simulation, simulate_calibration
-from photogram.comparator.source import read
-from photogram.comparator.tables import read_csv, to_csv
 from photogram.comparator.years import Comparison, RecordedCalibration, RecordedCase, compare
 from photogram.io.places import Place
 

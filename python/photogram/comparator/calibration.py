@@ -47,7 +47,7 @@ from photogram.errors import AdjustmentError
 from photogram.memory import require
 from photogram.messages import Message
 from photogram.show.brief import Brief
-from photogram.show.ways import Judged, html_of
+from photogram.show.ways import Judged, Paged
 
 if TYPE_CHECKING:
     from photogram.comparator.readings import Session
@@ -122,7 +122,7 @@ class PlateResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(Judged, Brief):
+class Calibration(Judged, Paged, Brief):
     """A calibrated comparator.
 
     Attributes
@@ -170,13 +170,6 @@ class Calibration(Judged, Brief):
     screening: Screening
     far_pointings: tuple[FarPointing, ...]
     messages: list[Message]
-
-    def to_html(self) -> bytes:
-        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
-
-        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
-        """
-        return html_of(self)
 
     @property
     def usable(self) -> bool:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import orjson
 
+from photogram.arguments.arrays import is_covariance
 from photogram.comparator.identity import Identity
 from photogram.comparator.polynomial import Frame, Polynomial, design
 from photogram.errors import InputError
@@ -31,8 +32,6 @@ MODEL = ("mx", "my", "lean", *(f"{axis}{term}" for axis in "xy" for term in "ABC
 MM = 1000.0
 """In micrometres."""
 STEPS = 20
-ROUNDING = 1e-6
-"""Of correlations that were written with all digits and read again, with room to spare."""
 
 
 def _no_covariance() -> Floats:
@@ -80,7 +79,7 @@ class Correction:
                 raise InputError("the polynomial has coefficients or a centre that are not finite")
             if not all(0 < half < math.inf for half in self.polynomial.frame.half_range_um):
                 raise InputError("half_range_um must be positive numbers")
-        if not _is_covariance(self.covariance):
+        if self.covariance.shape != 2 * (PARAMETERS,) or not is_covariance(self.covariance, singular=True):
             raise InputError("covariance is no covariance matrix")
 
     @property
@@ -241,15 +240,15 @@ class Correction:
             "scale_y": self.scale_y,
             "nonorthogonality_rad": self.nonorthogonality_rad,
             "polynomial": None,
-            "covariance": self.covariance.tolist(),
-            "identity": None if self.identity is None else self.identity.document(),
+            "covariance": self.covariance,
+            "identity": self.identity,
         }
         if self.polynomial is not None:
             document["polynomial"] = {
-                "centre_um": list(self.polynomial.frame.centre_um),
-                "half_range_um": list(self.polynomial.frame.half_range_um),
-                "coefficients_x_um": self.polynomial.scaled_um[0].tolist(),
-                "coefficients_y_um": self.polynomial.scaled_um[1].tolist(),
+                "centre_um": self.polynomial.frame.centre_um,
+                "half_range_um": self.polynomial.frame.half_range_um,
+                "coefficients_x_um": self.polynomial.scaled_um[0],
+                "coefficients_y_um": self.polynomial.scaled_um[1],
             }
         return document
 
@@ -273,8 +272,7 @@ class Correction:
             _numbers(document[name], ()).item() for name in ("scale_x", "scale_y", "nonorthogonality_rad")
         )
         covariance = _numbers(document["covariance"], (PARAMETERS, PARAMETERS))
-        # Files of earlier versions have none.
-        members = document.get("identity")
+        members = document["identity"]
         identity = None if members is None else Identity.from_document(members)
         return cls(scale_x, scale_y, lean, polynomial, covariance, identity)
 
@@ -291,21 +289,11 @@ class Correction:
         InputError
             The file cannot be read or holds none.
         """
-        data = read_bytes(path)
-        try:
-            document = orjson.loads(data)
-        except ValueError as error:
-            raise InputError(f"holds no correction of a comparator: {error}", file=path) from None
-        if isinstance(document, dict) and document.get("usable") is False:
-            raise InputError("holds a calibration whose correction is withheld: see its messages", file=path)
-        try:
+        with json.holding("correction of a comparator", path):
+            document = orjson.loads(read_bytes(path))
+            if document.get("usable") is False:
+                raise InputError("holds a calibration whose correction is withheld: see its messages")
             return cls.from_document(document.get("correction", document))
-        except InputError as error:
-            raise InputError(error.message, file=path) from None
-        except KeyError as error:
-            raise InputError(f"holds no correction of a comparator: {error} is missing", file=path) from None
-        except (ValueError, TypeError, AttributeError) as error:
-            raise InputError(f"holds no correction of a comparator: {error}", file=path) from None
 
 
 def _beneath(camera: Camera) -> dict[str, float]:
@@ -339,20 +327,3 @@ def _numbers(value: Any, shape: tuple[int, ...]) -> Floats:
         what = "a number" if not shape else f"{' x '.join(str(size) for size in shape)} numbers"
         raise ValueError(f"{quoted(str(value))} is not {what}")
     return array.astype(float)
-
-
-def _is_covariance(matrix: Floats) -> bool:
-    """Whether a matrix is finite, symmetric and not indefinite, each parameter taken in its own unit."""
-    if matrix.shape != (PARAMETERS, PARAMETERS) or not np.isfinite(matrix).all():
-        return False
-    variances = np.diagonal(matrix)
-    known = variances > 0
-    if (variances < 0).any() or matrix[~known].any():
-        return False
-    scale = np.sqrt(variances[known])
-    with np.errstate(over="ignore", invalid="ignore"):
-        correlations = matrix[np.ix_(known, known)] / scale / scale[:, np.newaxis]
-        asymmetry = np.abs(correlations - correlations.T).max(initial=0.0)
-    if not asymmetry <= ROUNDING or not np.isfinite(correlations).all():
-        return False
-    return bool(np.linalg.eigvalsh(correlations).min(initial=0.0) > -ROUNDING)

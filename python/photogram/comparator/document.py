@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from photogram import _photocore
+from photogram.comparator.tables import precisions, terms
 from photogram.io import json
+from photogram.show.quantity import Quantity, of_each, records
 
 if TYPE_CHECKING:
     from photogram.comparator.calibration import Calibration, CaseResult, PlateResult
     from photogram.comparator.closeout import Closeout
+    from photogram.comparator.correction import Correction
+    from photogram.comparator.decomposition import Decomposition
     from photogram.comparator.joint import JointFit
-    from photogram.comparator.pointing import Ellipse, PointReadings, Precision
+    from photogram.comparator.pointing import Precision
     from photogram.comparator.residuals import Residuals
     from photogram.comparator.rigid import RigidFit
 
-__all__ = ["to_document", "to_json"]
+__all__ = ["to_json"]
 
 CONVENTIONS = {
     "residuals_comparator_um": "grid transformed into the comparator system less measured: to be added to"
@@ -43,32 +45,29 @@ CONVENTIONS = {
 
 def to_json(calibration: Calibration) -> bytes:
     """Return the whole calibration as JSON (UTF-8). What is not a number is null."""
-    return json.to_json(to_document(calibration))
+    return json.to_json(_document(calibration))
 
 
-def to_document(calibration: Calibration) -> dict[str, Any]:
-    """Return the calibration as plain values, units in the names of the members."""
+def _document(calibration: Calibration) -> dict[str, Any]:
     session, linear, nonlinear = calibration.session, calibration.linear, calibration.nonlinear
     plates = list(calibration.plates.values())
-    coefficients = nonlinear.polynomial.coefficients.tolist() if nonlinear else [None, None]
+    coefficients = nonlinear.polynomial.coefficients if nonlinear else [None, None]
     return {
         "program": f"photogram {_photocore.__version__}",
         "comparator": session.comparator,
         "secondary_stage": session.secondary,
         "date": session.date,
         "left_handed": calibration.cases[0].placed.orientation.left_handed,
-        "options": asdict(calibration.options),
+        "options": calibration.options,
         "conventions": CONVENTIONS,
         "messages": [str(message) for message in calibration.messages],
         "usable": calibration.usable,
         "verdict": calibration.verdict.document(),
-        "screening": asdict(calibration.screening),
-        "far_pointings": [asdict(pointing) for pointing in calibration.far_pointings],
+        "screening": calibration.screening,
+        "far_pointings": calibration.far_pointings,
         "linear": {
-            "scale_x": linear.correction.scale_x,
-            "scale_y": linear.correction.scale_y,
-            "nonorthogonality_rad": linear.correction.nonorthogonality_rad,
-            "covariance": linear.covariance.tolist(),
+            **_linear(linear.correction),
+            "covariance": linear.covariance,
             "sigma0_um": linear.sigma0_um,
             "degrees_of_freedom": linear.degrees_of_freedom,
         },
@@ -77,16 +76,24 @@ def to_document(calibration: Calibration) -> dict[str, Any]:
         "polynomial_y": coefficients[1],
         "polynomial": _polynomial(calibration),
         "pointing": _pointing(calibration),
-        "grid_points": plates[0].averages.points.tolist(),
-        "grid_corrections_um": plates[0].averages.grid_um.tolist(),
+        "grid_points": plates[0].averages.points,
+        "grid_corrections_um": plates[0].averages.grid_um,
         "sigma_grid_um": calibration.sigma_grid_um(plates[0].averages.plate),
         "plates": [_plate(calibration, result) for result in plates],
         "variance_components_um": calibration.variance.components_um,
         "variance_analysis_um": _variance(calibration),
-        "case_variances": asdict(calibration.case_test) if calibration.case_test else None,
+        "case_variances": calibration.case_test,
         "joint": _joint(calibration.joint, usable=calibration.usable) if calibration.joint else None,
         "joint_check_sd": calibration.joint_check,
         "correction": calibration.correction.document() if calibration.usable else None,
+    }
+
+
+def _linear(found: Correction | Decomposition) -> dict[str, float]:
+    return {
+        "scale_x": found.scale_x,
+        "scale_y": found.scale_y,
+        "nonorthogonality_rad": found.nonorthogonality_rad,
     }
 
 
@@ -99,12 +106,12 @@ def _case(calibration: Calibration, index: int) -> dict[str, Any]:
         "case": case.number,
         "operator": placed.case.operator,
         "plate": placed.case.plate,
-        "points": placed.points.tolist(),
+        "points": placed.points,
         "nearest_point": placed.orientation.nearest_point,
         "corner": placed.orientation.corner,
         "left_handed": placed.orientation.left_handed,
         "rotation_rad": combined.rotation_rad,
-        "translation_um": combined.translation_um.tolist(),
+        "translation_um": combined.translation_um,
         "sigma0_um": {
             "free": case.free.residuals.sigma0_um,
             "linear": case.linear.residuals.sigma0_um,
@@ -114,23 +121,21 @@ def _case(calibration: Calibration, index: int) -> dict[str, Any]:
             "linear": combined.residuals.sigma0_um,
             "nonlinear": last.residuals.sigma0_um if calibration.nonlinear else None,
         },
-        "means_um": placed.means_um.tolist(),
-        "corrected_um": last.residuals.xy_um.tolist(),
-        "residuals_comparator_um": last.residuals.comparator_um.tolist(),
-        "residuals_grid_um": last.residuals.grid_um.tolist(),
+        "means_um": placed.means_um,
+        "corrected_um": last.residuals.xy_um,
+        "residuals_comparator_um": last.residuals.comparator_um,
+        "residuals_grid_um": last.residuals.grid_um,
         "stages": _stages(case, combined, last),
         "linear": {
-            "scale_x": parameters.scale_x,
-            "scale_y": parameters.scale_y,
-            "nonorthogonality_rad": parameters.nonorthogonality_rad,
+            **_linear(parameters),
             "rotation_rad": parameters.rotation_rad,
-            "translation_um": case.linear.translation_um.tolist(),
-            "covariance": case.linear.covariance.tolist(),
+            "translation_um": case.linear.translation_um,
+            "covariance": case.linear.covariance,
         },
         "polynomial": {
-            "coefficients_x": case.polynomial.polynomial.coefficients[0].tolist(),
-            "coefficients_y": case.polynomial.polynomial.coefficients[1].tolist(),
-            "covariance": case.polynomial.covariance.tolist(),
+            "coefficients_x": case.polynomial.polynomial.coefficients[0],
+            "coefficients_y": case.polynomial.polynomial.coefficients[1],
+            "covariance": case.polynomial.covariance,
         }
         if case.polynomial
         else None,
@@ -153,20 +158,19 @@ def _stages(case: CaseResult, combined: RigidFit, last: RigidFit) -> dict[str, A
 
 def _residuals(residuals: Residuals) -> dict[str, Any]:
     return {
-        "comparator_um": residuals.comparator_um.tolist(),
-        "grid_um": residuals.grid_um.tolist(),
-        "sum_vv_um2": list(residuals.squares_um2),
-        "sigma_um": list(residuals.sigma_um),
+        "comparator_um": residuals.comparator_um,
+        "grid_um": residuals.grid_um,
+        "sum_vv_um2": residuals.squares_um2,
+        "sigma_um": residuals.sigma_um,
     }
 
 
 def _closeout(closeout: Closeout) -> dict[str, Any]:
-    total = closeout.total_shift_um
     return {
         "point": closeout.point,
-        "pointings": list(closeout.counts),
-        "sequential_shifts_um": closeout.sequential_shifts_um.tolist(),
-        "total_shift_um": None if total is None else total.tolist(),
+        "pointings": closeout.counts,
+        "sequential_shifts_um": closeout.sequential_shifts_um,
+        "total_shift_um": closeout.total_shift_um,
         "verdict": closeout.verdict,
     }
 
@@ -177,64 +181,45 @@ def _polynomial(calibration: Calibration) -> dict[str, Any] | None:
         return None
     return {
         "sigma0_um": nonlinear.sigma0_um,
-        "sigma_um": list(nonlinear.sigma_um),
+        "sigma_um": nonlinear.sigma_um,
         "degrees_of_freedom": nonlinear.degrees_of_freedom,
-        "covariance": nonlinear.covariance.tolist(),
+        "covariance": nonlinear.covariance,
         "f_ratio": tests.ratio,
-        "f_degrees_of_freedom": list(tests.degrees_of_freedom),
+        "f_degrees_of_freedom": tests.degrees_of_freedom,
         "f_probability": tests.probability,
-        "terms": [{**asdict(term), "ratio": term.ratio} for term in tests.terms],
-    }
-
-
-def _precision(precision: Precision) -> dict[str, Any]:
-    return {
-        "readings": precision.readings,
-        "points": precision.points,
-        "degrees_of_freedom": precision.degrees_of_freedom,
-        "sd_um": list(precision.sd_um),
-        "sd_point_um": precision.sd_point_um,
-        "covariance_um2": precision.covariance_um2,
-        "correlation": precision.correlation,
-        "correlation_percent": precision.listed_correlation_percent,
-        "sd_mean_um": list(precision.mean_sd_um),
-        "sd_mean_point_um": precision.mean_sd_point_um,
-        "ellipse": None if math.isnan(precision.sd_point_um) else _ellipse(precision.ellipse),
-    }
-
-
-def _ellipse(ellipse: Ellipse) -> dict[str, float]:
-    return {
-        "major_um": ellipse.major_um,
-        "minor_um": ellipse.minor_um,
-        "angle_rad": ellipse.angle_rad,
+        "terms": records(terms(tests.terms)),
     }
 
 
 def _pointing(calibration: Calibration) -> dict[str, Any]:
     """Precision by point (of each case, and over all cases), by case, by operator, and in all."""
     pointing = calibration.pointing
-
-    def point(case: CaseResult, readings: PointReadings) -> dict[str, Any]:
-        head = {"case": case.number, "point": readings.point, "mean_um": readings.mean_um.tolist()}
-        return {**head, **_precision(readings.precision)}
-
+    read = [(case.number, each) for case in calibration.cases for each in case.placed.readings]
+    readings = [each for _, each in read]
+    points = [
+        Quantity([number for number, _ in read], member="case"),
+        of_each(readings, "point"),
+        of_each(readings, "mean_um"),
+        *precisions([each.precision for each in readings]),
+    ]
+    own = [case.placed.precision for case in calibration.cases]
     return {
-        "points": [point(case, readings) for case in calibration.cases for readings in case.placed.readings],
-        "cases": [{"case": case.number, **_precision(case.placed.precision)} for case in calibration.cases],
+        "points": records(points),
+        "cases": records([of_each(calibration.cases, "number", member="case"), *precisions(own)]),
         "operators": [
-            {
-                "operator": operator,
-                **_precision(total),
-                "points": [{"point": number, **_precision(own)} for number, own in points.items()],
-            }
-            for operator, (points, total) in pointing.operators.items()
+            {"operator": operator, **_precision(total), "points": _by_point(of_points)}
+            for operator, (of_points, total) in pointing.operators.items()
         ],
-        "total": {
-            **_precision(pointing.total),
-            "by_point": [{"point": number, **_precision(own)} for number, own in pointing.points.items()],
-        },
+        "total": {**_precision(pointing.total), "by_point": _by_point(pointing.points)},
     }
+
+
+def _precision(precision: Precision) -> dict[str, Any]:
+    return records(precisions([precision]))[0]
+
+
+def _by_point(points: dict[int, Precision]) -> list[dict[str, Any]]:
+    return records([Quantity([*points], member="point"), *precisions([*points.values()])])
 
 
 def _plate(calibration: Calibration, result: PlateResult) -> dict[str, Any]:
@@ -248,11 +233,11 @@ def _plate(calibration: Calibration, result: PlateResult) -> dict[str, Any]:
         "temperature_c": grid.temperature_c,
         "expansion_per_k": grid.expansion_per_k,
         "left_handed": averages.left_handed,
-        "points": averages.points.tolist(),
-        "cases": averages.counts.tolist(),
-        "corrections_um": averages.grid_um.tolist(),
-        "corrections_plate_um": corrections.tolist(),
-        "corrected_plate_um": (given + corrections).tolist(),
+        "points": averages.points,
+        "cases": averages.counts,
+        "corrections_um": averages.grid_um,
+        "corrections_plate_um": corrections,
+        "corrected_plate_um": given + corrections,
         "sigma_um": {
             "a_priori": grid.sigma_um,
             "unbiased": result.unbiased_um,
@@ -263,16 +248,8 @@ def _plate(calibration: Calibration, result: PlateResult) -> dict[str, Any]:
             "comparator": result.listed.mean_comparator_um,
             "grid": result.listed.mean_grid_um,
         },
-        "random_um": list(result.listed.random_um),
-        "by_location": [
-            {
-                "cases": list(place.cases),
-                "locations": place.locations.tolist(),
-                "xy_um": place.xy_um.tolist(),
-                "residuals_um": place.residuals_um.tolist(),
-            }
-            for place in averages.by_location
-        ],
+        "random_um": result.listed.random_um,
+        "by_location": averages.by_location,
     }
 
 
@@ -289,16 +266,14 @@ def _variance(calibration: Calibration) -> dict[str, Any]:
         name: None if line is None else {"x": line.x, "y": line.y, "total": line.total}
         for name, line in lines.items()
     }
-    return {**document, "negative": list(variance.negative)}
+    return {**document, "negative": variance.negative}
 
 
 def _joint(joint: JointFit, *, usable: bool) -> dict[str, Any]:
     correction = joint.correction
     return {
-        "scale_x": correction.scale_x,
-        "scale_y": correction.scale_y,
-        "nonorthogonality_rad": correction.nonorthogonality_rad,
-        "covariance": joint.covariance.tolist(),
+        **_linear(correction),
+        "covariance": joint.covariance,
         "sigma0": joint.sigma0,
         "degrees_of_freedom": joint.degrees_of_freedom,
         "sigma_random_um": joint.random_um,
@@ -306,22 +281,22 @@ def _joint(joint: JointFit, *, usable: bool) -> dict[str, Any]:
             {
                 "case": case.number,
                 "rotation_rad": case.rotation_rad,
-                "translation_um": case.translation_um.tolist(),
-                "residuals_comparator_um": case.residuals.comparator_um.tolist(),
-                "standardized": case.standardized.tolist(),
+                "translation_um": case.translation_um,
+                "residuals_comparator_um": case.residuals.comparator_um,
+                "standardized": case.standardized,
             }
             for case in joint.cases
         ],
         "plates": [
             {
                 "plate": number,
-                "points": plate.points.tolist(),
-                "corrections_plate_um": plate.corrections_um.tolist(),
-                "covariance_plate_um2": plate.covariance_um2.tolist(),
+                "points": plate.points,
+                "corrections_plate_um": plate.corrections_um,
+                "covariance_plate_um2": plate.covariance_um2,
                 "sigma_um": plate.sigma_um,
                 "sigma_estimated": plate.estimated,
                 "variance_ratio": plate.variance_ratio,
-                "test": asdict(plate.test) if plate.test else None,
+                "test": plate.test,
             }
             for number, plate in joint.plates.items()
         ],

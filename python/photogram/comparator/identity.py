@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -74,13 +74,9 @@ class Identity:
         (low_x, low_y), (high_x, high_y) = self.low_um, self.high_um
         return f"x {low_x:.0f} to {high_x:.0f}, y {low_y:.0f} to {high_y:.0f} um"
 
-    def document(self) -> dict[str, Any]:
-        """Return it as members of a JSON document."""
-        return asdict(self)
-
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Identity:
-        """Return what :meth:`document` described.
+        """Return what the fields of a JSON document describe.
 
         Raises
         ------

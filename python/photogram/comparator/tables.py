@@ -1,141 +1,183 @@
-"""Measurements as plain tables: columns case, point, x_um, y_um and, where need be, plate, leg, operator."""
+"""What is known of a calibration, quantity by quantity."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
-from typing import TypeVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from photogram.comparator.csvfile import Setting, Table, read_table
-from photogram.comparator.grid import Grid, find_grid
-from photogram.comparator.readings import LARGEST_UM, Case, Reading, Session, collect_cases
-from photogram.errors import InputError
-from photogram.io.numbers import is_whole_number
-from photogram.io.rows import Row
-from photogram.messages import quoted
+import numpy as np
 
-__all__ = ["read_csv", "to_csv"]
+from photogram.comparator.polynomial import TERMS
+from photogram.show.angles import ARCSEC
+from photogram.show.quantity import Axis, Quantity, component, of_each
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
+    from photogram.comparator.calibration import Calibration
+    from photogram.comparator.combined import CombinedPolynomial
+    from photogram.comparator.correction import Correction
+    from photogram.comparator.outliers import FarPointing, Outlier
+    from photogram.comparator.pointing import Precision
+    from photogram.comparator.significance import TermTest
 
-KEYS = ("grid", "comparator", "date", "left_handed", "range_centre_um", "temperature_c")
-"""What lines above the table may set."""
+__all__ = [
+    "UM",
+    "XY",
+    "cases",
+    "coefficients",
+    "far_pointings",
+    "linear",
+    "outliers",
+    "precisions",
+    "terms",
+    "variance",
+]
 
-
-def read_csv(
-    paths: Sequence[Path], grids: Iterable[Grid] = (), *, left_handed: bool | None = None
-) -> Session:
-    """Read the tables of one calibration.
-
-    Each has the columns `case`, `point` and `x_um`, `y_um` (or `x_mm`, `y_mm`), and may have `plate` (number
-    of the grid), `leg` (1 to 4; 0 or blank: intersection) and `operator`. Rows stand in the order measured;
-    those with blank coordinates are missing. Lines above the table may set `# grid = 1320` (a built-in grid,
-    or a file beside the table), `# comparator = 3`, `# date = 7/17/72`, `# left_handed = yes`,
-    `# range_centre_um = 125000` (middle of the range of the comparator), `# temperature_c = 21.7` (of the
-    plate while it was measured); `# note = ...` sets nothing.
-
-    Parameters
-    ----------
-    paths
-        The files.
-    grids
-        Plates, instead of those that the tables name.
-    left_handed
-        Whether the comparator is left-handed against the plate, instead of what the tables say.
-
-    Raises
-    ------
-    InputError
-        A file that is no such table, no plate, a case measured twice, a key that nothing reads, tables that
-        set one thing differently.
-    """
-    if not paths:
-        raise InputError("there is no table to read")
-    tables = [read_table(path, "case", "point", keys=KEYS) for path in paths]
-    plates = {grid.number: grid for grid in grids}
-    if not plates:
-        plates = {grid.number: grid for table in tables for grid in _named_grids(table)}
-    if not plates:
-        raise InputError("names no grid plate: '# grid = 1320', or --grid", file=paths[0])
-    cases = collect_cases(reading for table in tables for reading in _readings(table, plates))
-    session = Session(
-        cases=cases,
-        grids=plates,
-        comparator=_one(tables, "comparator", Setting.integer) or 0,
-        date=next((table.text("date") for table in tables if table.text("date")), ""),
-        left_handed=left_handed if left_handed is not None else _one(tables, "left_handed", Setting.switch),
-        range_centre_um=_one(tables, "range_centre_um", _range_centre_um),
-        temperature_c=_one(tables, "temperature_c", Setting.number),
-        source=paths[0],
-    )
-    session.check()
-    return session
+UM = (Axis.of("", "um"),)
+XY = (Axis.of("x", "um"), Axis.of("y", "um"))
+_LINEAR = (
+    Axis.of("Scale x", ""),
+    Axis.of("Scale y", ""),
+    Axis.of("Scale x over scale y", ""),
+    Axis.of("Lack of orthogonality α", "arcsec"),
+)
 
 
-def _one(tables: Sequence[Table], key: str, value_of: Callable[[Setting], T]) -> T | None:
-    """Return what the tables of a calibration set, None where none does; they may not contradict."""
-    settings = [table.settings[key] for table in tables if key in table.settings]
-    values = [value_of(setting) for setting in settings]
-    for setting, value in zip(settings, values, strict=True):
-        if value != values[0]:
-            raise setting.place.error(f"{key} = {quoted(setting.text)}, but another table says {values[0]}")
-    return values[0] if values else None
-
-
-def _range_centre_um(setting: Setting) -> float:
-    value = setting.number()
-    if abs(value) > LARGEST_UM:
-        raise setting.place.error(f"{setting.key} = {value:g} is beyond every comparator ({LARGEST_UM:g} um)")
-    return value
-
-
-def _named_grids(table: Table) -> list[Grid]:
-    """Return the plates that a table names: built in, or files beside it."""
-    names = [name.strip() for name in table.text("grid").split(",") if name.strip()]
-    return [find_grid(name if is_whole_number(name) else str(table.path.parent / name)) for name in names]
-
-
-def _readings(table: Table, plates: dict[int, Grid]) -> list[Reading]:
+def variance(calibration: Calibration) -> list[Quantity]:
+    """Return the analysis of variance: standard deviations of each axis and of both, line by line."""
+    own = calibration.variance
+    stages = {
+        "Before the calibration, everything": own.before,
+        "After the linear parameters": own.after_linear,
+        "After linear parameters and polynomials": own.after_nonlinear,
+        "Pointing, mean of a point": own.pointing,
+    }
+    rows = {name: (each.x, each.y, each.total) for name, each in stages.items() if each is not None}
+    totals: dict[str, float | None] = {}
+    for plate in calibration.plates:
+        totals[f"Grid {plate}, given"] = calibration.session.grids[plate].sigma_um
+        totals[f"Grid {plate}, computed without bias"] = calibration.sigma_grid_um(plate)
+    totals["Systematic comparator, linear"] = own.linear
+    totals["Systematic comparator, polynomials"] = own.nonlinear
+    totals["Random comparator"] = own.random
+    values = np.array([*rows.values(), *((None, None, total) for total in totals.values())], dtype=float)
+    axes = (*XY, Axis.of("Total", "um"))
     return [
-        _reading(row, xy, next(iter(plates)) if len(plates) == 1 else 0)
-        for row in table.records.rows()
-        if (xy := table.coordinates_um(row)) is not None
+        Quantity([*rows, *totals], kind="name", head="Standard deviation"),
+        Quantity(values, axes, "deviation", head="{}", decimals=3),
     ]
 
 
-def _reading(row: Row, xy_um: tuple[float, float], only_plate: int) -> Reading:
-    leg = row.integer("leg", 0)
-    if leg > 4:
-        raise row.place.error(f"leg {leg}: legs are numbered 1 to 4, and 0 is the intersection")
-    return Reading(
-        plate=row.integer("plate", only_plate),
-        case=row.integer("case"),
-        operator=row.integer("operator", 0),
-        leg=leg,
-        point=row.integer("point"),
-        xy_um=xy_um,
-        place=row.place,
-    )
+def linear(correction: Correction, covariance: Floats) -> list[Quantity]:
+    """Return scales, their ratio and the lack of orthogonality, each in a row, with standard deviations.
+
+    Parameters
+    ----------
+    correction
+        What has them.
+    covariance
+        (3, 3) of scale x, scale y, lack of orthogonality (rad).
+    """
+    x, y, lean = correction.scale_x, correction.scale_y, correction.nonorthogonality_rad
+    of_ratio = np.array([1 / y, -x / y**2])
+    variances = [*np.diag(covariance)[:2], of_ratio @ covariance[:2, :2] @ of_ratio]
+    sd = np.array([*np.sqrt(variances), np.sqrt(covariance[2, 2]) / ARCSEC])
+    scales, of = np.array([x, y, x / y]), np.arange(4)
+    less_one = np.array([*(1e6 * (scales - 1)), np.nan])
+    axis = (Axis.of("", "um/m"),)
+    return [
+        component(_LINEAR, of)[0],
+        Quantity(np.array([*scales, lean / ARCSEC]), _LINEAR, "value", head="Value", of=of),
+        Quantity(sd, _LINEAR, "deviation", head="sd", of=of),
+        Quantity(less_one, axis, "deviation", head="Less one", decimals=2),
+    ]
 
 
-def to_csv(session: Session) -> bytes:
-    """Return the measurements of a session as a table that :func:`read_csv` reads, in micrometres."""
-    lines = [f"# comparator = {session.comparator}"]
-    lines += [f"# grid = {', '.join(str(number) for number in session.grids)}"]
-    lines += [f"# date = {session.date}"] if session.date else []
-    if session.range_centre_um is not None:
-        lines.append(f"# range_centre_um = {session.range_centre_um:g}")
-    if session.temperature_c is not None:
-        lines.append(f"# temperature_c = {session.temperature_c:g}")
-    if session.left_handed is not None:
-        lines.append(f"# left_handed = {'yes' if session.left_handed else 'no'}")
-    lines.append("plate,case,operator,leg,point,x_um,y_um")
-    for case in session.cases:
-        lines += _lines(case)
-    return ("\n".join(lines) + "\n").encode()
+def terms(found: Sequence[TermTest]) -> list[Quantity]:
+    """Return the terms of the polynomials with their tests."""
+    return [
+        of_each(found, "axis", kind="name", head="Axis"),
+        of_each(found, "term", kind="name"),
+        _powers([each.term for each in found]),
+        of_each(found, "coefficient_um", UM, "deviation", head="Coefficient", decimals=3),
+        of_each(found, "sd_um", UM, "deviation", head="sd", decimals=3),
+        of_each(found, "ratio", head="t", decimals=2),
+        of_each(found, "probability", head="p", decimals=4),
+    ]
 
 
-def _lines(case: Case) -> list[str]:
-    rows = zip(case.legs.tolist(), case.points.tolist(), case.xy_um.tolist(), strict=True)
-    head = f"{case.plate},{case.number},{case.operator}"
-    return [f"{head},{leg},{point},{x:.3f},{y:.3f}" for leg, point, (x, y) in rows]
+def coefficients(found: CombinedPolynomial) -> list[Quantity]:
+    """Return the coefficients of the polynomials, arguments in metres."""
+    axis, sd = (Axis.of("", "m"),), np.sqrt(np.diag(found.covariance)).reshape(2, -1)
+    table = [_powers(TERMS)]
+    for name, values, own in zip("xy", found.polynomial.coefficients, sd, strict=True):
+        table += [
+            Quantity(values, axis, "value", head=f"In {name}", figures=6),
+            Quantity(own, axis, "deviation", head="sd"),
+        ]
+    return table
+
+
+def _powers(terms: Sequence[str]) -> Quantity:
+    raised = str.maketrans({"^": "", "2": "²", "3": "³", "4": "⁴"})
+    return Quantity([each.translate(raised) for each in terms], kind="name", head="Term")
+
+
+def cases(calibration: Calibration) -> list[Quantity]:
+    """Return the cases with what each adjustment of them alone left."""
+    found = calibration.cases
+    stages = {"Unit weight, free": "free", "after linear": "linear", "after polynomials": "polynomial"}
+    fits = {head: [getattr(each, name) for each in found] for head, name in stages.items()}
+    sigmas = {
+        head: np.array([each.residuals.sigma0_um if each else np.nan for each in own])
+        for head, own in fits.items()
+    }
+    measured = [each.placed.case for each in found]
+    return [
+        of_each(found, "number", kind="name", head="Case"),
+        of_each(measured, "plate", kind="name", head="Plate"),
+        of_each(measured, "operator", kind="name", head="Operator"),
+        Quantity([len(each.placed.points) for each in found], head="Points"),
+        *(Quantity(own, UM, "deviation", head=head, decimals=3) for head, own in sigmas.items()),
+    ]
+
+
+def outliers(found: Sequence[Outlier]) -> list[Quantity]:
+    """Return measured points that do not agree with the adjustment of the others."""
+    instead = ["none" if each.instead is None else str(each.instead) for each in found]
+    return [
+        of_each(found, "case", kind="name", head="Case"),
+        of_each(found, "point", kind="name", head="Point"),
+        of_each(found, "off_um", XY, "deviation", head="Off in {}", decimals=2),
+        of_each(found, "ratio", head="Test value t", decimals=2),
+        Quantity(instead, kind="name", head="Point that is expected there"),
+    ]
+
+
+def far_pointings(found: Sequence[FarPointing]) -> list[Quantity]:
+    """Return single pointings that do not agree with the others of their case."""
+    return [
+        of_each(found, "case", kind="name", head="Case"),
+        of_each(found, "point", kind="name", head="Point"),
+        Quantity([each.row + 1 for each in found], head="Pointing"),
+        of_each(found, "deviation_um", UM, "deviation", head="Deviation from the mean", decimals=2),
+        of_each(found, "ratio", head="Over its sd", decimals=2),
+    ]
+
+
+def precisions(found: Sequence[Precision]) -> list[Quantity]:
+    """Return precisions of pointing, of whatever they are."""
+    ellipses = [None if np.isnan(each.sd_point_um) else each.ellipse for each in found]
+    return [
+        of_each(found, "readings"),
+        of_each(found, "points"),
+        of_each(found, "degrees_of_freedom"),
+        of_each(found, "sd_um"),
+        of_each(found, "sd_point_um"),
+        of_each(found, "covariance_um2"),
+        of_each(found, "correlation"),
+        of_each(found, "listed_correlation_percent", member="correlation_percent"),
+        of_each(found, "mean_sd_um", member="sd_mean_um"),
+        of_each(found, "mean_sd_point_um", member="sd_mean_point_um"),
+        Quantity(ellipses, member="ellipse"),
+    ]

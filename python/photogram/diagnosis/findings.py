@@ -12,7 +12,7 @@ from photogram.arguments.types import Bools
 from photogram.io import json
 from photogram.show.brief import Brief, Rows
 from photogram.show.sections import composed, headline
-from photogram.show.ways import html_of
+from photogram.show.ways import Paged
 from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Verdict
 
 if TYPE_CHECKING:
@@ -264,7 +264,7 @@ class Section:
 
 
 @dataclass(repr=False)
-class Diagnosis(Brief):
+class Diagnosis(Paged, Brief):
     """The outcome of a check.
 
     Attributes
@@ -341,13 +341,6 @@ class Diagnosis(Brief):
         head = f"{headline('check', self.title)}\n{grave} grave, {look} to look at"
         sections = [(section.title, section.text()) for section in self.sections]
         return composed(head, [("What to do next", list(self.verdict.next)), *sections])
-
-    def to_html(self) -> bytes:
-        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
-
-        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
-        """
-        return html_of(self)
 
     def to_json(self) -> bytes:
         """Return the findings as a JSON document (UTF-8); `docs/giant-check.md` lists its members."""

@@ -12,7 +12,7 @@ from photogram.perspective_center.deck import Deck
 from photogram.perspective_center.grid import Grid, joined
 from photogram.perspective_center.solution import PerspectiveCenter, Weights, determine
 from photogram.show.brief import Brief
-from photogram.show.ways import html_of
+from photogram.show.ways import Paged
 
 __all__ = ["Run", "Stop", "run_deck"]
 
@@ -38,7 +38,7 @@ class Stop:
 
 
 @dataclass(repr=False)
-class Run(Brief):
+class Run(Paged, Brief):
     """What a run through a deck gave.
 
     Attributes
@@ -54,13 +54,6 @@ class Run(Brief):
     results: list[PerspectiveCenter] = field(default_factory=list)
     messages: list[Message] = field(default_factory=list)
     stop: Stop | None = None
-
-    def to_html(self) -> bytes:
-        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
-
-        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
-        """
-        return html_of(self)
 
     @property
     def converged(self) -> bool:

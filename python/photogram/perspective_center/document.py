@@ -9,6 +9,8 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.perspective_center.batch import Run
 from photogram.perspective_center.solution import INTERIOR, PerspectiveCenter
+from photogram.perspective_center.tables import points
+from photogram.show.quantity import records
 
 __all__ = ["to_json"]
 
@@ -62,25 +64,5 @@ def _set(result: PerspectiveCenter) -> dict[str, Any]:
         "verdict": result.verdict.document(),
         "converged": result.converged,
         "iterations": len(result.cycles),
-        "points": _points(result),
+        "points": records(points(result)),
     }
-
-
-def _points(result: PerspectiveCenter) -> list[dict[str, Any]]:
-    grid = result.grid
-    columns = zip(
-        grid.ids,
-        grid.readings.tolist(),
-        grid.model[:, :2].tolist(),
-        result.residual.tolist(),
-        result.radial_distortion.tolist(),
-        result.redundancy.tolist(),
-        result.standardized.tolist(),
-        result.studentized.tolist(),
-        strict=True,
-    )
-    names = (
-        *("id", "readings", "mean", "residual", "radial_distortion"),
-        *("redundancy", "standardized", "studentized"),
-    )
-    return [dict(zip(names, row, strict=True)) for row in columns]

@@ -5,27 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-import numpy as np
-
 from photogram.perspective_center.batch import Run
 from photogram.perspective_center.plot import figure
-from photogram.perspective_center.solution import INTERIOR, PerspectiveCenter
+from photogram.perspective_center.solution import PerspectiveCenter
+from photogram.perspective_center.tables import cycles, points, size_of, unknowns
+from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section
-from photogram.show.page import (
-    Cell,
-    Column,
-    Drawing,
-    Fact,
-    Judgement,
-    Layers,
-    Page,
-    Part,
-    Row,
-    Section,
-    Table,
-    decimals_of,
-    significant,
-)
+from photogram.show.page import Drawing, Fact, Judgement, Layers, Page, Part, Section, Table, significant
 from photogram.show.ways import page_of
 
 __all__ = ["run_page"]
@@ -90,70 +76,14 @@ def _highlights(result: PerspectiveCenter) -> list[Fact]:
 
 
 def _parameters(result: PerspectiveCenter) -> Table:
-    names = ("X", "Y", "Z", "omega, ′", "phi, ′", "kappa, ′")
-    errors = np.full(6, np.nan) if result.standard_errors is None else result.standard_errors
-    values = [*result.position, *result.attitude_minutes]
-    rows: list[Row] = [
-        [name, Cell(f"{value:.{decimals_of(np.array([error]))}f}", sorts=float(value)), float(error)]
-        for name, value, error in zip(names, values, errors, strict=True)
-    ]
-    errors_of = dict(
-        zip(result.unknown, () if result.interior_errors is None else result.interior_errors, strict=False)
-    )
-    for name, value in zip(INTERIOR, result.interior, strict=True):
-        if name in result.unknown:
-            rows.append(
-                [
-                    f"{name}, mm",
-                    Cell(f"{value:.4f}", sorts=float(value)),
-                    float(errors_of.get(name, math.nan)),
-                ]
-            )
-    grid = result.grid
-    how = "as published" if result.as_published else "least squares"
-    note = (
-        f"{len(grid.ids)} points, {int(grid.readings.sum())} readings, {how}, {len(result.cycles)} iterations"
-    )
-    columns = (Column("Unknown", text=True), Column("Value"), Column("Standard error", figures=3))
-    return Table(_name(result), columns, rows, note)
+    table = unknowns(result)
+    return page_table(_name(result), table, size_of(result), table[2].values)
 
 
 def _points(result: PerspectiveCenter) -> Table:
-    beyond = set(result.outliers)
-    rows: list[Row] = [
-        [
-            str(name),
-            int(result.grid.readings[k]),
-            *map(float, result.residual[k]),
-            1000.0 * float(result.radial_distortion[k]),
-            *map(float, result.redundancy[k]),
-            *(
-                Cell(float(result.studentized[k, axis]), tone="look" if (k, axis) in beyond else "")
-                for axis in (0, 1)
-            ),
-        ]
-        for k, name in enumerate(result.grid.ids)
-    ]
-    columns = [
-        Column("Point", text=True),
-        Column("Readings"),
-        *(Column(f"Residual {axis}", decimals=4) for axis in "XY"),
-        Column("Radial distortion", "µm", decimals=1),
-        *(Column(f"Redundancy {axis}", decimals=3) for axis in "XY"),
-        *(Column(f"t {axis}", decimals=2) for axis in "XY"),
-    ]
     note = f"Beyond {result.limit:.2f} the test rejects." if math.isfinite(result.limit) else ""
-    return Table(_name(result), columns, rows, note)
+    return page_table(_name(result), points(result), note)
 
 
 def _iterations(result: PerspectiveCenter) -> Table:
-    columns = [
-        Column("Cycle"),
-        *(Column(axis, decimals=5) for axis in "XYZ"),
-        *(Column(f"Correction {axis}", figures=3) for axis in "XYZ"),
-    ]
-    rows: list[Row] = [
-        [k, *map(float, each.position), *map(float, each.correction[:3])]
-        for k, each in enumerate(result.cycles, 1)
-    ]
-    return Table(_name(result), columns, rows)
+    return page_table(_name(result), cycles(result))

@@ -17,7 +17,7 @@ from photogram.io import json
 from photogram.network.block import Block
 from photogram.planning.pattern import Pattern
 from photogram.planning.text import report, what_next
-from photogram.show.ways import html_of
+from photogram.show.ways import Paged
 from photogram.statistics.reliability import TESTABLE, noncentrality
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ __all__ = ["Plan", "plan"]
 
 
 @dataclass(frozen=True)
-class Plan:
+class Plan(Paged):
     """Patterns of a network side by side.
 
     Attributes
@@ -62,13 +62,6 @@ class Plan:
     def report(self) -> str:
         """Return the tables a planner needs as text."""
         return report(self.patterns)
-
-    def to_html(self) -> bytes:
-        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
-
-        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
-        """
-        return html_of(self)
 
     @overload
     def plot(self) -> Figure: ...

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.results.iteration import iteration_table
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.show.quantity import Axis, Link, Quantity
 from photogram.show.ways import Way
@@ -139,16 +140,8 @@ def images(result: AdjustedNetwork, rows: Indices | None = None) -> list[Quantit
 
 
 def iterations(result: AdjustedNetwork) -> list[Quantity]:
-    """Return the history: numbers, sums after the corrections, largest changes, damping; first the start."""
-    first = [(0, result.initial_weighted_sum_of_squares, np.nan, np.nan)]
-    rows = [(i.number, i.weighted_sum_of_squares, i.largest_change, i.damping) for i in result.iterations]
-    number, squares, change, damping = np.array([*first, *rows]).T
-    return [
-        Quantity(number.astype(int), member="number", head="Iteration", decimals=0),
-        Quantity(squares, member="weighted_sum_of_squares", head="Weighted sum of squares", figures=7),
-        Quantity(change, member="largest_change_sd", head="Largest change over sd"),
-        Quantity(damping, member="damping", head="Damping", figures=2),
-    ]
+    """Return the history, first the start."""
+    return iteration_table(result.iterations, result.initial_weighted_sum_of_squares)
 
 
 def control(result: AdjustedNetwork) -> list[Quantity]:

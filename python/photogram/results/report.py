@@ -16,6 +16,7 @@ from photogram.results.axes import image_axes, point_axes
 from photogram.results.calibration_report import calibration_sections
 from photogram.results.features_report import features_sections
 from photogram.results.findings import tested_observations
+from photogram.results.iteration import iteration_lines
 from photogram.results.kinds import ObservedKind
 from photogram.results.network_tables import control, iterations, part, photos, stations
 from photogram.results.observed import NOTABLE, image_lines, observed_lines, suspect_lines
@@ -59,7 +60,7 @@ def report(result: Result) -> str:
         *summary(result),
         ("Redundancy by kind of observation", _redundancy(result)),
         ("Reliability", _reliability(result)),
-        ("Iterations", _iterations(result)),
+        ("Iterations", iteration_lines(iterations(result), ".6f")),
         ("Check points: adjusted minus given, standard deviations, test", _check_points(result)),
         (
             "Control as observations: adjusted minus given, redundancy, standardized difference",
@@ -210,18 +211,6 @@ def _redundancy(result: Result) -> list[str]:
 def _reliability(result: Result) -> list[str]:
     summary = result.reliability_summary
     return [] if summary is None else summary.lines(result.block.linear_unit)
-
-
-def _iterations(result: Result) -> list[str]:
-    number, squares, change, damping = iterations(result)
-    return table_lines(
-        [
-            *field(number, 6, ".0f", "number"),
-            *field(squares, 24, ".6f", "weighted sum of squares", " "),
-            *field(change, 20, ".3e", "largest change / sd", " "),
-            *field(damping, 9, ".1e", "damping", " "),
-        ]
-    )
 
 
 def _unheld(result: Result) -> list[str]:

@@ -14,7 +14,7 @@ from photogram.results.exchanged import Exchange
 from photogram.results.network import AdjustedNetwork
 from photogram.show.brief import Brief, Rows, few
 from photogram.show.sections import Section, composed, headline, verdict_sections
-from photogram.show.ways import Judged, html_of
+from photogram.show.ways import Judged, Paged
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.snooping import Outcome, Settings
@@ -27,7 +27,7 @@ __all__ = ["Snooped"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Snooped(Brief, Judged):
+class Snooped(Brief, Judged, Paged):
     """A network after data snooping.
 
     Attributes
@@ -139,13 +139,6 @@ class Snooped(Brief, Judged):
         """Return the whole result with its verdict and the log, `snooping`, as one JSON document (UTF-8)."""
         own = {"snooping": self.document()}
         return json.to_json({**orjson.loads(self.judged.to_json()), **own})
-
-    def to_html(self) -> bytes:
-        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
-
-        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
-        """
-        return html_of(self)
 
     def sections(self) -> list[Section]:
         """Return the log as titled sections of a report."""

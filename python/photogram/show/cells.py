@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import cycle
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.show.lines import degrees_written, unit_of
-from photogram.show.page import Cell, Column, Table, decimals_of, fixed
+from photogram.show.page import Cell, Column, Table, decimals_of, fixed, significant
 from photogram.show.quantity import Axis, Quantity, long
 from photogram.show.quantity import Table as Quantities
 
@@ -18,7 +19,16 @@ __all__ = ["LISTED", "long_table", "page_table", "unit_written"]
 
 LISTED = 120
 """Rows of a table with a row for each component at most."""
-_SIGNS = {"arcsec": "″", "deg": "°", "um": "µm"}
+_SIGNS = {
+    "arc seconds": "″",
+    "arcsec": "″",
+    "arcmin": "′",
+    "deg": "°",
+    "percent": "%",
+    "um": "µm",
+    "um/m": "µm/m",
+    "um2": "µm²",
+}
 _MOST_OF_DEGREES = 9
 
 Written = Cell | str | float | None
@@ -42,32 +52,35 @@ def page_table(caption: str, table: Quantities, note: str = "", by: Floats | Non
     by
         Deviations (r, k) that say how many decimals the components have: two figures of the median.
     """
-    columns: list[Column] = []
-    cells: list[list[Written]] = []
-    for each in table:
-        if not each.head:
-            continue
-        if each.of is not None and each.kind == "name":
-            columns.append(Column(each.head, text=True))
-            mixed = _mixed(each)
-            cells.append([_component(each.axes[k], mixed) for k in each.of.tolist()])
-        elif each.of is not None:
-            decimals = [] if by is None or each.kind == "deviation" else _decimals(each, by)
-            unit = "" if _mixed(each) else _unit(each, each.axes[0])
-            columns.append(_column(each, each.head, unit, max(decimals, default=None)))
-            rows = each.of.tolist()
-            counts = [decimals[k] for k in rows] if decimals else []
-            cells.append(_numbers(each, each.outward(), [each.axes[k] for k in rows], counts))
-        elif not each.axes:
-            columns.append(_column(each, each.head, "", None))
-            cells.append(_cells(each))
-        else:
-            counts = [None] * len(each.axes) if by is None else _decimals(each, by)
-            values = each.outward().T
-            for axis, count, own in zip(each.axes, counts, values, strict=True):
-                columns.append(_column(each, each.head.format(axis.name), _unit(each, axis), count))
-                cells.append(_numbers(each, own, [axis] * len(own), [count or 0]))
-    return Table(caption, columns, [*zip(*cells, strict=True)], note)
+    written = [pair for each in table if each.head for pair in _columns(each, by)]
+    rows = zip(*(cells for _, cells in written), strict=True)
+    return Table(caption, [column for column, _ in written], [*rows], note)
+
+
+def _columns(each: Quantity, by: Floats | None) -> list[tuple[Column, list[Written]]]:
+    """Return the columns of a quantity with their cells."""
+    if each.of is not None and each.kind == "name":
+        mixed = _mixed(each)
+        return [(Column(each.head, text=True), [_component(each.axes[k], mixed) for k in each.of.tolist()])]
+    if not each.axes:
+        return [(_column(each, each.head, "", None), _with_marks(_cells(each), each.marked))]
+    if each.of is not None:
+        decimals = [] if by is None or each.kind == "deviation" else _decimals(each, by)
+        known = [count for count in decimals if count is not None]
+        unit = "" if _mixed(each) else _unit(each, each.axes[0])
+        rows = each.of.tolist()
+        counts, axes = [decimals[k] for k in rows] if decimals else [], [each.axes[k] for k in rows]
+        cells = _numbers(each, each.outward(), axes, counts, each.marked)
+        return [(_column(each, each.head, unit, max(known, default=None)), cells)]
+    values = np.reshape(each.outward(), (-1, len(each.axes)))
+    marked = None if each.marked is None else np.reshape(each.marked, values.shape)
+    found = []
+    own = [None] * len(each.axes) if by is None else _decimals(each, by)
+    for k, (axis, count) in enumerate(zip(each.axes, own, strict=True)):
+        column = _column(each, each.head.format(axis.name), _unit(each, axis), count)
+        marks = None if marked is None else marked[:, k]
+        found.append((column, _numbers(each, values[:, k], [axis] * len(values), [count], marks)))
+    return found
 
 
 def long_table(
@@ -118,14 +131,21 @@ def _unit(each: Quantity, axis: Axis) -> str:
     return unit_written(unit_of(each, axis))
 
 
-def _decimals(each: Quantity, by: Floats) -> list[int]:
-    """Return the decimals of components: two figures of the median deviation, of degrees four more."""
-    found = []
+def _decimals(each: Quantity, by: Floats) -> list[int | None]:
+    """Return the decimals of components: two figures of the median deviation, of degrees four more.
+
+    None where nothing tells: in a column of several components whose deviation is not known.
+    """
+    if each.kind == "number" or each.decimals is not None:
+        return [each.decimals] * len(each.axes)
+    found: list[int | None] = []
+    alone = each.of is not None and _mixed(each)
     for axis, column in zip(each.axes, np.reshape(by, (-1, len(each.axes))).T, strict=True):
         count = decimals_of(column * axis.factor)
-        if each.kind == "number":
-            count = each.decimals or 0
-        elif each.kind == "value":
+        if alone and not (column > 0).any():
+            found.append(None)
+            continue
+        if each.kind == "value":
             count = min(count + (4 if axis.angle == "deg" else 0), _MOST_OF_DEGREES)
         elif each.kind == "difference":
             count += 1
@@ -146,21 +166,37 @@ def _cells(each: Quantity) -> list[Written]:
     return [Cell(str(name), goes_to=own) for name, own in zip(plain, ids, strict=True)]
 
 
-def _numbers(each: Quantity, values: Floats, axes: Sequence[Axis], decimals: Sequence[int]) -> list[Written]:
+def _numbers(
+    each: Quantity,
+    values: Floats,
+    axes: Sequence[Axis],
+    decimals: Sequence[int | None],
+    marked: Bools | None = None,
+) -> list[Written]:
     """Write numbers as people see them, with the axis and the decimals of each."""
     words = each.words or {}
-    counts = cycle(decimals or [0])
-    return [
-        words[value] if value in words else _number(each, value, axis, count)
+    counts = cycle(decimals or [None])
+    # What shares a column and is of several components has decimals of its own.
+    own = each.kind == "difference" or (each.kind == "value" and each.of is not None and _mixed(each))
+    found = [
+        words[value] if value in words else _number(each, value, axis, count, own=own)
         for value, axis, count in zip(values.tolist(), axes, counts, strict=False)
     ]
+    return _with_marks(found, marked)
 
 
-def _number(each: Quantity, value: float, axis: Axis, decimals: int) -> Written:
-    if math.isfinite(value) and each.kind == "value" and axis.angle == "dms":
-        return Cell(degrees_written(value, decimals), sorts=math.degrees(value))
-    if each.kind == "value" and axis.angle:
-        return math.degrees(value)
-    # Differences of components that share a column have decimals of their own.
-    own = each.kind == "difference" and math.isfinite(value)
-    return Cell(fixed(value, decimals), sorts=value) if own else value
+def _number(each: Quantity, value: float, axis: Axis, decimals: int | None, *, own: bool) -> Written:
+    if not math.isfinite(value):
+        return value
+    if each.kind == "value" and axis.angle == "dms":
+        return Cell(degrees_written(value, decimals or 0), sorts=math.degrees(value))
+    if not own:
+        return value
+    return Cell(significant(value, each.figures) if decimals is None else fixed(value, decimals), sorts=value)
+
+
+def _with_marks(cells: list[Written], marked: Bools | None) -> list[Written]:
+    if marked is None:
+        return cells
+    whole = [cell if isinstance(cell, Cell) else Cell(cell) for cell in cells]
+    return [replace(cell, tone="look") if mark else cell for cell, mark in zip(whole, marked, strict=True)]

@@ -2,94 +2,79 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
-from photogram.show.page import Cell, Column, Row, Table, decimals_of, fixed
+import numpy as np
+
+from photogram.show.cells import page_table, unit_written
+from photogram.show.page import Table
 from photogram.show.pictures import new_figure
+from photogram.show.quantity import Axis, Quantity, component, of_each, records
 from photogram.show.style import FAINT, INK, MARKED, in_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from photogram.statistics.history import History, Series
+    from photogram.arguments.types import Floats
+    from photogram.statistics.history import History
 
-__all__ = ["control_charts", "history_document", "series_table", "values_table"]
+__all__ = ["control_charts", "history_document", "series", "series_table", "values_table"]
 
 ACROSS = 3
 """Charts beside each other."""
 
 
+def series(history: History) -> list[Quantity]:
+    """Return a row for each quantity: mean, drift, the largest test of a step, and what was found."""
+    own = history.series
+    axes = tuple(Axis.of(each.name, each.unit) for each in own)
+    of, found = np.arange(len(own)), [", ".join(change.kind for change in each.changes) for each in own]
+    steps = [max((t for t in each.steps.tolist() if t == t), key=abs, default=np.nan) for each in own]
+    p = [each.test.probability_above if each.test else None for each in own]
+    names = [found_ or "constant" for found_ in found]
+    return [
+        component(axes, of)[0],
+        of_each(own, "mean", axes, "value", of=of, head="Mean"),
+        of_each(own, "mean_sd", axes, "deviation", of=of, head="sd", figures=2),
+        of_each(own, "drift", axes, "deviation", of=of, head="Drift a unit of time"),
+        of_each(own, "drift_sd", axes, "deviation", of=of, head="sd", figures=2),
+        Quantity(np.array(steps), head="Largest t of a step", decimals=2),
+        Quantity(p, head="p of constancy", member="probability", figures=2),
+        Quantity(names, kind="name", head="Found", marked=np.array([bool(each) for each in found])),
+    ]
+
+
 def series_table(history: History, whose: str) -> Table:
     """Return one line for each quantity: mean, drift, the largest test of a step, and what was found."""
-    columns = (
-        Column("Quantity", text=True),
-        Column("Unit", text=True),
-        Column("Mean"),
-        Column("sd", figures=2),
-        Column("Drift a unit of time", figures=3),
-        Column("sd", figures=2),
-        Column("Largest t of a step", decimals=2),
-        Column("p of constancy", figures=2),
-        Column("Found", text=True),
-    )
     note = (
         f"Of {history.tests} single tests together one rejects by chance with probability {history.level:g}:"
         f" |t| beyond {history.limit:.3g} is accepted. Drift and steps as if nothing else changed."
     )
-    return Table(f"What changed in {whose}", columns, [_line(own) for own in history.series], note)
-
-
-def _line(own: Series) -> Row:
-    found = ", ".join(change.kind for change in own.changes)
-    steps = [t for t in own.steps.tolist() if not math.isnan(t)]
-    return [
-        own.name,
-        _micro(own.unit),
-        Cell(fixed(own.mean, decimals_of(own.sd)), sorts=own.mean),
-        own.mean_sd,
-        None if math.isnan(own.drift) else own.drift,
-        None if math.isnan(own.drift) else own.drift_sd,
-        max(steps, key=abs, default=None),
-        own.test.probability_above if own.test else None,
-        Cell(found or "constant", tone="look" if found else ""),
-    ]
+    return page_table(f"What changed in {whose}", series(history), note, _deviations(history))
 
 
 def values_table(history: History, whose: str) -> Table:
     """Return all values: what was determined on each occasion, and how far it is from the others."""
-    columns = (
-        Column("Quantity", text=True),
-        Column("Occasion", text=True),
-        Column("Value"),
-        Column("sd", figures=2),
-        Column("Less the others", figures=3),
-        Column("t", decimals=2),
-        Column("Unit", text=True),
+    own, occasions = history.series, history.occasions
+    axes = tuple(Axis.of(each.name, each.unit) for each in own)
+    of = np.repeat(np.arange(len(own)), len(occasions))
+    values, sd, off, off_sd = (
+        np.concatenate([getattr(each, name) for each in own]) for name in ("values", "sd", "off", "off_sd")
     )
-    rows: list[Row] = []
-    for own in history.series:
-        for k, occasion in enumerate(history.occasions):
-            value, off = float(own.values[k]), float(own.off[k])
-            t = off / float(own.off_sd[k])
-            beyond = abs(t) > history.limit
-            rows.append(
-                [
-                    own.name,
-                    occasion,
-                    Cell(fixed(value, decimals_of(own.sd)), sorts=value),
-                    float(own.sd[k]),
-                    off,
-                    Cell(f"{t:.2f}", tone="look" if beyond else "", sorts=t),
-                    _micro(own.unit),
-                ]
-            )
-    return Table(f"All values of {whose}", columns, rows)
+    t = off / off_sd
+    table = [
+        component(axes, of)[0],
+        Quantity([*occasions] * len(own), kind="name", head="Occasion"),
+        Quantity(values, axes, "value", head="Value", of=of),
+        Quantity(sd, axes, "deviation", head="sd", figures=2, of=of),
+        Quantity(off, axes, "deviation", head="Less the others", of=of),
+        Quantity(t, head="t", decimals=2, marked=np.abs(t) > history.limit),
+    ]
+    return page_table(f"All values of {whose}", table, by=_deviations(history))
 
 
-def _micro(unit: str) -> str:
-    """Return a unit as pages write it."""
-    return unit.replace("um", "µm").replace("arc seconds", "″").replace("percent", "%")
+def _deviations(history: History) -> Floats:
+    return np.array([each.sd for each in history.series]).T
 
 
 @in_style
@@ -118,7 +103,7 @@ def control_charts(history: History, title: str) -> Figure:
             beyond = abs(own.off) > history.limit * own.off_sd
             panel.plot(t[beyond], own.values[beyond], "o", color=MARKED, markersize=6, fillstyle="none")
         panel.set_title(own.name, fontsize=9)
-        panel.set_ylabel(_micro(own.unit))
+        panel.set_ylabel(unit_written(own.unit))
         panel.ticklabel_format(useOffset=False)
     figure.suptitle(title, fontsize=11)
     return figure
@@ -126,9 +111,31 @@ def control_charts(history: History, title: str) -> Figure:
 
 def history_document(history: History) -> dict[str, object]:
     """Return a history as plain values for a JSON document."""
+    own = history.series
+    occasions = [
+        [None if change.at is None else history.occasions[change.at] for change in each.changes]
+        for each in own
+    ]
+    changes = [
+        [
+            {
+                "kind": change.kind,
+                "size": change.size,
+                "sd": change.sd,
+                "t": change.statistic,
+                "log10_p": change.log10_p,
+                "occasion": occasion,
+                "sentence": change.sentence,
+            }
+            for change, occasion in zip(each.changes, when, strict=True)
+        ]
+        for each, when in zip(own, occasions, strict=True)
+    ]
+    more = [of_each(own, name) for name in ("name", "unit", "values", "sd", "model", "off", "off_sd")]
+    table = [*more, *series(history), of_each(own, "steps", member="steps_t")]
     return {
-        "occasions": list(history.occasions),
-        "times": history.times.tolist(),
+        "occasions": history.occasions,
+        "times": history.times,
         "tests": history.tests,
         "level": history.level,
         "limit": history.limit,
@@ -137,34 +144,5 @@ def history_document(history: History) -> dict[str, object]:
             "degrees_of_freedom": history.constancy.degrees_of_freedom,
             "probability": history.constancy.probability_above,
         },
-        "series": [
-            {
-                "name": own.name,
-                "unit": own.unit,
-                "values": own.values.tolist(),
-                "sd": own.sd.tolist(),
-                "mean": own.mean,
-                "mean_sd": own.mean_sd,
-                "model": own.model.tolist(),
-                "off": own.off.tolist(),
-                "off_sd": own.off_sd.tolist(),
-                "drift": own.drift,
-                "drift_sd": own.drift_sd,
-                "steps_t": own.steps.tolist(),
-                "probability": own.test.probability_above if own.test else None,
-                "changes": [
-                    {
-                        "kind": change.kind,
-                        "size": change.size,
-                        "sd": change.sd,
-                        "t": change.statistic,
-                        "log10_p": change.log10_p,
-                        "occasion": None if change.at is None else history.occasions[change.at],
-                        "sentence": change.sentence,
-                    }
-                    for change in own.changes
-                ],
-            }
-            for own in history.series
-        ],
+        "series": records([*table, Quantity(changes, member="changes")]),
     }

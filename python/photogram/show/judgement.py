@@ -36,7 +36,7 @@ def judged(verdict: Verdict, on: str = "") -> Judgement:
     return Judgement(mark, verdict.headline, verdict.lines, tone, on)
 
 
-def verdict_table(verdict: Verdict, of: str = "") -> Table:
+def verdict_table(verdict: Verdict) -> Table:
     """Return all tests of a verdict."""
     columns = (
         Column("Test", text=True),
@@ -49,13 +49,12 @@ def verdict_table(verdict: Verdict, of: str = "") -> Table:
         Column("Tests that share it", decimals=0),
         Column("Outcome", text=True),
     )
-    caption = f"Tests of {of}" if of else "Tests"
     note = (
         "p is the probability of a value as far out where nothing is wrong. A test rejects where it is"
         " below its"
         " level. Of every kind of observation the least probable one stands here."
     )
-    return Table(caption, columns, [_row(each) for each in verdict.tests], note)
+    return Table("Tests", columns, [_row(each) for each in verdict.tests], note)
 
 
 def tests_section(verdict: Verdict) -> Section:

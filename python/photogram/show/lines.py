@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +13,10 @@ from photogram.arguments.types import Floats
 from photogram.show.angles import degrees_minutes_seconds
 from photogram.show.quantity import Axis, Quantity
 
-__all__ = ["Field", "field", "stacked", "table_lines"]
+if TYPE_CHECKING:
+    from photogram.show.page import Fact
+
+__all__ = ["Field", "fact_lines", "field", "marks", "stacked", "table_lines"]
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,11 @@ class Field:
 
 
 def field(
-    quantity: Quantity, width: int, form: str = "", head: str = "{name} {unit}", gap: str = ""
+    quantity: Quantity,
+    width: int,
+    form: str | Sequence[str] = "",
+    head: str = "{name} {unit}",
+    gap: str = "",
 ) -> list[Field]:
     """Return a quantity as fields, one for each of its components.
 
@@ -33,44 +41,60 @@ def field(
     quantity
         Numbers are set to the right, names to the left.
     width
-        Of each.
+        Of each; 0 for as many characters as it takes.
     form
-        How numbers are written, `.3f`; those that are not finite are `-` unless the quantity has a word for
-        them.
+        How numbers are written, `.3f`, all of them or those of each component; with fewer digits where they
+        are too long; those that are not finite are `-` unless the quantity has a word for them. How
+        components are, `{name}` or `{name} {unit}`.
     head
-        `{name}` and `{unit}` stand for those of the component.
+        `{name}` and `{unit}` stand for those of the component; where each row has one, for their common unit.
     gap
         What stands before each.
     """
     if quantity.kind == "name":
         plain = [*map(str, np.asarray(quantity.values).tolist())]
         if quantity.of is not None:
-            components = [f"{axis.name} {axis.small}".rstrip() for axis in quantity.axes]
+            written = form if form and isinstance(form, str) else "{name} {unit}"
+            components = [written.format(name=axis.name, unit=axis.small).rstrip() for axis in quantity.axes]
             plain = [components[k] for k in quantity.of.tolist()]
         texts = [f"{gap}{text:<{width}}" for text in plain]
-        return [Field(f"{gap}{head:<{width}}", texts)]
+        return [Field(f"{gap}{head.format(name='', unit='').strip():<{width}}", texts)]
     values = quantity.outward()
+    forms = [form] * max(len(quantity.axes), 1) if isinstance(form, str) else form
     if quantity.single:
-        axis = Axis("")
-        return [_numbers(quantity, axis, values, width, form, head, gap)]
+        units = {unit_of(quantity, axis) for axis in quantity.axes}
+        common = units.pop() if len(units) == 1 else ""
+        axis = quantity.axes[0] if len(quantity.axes) == 1 else Axis("", common, small=common)
+        of = [0] * len(values) if quantity.of is None else quantity.of.tolist()
+        return [_numbers(quantity, axis, values, width, [forms[k] for k in of], head, gap)]
     return [
-        _numbers(quantity, axis, column, width, form, head, gap)
-        for axis, column in zip(quantity.axes, values.T, strict=True)
+        _numbers(quantity, axis, column, width, [own] * len(column), head, gap)
+        for axis, column, own in zip(quantity.axes, values.T, forms, strict=True)
     ]
 
 
 def _numbers(
-    quantity: Quantity, axis: Axis, values: Floats, width: int, form: str, head: str, gap: str
+    quantity: Quantity,
+    axis: Axis,
+    values: Floats,
+    width: int,
+    forms: Sequence[str],
+    head: str,
+    gap: str,
 ) -> Field:
     unit = unit_of(quantity, axis)
     named = f"{gap}{head.format(name=axis.name, unit=unit).strip():>{width}}"
     if quantity.kind == "value" and axis.angle == "dms":
         texts = [degrees_written(value, 5) if math.isfinite(value) else "-" for value in values.tolist()]
         return Field(named, [f"{gap}{text:>{width}}" for text in texts])
-    if quantity.kind == "value" and axis.angle == "deg":
-        values = np.degrees(values)
-    whole = f"{gap}%{width}{form}"
-    texts = [whole % value for value in values.tolist()]
+    plain = values.tolist()
+    texts = [f"{gap}%{width}{form}" % value for form, value in zip(forms, plain, strict=True)]
+    if width and any(len(text) > width + len(gap) for text in texts):
+        short = f"{gap}%{width}.{max(width - 8, 1)}g"
+        texts = [
+            text if len(text) <= width + len(gap) else short % value
+            for text, value in zip(texts, plain, strict=True)
+        ]
     words: Mapping[float, str] = quantity.words or {}
     odd = ~np.isfinite(values)
     for number in words:
@@ -96,6 +120,22 @@ def degrees_written(angle: float, decimals: int) -> str:
     return f"{'-' if angle < 0 else ''}{degrees} {minutes:02d} {seconds:0{width}.{decimals}f}"
 
 
+def marks(quantity: Quantity, mark: str) -> Field:
+    """Return what stands behind the rows whose number is marked."""
+    rows = np.zeros(len(quantity.values), dtype=bool) if quantity.marked is None else quantity.marked
+    return Field("", [mark if row else "" for row in rows.tolist()])
+
+
+def fact_lines(facts: Sequence[Fact]) -> list[str]:
+    """Return named figures, one under the other, with their units and, in brackets, what is said of them."""
+    lines = []
+    for each in facts:
+        said = f" ({each.note})" if each.note else ""
+        name = each.name if each.name[1:2].isupper() else each.name[:1].lower() + each.name[1:]
+        lines.append(f"{name:<36}{f'{each.value} {each.unit}'.rstrip()}{said}")
+    return lines
+
+
 def table_lines(*rows: Sequence[Field]) -> list[str]:
     """Return a table: heads, then of each thing a line for each of the given rows; nothing without things.
 
@@ -103,8 +143,8 @@ def table_lines(*rows: Sequence[Field]) -> list[str]:
     """
     if not rows[0][0].texts:
         return []
-    heads = ["".join(each.head for each in row) for row in rows]
-    found = [head for head in heads if head.strip()]
+    heads = ["".join(each.head for each in row).rstrip() for row in rows]
+    found = [head for head in heads if head]
     texts = [map("".join, zip(*(each.texts for each in row), strict=True)) for row in rows]
     for of_one in zip(*texts, strict=True):
         found += of_one

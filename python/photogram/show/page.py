@@ -304,13 +304,13 @@ def significant(value: float, figures: int = 4) -> str:
     return f"{value:.{figures - 1}e}"
 
 
-def decimals_of(deviations: Floats, figures: int = 2) -> int:
+def decimals_of(deviations: Floats) -> int:
     """Return with how many decimals values are written whose standard deviations are these.
 
-    The median standard deviation keeps so many significant figures; 4 decimals where none is known.
+    The median standard deviation keeps two significant figures; 4 decimals where none is known.
     """
     known = np.asarray(deviations, dtype=float)
     known = known[np.isfinite(known) & (known > 0)]
     if not known.size:
         return 4
-    return int(np.clip(figures - 1 - math.floor(math.log10(float(np.median(known)))), 0, MOST_DECIMALS))
+    return int(np.clip(1 - math.floor(math.log10(float(np.median(known)))), 0, MOST_DECIMALS))

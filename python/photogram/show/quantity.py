@@ -6,6 +6,7 @@ A table is a list of quantities of the same n things. `frame` makes files of com
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -26,8 +27,12 @@ __all__ = [
     "joined",
     "labelled",
     "long",
+    "of_each",
     "records",
 ]
+
+
+Kind = Literal["value", "deviation", "difference", "number", "name"]
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,12 @@ class Axis:
         """Return an axis in radians, whose deviations are seconds of arc."""
         return cls(name, "rad", angle, "_deg" if angle else "_rad", "arcsec", 1.0 / ARCSEC)
 
+    def outward(self, kind: str) -> float:
+        """Return by what a number of a kind of quantity is multiplied for people."""
+        if kind == "value":
+            return math.degrees(1.0) if self.angle == "deg" else 1.0
+        return self.factor
+
 
 @dataclass(frozen=True)
 class Link:
@@ -83,7 +94,7 @@ class Quantity:
     Attributes
     ----------
     values
-        (n,), or (n, k) with k axes.
+        (n,), or (n, k) with k axes; (n,), too, with the one axis of all of them.
     axes
         The components; also of what has one of them in each row, as `of` says.
     kind
@@ -104,6 +115,8 @@ class Quantity:
         What stands for single numbers: `fixed` for 0.
     seen
         Where people see a number, of the form of the values; None: everywhere.
+    marked
+        Which numbers are to be looked at, of the form of the values; None: no one more than others.
     link
         What a name leads to on a page.
     of
@@ -112,7 +125,7 @@ class Quantity:
 
     values: Any
     axes: tuple[Axis, ...] = ()
-    kind: Literal["value", "deviation", "difference", "number", "name"] = "number"
+    kind: Kind = "number"
     name: str | None = None
     member: str | Mapping[str, slice] = ""
     about: str = ""
@@ -122,27 +135,40 @@ class Quantity:
     figures: int = 3
     words: Mapping[float, str] | None = None
     seen: Bools | None = None
+    marked: Bools | None = None
     link: Link | None = None
     of: Indices | None = None
 
     @property
     def single(self) -> bool:
         """Whether each thing has one value."""
-        return not self.axes or self.of is not None
+        return not self.axes or self.of is not None or np.ndim(self.values) == 1
 
     def outward(self) -> Floats:
-        """Return the numbers that people see, in the units in which they read deviations and differences."""
+        """Return the numbers that people see, in the units in which they read them.
+
+        Degrees for angles that are written so; what is written in degrees, minutes and seconds is in radians.
+        """
         values = np.asarray(self.values, dtype=float)
         if self.seen is not None:
             values = np.where(self.seen, values, np.nan)
-        if self.kind in ("deviation", "difference") and self.axes:
-            factors = np.array([axis.factor for axis in self.axes])
+        if self.kind in ("value", "deviation", "difference") and self.axes:
+            factors = np.array([axis.outward(self.kind) for axis in self.axes])
             values = values * (factors if self.of is None else factors[self.of])
         return values
 
 
 Table = Sequence[Quantity]
 """Quantities of the same things."""
+
+
+def of_each(
+    things: Sequence[Any], attribute: str, axes: tuple[Axis, ...] = (), kind: Kind = "number", **more: Any
+) -> Quantity:
+    """Return an attribute of n things; JSON documents call it as it is called, unless `member` says else."""
+    found = [getattr(each, attribute) for each in things]
+    values = np.array(found, dtype=object if kind == "name" else None)
+    return Quantity(values, axes, kind, **{"member": attribute, **more})
 
 
 def labelled(table: Table, label: str) -> Quantity:
@@ -152,25 +178,32 @@ def labelled(table: Table, label: str) -> Quantity:
 
 def chosen(table: Table, rows: Indices) -> list[Quantity]:
     """Return the table of some of its things."""
-    found = []
-    for each in table:
-        link = each.link and replace(each.link, rows=each.link.rows[rows])
-        of = None if each.of is None else each.of[rows]
-        seen = None if each.seen is None else each.seen[rows]
-        found.append(replace(each, values=np.asarray(each.values)[rows], seen=seen, link=link, of=of))
-    return found
+    return [
+        replace(
+            each,
+            values=np.asarray(each.values)[rows],
+            seen=_picked(each.seen, rows),
+            marked=_picked(each.marked, rows),
+            link=each.link and replace(each.link, rows=each.link.rows[rows]),
+            of=_picked(each.of, rows),
+        )
+        for each in table
+    ]
+
+
+def _picked(part: Any, places: Any) -> Any:
+    return None if part is None else part[places]
 
 
 def long(table: Table, places: Indices) -> list[Quantity]:
     """Return a table with a row for each of some components: (r, 2) of which thing, and of which axis."""
     rows, axis = places[:, 0], places[:, 1]
-    axes = next(each.axes for each in table if each.axes)
-    found = chosen([each for each in table if not each.axes], rows)
-    found = [*chosen([each for each in table if not each.axes], rows), *component(axes, axis)]
+    axes = next(each.axes for each in table if not each.single)
+    found = [*chosen([each for each in table if each.single], rows), *component(axes, axis)]
     for each in table:
-        if each.axes:
-            seen = None if each.seen is None else each.seen[rows, axis]
-            found.append(replace(each, values=each.values[rows, axis], seen=seen, of=axis))
+        if not each.single:
+            seen, marked = _picked(each.seen, (rows, axis)), _picked(each.marked, (rows, axis))
+            found.append(replace(each, values=each.values[rows, axis], seen=seen, marked=marked, of=axis))
     return found
 
 

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from photogram.show.page import Page
-    from photogram.show.run import Run
 
 __all__ = [
     "Judged",
+    "Paged",
     "Shown",
     "Way",
     "axes_of",
@@ -32,7 +32,6 @@ __all__ = [
     "document_of",
     "files_of",
     "findings_of",
-    "html_of",
     "page_of",
     "report_of",
 ]
@@ -118,15 +117,6 @@ def page_of(result: object) -> Page:
     _undefined(result, "page")
 
 
-def html_of(result: object, run: Run | None = None) -> bytes:
-    """Return the report of a result as one HTML file; `run` is the run of the command that made it."""
-    from photogram.show.html import page_html
-    from photogram.show.run import reproducibility
-
-    page = page_of(result)
-    return page_html(page.with_sections(reproducibility(run, page.phases)))
-
-
 @Way
 def findings_of(result: object) -> Findings:
     """Return what the verdict on a result rests on."""
@@ -146,7 +136,22 @@ class Judged:
         return verdict(findings_of(self))
 
 
-class Shown(Judged):
+class Paged:
+    """What has a report for the browser."""
+
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        from photogram.show.html import page_html
+        from photogram.show.run import reproducibility
+
+        page = page_of(self)
+        return page_html(page.with_sections(reproducibility(None, page.phases)))
+
+
+class Shown(Judged, Paged):
     """What has a report, a JSON document, and tables."""
 
     def report(self) -> str:
@@ -156,13 +161,6 @@ class Shown(Judged):
     def to_json(self) -> bytes:
         """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
         return document_of(self)
-
-    def to_html(self) -> bytes:
-        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
-
-        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
-        """
-        return html_of(self)
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return what the result says about one kind of thing as a data frame.

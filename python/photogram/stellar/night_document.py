@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from typing import Any
 
@@ -11,9 +10,10 @@ import numpy as np
 from photogram import _photocore
 from photogram.io import json
 from photogram.show.angles import ARCSEC
+from photogram.show.quantity import records
 from photogram.stellar.lens_tests import LensTest
+from photogram.stellar.night_tables import exposures, images, stars
 from photogram.stellar.nights import CalibratedNight
-from photogram.stellar.pointing import axis_of
 
 __all__ = ["to_json"]
 
@@ -58,11 +58,11 @@ def to_json(result: CalibratedNight) -> bytes:
                 "model": result.camera.facts.model,
                 "formula": result.camera.facts.formula,
                 "common_scale": result.camera.common_scale,
-                "tried": [asdict(fit) for fit in result.lenses],
+                "tried": result.lenses,
                 "scale_test": _test(result.scale_test),
                 "term_tests": [_test(test) for test in result.term_tests],
             },
-            "effects": asdict(night.site.effects),
+            "effects": night.site.effects,
             "standstill": None if result.standstill is None else _standstill(result),
             "messages": [str(message) for message in result.messages],
             "parameters": {
@@ -76,9 +76,9 @@ def to_json(result: CalibratedNight) -> bytes:
             "covariance": {"order": result.camera.names, "matrix": result.camera.covariance},
             "correlated": [{"parameters": [a, b], "correlation": r} for a, b, r in result.correlated()],
             "significance": result.significance(),
-            "exposures": _exposures(result),
-            "stars": _stars(result),
-            "images": _images(result),
+            "exposures": records(exposures(result)),
+            "stars": records(stars(result)),
+            "images": records(images(result)),
         }
     )
 
@@ -98,100 +98,3 @@ def _standstill(result: CalibratedNight) -> dict[str, Any]:
         "turn_arcsec": test.turns / ARCSEC,
         "moved": [result.names[k] for k in test.moved],
     }
-
-
-def _exposures(result: CalibratedNight) -> list[dict[str, Any]]:
-    found = result.calibration
-    return [
-        {
-            "name": name,
-            "utc": exposure.utc,
-            "alpha_omega_kappa_rad": attitude,
-            "covariance": covariance,
-            "covariance_with_camera": cross,
-            "azimuth_deg": math.degrees(axis_of(attitude)[0]),
-            "elevation_deg": math.degrees(axis_of(attitude)[1]),
-            "images": len(exposure.xy),
-            "identified": identified,
-            "rejected": rejected,
-            "icrs": {
-                "quaternion": inertial.quaternion,
-                "quaternion_covariance": inertial.quaternion_covariance,
-                "covariance": inertial.covariance,
-                "right_ascension_deg": math.degrees(inertial.axis[0]),
-                "declination_deg": math.degrees(inertial.axis[1]),
-            },
-            "expected_chance_matches": odds,
-            "probability": probability,
-            "log_odds": log_odds,
-        }
-        for (
-            name,
-            exposure,
-            attitude,
-            covariance,
-            cross,
-            inertial,
-            identified,
-            rejected,
-            odds,
-            probability,
-            log_odds,
-        ) in zip(
-            result.names,
-            result.exposures,
-            found.attitudes,
-            found.attitude_covariances,
-            found.cross_covariances,
-            result.inertial,
-            result.identified.tolist(),
-            result.rejected.tolist(),
-            result.odds.tolist(),
-            result.probabilities.tolist(),
-            result.log_odds.tolist(),
-            strict=True,
-        )
-    ]
-
-
-def _stars(result: CalibratedNight) -> list[dict[str, Any]]:
-    """List the stars that were estimated."""
-    found, ids = result.calibration, result.night.catalogue.ids
-    rows = zip(
-        found.catalogue.tolist(),
-        (found.star_residuals / ARCSEC).tolist(),
-        found.star_redundancy.tolist(),
-        found.star_standardized.tolist(),
-        strict=True,
-    )
-    return [
-        {"id": ids[star], "residual": residual, "redundancy": redundancy, "standardized": standardized}
-        for star, residual, redundancy, standardized in rows
-        if not math.isnan(residual[0])
-    ]
-
-
-def _images(result: CalibratedNight) -> list[dict[str, Any]]:
-    found, ids = result.calibration, result.night.catalogue.ids
-    rows = zip(
-        found.exposures.tolist(),
-        found.stars.tolist(),
-        found.xy.tolist(),
-        found.residuals.tolist(),
-        found.redundancy.tolist(),
-        found.standardized.tolist(),
-        result.star_probabilities.tolist(),
-        strict=True,
-    )
-    return [
-        {
-            "exposure": result.names[exposure],
-            "star": ids[star],
-            "xy_px": xy,
-            "residual_px": residual,
-            "redundancy": redundancy,
-            "standardized": standardized,
-            "probability": probability,
-        }
-        for exposure, star, xy, residual, redundancy, standardized, probability in rows
-    ]

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from photogram.show.angles import ARCSEC
+from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.page import (
     Cell,
@@ -23,11 +23,20 @@ from photogram.show.page import (
     fixed,
     significant,
 )
+from photogram.show.quantity import chosen
 from photogram.show.ways import page_of
 from photogram.stellar.night_plots import figures
+from photogram.stellar.night_tables import (
+    attitudes,
+    facts,
+    fit,
+    inertial,
+    largest,
+    lens_tests,
+    lenses,
+)
 from photogram.stellar.nights import CalibratedNight
 from photogram.stellar.page import plate_pictures
-from photogram.stellar.pointing import axis_of
 
 __all__ = ["night_page"]
 
@@ -40,13 +49,12 @@ LISTED = 200
 @page_of.register(CalibratedNight)
 def night_page(result: CalibratedNight) -> Page:
     """Return the report of a night for the browser."""
+    much, good = facts(result)
     sections = [
         Section(
             "pictures", "Stars and residuals", [Layers("picture-layers", plate_pictures(figures(result)))]
         ),
-        Section(
-            "size", "How much, how good", [Facts("How much", _much(result)), Facts("How good", _good(result))]
-        ),
+        Section("size", "How much, how good", [Facts("How much", much), Facts("How good", good)]),
         Section("camera", "Camera", _camera(result)),
         Section("exposures", "Exposures", _exposures(result)),
         Section(
@@ -88,36 +96,6 @@ def _highlights(result: CalibratedNight) -> list[Fact]:
         Fact(
             "Any exposure falsely identified", f"{result.falsely_identified:.0e}", note="probability, at most"
         ),
-    ]
-
-
-def _much(result: CalibratedNight) -> list[Fact]:
-    found, night = result.calibration, result.night
-    measured = sum(len(exposure.xy) for exposure in result.exposures)
-    lens = result.camera.lens + (" (fx = fy)" if result.camera.common_scale else "")
-    return [
-        Fact("Exposures", f"{len(result.exposures)} of {len(night.exposures)}"),
-        Fact("Images measured, identified, used", f"{measured}, {result.identified.sum()}, {len(found.xy)}"),
-        Fact(
-            "Stars",
-            f"{len(found.catalogue)}",
-            note=f"{int(np.isfinite(found.star_residuals[:, 0]).sum())} of them estimated",
-        ),
-        Fact("Degrees of freedom", f"{found.degrees_of_freedom}"),
-        Fact("Lens", lens),
-        Fact("Status", f"{found.status}, {found.iterations} iterations"),
-        Fact("Effects left out of places", ", ".join(night.site.effects.left_out) or "none"),
-    ]
-
-
-def _good(result: CalibratedNight) -> list[Fact]:
-    found, night = result.calibration, result.night
-    rms = np.sqrt(np.mean(found.residuals**2, axis=0))
-    return [
-        Fact("Mean error of an image coordinate", f"{found.mean_error * night.pixel_sd:.4f}", "px"),
-        Fact("rms of residuals in x and y", f"{rms[0]:.4f}, {rms[1]:.4f}", "px"),
-        Fact("UT1 - UTC", f"{night.earth.dut1:.4f}", "s"),
-        Fact("Pole x, y", ", ".join(f"{value / ARCSEC:.4f}" for value in night.earth.pole), "″"),
     ]
 
 
@@ -163,135 +141,30 @@ def _camera(result: CalibratedNight) -> list[Part]:
 
 
 def _exposures(result: CalibratedNight) -> list[Part]:
-    found = result.calibration
-    fit: list[Row] = []
-    attitudes: list[Row] = []
-    for i, (name, exposure) in enumerate(zip(result.names[:LISTED], result.exposures, strict=False)):
-        azimuth, elevation = (math.degrees(angle) for angle in axis_of(found.attitudes[i]))
-        errors = np.sqrt(np.diag(found.attitude_covariances[i])) / ARCSEC
-        own = found.exposures == i
-        rms = math.sqrt(float(np.mean(found.residuals[own] ** 2)))
-        certain = result.star_probabilities[own]
-        least = float(np.nanmin(certain)) if np.isfinite(certain).any() else None
-        fit.append(
-            [
-                name,
-                exposure.utc,
-                len(exposure.xy),
-                int(result.identified[i]),
-                int(result.rejected[i]),
-                rms,
-                float(result.log_odds[i]),
-                least,
-            ]
-        )
-        ra, dec = (math.degrees(angle) for angle in result.inertial[i].axis)
-        attitudes.append([name, azimuth, elevation, ra, dec, *map(float, errors)])
-    text = Column("Exposure", text=True)
-    fit_columns = (
-        text,
-        Column("UTC", text=True),
-        Column("Images"),
-        Column("Identified"),
-        Column("Left out"),
-        Column("rms", "px", decimals=3),
-        Column("Log odds", decimals=1),
-        Column("Least certain star", figures=6),
-    )
-    attitude_columns = (
-        text,
-        Column("Azimuth", "° from south, positive west", decimals=5),
-        Column("Elevation", "°", decimals=5),
-        Column("Right ascension", "° ICRS", decimals=6),
-        Column("Declination", "° ICRS", decimals=6),
-        *(Column(f"sd {angle}", "″", decimals=2) for angle in ("alpha", "omega", "kappa")),
-    )
-    note = (
-        ""
-        if len(result.names) <= LISTED
-        else f"The first {LISTED} of {len(result.names)}; exposures.csv has all."
-    )
-    tables = [
-        Table("Identification and fit", fit_columns, fit, note),
-        Table("Attitudes", attitude_columns, attitudes, note),
-    ]
+    count = len(result.names)
+    note = f"The first {LISTED} of {count}; exposures.csv has all." if count > LISTED else ""
+    names, azimuth, elevation, _, errors, *_ = attitudes(result)
+    _, ra, dec, *_ = inertial(result)
+    both = {
+        "Identification and fit": fit(result),
+        "Attitudes": [names, azimuth, elevation, ra, dec, errors],
+    }
+    rows = np.arange(min(count, LISTED))
+    tables = [page_table(caption, chosen(table, rows), note) for caption, table in both.items()]
     return [Layers("exposure-layers", tables)]
 
 
 def _lens(result: CalibratedNight) -> list[Part]:
     parts: list[Part] = []
-    tests = [*([result.scale_test] if result.scale_test else []), *result.term_tests]
-    if tests:
-        columns = (
-            Column("Zero?", text=True),
-            Column("F", decimals=2),
-            Column("Degrees of freedom", text=True),
-            Column("p", figures=2),
-            Column("Level", figures=2),
-            Column("Effect", "px", decimals=3),
-            Column("Outcome", text=True),
-        )
-        rows: list[Row] = [
-            [
-                each.name,
-                each.statistic,
-                f"{each.dimension}, {each.freedom}",
-                each.probability,
-                each.level,
-                each.effect,
-                each.verdict,
-            ]
-            for each in tests
-        ]
-        parts.append(
-            Table(
-                "Terms",
-                columns,
-                rows,
-                "In the order in which they may be left out, each without those above it.",
-            )
-        )
+    if result.scale_test or result.term_tests:
+        order = "In the order in which they may be left out, each without those above it."
+        parts.append(page_table("Terms", lens_tests(result), order))
     if result.lenses:
-        best = min(fit.bic for fit in result.lenses)
-        heads = (
-            Column("Lens", text=True),
-            Column("Parameters"),
-            Column("Images"),
-            Column("Unit weight", decimals=4),
-            Column("BIC over the best", decimals=1),
-            Column("Remark", text=True),
-        )
-        fits: list[Row] = [
-            [fit.lens, None, None, None, None, f"not adjusted: {fit.reason}"]
-            if fit.reason
-            else [fit.lens, fit.parameters, fit.images, fit.mean_error, fit.bic - best, ""]
-            for fit in result.lenses
-        ]
-        parts.append(Table("Lenses that were tried", heads, fits, "The first is taken."))
+        parts.append(page_table("Lenses that were tried", lenses(result), "The first is taken."))
     return parts
 
 
 def _worst(result: CalibratedNight) -> Table:
-    found, ids = result.calibration, result.night.catalogue.ids
-    size = np.nanmax(np.abs(np.nan_to_num(found.standardized)), axis=1)
-    rows: list[Row] = [
-        [
-            result.names[found.exposures[k]],
-            str(ids[found.stars[k]]),
-            *map(float, found.xy[k]),
-            *map(float, found.residuals[k]),
-            *map(float, found.standardized[k]),
-        ]
-        for k in np.argsort(-size, kind="stable")[:WORST].tolist()
-    ]
-    columns = (
-        Column("Exposure", text=True),
-        Column("Star", text=True),
-        Column("x", "px", decimals=2),
-        Column("y", "px", decimals=2),
-        Column("Residual x", "px", decimals=3),
-        Column("Residual y", "px", decimals=3),
-        Column("w x", decimals=2),
-        Column("w y", decimals=2),
-    )
-    return Table("Worst observations", columns, rows, f"The {len(rows)} images of the largest test values.")
+    table = largest(result, WORST)
+    note = f"The {len(table[0].values)} images of the largest test values."
+    return page_table("Worst observations", table, note)

@@ -4,16 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
-from photogram.show.angles import ARCSEC
+from photogram.show.lines import Field, fact_lines, field, table_lines
+from photogram.show.quantity import Table, chosen
 from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE
-from photogram.stellar.nights import SIGNIFICANT, CalibratedNight, Night
+from photogram.stellar.night_tables import (
+    attitudes,
+    facts,
+    fit,
+    images,
+    inertial,
+    largest,
+    lens_tests,
+    lenses,
+    stars,
+)
+from photogram.stellar.nights import SIGNIFICANT, CalibratedNight
 from photogram.stellar.odds import ACCEPTED, LOG_ODDS
 from photogram.stellar.parameters import GRAD
-from photogram.stellar.pointing import axis_of
 
 __all__ = ["report", "summary"]
 
@@ -30,9 +42,9 @@ def report(result: CalibratedNight) -> str:
         ("Tests of the lens", _lens_tests(result)),
         ("Lenses that were tried", _lenses(result)),
         ("Correlations of the camera", _correlations(result)),
-        ("Largest standardized residuals", _largest(result)),
+        ("Largest standardized residuals", _images(largest(result, _LARGEST))),
         ("Largest corrections of stars", _stars(result)),
-        ("Images and their stars", _images(result, range(len(result.calibration.xy)))),
+        ("Images and their stars", _images(images(result))),
     ]
     return composed(headline("stellar camera, exposures", result.night.title), sections)
 
@@ -48,51 +60,8 @@ def summary(result: CalibratedNight) -> list[Section]:
 
 
 def _adjustment(result: CalibratedNight) -> list[str]:
-    found, night = result.calibration, result.night
-    estimated = int(np.isfinite(found.star_residuals[:, 0]).sum())
-    rms = np.sqrt(np.mean(found.residuals**2, axis=0))
-    measured = sum(len(exposure.xy) for exposure in result.exposures)
-    rows = [
-        ("status", f"{found.status}, {found.iterations} iterations"),
-        ("exposures, of those given", f"{len(result.exposures)} of {len(night.exposures)}"),
-        (
-            "images measured, identified, used",
-            f"{measured}, {result.identified.sum()}, {len(found.xy)}",
-        ),
-        ("stars, of them estimated", f"{len(found.catalogue)}, {estimated}"),
-        ("degrees of freedom", f"{found.degrees_of_freedom}"),
-        ("mean error of unit weight", f"{found.mean_error:.4f}"),
-        ("global test", _global_test(result)),
-        ("mean error of an image coordinate", f"{found.mean_error * night.pixel_sd:.4f} px"),
-        ("root mean square residual x, y", f"{rms[0]:.4f}, {rms[1]:.4f} px"),
-        ("UT1 - UTC", f"{night.earth.dut1:.4f} s"),
-        ("lens", result.camera.lens + (" (fx = fy)" if result.camera.common_scale else "")),
-        ("first attitudes", _first_attitudes(night)),
-        ("effects left out of places", ", ".join(night.site.effects.left_out) or "none"),
-        ("any exposure falsely identified", f"probability below {result.falsely_identified:.1E}"),
-        ("pole x, y", ", ".join(f"{value / ARCSEC:.4f}" for value in night.earth.pole) + " arcsec"),
-    ]
-    return [f"{name:<36}{value}" for name, value in rows]
-
-
-def _first_attitudes(night: Night) -> str:
-    """Say what was known of the attitudes before."""
-    if night.blind is not None:
-        low, high = (math.degrees(field) for field in night.blind)
-        return f"found in the whole sky, with a field of view between {low:g} and {high:g} degrees"
-    if all(exposure.stars is not None for exposure in night.exposures):
-        return "given, and the stars named"
-    roll = "" if night.roll_known else ", but for the roll"
-    return f"given within {math.degrees(night.attitude_error):g} degrees{roll}"
-
-
-def _global_test(result: CalibratedNight) -> str:
-    test = result.test
-    if test is None:
-        return "no degrees of freedom"
-    low, high = test.limits
-    verdict = "fails" if test.rejected_high or test.rejected_low else "holds"
-    return f"{verdict}: variance {test.variance:.4f}, expected {low:.3f} to {high:.3f}"
+    much, good = facts(result)
+    return fact_lines([*much, *good])
 
 
 def _camera(result: CalibratedNight) -> list[str]:
@@ -119,41 +88,29 @@ def _shown(value: float, error: float) -> str:
 
 
 def _exposures(result: CalibratedNight) -> list[str]:
-    found = result.calibration
-    lines = [
-        f"{'name':<10}{'utc':<26}{'images':>7}{'found':>7}{'left out':>9}{'azimuth':>11}{'elevation':>11}"
-        f"{'alpha':>13}{'omega':>13}{'kappa':>13}{'mean errors arcsec':>26}{'rms px':>8}"
-    ]
-    for i, (name, exposure) in enumerate(zip(result.names, result.exposures, strict=True)):
-        attitude = found.attitudes[i]
-        azimuth, elevation = (math.degrees(angle) for angle in axis_of(attitude))
-        errors = np.sqrt(np.diag(found.attitude_covariances[i])) / ARCSEC
-        rms = math.sqrt(float(np.mean(found.residuals[found.exposures == i] ** 2)))
-        lines.append(
-            f"{name:<10}{exposure.utc:<26}{len(exposure.xy):7d}{result.identified[i]:7d}{result.rejected[i]:9d}"
-            f"{azimuth:11.5f}{elevation:11.5f}"
-            + "".join(f"{angle / GRAD:13.6f}" for angle in attitude)
-            + f"{errors[0]:10.2f}{errors[1]:8.2f}{errors[2]:8.2f}{rms:8.3f}"
-        )
-    return [
-        *lines,
-        "azimuth from south, positive west, and elevation in degrees; alpha, omega, kappa in grads",
-    ]
+    names, utc, count, identified, rejected, rms, *_ = fit(result)
+    _, azimuth, elevation, angles, errors, *_ = attitudes(result)
+    grads = replace(angles, values=angles.values / GRAD, kind="number")
+    row = [*field(names, 10, head="name"), *field(utc, 26, head="utc"), *field(count, 7, ".0f", "images")]
+    row += [*field(identified, 7, ".0f", "found"), *field(rejected, 9, ".0f", "left out")]
+    row += [*field(azimuth, 11, ".5f", "azimuth"), *field(elevation, 11, ".5f", "elevation")]
+    row += [*field(grads, 13, ".6f", "{name}"), *field(errors, 10, ".2f", "sd {name}")]
+    said = "azimuth from south, positive west, and elevation in degrees; angles in grads, sd in arcsec"
+    return [*table_lines([*row, *field(rms, 8, ".3f", "rms {unit}")]), said]
 
 
 def _identification(result: CalibratedNight) -> list[str]:
     """List the odds of exposures, and of the stars that are least certain."""
-    lines = [
-        f"{'exposure':<10}{'by chance':>12}{'probability':>16}{'log odds':>11}{'least certain star':>20}"
-    ]
-    of = result.calibration.exposures
-    for i, name in enumerate(result.names):
-        own = result.star_probabilities[of == i]
-        named = math.isnan(result.odds[i])
-        least = "" if named else _probability(float(np.nanmin(own)))
-        odds = "" if named else f"{result.log_odds[i]:.1f}"
-        probability = "" if named else _probability(float(result.probabilities[i]))
-        lines.append(f"{name:<10}{_odds(result.odds[i]):>12}{probability:>16}{odds:>11}{least:>20}")
+    names, *_, odds, probabilities, log_odds, least = fit(result)
+    lines = table_lines(
+        [
+            *field(names, 10, head="exposure"),
+            _right("by chance", 12, map(_odds, odds.values)),
+            _right("probability", 16, map(_probability, probabilities.values)),
+            *field(log_odds, 11, ".1f", "log odds"),
+            _right("least certain star", 20, map(_probability, least.values)),
+        ]
+    )
     lines += [
         f"{name:<10}{_odds(expected):>12}{'doubtful':>16}" for name, expected in result.doubtful.items()
     ]
@@ -165,63 +122,49 @@ def _identification(result: CalibratedNight) -> list[str]:
     ]
 
 
+def _right(head: str, width: int, texts: Iterable[str]) -> Field:
+    return Field(f"{head:>{width}}", [f"{text:>{width}}" for text in texts])
+
+
 def _probability(value: float) -> str:
-    """Write a probability near 1 by what it misses."""
+    """Write a probability near 1 by what it misses; nothing for named stars."""
+    if math.isnan(value):
+        return ""
     return f"1 - {1 - value:.0E}" if 1e-15 < 1 - value < 0.01 else f"{value:.6f}"
 
 
 def _inertial(result: CalibratedNight) -> list[str]:
-    lines = [
-        f"{'exposure':<10}{'ra deg':>12}{'dec deg':>12}{'w':>14}{'x':>14}{'y':>14}{'z':>14}"
-        f"{'mean errors arcsec, about x, y, z':>36}"
-    ]
-    for name, attitude in zip(result.names, result.inertial, strict=True):
-        ra, dec = (math.degrees(angle) for angle in attitude.axis)
-        errors = np.sqrt(np.diag(attitude.covariance)) / ARCSEC
-        lines.append(
-            f"{name:<10}{ra:12.6f}{dec:12.6f}"
-            + "".join(f"{value:14.9f}" for value in attitude.quaternion)
-            + f"{errors[0]:16.2f}{errors[1]:10.2f}{errors[2]:10.2f}"
-        )
-    return [
-        *lines,
-        "quaternion w, x, y, z from ICRS to the camera: x right, y down, z along the axis",
-    ]
+    names, ra, dec, quaternions, errors, *_ = inertial(result)
+    row = [*field(names, 10, head="exposure"), *field(ra, 12, ".6f", "ra {unit}")]
+    row += [*field(dec, 12, ".6f", "dec {unit}"), *field(quaternions, 14, ".9f", "{name}")]
+    said = "quaternion w, x, y, z from ICRS to the camera: x right, y down, z along the axis; sd in arcsec"
+    return [*table_lines([*row, *field(errors, 12, ".2f", "sd {name}")]), said]
 
 
 def _lens_tests(result: CalibratedNight) -> list[str]:
-    tests = [*([result.scale_test] if result.scale_test else []), *result.term_tests]
-    if not tests:
-        return []
-    lines = [
-        f"{'zero?':<10}{'F':>12}{'degrees':>12}{'probability':>14}{'level':>10}{'effect px':>11}  verdict"
-    ]
-    for test in tests:
-        degrees = f"{test.dimension}, {test.freedom}"
-        lines.append(
-            f"{test.name:<10}{test.statistic:12.2f}{degrees:>12}{test.probability:14.2G}{test.level:10.2G}"
-            f"{test.effect:11.3f}  {test.verdict}"
-        )
-    return [*lines, "terms in the order in which they may be left out, each without those above it"]
+    names, f, degrees, p, level, effect, verdict = lens_tests(result)
+    lines = table_lines(
+        [
+            *field(names, 10, head="zero?"),
+            *field(f, 12, ".2f", "F"),
+            *field(degrees, 8, head="degrees", gap="    "),
+            *field(p, 14, ".2G", "probability"),
+            *field(level, 10, ".2G", "level"),
+            *field(effect, 11, ".3f", "effect {unit}"),
+            *field(verdict, 0, head="verdict", gap="  "),
+        ]
+    )
+    order = "terms in the order in which they may be left out, each without those above it"
+    return [*lines, order] if lines else []
 
 
 def _lenses(result: CalibratedNight) -> list[str]:
-    if not result.lenses:
-        return []
-    best = min(fit.bic for fit in result.lenses)
-    lines = [f"{'lens':<16}{'parameters':>11}{'images':>8}{'unit weight':>13}{'BIC - best':>12}"]
-    for fit in result.lenses:
-        if fit.reason:
-            lines.append(f"{fit.lens:<16}not adjusted: {fit.reason}")
-        else:
-            lines.append(
-                f"{fit.lens:<16}{fit.parameters:11d}{fit.images:8d}{fit.mean_error:13.4f}"
-                f"{fit.bic - best:12.1f}"
-            )
-    return [
-        *lines,
-        f"the first is taken; a difference above {DECISIVE:g} is decisive, above {POSITIVE:g} positive",
-    ]
+    names, parameters, images_, unit_weight, over, remarks = lenses(result)
+    row = [*field(names, 16, head="lens"), *field(parameters, 11, ".0f", "parameters")]
+    row += [*field(images_, 8, ".0f", "images"), *field(unit_weight, 13, ".4f", "unit weight")]
+    lines = table_lines([*row, *field(over, 12, ".1f", "BIC - best"), *field(remarks, 0, gap="  ")])
+    taken = f"the first is taken; a difference above {DECISIVE:g} is decisive, above {POSITIVE:g} positive"
+    return [*lines, taken] if lines else []
 
 
 def _odds(expected: float) -> str:
@@ -239,24 +182,18 @@ def _correlations(result: CalibratedNight) -> list[str]:
     return lines
 
 
-def _largest(result: CalibratedNight) -> list[str]:
-    size = np.nanmax(np.abs(np.nan_to_num(result.calibration.standardized)), axis=1)
-    return _images(result, np.argsort(-size, kind="stable")[:_LARGEST])
-
-
-def _images(result: CalibratedNight, chosen: Iterable[int]) -> list[str]:
-    found, ids = result.calibration, result.night.catalogue.ids
-    lines = [
-        f"{'exposure':<10}{'star':>10}{'x px':>11}{'y px':>11}{'vx px':>9}{'vy px':>9}{'w x':>8}{'w y':>8}"
-        f"{'probability':>14}"
-    ]
-    for k in chosen:
-        (x, y), (vx, vy), (wx, wy) = found.xy[k], found.residuals[k], found.standardized[k]
-        lines.append(
-            f"{result.names[found.exposures[k]]:<10}{ids[found.stars[k]]:>10}{x:11.3f}{y:11.3f}"
-            f"{vx:9.3f}{vy:9.3f}{wx:8.2f}{wy:8.2f}{_star(result.star_probabilities[k]):>14}"
-        )
-    return lines
+def _images(table: Table) -> list[str]:
+    exposures, stars_, xy, residuals, _, tests, probabilities = table
+    return table_lines(
+        [
+            *field(exposures, 10, head="exposure"),
+            *field(stars_, 10, head="star"),
+            *field(xy, 11, ".3f"),
+            *field(residuals, 9, ".3f", "v{name} {unit}"),
+            *field(tests, 8, ".2f", "w {name}"),
+            _right("probability", 14, map(_star, probabilities.values)),
+        ]
+    )
 
 
 def _star(probability: float) -> str:
@@ -264,13 +201,8 @@ def _star(probability: float) -> str:
 
 
 def _stars(result: CalibratedNight) -> list[str]:
-    found, ids = result.calibration, result.night.catalogue.ids
-    size = np.nan_to_num(np.abs(found.star_standardized)).max(axis=1)
-    chosen = [
-        k for k in np.argsort(-size, kind="stable")[:_LARGEST] if np.isfinite(found.star_residuals[k, 0])
-    ]
-    lines = [f"{'star':>10}{'ra arcsec':>12}{'dec arcsec':>12}{'w ra':>8}{'w dec':>8}"]
-    for k in chosen:
-        (ra, dec), (w_ra, w_dec) = found.star_residuals[k] / ARCSEC, found.star_standardized[k]
-        lines.append(f"{ids[found.catalogue[k]]:>10}{ra:12.5f}{dec:12.5f}{w_ra:8.2f}{w_dec:8.2f}")
-    return lines if chosen else []
+    table = stars(result)
+    size = np.nan_to_num(np.abs(table[3].values)).max(axis=1, initial=0.0)
+    names, residuals, _, tests = chosen(table, np.argsort(-size, kind="stable")[:_LARGEST])
+    row = [*field(names, 10, head="star"), *field(residuals, 12, ".5f")]
+    return table_lines([*row, *field(tests, 8, ".2f", "w {name}")])

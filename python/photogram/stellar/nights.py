@@ -12,7 +12,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import Message, listed
 from photogram.show.brief import Brief
-from photogram.show.ways import Judged, html_of
+from photogram.show.ways import Judged, Paged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.inertial import InertialAttitude, inertial_attitude
@@ -131,7 +131,7 @@ class Night(Brief):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CalibratedNight(Judged, Brief):
+class CalibratedNight(Judged, Paged, Brief):
     """A calibrated camera, and what happened to the images.
 
     Attributes
@@ -184,13 +184,6 @@ class CalibratedNight(Judged, Brief):
     scale_test: LensTest | None = None
     term_tests: tuple[LensTest, ...] = ()
     standstill: Standstill | None = None
-
-    def to_html(self) -> bytes:
-        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
-
-        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
-        """
-        return html_of(self)
 
     @property
     def converged(self) -> bool:

@@ -14,7 +14,7 @@ from photogram.arguments.types import Floats
 from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.show.brief import Brief
-from photogram.show.ways import Judged, html_of
+from photogram.show.ways import Judged, Paged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.counts import Counts
 from photogram.stellar.moved import Movement
@@ -144,7 +144,7 @@ class PreRun:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Judged, Brief):
+class Result(Judged, Paged, Brief):
     """A calibration.
 
     Residuals are computed minus measured (the report's v), for stars adjusted minus catalogue: what has to be
@@ -187,13 +187,6 @@ class Result(Judged, Brief):
     combined: Result | None = None
     pairs: tuple[tuple[str, str], ...] = ()
     spoiled: str = ""
-
-    def to_html(self) -> bytes:
-        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
-
-        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
-        """
-        return html_of(self)
 
     @property
     def converged(self) -> bool:

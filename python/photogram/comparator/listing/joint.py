@@ -8,6 +8,8 @@ import numpy as np
 
 from photogram.comparator.listing.forms import centred, number
 from photogram.comparator.listing.parameters import linear_lines, polynomial_lines
+from photogram.comparator.tables import terms
+from photogram.show.lines import field, table_lines
 
 if TYPE_CHECKING:
     from photogram.comparator.calibration import Calibration
@@ -29,16 +31,16 @@ def tests_page(calibration: Calibration) -> list[str]:
 
 def _polynomial(test: PolynomialTest) -> list[str]:
     first, second = test.degrees_of_freedom
-    lines = [
+    axis, term, _, coefficient, sd, ratio, p = terms(test.terms)
+    row = [*field(axis, 6, head="AXIS", gap="  "), *field(term, 6, head="TERM")]
+    row += [*field(coefficient, 12, ".3f", "COEFFICIENT"), *field(sd, 10, ".3f", "SIGMA")]
+    row += [*field(ratio, 10, ".2f", "T"), *field(p, 14, ".4f", "PROBABILITY")]
+    return [
         f"ALL TERMS TOGETHER: F = {test.ratio:.2f} WITH {first} AND {second} DEGREES OF FREEDOM,"
         f" PROBABILITY {_probability(test.probability)}",
         "EACH TERM, ITS ARGUMENT FROM -1 TO 1 OVER THE MEASURED RANGE (MICRONS)",
-        f"  {'AXIS':<6}{'TERM':<6}{'COEFFICIENT':>12}{'SIGMA':>10}{'T':>10}{'PROBABILITY':>14}",
+        *table_lines(row),
     ]
-    for term in test.terms:
-        values = f"{term.coefficient_um:12.3f}{term.sd_um:10.3f}{term.ratio:10.2f}"
-        lines.append(f"  {term.axis:<6}{term.term:<6}{values}{_probability(term.probability):>14}")
-    return lines
 
 
 def _cases(test: CaseVarianceTest) -> list[str]:

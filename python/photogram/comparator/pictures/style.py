@@ -21,13 +21,13 @@ __all__ = ["ACCENT", "FAINT", "MAIN", "arrows", "key", "panels", "plain"]
 
 MAIN, ACCENT = BLUE, VERMILION
 MM = 1000.0
+ACROSS = 4
+"""Panels beside each other."""
 
 
-def panels(
-    count: int, *, across: int = 4, side: float = 3.4, shared: bool = True
-) -> tuple[Figure, list[Axes]]:
+def panels(count: int, *, side: float = 3.4, shared: bool = True) -> tuple[Figure, list[Axes]]:
     """Return a figure of square panels, and its axes; their limits are shared, or each has its own."""
-    columns = min(count, across)
+    columns = min(count, ACROSS)
     rows = -(-count // columns)
     figure = pictures.new_figure(max(side * columns, 5.0), side * rows + 0.6)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=shared, sharey=shared).ravel().tolist()

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from photogram import _photocore
 from photogram.comparator.years.comparison import Comparison
+from photogram.comparator.years.tables import calibrations, operators
 from photogram.io import json
-from photogram.show.history import history_document
-from photogram.show.page import decimals_of, fixed
+from photogram.show.history import history_document, series
+from photogram.show.lines import field, table_lines
+from photogram.show.page import decimals_of
+from photogram.show.quantity import Quantity, records
 from photogram.show.ways import document_of, report_of
 
 __all__ = ["comparison_document", "comparison_text"]
@@ -16,24 +19,12 @@ __all__ = ["comparison_document", "comparison_text"]
 def comparison_document(comparison: Comparison) -> bytes:
     """Return everything as JSON."""
     together = comparison.together
-    corrections = comparison.corrections()
+    corrections = [Quantity([each.document() for each in comparison.corrections()], member="correction")]
     document = {
         "program": f"photogram {_photocore.__version__}",
         "verdict": comparison.verdict.document(),
-        "calibrations": [
-            {
-                "name": record.name,
-                "day": record.day.isoformat(),
-                "random_um": record.random_um,
-                "degrees_of_freedom": record.freedom,
-                "pointing_um": record.pointing_um,
-                "pointing_covariance_um2": record.pointing_covariance_um2,
-                "pointing_degrees_of_freedom": record.pointing_freedom,
-                "correction": corrections[k].document(),
-            }
-            for k, record in enumerate(comparison.calibrations)
-        ],
-        "covariance": together.covariance.tolist(),
+        "calibrations": records([*calibrations(comparison), *corrections]),
+        "covariance": together.covariance,
         "comparators": {
             name: {
                 "centre_um": comparison.ranges[name].centre_um,
@@ -50,17 +41,14 @@ def comparison_document(comparison: Comparison) -> bytes:
                 "points": grid.points,
                 "given_um": together.grids[plate].xy_um,
                 "corrections_um": together.corrections_um[plate],
-                "covariance_um2": together.covariance_um2[plate].tolist(),
+                "covariance_um2": together.covariance_um2[plate],
                 "sigma_um": grid.sigma_um,
                 "adopted": grid.adopted,
                 "usable": comparison.usable_grids,
             }
             for plate, grid in comparison.grids.items()
         ],
-        "operators": [
-            {"operator": operator, "pointing_um": [x, y], "degrees_of_freedom": freedom}
-            for operator, (x, y, freedom) in comparison.operators.items()
-        ],
+        "operators": records(operators(comparison)),
     }
     return json.to_json(document)
 
@@ -68,24 +56,35 @@ def comparison_document(comparison: Comparison) -> bytes:
 @report_of.register(Comparison)
 def comparison_text(comparison: Comparison) -> str:
     """Return what a reader wants first, as text."""
-    lines = [f"{'calibration':<20}{'day':<12}{'of':<16}{'cases':>6}{'random':>9}{'pointing':>17}"]
-    for record in comparison.calibrations:
-        x, y = record.pointing_um
-        lines.append(
-            f"{record.name[:19]:<20}{record.day.isoformat():<12}{record.comparator[:15]:<16}"
-            f"{len(record.cases):6d}{record.random_um:9.3f}{x:9.3f}{y:8.3f}"
-        )
+    names, days, of, _, cases, _, random, _, pointing, *_ = calibrations(comparison)
+    lines = table_lines(
+        [
+            *field(names, max(18, *map(len, names.values)) + 2, head="calibration"),
+            *field(days, 12, head="day"),
+            *field(of, 16, head="of"),
+            *field(cases, 6, ".0f", "cases"),
+            *field(random, 9, ".3f", "random"),
+            *field(pointing, 12, ".3f", "pointing {name}"),
+        ]
+    )
     for name, own in comparison.histories.items():
-        lines += ["", f"{name:<30}{'mean':>12}{'sd':>9}{'drift a year':>14}{'sd':>9}{'step t':>8}  found"]
-        for each in own.series:
-            decimals = decimals_of(each.sd)
-            steps = max((t for t in each.steps.tolist() if t == t), key=abs, default=0.0)
-            found = ", ".join(change.kind for change in each.changes) or "-"
-            lines.append(
-                f"  {each.name + ', ' + each.unit:<32}{fixed(each.mean, decimals):>8}"
-                f"{fixed(each.mean_sd, decimals):>9}{fixed(each.drift, decimals):>14}"
-                f"{fixed(each.drift_sd, decimals):>9}{steps:8.2f}  {found}"
-            )
+        components, mean, mean_sd, drift, drift_sd, steps, _, found = series(own)
+        forms = [f".{decimals_of(each.sd)}f" for each in own.series]
+        lines += [
+            "",
+            name,
+            *table_lines(
+                [
+                    *field(components, 36, gap="  "),
+                    *field(mean, 9, forms, "mean"),
+                    *field(mean_sd, 9, forms, "sd"),
+                    *field(drift, 14, forms, "drift a year"),
+                    *field(drift_sd, 9, forms, "sd"),
+                    *field(steps, 8, ".2f", "step t"),
+                    *field(found, 0, head="found", gap="  "),
+                ]
+            ),
+        ]
     lines.append("")
     for plate, grid in comparison.grids.items():
         given = comparison.together.grids[plate].sigma_um or 0.0

@@ -16,9 +16,10 @@ import orjson
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.calibration import Calibration
 from photogram.comparator.correction import Correction
-from photogram.comparator.document import to_document
+from photogram.comparator.document import to_json
 from photogram.comparator.grid import Grid
 from photogram.errors import InputError
+from photogram.io import json
 from photogram.io.files import read_bytes
 from photogram.messages import quoted
 
@@ -26,6 +27,7 @@ __all__ = ["RecordedCalibration", "RecordedCase"]
 
 ISO = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})$")
 OF_THE_REPORT = re.compile(r"(\d{1,2})/(\d{1,2})/(\d{2}|\d{4})$")
+_WHAT = "calibration of a comparator"
 FIRST_YEAR = 50
 """Years of two digits from here on are of the 20th century, those before of the 21st."""
 
@@ -115,41 +117,17 @@ class RecordedCalibration:
             The file cannot be read or holds none; a calibration that was withheld, has no joint adjustment or
             no date.
         """
-        try:
+        with json.holding(_WHAT, path):
             found = orjson.loads(read_bytes(path))
-        except ValueError as error:
-            raise InputError(f"holds no calibration of a comparator: {error}", file=path) from None
-        many = found if isinstance(found, list) else [found]
-        names = [path.stem] if len(many) == 1 else [f"{path.stem}-{k + 1}" for k in range(len(many))]
-        try:
-            return [cls.from_document(each, name) for each, name in zip(many, names, strict=True)]
-        except InputError as error:
-            raise InputError(error.message, file=path) from None
+            many = found if isinstance(found, list) else [found]
+            names = [path.stem] if len(many) == 1 else [f"{path.stem}-{k + 1}" for k in range(len(many))]
+            return [_from_document(each, name) for each, name in zip(many, names, strict=True)]
 
     @classmethod
     def of(cls, calibration: Calibration, name: str) -> RecordedCalibration:
         """Return a calibration as its document says it."""
-        # What the writer makes numbers of (names of members) is taken as a file would have it.
-        return cls.from_document(orjson.loads(orjson.dumps(to_document(calibration), option=_PLAIN)), name)
-
-    @classmethod
-    def from_document(cls, document: Any, name: str) -> RecordedCalibration:
-        """Return the calibration of a document.
-
-        Raises
-        ------
-        InputError
-            It is none that can be compared.
-        """
-        try:
-            return _from_document(document, name)
-        except KeyError as error:
-            raise InputError(f"holds no calibration of a comparator: {error} is missing") from None
-        except (ValueError, TypeError, AttributeError, IndexError) as error:
-            raise InputError(f"holds no calibration of a comparator: {error}") from None
-
-
-_PLAIN = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS
+        with json.holding(_WHAT):
+            return _from_document(orjson.loads(to_json(calibration)), name)
 
 
 def day_of(text: str) -> date:
@@ -186,7 +164,7 @@ def _from_document(document: Any, name: str) -> RecordedCalibration:
         raise InputError("holds a calibration without a joint adjustment: nothing to compare")
     correction = Correction.from_document(joint["correction"])
     if correction.identity is None:
-        raise InputError("holds a calibration of an earlier version: calibrate again")
+        raise InputError("holds a calibration that does not say of which comparator it is")
     counts = {(each["case"], each["point"]): each["readings"] for each in document["pointing"]["points"]}
     total = document["pointing"]["total"]
     freedom = int(total["degrees_of_freedom"])

@@ -1,0 +1,176 @@
+"""Measurements in files: decks of cards, or plain tables.
+
+Tables have columns case, point, x_um, y_um and, where need be, plate, leg, operator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+from photogram.comparator.cards import read_cards
+from photogram.comparator.csvfile import Setting, Table, read_table
+from photogram.comparator.grid import Grid, find_grid
+from photogram.comparator.readings import LARGEST_UM, Case, Reading, Session, collect_cases
+from photogram.errors import InputError
+from photogram.io.numbers import is_whole_number
+from photogram.io.rows import Row
+from photogram.messages import quoted
+
+__all__ = ["read", "read_csv", "to_csv"]
+
+T = TypeVar("T")
+
+KEYS = ("grid", "comparator", "date", "left_handed", "range_centre_um", "temperature_c")
+"""What lines above the table may set."""
+
+
+def read(
+    paths: Sequence[Path | str], grids: Iterable[Grid] = (), *, left_handed: bool | None = None
+) -> list[Session]:
+    """Read measurements: files named *.csv are tables, all others are decks of cards.
+
+    Parameters
+    ----------
+    paths
+        Tables, which make one calibration together, or files of decks, of which each makes one.
+    grids
+        Plates, instead of those that the files name.
+    left_handed
+        Whether the comparator is left-handed against the plate, instead of what the files say.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read or understood; tables and decks together; no file.
+    """
+    files = [Path(path) for path in paths]
+    if not files:
+        raise InputError("there is no file to read")
+    tables = [path for path in files if path.suffix.lower() == ".csv"]
+    plates = list(grids)
+    if not tables:
+        return [session for path in files for session in read_cards(path, plates, left_handed=left_handed)]
+    if len(tables) < len(files):
+        raise InputError("tables and decks of cards cannot make one calibration", file=tables[0])
+    return [read_csv(tables, plates, left_handed=left_handed)]
+
+
+def read_csv(
+    paths: Sequence[Path], grids: Iterable[Grid] = (), *, left_handed: bool | None = None
+) -> Session:
+    """Read the tables of one calibration.
+
+    Each has the columns `case`, `point` and `x_um`, `y_um` (or `x_mm`, `y_mm`), and may have `plate` (number
+    of the grid), `leg` (1 to 4; 0 or blank: intersection) and `operator`. Rows stand in the order measured;
+    those with blank coordinates are missing. Lines above the table may set `# grid = 1320` (a built-in grid,
+    or a file beside the table), `# comparator = 3`, `# date = 7/17/72`, `# left_handed = yes`,
+    `# range_centre_um = 125000` (middle of the range of the comparator), `# temperature_c = 21.7` (of the
+    plate while it was measured); `# note = ...` sets nothing.
+
+    Parameters
+    ----------
+    paths
+        The files.
+    grids
+        Plates, instead of those that the tables name.
+    left_handed
+        Whether the comparator is left-handed against the plate, instead of what the tables say.
+
+    Raises
+    ------
+    InputError
+        A file that is no such table, no plate, a case measured twice, a key that nothing reads, tables that
+        set one thing differently.
+    """
+    if not paths:
+        raise InputError("there is no table to read")
+    tables = [read_table(path, "case", "point", keys=KEYS) for path in paths]
+    plates = {grid.number: grid for grid in grids}
+    if not plates:
+        plates = {grid.number: grid for table in tables for grid in _named_grids(table)}
+    if not plates:
+        raise InputError("names no grid plate: '# grid = 1320', or --grid", file=paths[0])
+    cases = collect_cases(reading for table in tables for reading in _readings(table, plates))
+    session = Session(
+        cases=cases,
+        grids=plates,
+        comparator=_one(tables, "comparator", Setting.integer) or 0,
+        date=next((table.text("date") for table in tables if table.text("date")), ""),
+        left_handed=left_handed if left_handed is not None else _one(tables, "left_handed", Setting.switch),
+        range_centre_um=_one(tables, "range_centre_um", _range_centre_um),
+        temperature_c=_one(tables, "temperature_c", Setting.number),
+        source=paths[0],
+    )
+    session.check()
+    return session
+
+
+def _one(tables: Sequence[Table], key: str, value_of: Callable[[Setting], T]) -> T | None:
+    """Return what the tables of a calibration set, None where none does; they may not contradict."""
+    settings = [table.settings[key] for table in tables if key in table.settings]
+    values = [value_of(setting) for setting in settings]
+    for setting, value in zip(settings, values, strict=True):
+        if value != values[0]:
+            raise setting.place.error(f"{key} = {quoted(setting.text)}, but another table says {values[0]}")
+    return values[0] if values else None
+
+
+def _range_centre_um(setting: Setting) -> float:
+    value = setting.number()
+    if abs(value) > LARGEST_UM:
+        raise setting.place.error(f"{setting.key} = {value:g} is beyond every comparator ({LARGEST_UM:g} um)")
+    return value
+
+
+def _named_grids(table: Table) -> list[Grid]:
+    """Return the plates that a table names: built in, or files beside it."""
+    names = [name.strip() for name in table.text("grid").split(",") if name.strip()]
+    return [find_grid(name if is_whole_number(name) else str(table.path.parent / name)) for name in names]
+
+
+def _readings(table: Table, plates: dict[int, Grid]) -> list[Reading]:
+    return [
+        _reading(row, xy, next(iter(plates)) if len(plates) == 1 else 0)
+        for row in table.records.rows()
+        if (xy := table.coordinates_um(row)) is not None
+    ]
+
+
+def _reading(row: Row, xy_um: tuple[float, float], only_plate: int) -> Reading:
+    leg = row.integer("leg", 0)
+    if leg > 4:
+        raise row.place.error(f"leg {leg}: legs are numbered 1 to 4, and 0 is the intersection")
+    return Reading(
+        plate=row.integer("plate", only_plate),
+        case=row.integer("case"),
+        operator=row.integer("operator", 0),
+        leg=leg,
+        point=row.integer("point"),
+        xy_um=xy_um,
+        place=row.place,
+    )
+
+
+def to_csv(session: Session) -> bytes:
+    """Return the measurements of a session as a table that :func:`read_csv` reads, in micrometres."""
+    lines = [f"# comparator = {session.comparator}"]
+    lines += [f"# grid = {', '.join(str(number) for number in session.grids)}"]
+    lines += [f"# date = {session.date}"] if session.date else []
+    if session.range_centre_um is not None:
+        lines.append(f"# range_centre_um = {session.range_centre_um:g}")
+    if session.temperature_c is not None:
+        lines.append(f"# temperature_c = {session.temperature_c:g}")
+    if session.left_handed is not None:
+        lines.append(f"# left_handed = {'yes' if session.left_handed else 'no'}")
+    lines.append("plate,case,operator,leg,point,x_um,y_um")
+    for case in session.cases:
+        lines += _lines(case)
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _lines(case: Case) -> list[str]:
+    rows = zip(case.legs.tolist(), case.points.tolist(), case.xy_um.tolist(), strict=True)
+    head = f"{case.plate},{case.number},{case.operator}"
+    return [f"{head},{leg},{point},{x:.3f},{y:.3f}" for leg, point, (x, y) in rows]

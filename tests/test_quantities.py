@@ -1,0 +1,97 @@
+"""Quantities that are declared once, as text, on a page and in a document."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from photogram.errors import InputError
+from photogram.io import json
+from photogram.show.cells import page_table
+from photogram.show.lines import fact_lines, field, marks, table_lines
+from photogram.show.page import Cell, Fact
+from photogram.show.quantity import Axis, Quantity, component, of_each, records
+
+AXES = (Axis.turned("omega", "deg"), Axis.of("s", "mm / m"), Axis.of("b1", "mm"))
+OF = np.arange(3)
+VALUES = Quantity(np.array([0.5, 0.25, 292719.3]), AXES, "value", head="Value", figures=6, of=OF)
+SD = Quantity(np.array([1e-5, 0.0, 17.1]), AXES, "deviation", head="sd", words={0.0: "held"}, of=OF)
+
+
+def test_components_of_different_units_share_a_column_each_with_its_own_decimals():
+    table = page_table("", [component(AXES, OF)[0], VALUES, SD], by=SD.values)
+    rows = [[column.written(cell.value) for column, cell in row] for row in table.cells()]
+    # Two figures of 2.1 seconds of arc, of degrees four more; significant figures where nothing is known.
+    assert rows[0] == ["omega, ″", "28.64789", "2.06"]
+    assert rows[1] == ["s, mm / m", "0.250000", "held"]
+    assert rows[2] == ["b1, mm", "292719", "17.1"]
+    lines = table_lines([*field(VALUES, 10, (".2f", ".3f", ".1f"), "value"), *field(SD, 8, ".2f", "sd")])
+    assert lines == ["     value      sd", "     28.65    2.06", "     0.250    held", "  292719.3   17.10"]
+
+
+def test_numbers_that_are_too_long_do_not_run_into_each_other():
+    wide = Quantity(np.array([[1.0, 123456789012.0]]), (Axis.of("x", "m"), Axis.of("y", "m")), "deviation")
+    assert table_lines(field(wide, 10, ".3f")) == ["       x m       y m", "     1.000   1.2e+11"]
+    assert table_lines(field(wide, 0, ".3f", "{name}")) == ["xy", "1.000123456789012.000"]
+
+
+def test_what_is_to_be_looked_at_is_marked():
+    marked = np.array([False, True])
+    tests = Quantity(np.array([1.0, -6.6]), head="t", decimals=2, marked=marked)
+    cells = page_table("", [tests]).rows
+    assert [cell.tone for (cell,) in cells if isinstance(cell, Cell)] == ["", "look"]
+    assert table_lines([*field(tests, 6, ".2f", "t"), marks(tests, " <--")])[1:] == ["  1.00", " -6.60 <--"]
+
+
+def test_facts_are_lines():
+    facts = [Fact("Status", "converged", note="method rigorous"), Fact("rms of residuals", "0.5", "mm")]
+    expected = [("status", "converged (method rigorous)"), ("rms of residuals", "0.5 mm")]
+    assert fact_lines(facts) == [f"{name:<36}{text}" for name, text in expected]
+
+
+@dataclass
+class Term:
+    """A thing with attributes."""
+
+    name: str
+    sd_um: float
+    probability: float | None
+
+
+def test_an_attribute_of_many_things_is_a_quantity():
+    things = [Term("x^2", 0.5, None), Term("y^2", 0.25, 0.05)]
+    um = (Axis.of("", "um"),)
+    table = [
+        of_each(things, "name", kind="name", head="Term"),
+        of_each(things, "sd_um", um, "deviation", head="sd", decimals=3),
+        of_each(things, "probability", member="p", head="p", decimals=2),
+    ]
+    assert records(table)[1] == {"name": "y^2", "sd_um": 0.25, "p": 0.05}
+    page = page_table("", table)
+    assert [(column.head, column.unit) for column in page.columns] == [("Term", ""), ("sd", "µm"), ("p", "")]
+    assert [cell.value for _, cell in next(iter(page.cells()))] == ["x^2", 0.5, None]
+
+
+def test_documents_take_arrays_however_they_lie_and_data_classes():
+    document = {"across": np.arange(6.0).reshape(2, 3)[:, :2].T, "term": Term("x", np.nan, None)}
+    text = json.to_json(document).decode()
+    assert "".join(text.split()) == (
+        '{"across":[[0.0,3.0],[1.0,4.0]],"term":{"name":"x","sd_um":null,"probability":null}}'
+    )
+    with pytest.raises(TypeError):
+        json.to_json({"path": object()})
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (KeyError("scale"), "holds no camera: 'scale' is missing"),
+        (TypeError("not so"), "holds no camera: not so"),
+        (InputError("is withheld"), "is withheld"),
+    ],
+)
+def test_a_document_that_is_another_is_named(error, said):
+    with pytest.raises(InputError, match=f"a.json: {said}") as caught, json.holding("camera", Path("a.json")):
+        raise error
+    assert caught.value.file == Path("a.json")
