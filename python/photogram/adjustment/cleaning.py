@@ -22,12 +22,10 @@ from photogram.results.components import VarianceComponents, component_lines, st
 from photogram.results.group_sums import Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
 from photogram.results.snooped import Snooped
 from photogram.show.brief import Brief
 from photogram.show.ways import report_of
 from photogram.statistics.components import WORTH_CHANGING
-from photogram.statistics.limits import global_test
 
 __all__ = ["Cleaned", "clean"]
 
@@ -141,7 +139,7 @@ def clean(
     settings = Settings(level=level, equality=False, probing=probing or Probing())
     factors = np.ones(grouping.count)
     snooped = of_network(network, level=level, threads=threads, **options)
-    if not _rejected(snooped.result, level):
+    if not _rejected(snooped.result):
         return Cleaned(snooped, None, names, factors, 0, settled=True)
     for rounds in range(1, MOST_ROUNDS + 1):
         left, own = _left(network, grouping, snooped.result)
@@ -176,28 +174,15 @@ def _finished(
     return Cleaned(snooped, found, grouping.groups.names, factors, rounds, settled)
 
 
-def _rejected(result: AdjustedNetwork, level: float) -> bool:
+def _rejected(result: AdjustedNetwork) -> bool:
     """Whether the residuals that are left are larger or smaller than their weights allow."""
-    if isinstance(result, Result):
-        test = result.global_test
-    else:
-        variance = result.variance_of_unit_weight
-        test = (
-            None
-            if variance is None
-            else global_test(variance * result.degrees_of_freedom, result.degrees_of_freedom, level)
-        )
+    test = result.global_test
     return test is not None and (test.rejected_high or test.rejected_low)
-
-
-def _network_of(result: Any) -> Any:
-    """Return the block or collection that was adjusted."""
-    return result.block if isinstance(result, Result) else result.collection
 
 
 def _left(network: Any, grouping: Grouping, result: AdjustedNetwork) -> tuple[Any, Grouping]:
     """Return what snooping has left of a network, and the groups of its observations."""
-    left = _network_of(result)
+    left = result.given
     points = int(network.image_points.max(initial=0)) + 1
     keys = network.image_photos * points + network.image_points
     order = np.argsort(keys)

@@ -67,24 +67,20 @@ class AdjustedCollection(AdjustedNetwork):
         return "collection"
 
     @property
-    def _image_unit(self) -> str:
-        return "px"
+    def given(self) -> Collection:
+        """What was adjusted: the collection."""
+        return self.collection
+
+    @property
+    def sum_and_freedom(self) -> tuple[float, float]:
+        """The weighted sum of squares of all observations, and its degrees of freedom."""
+        return self.weighted_sum_of_squares, self.degrees_of_freedom
 
     @property
     def cost(self) -> float:
         """Half the sum that was minimised, at the adjusted values."""
         last = self.iterations[-1].weighted_sum_of_squares if self.iterations else None
         return 0.5 * (self.initial_weighted_sum_of_squares if last is None else last)
-
-    @property
-    def image_points(self) -> Indices:
-        """(m,) the point of each image."""
-        return self.collection.image_points
-
-    @property
-    def image_given_sd(self) -> Floats:
-        """(m, 2) standard deviations a priori of the image coordinates."""
-        return self.collection.image_sd
 
     @property
     def photo_given_sd(self) -> Floats:
@@ -96,11 +92,6 @@ class AdjustedCollection(AdjustedNetwork):
         """(P, k) given minus adjusted parameters; 0 where fixed, NaN where free."""
         residuals = self.collection.photo_parameters - self.photo_parameters
         return np.where(np.isfinite(self.photo_given_sd), residuals, np.nan)
-
-    @property
-    def point_given_sd(self) -> Floats:
-        """(n, 3) standard deviations of given coordinates as observations: infinite free, zero fixed."""
-        return self.collection.point_sd
 
     @property
     def point_residuals(self) -> Floats:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.findings import tested_observations
-from photogram.collection.report import problems_of, size_of
+from photogram.collection.report import size_of
 from photogram.results.network_tables import control, points, stations
+from photogram.results.observed import tested_singly
 from photogram.results.page.parts import highlights, network_sections, size_section
 from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import observed_table
+from photogram.results.report import problems_of
 from photogram.show.judgement import judged
 from photogram.show.page import Fact, Page, Section, significant
 from photogram.show.ways import page_of
-from photogram.statistics.findings import by_t
 
 __all__ = ["collection_page"]
 
@@ -23,8 +23,7 @@ __all__ = ["collection_page"]
 @np.errstate(over="ignore", invalid="ignore")
 def collection_page(result: AdjustedCollection) -> Page:
     """Return the report of an adjusted collection for the browser."""
-    omega, freedom = result.weighted_sum_of_squares, result.degrees_of_freedom
-    groups = [by_t(each, omega, freedom) for each in tested_observations(result)]
+    groups = tested_singly(result)
     pictures = drawings(result)
     cameras = Section("cameras", "Cameras", [pictures[name] for name in ("distortion", "correlations")])
     sections = network_sections(

@@ -10,10 +10,10 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import POSE
-from photogram.collection.findings import names, tested_observations
 from photogram.network.cameras import Camera
 from photogram.plots.pictured import Correlated, Curve, Curves, Images, Pictured, Plan, pictured
 from photogram.results.distortion import RADIAL, added_along, radial_part
+from photogram.results.observed import tested_observations
 from photogram.statistics.outliers import Observations
 
 __all__ = ["PicturedCollection"]
@@ -47,16 +47,15 @@ class PicturedCollection(Pictured):
     def plan(self) -> Plan:
         """The network; a photo with P = R X + t stands at -R' t."""
         result = self.result
-        photos, points = names(result)
         rotations = _photocore.vector_rotations(np.ascontiguousarray(result.photo_parameters[:, :3]))
         used = result.used_points
         given = np.isfinite(result.point_given_sd).any(axis=1) & used
         return Plan(
             axes=("X", "Y", "Z"),
             unit="",
-            photo_ids=photos,
+            photo_ids=result.given.photo_ids,
             photos=-np.einsum("pji,pj->pi", rotations, result.photo_parameters[:, 3:6]),
-            point_ids=points,
+            point_ids=result.given.point_ids,
             points=np.where(used[:, np.newaxis], result.point_positions, np.nan),
             rays=result.point_rays,
             kinds=np.where(given, "control", "pass"),

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.findings import tested_observations
 from photogram.collection.tables import collection_photos, costs
 from photogram.results.network_tables import control, stations
 from photogram.results.observed import NOTABLE, image_lines, observed_lines, suspect_lines
+from photogram.results.report import problems_of
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, table_lines
-from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
+from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 from photogram.show.ways import report_of
-from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
-from photogram.statistics.outliers import outliers
+from photogram.statistics.limits import externally_studentized
 
-__all__ = ["problems_of", "report", "size_of", "summary"]
+__all__ = ["report", "size_of", "summary"]
 
 
 @report_of.register(AdjustedCollection)
@@ -62,27 +60,6 @@ def summary(result: AdjustedCollection) -> list[Section]:
 def _reliability(result: AdjustedCollection) -> list[str]:
     summary = result.reliability_summary
     return [] if summary is None else summary.lines("")
-
-
-def problems_of(result: AdjustedCollection) -> list[str]:
-    """Return a failed test and outliers before other remarks.
-
-    Standard deviations of pixels are guesses: single residuals are tested against all others.
-    """
-    omega, freedom = result.weighted_sum_of_squares, result.degrees_of_freedom
-    groups = [
-        replace(each, values=externally_studentized(each.values, omega, freedom))
-        for each in tested_observations(result)
-    ]
-    found = outliers(
-        groups, lambda tests: studentized_limit(freedom, tests), "externally studentized residuals"
-    )
-    return problems(
-        [*found, *result.messages],
-        result.status,
-        result.variance_of_unit_weight,
-        global_test(omega, freedom),
-    )
 
 
 def _adjustment(result: AdjustedCollection) -> list[str]:

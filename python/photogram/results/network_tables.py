@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.show.quantity import Axis, Link, Quantity
 from photogram.show.ways import Way
@@ -51,6 +52,8 @@ class Terms:
         (n, 3) coordinates as they were given.
     layers, parts
         What the unknowns of a photo consist of: how people call it, and JSON documents.
+    kinds
+        Observations beside images.
     split
         Whether JSON documents tell differences of positions from those of attitudes.
     """
@@ -65,6 +68,7 @@ class Terms:
     point_given: Floats
     layers: Mapping[str, slice]
     parts: Mapping[str, slice]
+    kinds: Iterable[ObservedKind] = ()
     split: bool = False
 
     @property

@@ -14,8 +14,8 @@ from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.ellipses import metric_covariances
 from photogram.results.features import Features, directions
-from photogram.results.findings import tested_observations
 from photogram.results.footprints import footprints
+from photogram.results.observed import tested_observations
 from photogram.results.result import Result
 from photogram.statistics.outliers import Observations
 

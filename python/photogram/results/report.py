@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -15,10 +16,16 @@ from photogram.network.structuring import structure
 from photogram.results.axes import image_axes, point_axes
 from photogram.results.calibration_report import calibration_sections
 from photogram.results.features_report import features_sections
-from photogram.results.findings import tested_observations
 from photogram.results.kinds import ObservedKind
+from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import control, iterations, part, photos, stations
-from photogram.results.observed import NOTABLE, image_lines, observed_lines, suspect_lines
+from photogram.results.observed import (
+    NOTABLE,
+    image_lines,
+    observed_lines,
+    suspect_lines,
+    tested_observations,
+)
 from photogram.results.result import Result
 from photogram.results.tables import (
     block_points,
@@ -33,7 +40,7 @@ from photogram.show.lines import Field, field, stacked, table_lines
 from photogram.show.quantity import Axis, Quantity, labelled
 from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
 from photogram.show.ways import report_of
-from photogram.statistics.limits import normal_limit
+from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
 from photogram.statistics.outliers import outliers
 
 if TYPE_CHECKING:
@@ -106,9 +113,20 @@ def summary(result: Result) -> list[Section]:
     ]
 
 
-def problems_of(result: Result) -> list[str]:
-    """Return what keeps a reader from using the values: a failed test and outliers before other remarks."""
-    found = outliers(tested_observations(result), normal_limit, "standardized residuals")
+def problems_of(result: AdjustedNetwork) -> list[str]:
+    """Return what keeps a reader from using the values: a failed test and outliers before other remarks.
+
+    Where standard deviations may be guesses, single residuals are tested against all others.
+    """
+    groups, (omega, freedom) = tested_observations(result), result.sum_and_freedom
+    if result.KNOWN:
+        found = outliers(groups, normal_limit, "standardized residuals")
+    else:
+        groups = [
+            replace(each, values=externally_studentized(each.values, omega, freedom)) for each in groups
+        ]
+        limit = partial(studentized_limit, freedom)
+        found = outliers(groups, limit, "externally studentized residuals")
     messages = [*found, *result.messages]
     return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
 

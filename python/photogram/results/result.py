@@ -200,8 +200,14 @@ class Result(AdjustedNetwork):
         return f"block: {self.block.title}" if self.block.title else "block"
 
     @property
-    def _image_unit(self) -> str:
-        return self.block.image_unit
+    def given(self) -> Block:
+        """What was adjusted: the block."""
+        return self.block
+
+    @property
+    def sum_and_freedom(self) -> tuple[float, float]:
+        """The weighted sum of squares of all observations, and the degrees of freedom of the unit weight."""
+        return self.sums_of_squares.total, self.degrees_of_freedom
 
     def covariances(self) -> Covariances:
         """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`."""
@@ -295,21 +301,6 @@ class Result(AdjustedNetwork):
         return table
 
     @property
-    def geographic(self) -> bool:
-        """Whether plan coordinates are angles."""
-        return self.block.geographic
-
-    @property
-    def image_points(self) -> Indices:
-        """(m,) the point of each image."""
-        return self.block.image_points
-
-    @property
-    def image_given_sd(self) -> Floats:
-        """(m, 2) standard deviations a priori of the image coordinates."""
-        return self.block.image_sd
-
-    @property
     def global_test(self) -> GlobalTest | None:
         """The test of all residuals together; None without degrees of freedom.
 
@@ -318,7 +309,7 @@ class Result(AdjustedNetwork):
         where there are no covariances (docs/tests.md).
         """
         if self.unit_variance == "constrained":
-            return global_test(self.sums_of_squares.total, self.degrees_of_freedom)
+            return super().global_test
         if self.redundancies is None:
             return None
         return global_test(self.sums_of_squares.measured, self.redundancies.measured)
@@ -349,11 +340,6 @@ class Result(AdjustedNetwork):
     def photo_given_sd(self) -> Floats:
         """(P, 6) standard deviations of observed positions and attitudes: infinite free, zero fixed."""
         return np.hstack([self.block.photo_position_sd, self.block.photo_attitude_sd])
-
-    @property
-    def point_given_sd(self) -> Floats:
-        """(n, 3) standard deviations of supplied coordinates: infinite not held, zero fixed."""
-        return self.block.point_sd
 
     @property
     def point_residuals(self) -> Floats:

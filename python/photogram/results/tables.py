@@ -85,6 +85,7 @@ def _terms(result: Result) -> Terms:
         point_given=block.point_positions,
         layers={"Positions": slice(0, 3), "Attitudes": slice(3, 6)},
         parts={"position": slice(0, 3), "attitude_rad": slice(3, 6)},
+        kinds=result.kinds.values(),
         split=True,
     )
 

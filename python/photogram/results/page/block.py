@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.results.axes import point_axes
-from photogram.results.findings import tested_observations
+from photogram.results.observed import tested_singly
 from photogram.results.page.cameras import cameras_section
 from photogram.results.page.features import features_section
 from photogram.results.page.parts import highlights, network_sections, size_section
@@ -20,7 +20,6 @@ from photogram.show.cells import page_table, unit_written
 from photogram.show.judgement import judged
 from photogram.show.page import Fact, Page, Section, Table, significant
 from photogram.show.ways import page_of
-from photogram.statistics.findings import by_w
 
 __all__ = ["block_page"]
 
@@ -29,7 +28,7 @@ __all__ = ["block_page"]
 @np.errstate(over="ignore", invalid="ignore")
 def block_page(result: Result) -> Page:
     """Return the report of an adjusted block for the browser."""
-    groups = [by_w(each) for each in tested_observations(result)]
+    groups = tested_singly(result)
     pictures = drawings(result)
     given = [
         control_section(result),
