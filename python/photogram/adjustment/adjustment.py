@@ -34,7 +34,9 @@ from photogram.network.refracted import check_cameras, remarks
 from photogram.network.unknowns import Unknown
 from photogram.results.datum import datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
+from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
+from photogram.show.ways import Way
 
 __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust", "adjusted_again", "teller"]
 
@@ -282,20 +284,26 @@ def _adjusted(
         return _result(block, solution, options, freedom, inner, as_published)
 
 
+@Way
 def adjusted_again(
-    block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
-) -> Result:
-    """Adjust a block, of which only weights have changed, from where an adjustment of it has ended.
+    block: object, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
+) -> AdjustedNetwork:
+    """Adjust a network, of which only weights have changed, from where an adjustment of it has ended.
 
     Parameters
     ----------
     block
-        The block.
+        The block, or another network.
     options, start
         Those of the former result, and where it ended: its `options` and `state`.
     threads
         As of :func:`adjust`.
     """
+    raise NotImplementedError(type(block).__name__)
+
+
+@adjusted_again.register
+def _(block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None) -> Result:
     network = block_network(block, options)
     try:
         solution = network.adjust(datum=None, threads=core_threads(threads), progress=None, start=start)

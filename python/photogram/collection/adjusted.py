@@ -9,15 +9,14 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
-from photogram.collection.core import CollectionOptions, collection_network
+from photogram.collection.core import collection_network
 from photogram.collection.failures import named
 from photogram.collection.suspects import collection_trial
-from photogram.results.covariance import Covariances
+from photogram.results.covariance import Failure
 from photogram.results.network import AdjustedNetwork
 from photogram.results.selection import Adjusted
 
 if TYPE_CHECKING:
-    from photogram import _photocore
     from photogram.results.network_trial import NetworkTrial
 
 __all__ = ["AdjustedCollection"]
@@ -30,7 +29,9 @@ POSE = 6
 class AdjustedCollection(AdjustedNetwork):
     """An adjusted collection; the arrays that every network has are those of `AdjustedNetwork`.
 
-    The k unknowns of a photo are its parameters in the collection. Cofactors hold for the datum that the
+    The k unknowns of a photo are its parameters in the collection. Of covariances kinds are `photo` (all
+    parameters), `pose` and `camera` (its first six, the others) and `point`; photos and points are called by
+    their numbers: `("photo", 3)`, `("point", [7, 8])`. Cofactors hold for the datum that the
     observations and weights give; where these give none, for that of the held parameters in `datum`.
 
     Attributes
@@ -47,8 +48,6 @@ class AdjustedCollection(AdjustedNetwork):
         (n,) how many image points have the point behind the camera.
     datum
         Photos and parameters that were held to give the cofactors a datum.
-    options, state
-        How the core adjusted the collection, and where that ended.
     """
 
     collection: Collection
@@ -57,8 +56,6 @@ class AdjustedCollection(AdjustedNetwork):
     photo_images: Indices
     point_rays_behind: Indices
     datum: list[tuple[int, str]]
-    options: CollectionOptions
-    state: _photocore.BlockState
 
     KNOWN: ClassVar[bool] = False
 
@@ -99,23 +96,16 @@ class AdjustedCollection(AdjustedNetwork):
         residuals = self.collection.point_positions - self.point_positions
         return np.where(np.isfinite(self.point_given_sd), residuals, np.nan)
 
-    def covariances(self) -> Covariances:
-        """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`.
+    def _adjusted(self) -> Adjusted:
+        return _selectable(self)
 
-        Kinds are `photo` (all parameters), `pose` and `camera` (its first six, the others) and `point`.
-        Photos and points are called by their numbers: `("photo", 3)`, `("point", [7, 8])`.
-        """
-        network = collection_network(self.collection, self.options)
-        return Covariances(
-            _selectable(self),
-            lambda: network.covariances(self.state, threads=0, progress=None),
-            lambda error: named(*error.args),
-            self.covariance_scale,
-        )
+    def _refused(self, error: Failure) -> Exception:
+        return named(*error.args)
 
     def _trial(self) -> NetworkTrial:
         options = replace(self.options, covariance=True, loss=None)
-        return collection_trial(self.collection, options, self.state)
+        core = collection_network(self.collection, options).trial(self.state, threads=0)
+        return collection_trial(self.collection, core)
 
     def adjusted(self) -> Collection:
         """Return the collection at its adjusted values; points that were left out stay as they were."""

@@ -19,11 +19,12 @@ from photogram.collection.adjust import adjust, adjusted
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.as_block import as_block
 from photogram.collection.collection import Collection
-from photogram.collection.core import CollectionOptions, collection_network
+from photogram.collection.core import collection_network
 from photogram.collection.held import collection_held
 from photogram.collection.suspects import collection_trial
 from photogram.errors import AdjustmentError
 from photogram.messages import Message
+from photogram.network.core import CoreOptions
 from photogram.results.exchanged import exchanged_names
 from photogram.results.held import remark_on
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, NetworkTrial
@@ -64,7 +65,8 @@ def snoop_collection(
     def tried(covariance: bool) -> tuple[AdjustedCollection, NetworkTrial, Outcome]:
         first = adjust(collection, covariance=covariance, threads=threads, progress=progress, **options)
         own = dataclasses.replace(first.options, covariance=True, loss=None)
-        trial = collection_trial(collection, own, first.state, core_threads(threads), parts=parts)
+        core = collection_network(collection, own).trial(first.state, threads=core_threads(threads))
+        trial = collection_trial(collection, core, parts=parts)
 
         def afresh() -> Aside | None:
             found = started_robustly(collection, first.options, threads=threads)
@@ -117,7 +119,7 @@ def _held(collection: Collection, outcome: Outcome, options: Mapping[str, Any]) 
 
 
 def started_robustly(
-    collection: Collection, options: CollectionOptions, *, threads: int | None
+    collection: Collection, options: CoreOptions, *, threads: int | None
 ) -> tuple[_photocore.BlockState, Indices] | None:
     """Adjust a collection robustly from its given values on, and return the end and the images far from it.
 

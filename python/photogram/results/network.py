@@ -19,12 +19,13 @@ from photogram.arguments.arrays import finite_rows, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
+from photogram.network.core import CoreOptions, core_network
 from photogram.network.given import Given
-from photogram.results.covariance import Covariances, Propagated
+from photogram.results.covariance import Covariances, Failure, Propagated
 from photogram.results.iteration import Iteration
 from photogram.results.reliability import Reliability, reliability_of
 from photogram.results.reliability_summary import ReliabilitySummary, reliability_summary
-from photogram.results.selection import Selection
+from photogram.results.selection import Adjusted, Selection
 from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown, files_of
 from photogram.statistics.limits import GlobalTest, global_test
@@ -126,6 +127,8 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
     operations, formations, seconds
         Predicted multiply-adds of each phase, the number of formations of the normal equations, and seconds
         spent in each phase.
+    options, state
+        How the core adjusted the network, and where that ended: what covariances are computed from.
     """
 
     status: str
@@ -150,6 +153,8 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
     operations: Mapping[str, float]
     formations: int
     seconds: Mapping[str, float]
+    options: CoreOptions
+    state: _photocore.BlockState
 
     KNOWN: ClassVar[bool] = True
     """Whether standard deviations are given, so that the unit weight is known."""
@@ -364,6 +369,13 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         return standard_deviations(self.point_covariances)
 
     @abstractmethod
+    def _adjusted(self) -> Adjusted:
+        """Return the adjusted values by kinds and names."""
+
+    @abstractmethod
+    def _refused(self, error: Failure) -> Exception:
+        """Put into words what the core has refused."""
+
     def covariances(self) -> Covariances:
         """Return an object that answers for covariances of anything with anything, from one factor.
 
@@ -379,6 +391,13 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         KeyboardInterrupt
             Ctrl-C.
         """
+        network = core_network(self.given, self.options)
+        return Covariances(
+            self._adjusted(),
+            lambda: network.covariances(self.state, threads=0, progress=None),
+            self._refused,
+            self.covariance_scale,
+        )
 
     def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
         """Return the joint covariance matrix of a selection, or that of one with another.

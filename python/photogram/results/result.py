@@ -19,7 +19,7 @@ from photogram.network.core import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
 from photogram.results.check_points import CheckPoints, check_points
-from photogram.results.covariance import Covariances
+from photogram.results.covariance import Failure
 from photogram.results.datum import (
     ResultDatum,
     datum_messages,
@@ -122,8 +122,6 @@ class Result(AdjustedNetwork):
         Points left out, with the reason.
     datum
         What coordinates and standard deviations refer to.
-    options, state
-        How the core adjusted the block, and where that ended: what covariances are computed from.
     hints
         Mistakes in conventions (units, axes, signs, angles) that would explain why images do not fit, as
         sentences, as :func:`photogram.diagnose` finds them; none before. They head the verdict.
@@ -151,8 +149,6 @@ class Result(AdjustedNetwork):
     unknowns: tuple[AdjustedUnknown, ...]
     dropped: Mapping[str, str]
     datum: ResultDatum
-    options: CoreOptions
-    state: _photocore.BlockState
     hints: tuple[str, ...] = ()
     exchanged: tuple[str, ...] = ()
     set_aside: tuple[str, ...] = ()
@@ -209,15 +205,11 @@ class Result(AdjustedNetwork):
         """The weighted sum of squares of all observations, and the degrees of freedom of the unit weight."""
         return self.sums_of_squares.total, self.degrees_of_freedom
 
-    def covariances(self) -> Covariances:
-        """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`."""
-        network, state = block_network(self.block, self.options), self.state
-        return Covariances(
-            adjusted(self),
-            lambda: network.covariances(state, threads=0, progress=None),
-            lambda error: refused(self.block, network, state, error),
-            self.covariance_scale,
-        )
+    def _adjusted(self) -> Adjusted:
+        return adjusted(self)
+
+    def _refused(self, error: Failure) -> Exception:
+        return refused(self.block, block_network(self.block, self.options), self.state, error)
 
     def _trial(self) -> NetworkTrial:
         core = block_network(self.block, self.options).trial(self.state, threads=0, kept=True)
