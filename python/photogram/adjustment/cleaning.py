@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from photogram.adjustment.components import Settings, of_grouping, scaled
-from photogram.adjustment.snooping import of_network
+from photogram.adjustment.snooping import snoop
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.messages import counted
@@ -138,7 +138,7 @@ def clean(
     names = grouping.groups.names
     settings = Settings(level=level, equality=False, probing=probing or Probing())
     factors = np.ones(grouping.count)
-    snooped = of_network(network, level=level, threads=threads, **options)
+    snooped = snoop(network, level=level, threads=threads, **options)
     if not _rejected(snooped.result):
         return Cleaned(snooped, None, names, factors, 0, settled=True)
     for rounds in range(1, MOST_ROUNDS + 1):
@@ -146,7 +146,7 @@ def clean(
         found = of_grouping(left, own, settings, held=held, threads=threads)
         changed = _changed(found, names, factors)
         before = _out(snooped)
-        snooped = of_network(scaled(network, grouping, changed), level=level, threads=threads, **options)
+        snooped = snoop(scaled(network, grouping, changed), level=level, threads=threads, **options)
         stands = bool((np.abs(changed / factors - 1) <= STANDS).all())
         factors = changed
         if stands and before == _out(snooped):

@@ -32,11 +32,11 @@ WAYS = {
     "findings_of": ("findings",),
     "first_adjusted": ("components",),
     "observables": ("components",),
-    "of_network": ("snooping",),
     "page_of": ("page",),
     "pictured": ("pictured",),
     "report_of": ("report",),
     "scaled": ("components",),
+    "snooped_network": ("snooping",),
     "terms_of": ("tables",),
 }
 """The files that show results and work on collections, by the names of ways: see `photogram.show.ways`."""

@@ -31,7 +31,6 @@ __all__ = [
     "held_tested",
     "held_tests",
     "is_suspected",
-    "remark_on",
 ]
 
 HELD = "held values"
@@ -105,21 +104,16 @@ def held_tests(
     return [tested]
 
 
-def held_remark(result: Result, largest: float) -> list[str]:
+def held_remark(found: Sequence[Tested], largest: float) -> list[str]:
     """Say of what is held that it explains more than anything that was taken out.
 
     Parameters
     ----------
-    result
-        The adjustment of everything.
+    found
+        Its tests, in the adjustment of everything.
     largest
         The largest T of what was taken out.
     """
-    return remark_on(held_tested(result), largest)
-
-
-def remark_on(found: Sequence[Tested], largest: float) -> list[str]:
-    """Say the same of tests that were made."""
     place = found[0].largest() if found else None
     if place is None or not found[0].values[place] > largest:
         return []
