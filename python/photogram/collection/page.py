@@ -7,12 +7,9 @@ import numpy as np
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.report import size_of
 from photogram.results.network_tables import control, points, stations
-from photogram.results.observed import tested_singly
-from photogram.results.page.parts import highlights, network_sections, size_section
+from photogram.results.page.parts import network_page, size_section
 from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import observed_table
-from photogram.results.report import problems_of
-from photogram.show.judgement import judged
 from photogram.show.page import Fact, Page, Section, significant
 from photogram.show.ways import page_of
 
@@ -23,25 +20,15 @@ __all__ = ["collection_page"]
 @np.errstate(over="ignore", invalid="ignore")
 def collection_page(result: AdjustedCollection) -> Page:
     """Return the report of an adjusted collection for the browser."""
-    groups = tested_singly(result)
     pictures = drawings(result)
     cameras = Section("cameras", "Cameras", [pictures[name] for name in ("distortion", "correlations")])
-    sections = network_sections(
+    return network_page(
         result,
-        groups,
+        "Adjustment of a collection of photos",
         _size_section(result),
         [_weighted_section(result), cameras],
         points(result),
-        problems_of(result),
-    )
-    return Page(
-        what="Adjustment of a collection of photos",
-        title="",
-        judgements=[judged(result.verdict)],
-        advice=result.verdict.next,
-        highlights=highlights(result, int(np.count_nonzero(result.photo_images))),
-        sections=sections,
-        phases=result.seconds,
+        photos=int(np.count_nonzero(result.photo_images)),
     )
 
 
