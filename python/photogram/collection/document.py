@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.tables import collection_photos, costs
+from photogram.collection.tables import costs
 from photogram.io import json
 from photogram.results.document import network_members
-from photogram.results.network_tables import points
 from photogram.show.ways import document_of
 
 __all__ = ["to_json"]
@@ -22,7 +21,7 @@ def to_json(result: AdjustedCollection) -> bytes:
 
 def _document(result: AdjustedCollection) -> dict[str, Any]:
     return {
-        **network_members(result, collection_photos(result), points(result), costs(result)),
+        **network_members(result, costs(result)),
         "units": {
             **_units(result),
             "covariance": "products of these",

@@ -6,7 +6,7 @@ import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.report import size_of
-from photogram.results.network_tables import control, points, stations
+from photogram.results.network_tables import control, stations
 from photogram.results.page.parts import network_page, size_section
 from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import observed_table
@@ -27,7 +27,6 @@ def collection_page(result: AdjustedCollection) -> Page:
         "Adjustment of a collection of photos",
         _size_section(result),
         [_weighted_section(result), cameras],
-        points(result),
         photos=int(np.count_nonzero(result.photo_images)),
     )
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.tables import collection_photos, costs
-from photogram.results.network_tables import control, stations
+from photogram.collection.tables import costs
+from photogram.results.network_tables import control, photos, stations
 from photogram.results.observed import NOTABLE, image_lines, observed_lines, suspect_lines
 from photogram.results.report import problems_of
 from photogram.results.weakest import weakest_lines
@@ -113,7 +113,7 @@ def _iterations(result: AdjustedCollection) -> list[str]:
 
 
 def _photos(result: AdjustedCollection) -> list[str]:
-    own, count, values, sd = collection_photos(result)
+    own, count, values, sd = photos(result)
     rows = [[*field(own, 10, head="photo"), *field(count, 6, ".0f", "images"), *field(values, 14, ".6g")]]
     if np.isfinite(sd.values).any():
         rows.append([Field("", [f"{'sd':<16}"] * len(own.values)), *field(sd, 14, ".2g", "")])

@@ -12,10 +12,10 @@ from photogram.io import json
 from photogram.results.calibration_report import calibration_members
 from photogram.results.features_report import features_document
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import control, images, iterations, photos, stations, terms_of
+from photogram.results.network_tables import control, images, iterations, photos, points, stations, terms_of
 from photogram.results.report import problems_of
 from photogram.results.result import Result, SumsByKind
-from photogram.results.tables import block_points, camera_parameters, check_points, observations
+from photogram.results.tables import camera_parameters, check_points, observations
 from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show.quantity import Quantity, Table, chosen, records
 from photogram.show.ways import document_of
@@ -29,12 +29,13 @@ def to_json(result: Result) -> bytes:
     return json.to_json(_document(result))
 
 
-def network_members(result: AdjustedNetwork, photos: Table, points: Table, history: Table) -> dict[str, Any]:
-    """Return what the documents of all networks have, with tables of photos, points and iterations."""
+def network_members(result: AdjustedNetwork, history: Table, photo_members: Table = ()) -> dict[str, Any]:
+    """Return what the documents of all networks have, with a table of iterations and more of photos."""
     summary = result.reliability_summary
     called = int if terms_of(result).identity == "number" else str
     weights = Quantity(result.image_weights[result.used_images], member="weight_factor")
-    covariances = Quantity(result.point_covariances[result.used_points], member="covariance")
+    of_photos = Quantity(result.photo_covariances, member="covariance")
+    of_points = Quantity(result.point_covariances[result.used_points], member="covariance")
     return {
         "program": f"photogram {_photocore.__version__}",
         "status": result.status,
@@ -46,8 +47,8 @@ def network_members(result: AdjustedNetwork, photos: Table, points: Table, histo
         "verdict": result.verdict.document(),
         "reliability": summary.document() if summary else None,
         "iterations": records(history)[1:],
-        "photos": records([*photos, Quantity(result.photo_covariances, member="covariance")]),
-        "points": records([*points, covariances]),
+        "photos": records([*photos(result), *photo_members, of_photos]),
+        "points": records([*points(result), of_points]),
         "observations": records([*images(result), *([weights] if result.loss else [])]),
         "control": records(control(result)),
         "stations": records(stations(result)),
@@ -65,7 +66,7 @@ def network_members(result: AdjustedNetwork, photos: Table, points: Table, histo
 def _document(result: Result) -> dict[str, Any]:
     sums = result.sums_of_squares
     return {
-        **network_members(result, _photos(result), block_points(result), iterations(result)),
+        **network_members(result, iterations(result), _of_photos(result)),
         "title": result.block.title,
         "units": _units(result),
         "conventions": {
@@ -132,10 +133,9 @@ def _units(result: Result) -> dict[str, str]:
     }
 
 
-def _photos(result: Result) -> list[Quantity]:
+def _of_photos(result: Result) -> list[Quantity]:
     covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
     return [
-        *photos(result),
         Quantity(covariances[:, place, place], member="position_covariance"),
         Quantity(covariances[:, turn, turn], member="attitude_covariance"),
     ]

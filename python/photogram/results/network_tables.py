@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from photogram.show.quantity import Axis, Link, Quantity
 from photogram.show.ways import Way
 
 __all__ = [
+    "TABLES",
     "Terms",
     "control",
     "deviation",
@@ -52,6 +53,8 @@ class Terms:
         (n, 3) coordinates as they were given.
     layers, parts
         What the unknowns of a photo consist of: how people call it, and JSON documents.
+    of_photos, of_points
+        What tables tell first: of photos, of points that took part.
     kinds
         Observations beside images.
     split
@@ -68,6 +71,8 @@ class Terms:
     point_given: Floats
     layers: Mapping[str, slice]
     parts: Mapping[str, slice]
+    of_photos: tuple[Quantity, ...] = ()
+    of_points: tuple[Quantity, ...] = ()
     kinds: Iterable[ObservedKind] = ()
     split: bool = False
 
@@ -108,6 +113,7 @@ def photos(result: AdjustedNetwork) -> list[Quantity]:
     rows = np.arange(len(terms.photos))
     return [
         names(terms, "photo", rows, "id" if terms.identity == "id" else "", here=True),
+        *terms.of_photos,
         Quantity(
             terms.photo_values, terms.photo_axes, "value", name="", member=terms.parts, head="{}", figures=6
         ),
@@ -121,6 +127,7 @@ def points(result: AdjustedNetwork) -> list[Quantity]:
     rays, places, sd = result.point_rays[used], result.point_positions[used], result.point_sd[used]
     return [
         names(terms, "point", used, terms.identity, here=True),
+        *terms.of_points,
         Quantity(rays, name="rays", member="rays", head="Rays", decimals=0),
         Quantity(places, terms.point_axes, "value", name="", member="position", head="{}", figures=7),
         deviation(sd, terms.point_axes, member=""),
@@ -224,3 +231,13 @@ def test_value(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
     own: dict[str, Any] = dict.fromkeys(("name", "member", "label"), "standardized")
     about = "residual over its standard deviation, a priori unit weight: {}"
     return Quantity(values, axes, **own, about=about, head="Test value w", decimals=2, **more)
+
+
+TABLES: dict[str, Callable[[AdjustedNetwork], list[Quantity]]] = {
+    "photo": photos,
+    "point": points,
+    "image": images,
+    "control": control,
+    "station": stations,
+}
+"""The tables of every network by the kind of things that have their rows."""

@@ -18,7 +18,7 @@ from photogram.results.calibration_report import calibration_sections
 from photogram.results.features_report import features_sections
 from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import control, iterations, part, photos, stations
+from photogram.results.network_tables import control, iterations, part, photos, points, stations
 from photogram.results.observed import (
     NOTABLE,
     image_lines,
@@ -28,7 +28,6 @@ from photogram.results.observed import (
 )
 from photogram.results.result import Result
 from photogram.results.tables import (
-    block_points,
     check_points,
     observed_components,
     redundancy_by_kind,
@@ -307,7 +306,7 @@ def _held_cameras(result: Result) -> list[str]:
 
 
 def _points(result: Result) -> list[str]:
-    names, kinds, rays, values, sd = block_points(result)
+    names, kinds, rays, values, sd = points(result)
     blank = Field(f"{'':<10}", [f"{'':<10}"] * len(names.values))
     rest = [*field(rays, 4, ".0f", "rays", "  "), *field(kinds, 0, head="kind", gap="  ")]
     first = [*field(names, 10, head="point"), *field(values, 20, ".4f"), *rest]

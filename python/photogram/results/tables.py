@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.results import network_tables
 from photogram.results.axes import TURNS, component_axis, image_axes, point_axes
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.features import Features
@@ -18,15 +19,10 @@ from photogram.results.grouping import grouped
 from photogram.results.kinds import ObservedKind
 from photogram.results.network_tables import (
     Terms,
-    control,
     deviation,
     difference,
-    images,
     names,
-    photos,
-    points,
     redundancy,
-    stations,
     terms_of,
     test_value,
 )
@@ -38,7 +34,6 @@ from photogram.statistics.reliability import TESTABLE
 
 __all__ = [
     "TABLES",
-    "block_points",
     "camera_parameters",
     "check_points",
     "observations",
@@ -85,20 +80,19 @@ def _terms(result: Result) -> Terms:
         point_given=block.point_positions,
         layers={"Positions": slice(0, 3), "Attitudes": slice(3, 6)},
         parts={"position": slice(0, 3), "attitude_rad": slice(3, 6)},
+        of_points=(
+            Quantity(
+                result.point_kinds[result.used_points],
+                kind="name",
+                name="kind",
+                member="kind",
+                about="what it is",
+                head="Kind",
+            ),
+        ),
         kinds=result.kinds.values(),
         split=True,
     )
-
-
-def block_points(result: Result) -> list[Quantity]:
-    """Return the points that took part, with what they are."""
-    own, *rest = points(result)
-    kinds = result.point_kinds[result.used_points]
-    return [
-        own,
-        Quantity(kinds, kind="name", name="kind", member="kind", about="what it is", head="Kind"),
-        *rest,
-    ]
 
 
 def check_points(result: Result) -> list[Quantity]:
@@ -295,12 +289,8 @@ def _told(columns: Mapping[str, Any]) -> list[Quantity]:
 
 
 TABLES: dict[str, Callable[[Result], list[Quantity]]] = {
-    "photo": photos,
-    "point": block_points,
-    "image": images,
+    **network_tables.TABLES,
     "check": check_points,
-    "control": control,
-    "station": stations,
     "observation": lambda result: observed_components(result.kinds.values()),
     "camera": lambda result: camera_parameters(result.cameras),
     "unknown": lambda result: unknowns(result.unknowns),

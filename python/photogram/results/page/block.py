@@ -14,7 +14,7 @@ from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import beside_section, check_section, control_section, stations_section
 from photogram.results.report import size_of
 from photogram.results.result import Result
-from photogram.results.tables import block_points, redundancy_by_kind, unknowns
+from photogram.results.tables import redundancy_by_kind, unknowns
 from photogram.show.cells import page_table, unit_written
 from photogram.show.page import Fact, Page, Section, Table, significant
 from photogram.show.ways import page_of
@@ -40,7 +40,6 @@ def block_page(result: Result) -> Page:
         "Adjustment of a block of photos",
         _size_section(result),
         given,
-        block_points(result),
         photos=len(result.block.photo_ids),
         title=result.block.title,
         more=_accuracy(result),

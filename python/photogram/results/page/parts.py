@@ -17,7 +17,6 @@ from photogram.results.report import ORDERINGS, problems_of
 from photogram.show.cells import page_table, unit_written
 from photogram.show.judgement import judged, remarks_section, verdict_table
 from photogram.show.page import Column, Drawing, Fact, Facts, Page, Part, Row, Section, Table, significant
-from photogram.show.quantity import Quantity
 from photogram.statistics.findings import Tested
 
 __all__ = [
@@ -33,7 +32,6 @@ def network_page(
     what: str,
     size: Section,
     given: Sequence[Section],
-    table: Sequence[Quantity],
     *,
     photos: int,
     title: str = "",
@@ -50,8 +48,6 @@ def network_page(
         The network, and what it is called.
     size, given
         How much and how good it is, and the sections of what was given.
-    table
-        Its points.
     photos, more
         The number of its photos, and what a reader wants first besides.
     redundancy
@@ -67,7 +63,7 @@ def network_page(
         judgements=[judged(result.verdict)],
         advice=result.verdict.next,
         highlights=[*highlights(result, photos), *more],
-        sections=_sections(result, size, given, table, redundancy, beside, datum),
+        sections=_sections(result, size, given, redundancy, beside, datum),
         phases=result.seconds,
     )
 
@@ -76,7 +72,6 @@ def _sections(
     result: AdjustedNetwork,
     size: Section,
     given: Sequence[Section],
-    table: Sequence[Quantity],
     redundancy: Sequence[Table],
     beside: Sequence[Section],
     datum: str,
@@ -99,7 +94,7 @@ def _sections(
         worst_section(result, groups, found),
         *given,
         photos_section(result, photos, datum),
-        points_section(result, table, points, datum),
+        points_section(result, points, datum),
         iterations_section(result),
         remarks_section(problems_of(result)),
     ]

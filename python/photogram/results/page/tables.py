@@ -11,7 +11,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.results.axes import point_axes
 from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork, Observed
-from photogram.results.network_tables import Terms, control, part, photos, stations, terms_of
+from photogram.results.network_tables import Terms, control, part, photos, points, stations, terms_of
 from photogram.results.result import Result
 from photogram.results.tables import check_points, observations, unheld
 from photogram.results.weakest import weakest_photos, weakest_points
@@ -198,7 +198,7 @@ def photos_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "
         else f"{len(rows)} of {len(terms.photos)}: those that other tables name, the largest"
         " residuals and test values, and the weakest. The table of photos has all."
     )
-    own, values, sd = photos(result)
+    own, *_, values, sd = photos(result)
     tables = []
     for caption, of in terms.layers.items():
         by = result.photo_sd[:, of] if terms.split else None
@@ -248,15 +248,13 @@ def _fit_of_photos(result: AdjustedNetwork, terms: Terms) -> Floats:
     return found
 
 
-def points_section(
-    result: AdjustedNetwork, table: Sequence[Quantity], named: Iterable[int], intro: str = ""
-) -> Section:
+def points_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "") -> Section:
     """Return points with their standard deviations.
 
     Parameters
     ----------
-    result, table
-        The adjusted network, and the points that took part.
+    result
+        The adjusted network.
     named
         Points that other tables name.
     intro
@@ -280,5 +278,5 @@ def points_section(
     few_of = f"{len(rows)} of {len(used)}: those that other tables name, those of the largest sd"
     note = f"{'' if every else few_of + ', and the weakest. The table of points has all. '}{RATIO_NOTE}"
     by = result.point_sd[used] if terms.split else None
-    shown = [*chosen(table, np.searchsorted(used, rows)), ratios]
+    shown = [*chosen(points(result), np.searchsorted(used, rows)), ratios]
     return Section("points", "Points", [page_table("Points", shown, note, by)], intro)
