@@ -141,7 +141,3 @@ def _selectable(result: AdjustedCollection) -> Adjusted:
         parts={"photo": ("photo", "camera"), "pose": ("photo",)},
         numbered=True,
     )
-
-
-CollectionSolution = AdjustedCollection
-"""The name that its arrays had when they were a class of their own."""

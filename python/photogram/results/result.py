@@ -436,7 +436,3 @@ def adjusted(result: Result) -> Adjusted:
             "unknown": [each.sd for each in unknowns],
         },
     )
-
-
-AdjustedBlock = Result
-"""The name that its arrays had when they were a class of their own."""
