@@ -204,7 +204,14 @@ def adjust(
     truth_value("verdict", verdict)
     if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
         raise InputError(f"datum is InnerConstraints, MinimumConstraints or None, not {shown(datum)}")
-    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published)
+    one_of("unit_variance", unit_variance, get_args(UnitVariance))
+    if as_published is not None and not isinstance(as_published, AsPublished):
+        raise InputError(f"as_published is an AsPublished or None, not {shown(as_published)}")
+    check_iteration(
+        ordering,
+        as_published.max_iterations if as_published else max_iterations,
+        as_published.percent if as_published else tolerance,
+    )
     processors = core_threads(threads)
     row = loss_row(loss, scale)
     if unit_variance == "redundancy" and not covariance:
@@ -355,20 +362,18 @@ def teller(
     return tell
 
 
-def _check_options(
-    unit_variance: str,
-    ordering: str,
-    max_iterations: int,
-    tolerance: float,
-    as_published: AsPublished | None,
-) -> None:
-    one_of("unit_variance", unit_variance, get_args(UnitVariance))
+def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> None:
+    """Refuse an iteration that cannot be.
+
+    Raises
+    ------
+    InputError
+        An ordering that there is not, no iteration, a criterion that is not positive.
+    """
     one_of("ordering", ordering, get_args(Ordering))
-    if as_published is not None and not isinstance(as_published, AsPublished):
-        raise InputError(f"as_published is an AsPublished or None, not {shown(as_published)}")
-    if whole_number("max_iterations", as_published.max_iterations if as_published else max_iterations) < 1:
+    if whole_number("max_iterations", max_iterations) < 1:
         raise InputError("there must be one iteration at least")
-    if not number("the criterion", as_published.percent if as_published else tolerance) > 0:
+    if not number("the criterion", tolerance) > 0:
         raise InputError("the criterion of convergence must be positive")
 
 

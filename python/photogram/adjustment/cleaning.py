@@ -189,7 +189,7 @@ def _left(network: Any, grouping: Grouping, result: AdjustedNetwork) -> tuple[An
     # A photo has one image of a point.
     places = order[np.searchsorted(keys, left.image_photos * points + left.image_points, sorter=order)]
     observations = grouping.observations
-    if len(observations) != len(observables(left).observations):
+    if len(observations) != len(left.observations):
         names = [_told(each) for each in network.observations]
         rows = _rows(names, [_told(each) for each in left.observations])
         observations = observations[rows]

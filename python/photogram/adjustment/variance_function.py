@@ -96,7 +96,7 @@ def variance_function(
     if bins < 2 or max_steps < 1:
         raise InputError("there must be two bins and one step at least")
     seen = observables(network)
-    images = len(seen.image_photos)
+    images = len(seen.given.image_photos)
     own = Weighing(network, threads=threads, tolerance=TOLERANCE)
     values = _values(own, of, center, images)
     used = own.first.used_images
@@ -105,7 +105,9 @@ def variance_function(
         raise InputError("the values are all zero, or there are no redundancy numbers")
     share = np.repeat((values / largest) ** 2, 2)
     terms = np.stack([np.ones(2 * images), share], axis=1)
-    grouping = _each(seen.point_observed.shape, seen.photo_observed.shape, len(seen.observations), images)
+    grouping = _each(
+        seen.point_observed.shape, seen.photo_observed.shape, len(seen.given.observations), images
+    )
     first = True
 
     def adjusted(factors: Floats) -> _Left:

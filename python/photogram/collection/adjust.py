@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import Ordering, Progress, adjusted_again, core_threads, teller
+from photogram.adjustment.adjustment import (
+    Ordering,
+    Progress,
+    adjusted_again,
+    check_iteration,
+    core_threads,
+    teller,
+)
 from photogram.adjustment.ends import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
 from photogram.collection.core import collection_network
 from photogram.collection.failures import named
-from photogram.errors import InputError
 from photogram.messages import Message, Undetermined, listed
 from photogram.network.core import CoreOptions
 
@@ -91,14 +96,9 @@ def adjust(
     KeyboardInterrupt
         Ctrl-C.
     """
-    if ordering not in get_args(Ordering):
-        raise InputError(f"ordering is one of {', '.join(get_args(Ordering))}, not {ordering!r}")
-    if max_iterations < 1:
-        raise InputError("there must be one iteration at least")
     if tolerance is None:
         tolerance = 1e-8 if loss is None else 1e-6
-    if not tolerance > 0:
-        raise InputError("the criterion of convergence must be positive")
+    check_iteration(ordering, max_iterations, tolerance)
     options = options_of(
         tolerance, max_iterations, covariance=covariance, loss=loss_row(loss, scale), ordering=ordering
     )

@@ -14,7 +14,7 @@ from photogram.collection.failures import named
 from photogram.collection.suspects import collection_trial
 from photogram.results.covariance import Failure
 from photogram.results.network import AdjustedNetwork
-from photogram.results.selection import Adjusted
+from photogram.results.selection import Adjusted, Things
 
 if TYPE_CHECKING:
     from photogram.results.network_trial import NetworkTrial
@@ -117,27 +117,17 @@ class AdjustedCollection(AdjustedNetwork):
 
 def _selectable(result: AdjustedCollection) -> Adjusted:
     """Return the adjusted values of a collection by kinds and numbers."""
-    names = result.collection.parameters
-    photos, points = (
-        [str(each) for each in range(len(of))] for of in (result.photo_images, result.point_rays)
-    )
-    values, sd = result.photo_parameters, result.photo_sd
+    names, photos, points = result.collection.parameters, result.given.photo_ids, result.given.point_ids
+    values, sd, count = result.photo_parameters, result.photo_sd, len(photos)
+    pose, camera = slice(0, POSE), slice(POSE, None)
+    places = [("X", "Y", "Z")] * len(points)
     return Adjusted(
         network="collection",
-        ids={"photo": photos, "pose": photos, "camera": photos, "point": points},
-        components={
-            "photo": [names] * len(photos),
-            "pose": [names[:POSE]] * len(photos),
-            "camera": [names[POSE:]] * len(photos),
-            "point": [("X", "Y", "Z")] * len(points),
+        things={
+            "photo": Things(photos, [names] * count, values, sd, ("photo", "camera")),
+            "pose": Things(photos, [names[pose]] * count, values[:, pose], sd[:, pose], ("photo",)),
+            "camera": Things(photos, [names[camera]] * count, values[:, camera], sd[:, camera]),
+            "point": Things(points, places, result.point_positions, result.point_sd),
         },
-        values={
-            "photo": values,
-            "pose": values[:, :POSE],
-            "camera": values[:, POSE:],
-            "point": result.point_positions,
-        },
-        sd={"photo": sd, "pose": sd[:, :POSE], "camera": sd[:, POSE:], "point": result.point_sd},
-        parts={"photo": ("photo", "camera"), "pose": ("photo",)},
         numbered=True,
     )

@@ -24,20 +24,15 @@ def collection_observables(collection: Collection) -> Observables:
     photos = len(collection.photo_parameters)
     sd, point_sd = collection.photo_sd, collection.point_sd
     return Observables(
-        image_photos=collection.image_photos,
-        image_points=collection.image_points,
-        photo_names=collection.photo_ids,
+        given=collection,
         photo_cameras=np.arange(photos),
         camera_names=collection.photo_ids,
         strips=lambda: [np.arange(photos)],
         point_classes=np.where(np.isfinite(point_sd).any(axis=1), "control", "pass"),
-        point_observed=(point_sd > 0) & np.isfinite(point_sd),
         # The core has parameters of cameras apart; they keep their weights.
         photo_observed=(sd > 0) & np.isfinite(sd) & (np.arange(sd.shape[1]) < 6),
         stations=("rotations",) * 3 + ("translations",) * 3 + ("cameras",) * (sd.shape[1] - 6),
-        observations=[],
         commons=0,
-        cameras=photos,
     )
 
 

@@ -9,13 +9,12 @@ import numpy as np
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.tables import costs
 from photogram.results.network_tables import control, photos, stations
-from photogram.results.observed import NOTABLE, image_lines, observed_lines, suspect_lines
-from photogram.results.report import problems_of
+from photogram.results.observed import image_lines, observed_lines
+from photogram.results.report import first_sections, reliability_lines, suspects_section
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, table_lines
-from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
+from photogram.show.sections import Section, composed, headline
 from photogram.show.ways import report_of
-from photogram.statistics.limits import externally_studentized
 
 __all__ = ["report", "size_of", "summary"]
 
@@ -25,7 +24,7 @@ def report(result: AdjustedCollection) -> str:
     """Return the report of an adjusted collection."""
     sections = [
         *summary(result),
-        ("Reliability", _reliability(result)),
+        ("Reliability", reliability_lines(result, "")),
         ("Iterations", _iterations(result)),
         (
             "Weighted and fixed points: adjusted minus given, redundancy, standardized difference",
@@ -46,20 +45,7 @@ def report(result: AdjustedCollection) -> str:
 
 def summary(result: AdjustedCollection) -> list[Section]:
     """Return what a reader wants first, as titled sections: verdict, problems, adjustment, suspects."""
-    return [
-        *verdict_sections(result.verdict),
-        ("Problems", problems_or_none(problems_of(result), result.verdict)),
-        ("Adjustment", _adjustment(result)),
-        (
-            f"Image coordinates with |t| > {NOTABLE:g} (externally studentized), largest first",
-            _suspects(result),
-        ),
-    ]
-
-
-def _reliability(result: AdjustedCollection) -> list[str]:
-    summary = result.reliability_summary
-    return [] if summary is None else summary.lines("")
+    return [*first_sections(result, _adjustment(result)), suspects_section(result)]
 
 
 def _adjustment(result: AdjustedCollection) -> list[str]:
@@ -93,12 +79,6 @@ def size_of(result: AdjustedCollection) -> list[tuple[str, str]]:
         "image points": result.used_images,
     }
     return [(name, f"{np.count_nonzero(used)} used of {len(used)}") for name, used in counts.items()]
-
-
-def _suspects(result: AdjustedCollection) -> list[str]:
-    """List the image coordinates that fit worst, in units of what the others have."""
-    t = externally_studentized(result.standardized, result.weighted_sum_of_squares, result.degrees_of_freedom)
-    return suspect_lines(result, t, "t")
 
 
 def _iterations(result: AdjustedCollection) -> list[str]:

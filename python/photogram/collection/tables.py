@@ -28,12 +28,10 @@ def _terms(result: AdjustedCollection) -> Terms:
     return Terms(
         photos=np.arange(len(result.photo_parameters)),
         points=np.arange(len(result.point_positions)),
-        image_photos=given.image_photos,
         photo_axes=tuple(Axis.of(name, unit, f"_{unit}".rstrip("_")) for name, unit in named),
         point_axes=tuple(Axis.of(name, "") for name in "XYZ"),
         image_axes=image_axes("px"),
         photo_values=result.photo_parameters,
-        point_given=given.point_positions,
         layers={"Rotations": slice(0, 3), "Translations": slice(3, 6), "Cameras": slice(6, None)},
         parts={"parameters": slice(None)},
         of_photos=(

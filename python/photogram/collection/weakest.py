@@ -29,11 +29,8 @@ def _(result: AdjustedCollection) -> Determined:
     partials[:, :3, 3:] = -matrices
     partials[:, 3:, :3] = turns
     return Determined(
-        photo_ids=result.given.photo_ids,
-        point_ids=result.given.point_ids,
         stations=-np.einsum("pij,pj->pi", matrices, translations),
         points=result.point_positions,
-        image_photos=result.collection.image_photos,
         poses=partials @ cofactors @ partials.transpose(0, 2, 1),
         ranks=(np.diagonal(cofactors, axis1=1, axis2=2) > 0).sum(axis=1),
         point_cofactors=result.point_cofactors,

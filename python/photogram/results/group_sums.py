@@ -287,19 +287,14 @@ def block_observables(block: Block) -> Observables:
     cameras, photo_cameras = block.core_cameras()
     names = block.camera_names if block.cameras else [str(number) for number in range(len(cameras))]
     return Observables(
-        image_photos=block.image_photos,
-        image_points=block.image_points,
-        photo_names=block.photo_ids,
+        given=block,
         photo_cameras=photo_cameras,
         camera_names=names,
         strips=lambda: strips_of(local_axes(block).positions(block.photo_positions)),
         point_classes=np.where(held, "control", np.where(known, "check", "pass")),
-        point_observed=(block.point_sd > 0) & np.isfinite(block.point_sd),
         photo_observed=observed,
         stations=("positions",) * 3 + ("attitudes",) * 3,
-        observations=[each.label for each in block.observations],
         commons=len(block.unknowns),
-        cameras=len(cameras),
     )
 
 

@@ -43,14 +43,10 @@ class Terms:
     ----------
     photos, points
         (P,), (n,) names, or numbers from 0.
-    image_photos
-        (m,) the photo of each image.
     photo_axes, point_axes, image_axes
         Unknowns of a photo, coordinates of a point, image coordinates.
     photo_values
         (P, k) adjusted unknowns.
-    point_given
-        (n, 3) coordinates as they were given.
     layers, parts
         What the unknowns of a photo consist of: how people call it, and JSON documents.
     of_photos, of_points
@@ -63,12 +59,10 @@ class Terms:
 
     photos: np.ndarray
     points: np.ndarray
-    image_photos: Indices
     photo_axes: tuple[Axis, ...]
     point_axes: tuple[Axis, ...]
     image_axes: tuple[Axis, ...]
     photo_values: Floats
-    point_given: Floats
     layers: Mapping[str, slice]
     parts: Mapping[str, slice]
     of_photos: tuple[Quantity, ...] = ()
@@ -139,7 +133,7 @@ def images(result: AdjustedNetwork, rows: Indices | None = None) -> list[Quantit
     terms, used = terms_of(result), np.flatnonzero(result.used_images) if rows is None else rows
     axes = terms.image_axes
     return [
-        names(terms, "photo", terms.image_photos[used], "photo"),
+        names(terms, "photo", result.given.image_photos[used], "photo"),
         names(terms, "point", result.image_points[used], "point"),
         Quantity(
             result.residuals[used], axes, "deviation", name="residual", member=f"residual_{axes[0].unit}"
@@ -166,7 +160,7 @@ def control(result: AdjustedNetwork) -> list[Quantity]:
     """Return points as observations of their own coordinates."""
     terms, own = terms_of(result), result.control
     values = result.point_positions, result.point_sd
-    return _observed("point", terms, own, terms.point_axes, terms.point_given[own.rows], *values)
+    return _observed("point", terms, own, terms.point_axes, result.given.point_positions[own.rows], *values)
 
 
 def stations(result: AdjustedNetwork) -> list[Quantity]:

@@ -41,7 +41,7 @@ def tested_observations(result: AdjustedNetwork) -> list[Observations]:
     photos, points = terms.photos, terms.points
 
     def image(index: tuple[int, ...]) -> str:
-        point, photo = result.image_points[index[0]], terms.image_photos[index[0]]
+        point, photo = result.image_points[index[0]], result.given.image_photos[index[0]]
         return f"{'xy'[index[1]]} of point {points[point]} on photo {photos[photo]}"
 
     def kind(

@@ -45,7 +45,17 @@ from photogram.statistics.outliers import outliers
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
 
-__all__ = ["ORDERINGS", "bandwidths", "problems_of", "report", "size_of", "summary"]
+__all__ = [
+    "ORDERINGS",
+    "bandwidths",
+    "first_sections",
+    "problems_of",
+    "reliability_lines",
+    "report",
+    "size_of",
+    "summary",
+    "suspects_section",
+]
 
 ORDERINGS = {
     "input": "in input order",
@@ -64,7 +74,7 @@ def report(result: Result) -> str:
     sections = [
         *summary(result),
         ("Redundancy by kind of observation", _redundancy(result)),
-        ("Reliability", _reliability(result)),
+        ("Reliability", reliability_lines(result, result.block.linear_unit)),
         ("Iterations", _iterations(result)),
         ("Check points: adjusted minus given, standard deviations, test", _check_points(result)),
         (
@@ -98,18 +108,29 @@ def report(result: Result) -> str:
 @np.errstate(over="ignore")
 def summary(result: Result) -> list[Section]:
     """Return what a reader wants first, as titled sections: verdict, problems, adjustment, residuals."""
-    suspects = suspect_lines(result, result.standardized, "standardized")
+    more = [*features_sections(result.features), ("Residuals", _residuals(result))]
+    title, suspects = suspects_section(result)
+    return [*first_sections(result, _adjustment(result)), *more, (title, suspects or ["none"])]
+
+
+def first_sections(result: AdjustedNetwork, adjustment: list[str]) -> list[Section]:
+    """Return what the summary of every network begins with: verdict, problems, adjustment."""
     return [
         *verdict_sections(result.verdict),
         ("Problems", problems_or_none(problems_of(result), result.verdict)),
-        ("Adjustment", _adjustment(result)),
-        *features_sections(result.features),
-        ("Residuals", _residuals(result)),
-        (
-            f"Image coordinates with |standardized residual| > {NOTABLE:g}, largest first",
-            suspects or ["none"],
-        ),
+        ("Adjustment", adjustment),
     ]
+
+
+def suspects_section(result: AdjustedNetwork) -> Section:
+    """List the image coordinates that fit worst; where unit weight is not known, in units of the others."""
+    if result.KNOWN:
+        name, title, tests = "standardized", "|standardized residual| > {}", result.standardized
+    else:
+        name, title = "t", "|t| > {} (externally studentized)"
+        tests = externally_studentized(result.standardized, *result.sum_and_freedom)
+    head = f"Image coordinates with {title.format(f'{NOTABLE:g}')}, largest first"
+    return head, suspect_lines(result, tests, name)
 
 
 def problems_of(result: AdjustedNetwork) -> list[str]:
@@ -224,9 +245,10 @@ def _redundancy(result: Result) -> list[str]:
     return table_lines([*field(names, 36, head="kind"), *chain(*fields)])
 
 
-def _reliability(result: Result) -> list[str]:
+def reliability_lines(result: AdjustedNetwork, unit: str) -> list[str]:
+    """Return what a report says of reliability, lengths in a unit."""
     summary = result.reliability_summary
-    return [] if summary is None else summary.lines(result.block.linear_unit)
+    return [] if summary is None else summary.lines(unit)
 
 
 def _iterations(result: Result) -> list[str]:

@@ -30,7 +30,7 @@ from photogram.results.datum import (
 )
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
-from photogram.results.selection import Adjusted, photo_components, point_components
+from photogram.results.selection import Adjusted, Things, photo_components, point_components
 from photogram.results.suspects import network_trial
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
@@ -400,39 +400,29 @@ def _least_turns(angles: Floats) -> Floats:
 def adjusted(result: Result) -> Adjusted:
     """Return the adjusted values of a result by kinds and names."""
     block = result.block
-    photos = np.hstack([result.photo_positions, result.photo_attitudes])
-    of_photos = [photo_components(block)] * len(photos)
-    steps = (*point_components(block), "rho x", "rho y", "rho z")
+    photos, sd = np.hstack([result.photo_positions, result.photo_attitudes]), result.photo_sd
+    places, count = point_components(block), len(photos)
+    steps = (*places, "rho x", "rho y", "rho z")
+    points = [places] * len(block.point_ids)
     # Blocks with principal distances have a camera for each: they are known, and nobody asks for them.
     cameras, unknowns = result.cameras, result.unknowns
     return Adjusted(
         network="block",
-        ids={
-            "photo": block.photo_ids,
-            "step": block.photo_ids,
-            "point": block.point_ids,
-            "camera": [each.name for each in cameras],
-            "unknown": [each.name for each in unknowns],
-        },
-        components={
-            "photo": of_photos,
-            "step": [steps] * len(photos),
-            "point": [point_components(block)] * len(block.point_ids),
-            "camera": [each.names for each in cameras],
-            "unknown": [each.components for each in unknowns],
-        },
-        values={
-            "photo": photos,
-            "step": photos,
-            "point": result.point_positions,
-            "camera": [each.values for each in cameras],
-            "unknown": [each.values for each in unknowns],
-        },
-        sd={
-            "photo": result.photo_sd,
-            "step": result.photo_sd,
-            "point": result.point_sd,
-            "camera": [each.sd for each in cameras],
-            "unknown": [each.sd for each in unknowns],
+        things={
+            "photo": Things(block.photo_ids, [photo_components(block)] * count, photos, sd),
+            "step": Things(block.photo_ids, [steps] * count, photos, sd),
+            "point": Things(block.point_ids, points, result.point_positions, result.point_sd),
+            "camera": Things(
+                [each.name for each in cameras],
+                [each.names for each in cameras],
+                [each.values for each in cameras],
+                [each.sd for each in cameras],
+            ),
+            "unknown": Things(
+                [each.name for each in unknowns],
+                [each.components for each in unknowns],
+                [each.values for each in unknowns],
+                [each.sd for each in unknowns],
+            ),
         },
     )

@@ -72,12 +72,10 @@ def _terms(result: Result) -> Terms:
     return Terms(
         photos=np.array(block.photo_ids, dtype=object),
         points=np.array(block.point_ids, dtype=object),
-        image_photos=block.image_photos,
         photo_axes=(*axes, *TURNS),
         point_axes=axes,
         image_axes=image_axes(block.image_unit),
         photo_values=np.hstack([result.photo_positions, result.photo_attitudes]),
-        point_given=block.point_positions,
         layers={"Positions": slice(0, 3), "Attitudes": slice(3, 6)},
         parts={"position": slice(0, 3), "attitude_rad": slice(3, 6)},
         of_points=(
@@ -136,7 +134,7 @@ def _compared(
         tests = differences / np.hypot(sd, np.nan_to_num(given_sd))
     return [
         names(terms, "point", rows, "id"),
-        Quantity(terms.point_given[rows], axes, "value", head="Given"),
+        Quantity(result.given.point_positions[rows], axes, "value", head="Given"),
         Quantity(result.point_positions[rows], axes, "value", head="Adjusted"),
         difference(differences, axes),
         deviation(sd, axes, label="sd adjusted", head="sd adjusted"),

@@ -230,7 +230,7 @@ def photos_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "
 def _fit_of_photos(result: AdjustedNetwork, terms: Terms) -> Floats:
     """Return (P, 6) rms x and y, mean redundancy, longest residual, largest |w|, number of images."""
     used = result.used_images
-    photos, count = terms.image_photos[used], len(terms.photos)
+    photos, count = result.given.image_photos[used], len(terms.photos)
     images = np.bincount(photos, minlength=count)
     residuals = result.residuals[used]
     found = np.full((count, 6), np.nan)
