@@ -113,6 +113,7 @@ def snoop(
     KeyboardInterrupt
         Ctrl-C.
     """
+    truth_value("parts", parts)
     return snooped_network(
         block,
         settings_of(level, fdr, unit_weight, robust, max_rounds),
@@ -180,7 +181,6 @@ def _snoop_block(
 ) -> Snooped:
     block = checked(network)
     check_cameras(block)
-    truth_value("parts", parts)
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
 
     def adjusted(given: Block, **options: Any) -> Result:

@@ -12,7 +12,7 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, core_threads
 from photogram.adjustment.robust import Loss, loss_row
 from photogram.adjustment.snooping import finished, gone, snooped_network, used_images
-from photogram.arguments.arrays import one_of, truth_value
+from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjust import adjust, adjusted
 from photogram.collection.adjusted import POSE, AdjustedCollection
@@ -51,7 +51,6 @@ def _snoop_collection(
 ) -> Snooped:
     collection = network
     one_of("unit_variance", unit_variance, ("constrained",))
-    truth_value("parts", parts)
 
     def tried(covariance: bool) -> tuple[AdjustedCollection, NetworkTrial, Outcome]:
         first = adjust(collection, covariance=covariance, threads=threads, progress=progress, **options)
