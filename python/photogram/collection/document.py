@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.tables import costs
 from photogram.io import json
 from photogram.results.document import network_members
 from photogram.show.ways import document_of
@@ -21,7 +20,7 @@ def to_json(result: AdjustedCollection) -> bytes:
 
 def _document(result: AdjustedCollection) -> dict[str, Any]:
     return {
-        **network_members(result, costs(result)),
+        **network_members(result),
         "units": {
             **_units(result),
             "covariance": "products of these",

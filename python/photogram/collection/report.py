@@ -7,10 +7,9 @@ import math
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.tables import costs
 from photogram.results.network_tables import control, photos, stations
 from photogram.results.observed import image_lines, observed_lines
-from photogram.results.report import first_sections, reliability_lines, suspects_section
+from photogram.results.report import first_sections, iteration_lines, reliability_lines, suspects_section
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, table_lines
 from photogram.show.sections import Section, composed, headline
@@ -25,7 +24,7 @@ def report(result: AdjustedCollection) -> str:
     sections = [
         *summary(result),
         ("Reliability", reliability_lines(result, "")),
-        ("Iterations", _iterations(result)),
+        ("Iterations", iteration_lines(result)),
         (
             "Weighted and fixed points: adjusted minus given, redundancy, standardized difference",
             observed_lines(control(result), "point"),
@@ -79,17 +78,6 @@ def size_of(result: AdjustedCollection) -> list[tuple[str, str]]:
         "image points": result.used_images,
     }
     return [(name, f"{np.count_nonzero(used)} used of {len(used)}") for name, used in counts.items()]
-
-
-def _iterations(result: AdjustedCollection) -> list[str]:
-    number, cost, damping = costs(result)
-    return table_lines(
-        [
-            *field(number, 4, ".0f", "no."),
-            *field(cost, 16, ".6e", "cost"),
-            *field(damping, 10, ".1e", "damping"),
-        ]
-    )
 
 
 def _photos(result: AdjustedCollection) -> list[str]:

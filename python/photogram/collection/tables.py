@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.results.axes import image_axes
-from photogram.results.network_tables import TABLES, Terms, iterations, terms_of
+from photogram.results.network_tables import TABLES, Terms, terms_of
 from photogram.show.quantity import Axis, Quantity, frame
 from photogram.show.ways import columns_of
 
-__all__ = ["costs"]
+__all__: list[str] = []
 
 
 @columns_of.register(AdjustedCollection)
@@ -45,9 +44,3 @@ def _terms(result: AdjustedCollection) -> Terms:
             ),
         ),
     )
-
-
-def costs(result: AdjustedCollection) -> list[Quantity]:
-    """Return the history: numbers, costs (half the sum that is minimised), damping; first the start."""
-    number, squares, _, damping = iterations(result)
-    return [number, replace(squares, values=0.5 * squares.values, member="cost"), damping]

@@ -29,8 +29,8 @@ def to_json(result: Result) -> bytes:
     return json.to_json(_document(result))
 
 
-def network_members(result: AdjustedNetwork, history: Table, photo_members: Table = ()) -> dict[str, Any]:
-    """Return what the documents of all networks have, with a table of iterations and more of photos."""
+def network_members(result: AdjustedNetwork, photo_members: Table = ()) -> dict[str, Any]:
+    """Return what the documents of all networks have, with more members of photos."""
     summary = result.reliability_summary
     called = int if terms_of(result).identity == "number" else str
     weights = Quantity(result.image_weights[result.used_images], member="weight_factor")
@@ -46,7 +46,7 @@ def network_members(result: AdjustedNetwork, history: Table, photo_members: Tabl
         "covariance_scale": result.covariance_scale,
         "verdict": result.verdict.document(),
         "reliability": summary.document() if summary else None,
-        "iterations": records(history)[1:],
+        "iterations": records(iterations(result))[1:],
         "photos": records([*photos(result), *photo_members, of_photos]),
         "points": records([*points(result), of_points]),
         "observations": records([*images(result), *([weights] if result.loss else [])]),
@@ -66,7 +66,7 @@ def network_members(result: AdjustedNetwork, history: Table, photo_members: Tabl
 def _document(result: Result) -> dict[str, Any]:
     sums = result.sums_of_squares
     return {
-        **network_members(result, iterations(result), _of_photos(result)),
+        **network_members(result, _of_photos(result)),
         "title": result.block.title,
         "units": _units(result),
         "conventions": {

@@ -49,6 +49,7 @@ __all__ = [
     "ORDERINGS",
     "bandwidths",
     "first_sections",
+    "iteration_lines",
     "problems_of",
     "reliability_lines",
     "report",
@@ -75,7 +76,7 @@ def report(result: Result) -> str:
         *summary(result),
         ("Redundancy by kind of observation", _redundancy(result)),
         ("Reliability", reliability_lines(result, result.block.linear_unit)),
-        ("Iterations", _iterations(result)),
+        ("Iterations", iteration_lines(result)),
         ("Check points: adjusted minus given, standard deviations, test", _check_points(result)),
         (
             "Control as observations: adjusted minus given, redundancy, standardized difference",
@@ -251,7 +252,8 @@ def reliability_lines(result: AdjustedNetwork, unit: str) -> list[str]:
     return [] if summary is None else summary.lines(unit)
 
 
-def _iterations(result: Result) -> list[str]:
+def iteration_lines(result: AdjustedNetwork) -> list[str]:
+    """List the history: sums of squares, or of losses, changes and damping."""
     number, squares, change, damping = iterations(result)
     return table_lines(
         [
