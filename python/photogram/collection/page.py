@@ -6,10 +6,9 @@ import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.report import size_of
-from photogram.results.network_tables import control, stations
 from photogram.results.page.parts import network_page, size_section
 from photogram.results.page.pictures import drawings
-from photogram.results.page.tables import observed_table
+from photogram.results.page.tables import control_section, stations_section
 from photogram.show.page import Fact, Page, Section, significant
 from photogram.show.ways import page_of
 
@@ -26,7 +25,7 @@ def collection_page(result: AdjustedCollection) -> Page:
         result,
         "Adjustment of a collection of photos",
         _size_section(result),
-        [_weighted_section(result), cameras],
+        [control_section(result), stations_section(result), cameras],
         photos=int(np.count_nonzero(result.photo_images)),
     )
 
@@ -46,12 +45,3 @@ def _size_section(result: AdjustedCollection) -> Section:
         Fact("Variance of unit weight", f"{variance:.6f}" if variance is not None else "undefined"),
     ]
     return size_section(result, size_of(result), more, good)
-
-
-def _weighted_section(result: AdjustedCollection) -> Section:
-    of_points, of_photos = "Weighted and fixed points", "Weighted and fixed parameters of photos"
-    tables = [
-        *observed_table(of_points, control(result), result.control, result.point_sd),
-        *observed_table(of_photos, stations(result), result.stations, result.photo_sd),
-    ]
-    return Section("weighted", "Given values as observations", tables)

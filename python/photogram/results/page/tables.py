@@ -23,7 +23,6 @@ __all__ = [
     "beside_section",
     "check_section",
     "control_section",
-    "observed_table",
     "photos_section",
     "points_section",
     "stations_section",
@@ -42,10 +41,11 @@ RATIO_NOTE = (
 )
 
 
-def control_section(result: Result) -> Section:
+def control_section(result: AdjustedNetwork) -> Section:
     """Return control: prior, posterior, difference, test."""
-    tables = observed_table("Control points", control(result), result.control, result.point_sd)
-    tables += _compared("Components of control that are not held", unheld(result))
+    tables = _observed("Control points", control(result), result.control, result.point_sd)
+    if isinstance(result, Result):
+        tables += _compared("Components of control that are not held", unheld(result))
     intro = (
         "What was given for the control points, and what the adjustment made of it. A component with a"
         " redundancy"
@@ -55,7 +55,7 @@ def control_section(result: Result) -> Section:
     return Section("control", "Control points", tables, intro)
 
 
-def observed_table(caption: str, table: Sequence[Quantity], given: Observed, sd: Floats) -> list[Table]:
+def _observed(caption: str, table: Sequence[Quantity], given: Observed, sd: Floats) -> list[Table]:
     """Return prior, posterior, difference and test of every observed component; none where there are none.
 
     Parameters
@@ -134,14 +134,16 @@ def _compared(caption: str, table: Sequence[Quantity]) -> list[Table]:
     return long_table(caption, table, _tested(there, tests), own)
 
 
-def stations_section(result: Result) -> Section:
-    """Return positions and attitudes of photos as observations."""
+def stations_section(result: AdjustedNetwork) -> Section:
+    """Return what was given of photos as observations, layer by layer."""
     tables: list[Table] = []
-    for of, caption in ((slice(0, 3), "Positions"), (slice(3, 6), "Attitudes")):
+    layers = terms_of(result).layers
+    for caption, of in layers.items():
         given, table = result.stations, [part(each, of) if each.axes else each for each in stations(result)]
         own = replace(given, sd=given.sd[:, of], standardized=given.standardized[:, of])
-        tables += observed_table(f"{caption} of photos", table, own, result.photo_sd[:, of])
-    intro = "Positions and attitudes that were given with standard deviations."
+        tables += _observed(f"{caption} of photos", table, own, result.photo_sd[:, of])
+    *others, last = [caption.lower() for caption in layers]
+    intro = f"{', '.join(others).capitalize()} and {last} that were given with standard deviations."
     return Section("stations", "Observed photos", _layers("stations", tables), intro)
 
 
