@@ -294,3 +294,12 @@ def test_without_covariances_there_is_nothing_to_say(example):
     assert calibrations(result) == []
     assert "Calibration of" not in result.report()
     assert json.loads(result.to_json())["calibrations"] == []
+
+
+def test_without_covariances_a_curve_has_no_band(example, result):
+    bare = adjust(example.measured(), covariance=False)
+    for camera, other in zip(bare.cameras, result.cameras, strict=True):
+        found, expected = distortion_curve(bare, camera), distortion_curve(result, other)
+        np.testing.assert_allclose(found.values, expected.values, rtol=1e-3, atol=1e-6)
+        assert np.isnan(found.sd[1:]).all()
+    assert b"Radial distortion with its standard deviations" in bare.to_html()

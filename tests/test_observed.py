@@ -141,7 +141,6 @@ def test_a_wrong_weighted_point_of_a_collection_is_named():
 def test_a_result_is_one_class():
     assert Result.__bases__ == AdjustedCollection.__bases__ == (AdjustedNetwork,)
     assert Shown in Orientation.__bases__
-    assert photogram.results.result.AdjustedBlock is Result
 
 
 def test_a_way_that_nobody_has_defined_says_so():

@@ -34,7 +34,9 @@ from photogram.network.refracted import check_cameras, remarks
 from photogram.network.unknowns import Unknown
 from photogram.results.datum import datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
+from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
+from photogram.show.ways import Way
 
 __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust", "adjusted_again", "teller"]
 
@@ -202,7 +204,14 @@ def adjust(
     truth_value("verdict", verdict)
     if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
         raise InputError(f"datum is InnerConstraints, MinimumConstraints or None, not {shown(datum)}")
-    _check_options(unit_variance, ordering, max_iterations, tolerance, as_published)
+    one_of("unit_variance", unit_variance, get_args(UnitVariance))
+    if as_published is not None and not isinstance(as_published, AsPublished):
+        raise InputError(f"as_published is an AsPublished or None, not {shown(as_published)}")
+    check_iteration(
+        ordering,
+        as_published.max_iterations if as_published else max_iterations,
+        as_published.percent if as_published else tolerance,
+    )
     processors = core_threads(threads)
     row = loss_row(loss, scale)
     if unit_variance == "redundancy" and not covariance:
@@ -282,20 +291,26 @@ def _adjusted(
         return _result(block, solution, options, freedom, inner, as_published)
 
 
+@Way
 def adjusted_again(
-    block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
-) -> Result:
-    """Adjust a block, of which only weights have changed, from where an adjustment of it has ended.
+    block: object, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
+) -> AdjustedNetwork:
+    """Adjust a network, of which only weights have changed, from where an adjustment of it has ended.
 
     Parameters
     ----------
     block
-        The block.
+        The block, or another network.
     options, start
         Those of the former result, and where it ended: its `options` and `state`.
     threads
         As of :func:`adjust`.
     """
+    raise NotImplementedError(type(block).__name__)
+
+
+@adjusted_again.register
+def _(block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None) -> Result:
     network = block_network(block, options)
     try:
         solution = network.adjust(datum=None, threads=core_threads(threads), progress=None, start=start)
@@ -347,20 +362,18 @@ def teller(
     return tell
 
 
-def _check_options(
-    unit_variance: str,
-    ordering: str,
-    max_iterations: int,
-    tolerance: float,
-    as_published: AsPublished | None,
-) -> None:
-    one_of("unit_variance", unit_variance, get_args(UnitVariance))
+def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> None:
+    """Refuse an iteration that cannot be.
+
+    Raises
+    ------
+    InputError
+        An ordering that there is not, no iteration, a criterion that is not positive.
+    """
     one_of("ordering", ordering, get_args(Ordering))
-    if as_published is not None and not isinstance(as_published, AsPublished):
-        raise InputError(f"as_published is an AsPublished or None, not {shown(as_published)}")
-    if whole_number("max_iterations", as_published.max_iterations if as_published else max_iterations) < 1:
+    if whole_number("max_iterations", max_iterations) < 1:
         raise InputError("there must be one iteration at least")
-    if not number("the criterion", as_published.percent if as_published else tolerance) > 0:
+    if not number("the criterion", tolerance) > 0:
         raise InputError("the criterion of convergence must be positive")
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from photogram.adjustment.components import Settings, of_grouping, scaled
-from photogram.adjustment.snooping import of_network
+from photogram.adjustment.snooping import snoop
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.messages import counted
@@ -22,12 +22,10 @@ from photogram.results.components import VarianceComponents, component_lines, st
 from photogram.results.group_sums import Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
 from photogram.results.snooped import Snooped
 from photogram.show.brief import Brief
 from photogram.show.ways import report_of
 from photogram.statistics.components import WORTH_CHANGING
-from photogram.statistics.limits import global_test
 
 __all__ = ["Cleaned", "clean"]
 
@@ -140,15 +138,15 @@ def clean(
     names = grouping.groups.names
     settings = Settings(level=level, equality=False, probing=probing or Probing())
     factors = np.ones(grouping.count)
-    snooped = of_network(network, level=level, threads=threads, **options)
-    if not _rejected(snooped.result, level):
+    snooped = snoop(network, level=level, threads=threads, **options)
+    if not _rejected(snooped.result):
         return Cleaned(snooped, None, names, factors, 0, settled=True)
     for rounds in range(1, MOST_ROUNDS + 1):
         left, own = _left(network, grouping, snooped.result)
         found = of_grouping(left, own, settings, held=held, threads=threads)
         changed = _changed(found, names, factors)
         before = _out(snooped)
-        snooped = of_network(scaled(network, grouping, changed), level=level, threads=threads, **options)
+        snooped = snoop(scaled(network, grouping, changed), level=level, threads=threads, **options)
         stands = bool((np.abs(changed / factors - 1) <= STANDS).all())
         factors = changed
         if stands and before == _out(snooped):
@@ -176,35 +174,22 @@ def _finished(
     return Cleaned(snooped, found, grouping.groups.names, factors, rounds, settled)
 
 
-def _rejected(result: AdjustedNetwork, level: float) -> bool:
+def _rejected(result: AdjustedNetwork) -> bool:
     """Whether the residuals that are left are larger or smaller than their weights allow."""
-    if isinstance(result, Result):
-        test = result.global_test
-    else:
-        variance = result.variance_of_unit_weight
-        test = (
-            None
-            if variance is None
-            else global_test(variance * result.degrees_of_freedom, result.degrees_of_freedom, level)
-        )
+    test = result.global_test
     return test is not None and (test.rejected_high or test.rejected_low)
-
-
-def _network_of(result: Any) -> Any:
-    """Return the block or collection that was adjusted."""
-    return result.block if isinstance(result, Result) else result.collection
 
 
 def _left(network: Any, grouping: Grouping, result: AdjustedNetwork) -> tuple[Any, Grouping]:
     """Return what snooping has left of a network, and the groups of its observations."""
-    left = _network_of(result)
+    left = result.given
     points = int(network.image_points.max(initial=0)) + 1
     keys = network.image_photos * points + network.image_points
     order = np.argsort(keys)
     # A photo has one image of a point.
     places = order[np.searchsorted(keys, left.image_photos * points + left.image_points, sorter=order)]
     observations = grouping.observations
-    if len(observations) != len(observables(left).observations):
+    if len(observations) != len(left.observations):
         names = [_told(each) for each in network.observations]
         rows = _rows(names, [_told(each) for each in left.observations])
         observations = observations[rows]

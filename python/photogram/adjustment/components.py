@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import copy
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.adjustment.adjustment import adjust, adjusted_again
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
@@ -19,14 +17,13 @@ from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.observations.observation import Observation
 from photogram.results.components import VarianceComponents
-from photogram.results.group_sums import Left, Probing, factored, observables
+from photogram.results.group_sums import Left, Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
 from photogram.show.ways import Way
 from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
 
-__all__ = ["Settings", "Weighing", "of_grouping", "scaled", "variance_components", "weighing"]
+__all__ = ["Settings", "Weighing", "first_adjusted", "of_grouping", "scaled", "variance_components"]
 
 NOTHING = 1e-6
 """A redundancy that is rounding."""
@@ -36,57 +33,32 @@ SHARPER = 1e-2
 """Of the tolerance of components, that of the adjustments in standard deviations."""
 
 
-class Weighing(ABC):
-    """A network that is adjusted again and again with other weights, each time from where it stood."""
-
-    network: Any
-    result: AdjustedNetwork
-    first: AdjustedNetwork
-
-    @abstractmethod
-    def adjust(self, grouping: Grouping, factors: Floats) -> AdjustedNetwork:
-        """Adjust with the variances of (G,) groups multiplied by factors."""
-
-    @abstractmethod
-    def total(self) -> tuple[float, float]:
-        """Return degrees of freedom and weighted sum of squares of all observations."""
-
-    @abstractmethod
-    def factored(self) -> _photocore.BlockCovariances:
-        """Return the factor of the normal equations as they are now."""
-
-
-class _Block(Weighing):
-    result: Result
-
-    def __init__(self, block: Block, threads: int | None, tolerance: float) -> None:
-        self.given = self.network = block
-        self.threads = threads
-        self.result = self.first = adjust(block, tolerance=tolerance, threads=threads)
-
-    def adjust(self, grouping: Grouping, factors: Floats) -> Result:
-        self.network = _scaled_block(self.given, grouping, factors)
-        self.result = adjusted_again(
-            self.network, self.result.options, self.result.state, threads=self.threads
-        )
-        return self.result
-
-    def total(self) -> tuple[float, float]:
-        return float(self.result.degrees_of_freedom), self.result.sums_of_squares.total
-
-    def factored(self) -> _photocore.BlockCovariances:
-        return factored(self.result)
-
-
 @Way
-def weighing(network: object, *, threads: int | None, tolerance: float) -> Weighing:
-    """Return what adjusts a block or a collection with other weights."""
+def first_adjusted(network: object, *, tolerance: float, threads: int | None) -> AdjustedNetwork:
+    """Return an adjustment of a block or a collection that is sharp enough for components."""
     raise InputError(f"no block or collection: {shown(network)}")
 
 
-@weighing.register
-def _(network: Block, *, threads: int | None, tolerance: float) -> Weighing:
-    return _Block(network, threads, tolerance)
+@first_adjusted.register
+def _(network: Block, *, tolerance: float, threads: int | None) -> AdjustedNetwork:
+    return adjust(network, tolerance=tolerance, threads=threads)
+
+
+class Weighing:
+    """A network that is adjusted again and again with other weights, each time from where it stood."""
+
+    def __init__(self, network: object, *, threads: int | None, tolerance: float) -> None:
+        self.result = self.first = first_adjusted(network, tolerance=tolerance, threads=threads)
+        self.given: Any = self.result.given
+        self.network: Any = self.given
+        self.threads = threads
+
+    def adjust(self, grouping: Grouping, factors: Floats) -> AdjustedNetwork:
+        """Adjust with the variances of (G,) groups multiplied by factors."""
+        self.network = scaled(self.given, grouping, factors)
+        options, state = self.result.options, self.result.state
+        self.result = adjusted_again(self.network, options, state, threads=self.threads)
+        return self.result
 
 
 @Way
@@ -211,7 +183,7 @@ def of_grouping(
     names = grouping.groups.names
     if unknown := [name for name in held if name not in names]:
         raise InputError(f"no group is called {shown(unknown[0])}; there are {', '.join(names[:20])}")
-    own = weighing(network, threads=threads, tolerance=min(1e-5, SHARPER * settings.tolerance))
+    own = Weighing(network, threads=threads, tolerance=min(1e-5, SHARPER * settings.tolerance))
     number = 0
 
     def adjusted(factors: Floats) -> Left:
@@ -222,7 +194,7 @@ def of_grouping(
         if progress is not None:
             progress(number, factors[:-1].copy())
         number += 1
-        return Left(result, grouping, *own.total(), own.factored, settings.probing)
+        return Left(result, grouping, settings.probing)
 
     found = estimate(
         adjusted,

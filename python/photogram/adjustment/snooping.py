@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import Any, get_args
 
 import numpy as np
@@ -13,7 +14,7 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, UnitVariance, adjust, adjusted_from, core_threads
 from photogram.adjustment.consensus import started_by_consensus
 from photogram.arguments.arrays import number, one_of, truth_value, whole_number
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
 from photogram.network.block import Block, checked
@@ -21,7 +22,8 @@ from photogram.network.core import CoreOptions, block_network
 from photogram.network.observations import observation_rows
 from photogram.network.refracted import check_cameras
 from photogram.results.exchanged import Exchange, exchanged_names
-from photogram.results.held import held_remark
+from photogram.results.held import held_remark, held_tested
+from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,
@@ -35,10 +37,18 @@ from photogram.results.snooped import Snooped
 from photogram.results.suspects import network_trial
 from photogram.show.ways import Way
 from photogram.statistics.distributions import LEVEL
+from photogram.statistics.findings import Tested
 from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 
-__all__ = ["block_trial", "of_network", "settings_of", "snoop", "used_images"]
+__all__ = [
+    "block_trial",
+    "finished",
+    "gone",
+    "snoop",
+    "snooped_network",
+    "used_images",
+]
 
 
 def snoop(
@@ -53,6 +63,7 @@ def snoop(
     unit_variance: UnitVariance = "constrained",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
+    **options: Any,
 ) -> Snooped:
     """Take gross errors out of a block, or of a collection, one after the other.
 
@@ -86,6 +97,8 @@ def snoop(
         See :func:`photogram.adjust`; the unit variance of collections is `constrained`.
     progress
         Told of the adjustments before and after.
+    options
+        Of a collection: further ones of :func:`photogram.collection.adjust`.
 
     Returns
     -------
@@ -100,22 +113,29 @@ def snoop(
     KeyboardInterrupt
         Ctrl-C.
     """
-    return of_network(
+    truth_value("parts", parts)
+    return snooped_network(
         block,
-        level=level,
-        fdr=fdr,
-        unit_weight=unit_weight,
-        robust=robust,
+        settings_of(level, fdr, unit_weight, robust, max_rounds),
         parts=parts,
-        max_rounds=max_rounds,
         unit_variance=unit_variance,
         threads=threads,
         progress=progress,
+        **options,
     )
 
 
 @Way
-def of_network(network: object, **options: Any) -> Snooped:
+def snooped_network(
+    network: object,
+    settings: Settings,
+    *,
+    parts: bool,
+    unit_variance: UnitVariance,
+    threads: int | None,
+    progress: Callable[[Progress], None] | None,
+    **options: Any,
+) -> Snooped:
     """Take gross errors out of a network of any class; see :func:`snoop`."""
     raise InputError(f"snoop takes a Block or a Collection, not {type(network).__name__}")
 
@@ -149,24 +169,18 @@ def settings_of(
     )
 
 
-@of_network.register
+@snooped_network.register
 def _snoop_block(
-    block: Block,
+    network: Block,
+    settings: Settings,
     *,
-    level: float = LEVEL,
-    fdr: float | None = None,
-    unit_weight: str = "known",
-    robust: bool | None = None,
-    parts: bool = True,
-    max_rounds: int = 20,
-    unit_variance: UnitVariance = "constrained",
-    threads: int | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    parts: bool,
+    unit_variance: UnitVariance,
+    threads: int | None,
+    progress: Callable[[Progress], None] | None,
 ) -> Snooped:
-    checked(block)
+    block = checked(network)
     check_cameras(block)
-    settings = settings_of(level, fdr, unit_weight, robust, max_rounds)
-    truth_value("parts", parts)
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
 
     def adjusted(given: Block, **options: Any) -> Result:
@@ -186,52 +200,83 @@ def _snoop_block(
     except (LostSupportError, _photocore.BlockError):
         # It says by name what is not determined, or goes on where points have to leave.
         first = adjusted(block, covariance=False)
-        if not first.converged and robust is not False:
+        if not first.converged and settings.robust is not False:
             first = adjusted(block, covariance=False, loss="huber")
         trial, outcome = _snooped_from(first, settings, threads, parts=parts)
     cleaned, options = _without(block, trial, outcome.out), options_of(unit_variance)
     result = adjusted_from(cleaned, options, threads=threads, progress=progress)
-    said = [*outcome.remarks, *_held(block, outcome, adjusted)]
-    result = dataclasses.replace(result, messages=[*map(Message, said), *result.messages])
-    return Snooped(
-        result=result,
-        outcome=outcome,
-        suspects=trial.suspects,
-        settings=settings,
+    has_held = any(
+        (sd == 0).any() for sd in (block.photo_position_sd, block.photo_attitude_sd, block.point_sd)
+    )
+    return finished(
+        result,
+        trial,
+        outcome,
+        settings,
+        held=lambda: held_tested(adjusted(block)) if has_held else [],
         exchanged=_exchanged(block, trial, outcome, result),
     )
 
 
-def _exchanged(block: Block, trial: NetworkTrial, outcome: Outcome, result: Result) -> tuple[Exchange, ...]:
+def finished(
+    result: AdjustedNetwork,
+    trial: NetworkTrial,
+    outcome: Outcome,
+    settings: Settings,
+    *,
+    held: Callable[[], list[Tested]],
+    exchanged: Iterable[Exchange],
+) -> Snooped:
+    """Return what snooping gives, with what it has to say among the messages of its result.
+
+    Parameters
+    ----------
+    result
+        The adjustment without what is out.
+    trial, outcome, settings
+        What was tried, and what came of it.
+    held
+        Tests what is held in an adjustment of everything: it may explain more than what was taken out.
+    exchanged
+        Names that are exchanged.
+    """
+    largest = max((entry.statistic for entry in outcome.log if entry.is_out), default=math.inf)
+    said = list(outcome.remarks)
+    if not math.isinf(largest):
+        with suppress(AdjustmentError):
+            said += held_remark(held(), largest)
+    return Snooped(
+        result=dataclasses.replace(result, messages=[*map(Message, said), *result.messages]),
+        outcome=outcome,
+        suspects=trial.suspects,
+        settings=settings,
+        exchanged=tuple(exchanged),
+    )
+
+
+def _exchanged(block: Block, trial: NetworkTrial, outcome: Outcome, result: Result) -> list[Exchange]:
     """Find exchanged names among what is out."""
     reached = block.replace(
         photo_positions=result.photo_positions,
         photo_attitudes=result.photo_attitudes,
         cameras=result.block.cameras if not result.cameras else [each.camera for each in result.cameras],
     )
-    return tuple(exchanged_names(reached, used_images(trial, outcome.out, len(block.image_xy))))
+    return exchanged_names(reached, used_images(trial, outcome.out, len(block.image_xy)))
+
+
+def gone(trial: NetworkTrial, out: Out, kind: int) -> tuple[Indices, Indices]:
+    """Return what of a kind is out, row by row: the numbers of the subjects, and their components."""
+    kinds, subjects = trial.core.subjects
+    group = np.repeat(np.arange(len(kinds)), np.diff(trial.core.row_starts))
+    rows = out.rows & (kinds[group] == kind)
+    return subjects[group[rows]], trial.core.components[rows]
 
 
 def used_images(trial: NetworkTrial, out: Out, count: int) -> Bools:
     """(m,) images of a network, so many, that are not out."""
-    kinds, subjects = trial.core.subjects
-    group = np.repeat(np.arange(len(kinds)), np.diff(trial.core.row_starts))
     used = np.ones(count, dtype=bool)
-    used[subjects[group[out.rows & (kinds[group] == IMAGE)]]] = False
+    used[gone(trial, out, IMAGE)[0]] = False
     return used
-
-
-def _held(block: Block, outcome: Outcome, adjusted: Callable[..., Result]) -> list[str]:
-    """Say of what is held that it explains more than what was taken out; see :func:`held_remark`."""
-    largest = max((entry.statistic for entry in outcome.log if entry.is_out), default=math.inf)
-    if math.isinf(largest) or not any(
-        (sd == 0).any() for sd in (block.photo_position_sd, block.photo_attitude_sd, block.point_sd)
-    ):
-        return []
-    try:
-        return held_remark(adjusted(block), largest)
-    except AdjustmentError:
-        return []
 
 
 def _snooped_from(
@@ -287,22 +332,15 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     Points start where their rays meet; what was given of them stays, for check points are compared with it.
     Of control that is out nothing stays: what is taken for a gross error checks nothing.
     """
-    core = trial.core
-    kinds, subjects = core.subjects
-    starts, components = core.row_starts, core.components
-    reached = np.array([values[:6] for values in core.photos])
-    group = np.repeat(np.arange(len(kinds)), np.diff(starts))
-    gone = {kind: out.rows & (kinds[group] == kind) for kind in range(OBSERVATION + 1)}
-    subject = subjects[group]
-    images = np.ones(len(block.image_xy), dtype=bool)
-    images[subject[gone[IMAGE]]] = False
+    reached = np.array([values[:6] for values in trial.core.photos])
+    images = used_images(trial, out, len(block.image_xy))
     point_sd = block.point_sd.copy()
     point_positions = block.point_positions.copy()
-    control = subject[gone[CONTROL]], components[gone[CONTROL]]
+    control = gone(trial, out, CONTROL)
     point_sd[control], point_positions[control] = np.inf, np.nan
     position_sd, attitude_sd = block.photo_position_sd.copy(), block.photo_attitude_sd.copy()
-    position_sd[subject[gone[POSITION]], components[gone[POSITION]]] = np.inf
-    attitude_sd[subject[gone[ATTITUDE]], components[gone[ATTITUDE]]] = np.inf
+    position_sd[gone(trial, out, POSITION)] = np.inf
+    attitude_sd[gone(trial, out, ATTITUDE)] = np.inf
     # Nothing is left that determines them: they stay where they are.
     alone = sorted(out.photos)
     position_sd[alone], attitude_sd[alone] = 0.0, 0.0
@@ -311,7 +349,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
         for own, _ in observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
         for row in own
     ]
-    dropped = {rows[index] for index in subject[gone[OBSERVATION]].tolist()}
+    dropped = {rows[index] for index in gone(trial, out, OBSERVATION)[0].tolist()}
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
     return block.replace(
         photo_positions=np.where(position_sd == 0, block.photo_positions, reached[:, :3]),

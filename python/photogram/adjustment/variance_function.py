@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.adjustment.components import Weighing, weighing
+from photogram.adjustment.components import Weighing
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shaped, shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.results.group_sums import Probing, group_sums, observables
+from photogram.results.group_sums import Probing, factored, group_sums, observables
 from photogram.results.grouping import Grouping
 from photogram.results.network import AdjustedNetwork
 from photogram.results.variance_function import Bin, VarianceFunction
@@ -28,8 +28,8 @@ TOLERANCE = 1e-6
 class _Left:
     """What an adjustment leaves of image coordinates."""
 
-    def __init__(self, own: Weighing, result: AdjustedNetwork, probing: Probing) -> None:
-        self._own, self._probing = own, probing
+    def __init__(self, result: AdjustedNetwork, probing: Probing) -> None:
+        self._result, self._probing = result, probing
         with np.errstate(invalid="ignore"):
             self.squares: Floats = ((result.residuals / result.image_given_sd) ** 2).ravel()
         self.redundancy: Floats = np.nan_to_num(result.redundancy).ravel()
@@ -37,17 +37,17 @@ class _Left:
     def information(self, terms: Floats) -> Floats:
         """Return (t, t) sums of R_ij^2 c_i c_j^T, by random signs."""
         rows, count = terms.shape
-        factored = self._own.factored()
+        factor = factored(self._result)
         options = self._probing.options(rows)
         if rows <= options["exact"]:
             columns = np.eye(rows).reshape(rows, -1, 2)
-            projected = factored.project_images(columns, threads=0, progress=None).reshape(rows, rows)
+            projected = factor.project_images(columns, threads=0, progress=None).reshape(rows, rows)
             return np.asarray(terms.T @ projected**2 @ terms)
         signs = np.random.default_rng(options["seed"]).choice([-1.0, 1.0], (options["vectors"], rows))
         found = np.empty((count, count))
         for k in range(count):
             columns = (signs * np.sqrt(terms[:, k])).reshape(len(signs), -1, 2)
-            projected = factored.project_images(columns, threads=0, progress=None).reshape(len(signs), rows)
+            projected = factor.project_images(columns, threads=0, progress=None).reshape(len(signs), rows)
             found[:, k] = (projected**2).mean(axis=0) @ terms
         return (found + found.T) / 2
 
@@ -96,8 +96,8 @@ def variance_function(
     if bins < 2 or max_steps < 1:
         raise InputError("there must be two bins and one step at least")
     seen = observables(network)
-    images = len(seen.image_photos)
-    own = weighing(network, threads=threads, tolerance=TOLERANCE)
+    images = len(seen.given.image_photos)
+    own = Weighing(network, threads=threads, tolerance=TOLERANCE)
     values = _values(own, of, center, images)
     used = own.first.used_images
     largest = float(values[used].max(initial=0.0))
@@ -105,14 +105,16 @@ def variance_function(
         raise InputError("the values are all zero, or there are no redundancy numbers")
     share = np.repeat((values / largest) ** 2, 2)
     terms = np.stack([np.ones(2 * images), share], axis=1)
-    grouping = _each(seen.point_observed.shape, seen.photo_observed.shape, len(seen.observations), images)
+    grouping = _each(
+        seen.point_observed.shape, seen.photo_observed.shape, len(seen.given.observations), images
+    )
     first = True
 
     def adjusted(factors: Floats) -> _Left:
         nonlocal first
         result = own.first if first else own.adjust(grouping, factors)
         first = False
-        return _Left(own, result, probing)
+        return _Left(result, probing)
 
     found = estimate_function(adjusted, terms, max_steps=max_steps)
     shown_bins = _bins(own.result, values, found.factors.reshape(-1, 2)[:, 0], bins, probing)

@@ -140,10 +140,10 @@ def collection(
     if out is not None and out.suffix in (".txt", *PACKED) and not out.exists():
         raise typer.BadParameter("names a directory; adjusted.txt goes there", param_hint="--out")
     with job:
+        from photogram.adjustment import snooping
         from photogram.collection import AdjustedCollection, adjust, to_bytes
         from photogram.collection.formats import recognised
         from photogram.collection.report import summary
-        from photogram.collection.snooping import snoop_collection
         from photogram.show.ways import page_of
 
         if problem is None:
@@ -174,7 +174,7 @@ def collection(
                 options |= {"level": level, "fdr": fdr, "unit_weight": unit_weight.value}
                 if components:
                     made = cleaned(photos, components, options.pop("threads"), options)
-                log = made.snooped if made else snoop_collection(photos, **options)
+                log = made.snooped if made else snooping.snoop(photos, **options)
                 if not isinstance(log.result, AdjustedCollection):
                     raise TypeError("a collection gives the result of a collection")
                 result = log.result

@@ -22,20 +22,21 @@ __all__ = [
 check_arguments(globals(), set(__all__) - {"AdjustedCollection", "PARAMETERS", "Simulation"})
 
 WAYS = {
+    "adjusted_again": ("adjust",),
     "check_of": ("checking",),
     "columns_of": ("tables",),
+    "core_network": ("core",),
     "determined": ("weakest",),
     "document_of": ("document",),
-    "factored": ("components",),
     "files_of": ("saved",),
     "findings_of": ("findings",),
+    "first_adjusted": ("components",),
     "observables": ("components",),
-    "of_network": ("snooping",),
     "page_of": ("page",),
     "pictured": ("pictured",),
     "report_of": ("report",),
     "scaled": ("components",),
-    "weighing": ("components",),
+    "snooped_network": ("snooping",),
     "terms_of": ("tables",),
 }
 """The files that show results and work on collections, by the names of ways: see `photogram.show.ways`."""

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import Ordering, Progress, core_threads, teller
+from photogram.adjustment.adjustment import (
+    Ordering,
+    Progress,
+    adjusted_again,
+    check_iteration,
+    core_threads,
+    teller,
+)
 from photogram.adjustment.ends import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
-from photogram.collection.core import CollectionOptions, collection_network
+from photogram.collection.core import collection_network
 from photogram.collection.failures import named
-from photogram.errors import InputError
 from photogram.messages import Message, Undetermined, listed
+from photogram.network.core import CoreOptions
 
 __all__ = ["adjust", "adjusted"]
 
@@ -90,21 +96,40 @@ def adjust(
     KeyboardInterrupt
         Ctrl-C.
     """
-    if ordering not in get_args(Ordering):
-        raise InputError(f"ordering is one of {', '.join(get_args(Ordering))}, not {ordering!r}")
-    if max_iterations < 1:
-        raise InputError("there must be one iteration at least")
     if tolerance is None:
         tolerance = 1e-8 if loss is None else 1e-6
-    if not tolerance > 0:
-        raise InputError("the criterion of convergence must be positive")
-    options = CollectionOptions(tolerance, max_iterations, covariance, loss_row(loss, scale), ordering)
+    check_iteration(ordering, max_iterations, tolerance)
+    options = options_of(
+        tolerance, max_iterations, covariance=covariance, loss=loss_row(loss, scale), ordering=ordering
+    )
     return adjusted(collection, options, threads=threads, progress=progress)
+
+
+def options_of(
+    decrease: float,
+    max_iterations: int = 200,
+    *,
+    covariance: bool = True,
+    loss: tuple[str, float] | None = None,
+    ordering: str = "auto",
+) -> CoreOptions:
+    """Return how the core adjusts a collection: until a step lowers what is minimised by a small part."""
+    return CoreOptions(
+        criterion="decrease",
+        limit=decrease,
+        max_iterations=max_iterations,
+        covariance=covariance,
+        loss=loss,
+        ordering=ordering,
+        unit_variance="constrained",
+        minimum=None,
+        points_given=True,
+    )
 
 
 def adjusted(
     collection: Collection,
-    options: CollectionOptions,
+    options: CoreOptions,
     *,
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -127,6 +152,13 @@ def adjusted(
         options=options,
         state=solution.state,
     )
+
+
+@adjusted_again.register
+def _(
+    block: Collection, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
+) -> AdjustedCollection:
+    return adjusted(block, options, threads=threads, start=start)
 
 
 def _messages(solution: _photocore.CollectionSolution, collection: Collection) -> list[Message]:

@@ -9,15 +9,14 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
-from photogram.collection.core import CollectionOptions, collection_network
+from photogram.collection.core import collection_network
 from photogram.collection.failures import named
 from photogram.collection.suspects import collection_trial
-from photogram.results.covariance import Covariances
+from photogram.results.covariance import Failure
 from photogram.results.network import AdjustedNetwork
-from photogram.results.selection import Adjusted
+from photogram.results.selection import Adjusted, Things
 
 if TYPE_CHECKING:
-    from photogram import _photocore
     from photogram.results.network_trial import NetworkTrial
 
 __all__ = ["AdjustedCollection"]
@@ -30,7 +29,9 @@ POSE = 6
 class AdjustedCollection(AdjustedNetwork):
     """An adjusted collection; the arrays that every network has are those of `AdjustedNetwork`.
 
-    The k unknowns of a photo are its parameters in the collection. Cofactors hold for the datum that the
+    The k unknowns of a photo are its parameters in the collection. Of covariances kinds are `photo` (all
+    parameters), `pose` and `camera` (its first six, the others) and `point`; photos and points are called by
+    their numbers: `("photo", 3)`, `("point", [7, 8])`. Cofactors hold for the datum that the
     observations and weights give; where these give none, for that of the held parameters in `datum`.
 
     Attributes
@@ -47,8 +48,6 @@ class AdjustedCollection(AdjustedNetwork):
         (n,) how many image points have the point behind the camera.
     datum
         Photos and parameters that were held to give the cofactors a datum.
-    options, state
-        How the core adjusted the collection, and where that ended.
     """
 
     collection: Collection
@@ -57,8 +56,6 @@ class AdjustedCollection(AdjustedNetwork):
     photo_images: Indices
     point_rays_behind: Indices
     datum: list[tuple[int, str]]
-    options: CollectionOptions
-    state: _photocore.BlockState
 
     KNOWN: ClassVar[bool] = False
 
@@ -67,24 +64,20 @@ class AdjustedCollection(AdjustedNetwork):
         return "collection"
 
     @property
-    def _image_unit(self) -> str:
-        return "px"
+    def given(self) -> Collection:
+        """What was adjusted: the collection."""
+        return self.collection
+
+    @property
+    def sum_and_freedom(self) -> tuple[float, float]:
+        """The weighted sum of squares of all observations, and its degrees of freedom."""
+        return self.weighted_sum_of_squares, self.degrees_of_freedom
 
     @property
     def cost(self) -> float:
         """Half the sum that was minimised, at the adjusted values."""
         last = self.iterations[-1].weighted_sum_of_squares if self.iterations else None
         return 0.5 * (self.initial_weighted_sum_of_squares if last is None else last)
-
-    @property
-    def image_points(self) -> Indices:
-        """(m,) the point of each image."""
-        return self.collection.image_points
-
-    @property
-    def image_given_sd(self) -> Floats:
-        """(m, 2) standard deviations a priori of the image coordinates."""
-        return self.collection.image_sd
 
     @property
     def photo_given_sd(self) -> Floats:
@@ -98,33 +91,21 @@ class AdjustedCollection(AdjustedNetwork):
         return np.where(np.isfinite(self.photo_given_sd), residuals, np.nan)
 
     @property
-    def point_given_sd(self) -> Floats:
-        """(n, 3) standard deviations of given coordinates as observations: infinite free, zero fixed."""
-        return self.collection.point_sd
-
-    @property
     def point_residuals(self) -> Floats:
         """(n, 3) given minus adjusted coordinates; 0 where fixed, NaN where free."""
         residuals = self.collection.point_positions - self.point_positions
         return np.where(np.isfinite(self.point_given_sd), residuals, np.nan)
 
-    def covariances(self) -> Covariances:
-        """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`.
+    def _adjusted(self) -> Adjusted:
+        return _selectable(self)
 
-        Kinds are `photo` (all parameters), `pose` and `camera` (its first six, the others) and `point`.
-        Photos and points are called by their numbers: `("photo", 3)`, `("point", [7, 8])`.
-        """
-        network = collection_network(self.collection, self.options)
-        return Covariances(
-            _selectable(self),
-            lambda: network.covariances(self.state, threads=0, progress=None),
-            lambda error: named(*error.args),
-            self.covariance_scale,
-        )
+    def _refused(self, error: Failure) -> Exception:
+        return named(*error.args)
 
     def _trial(self) -> NetworkTrial:
         options = replace(self.options, covariance=True, loss=None)
-        return collection_trial(self.collection, options, self.state)
+        core = collection_network(self.collection, options).trial(self.state, threads=0)
+        return collection_trial(self.collection, core)
 
     def adjusted(self) -> Collection:
         """Return the collection at its adjusted values; points that were left out stay as they were."""
@@ -136,31 +117,17 @@ class AdjustedCollection(AdjustedNetwork):
 
 def _selectable(result: AdjustedCollection) -> Adjusted:
     """Return the adjusted values of a collection by kinds and numbers."""
-    names = result.collection.parameters
-    photos, points = (
-        [str(each) for each in range(len(of))] for of in (result.photo_images, result.point_rays)
-    )
-    values, sd = result.photo_parameters, result.photo_sd
+    names, photos, points = result.collection.parameters, result.given.photo_ids, result.given.point_ids
+    values, sd, count = result.photo_parameters, result.photo_sd, len(photos)
+    pose, camera = slice(0, POSE), slice(POSE, None)
+    places = [("X", "Y", "Z")] * len(points)
     return Adjusted(
         network="collection",
-        ids={"photo": photos, "pose": photos, "camera": photos, "point": points},
-        components={
-            "photo": [names] * len(photos),
-            "pose": [names[:POSE]] * len(photos),
-            "camera": [names[POSE:]] * len(photos),
-            "point": [("X", "Y", "Z")] * len(points),
+        things={
+            "photo": Things(photos, [names] * count, values, sd, ("photo", "camera")),
+            "pose": Things(photos, [names[pose]] * count, values[:, pose], sd[:, pose], ("photo",)),
+            "camera": Things(photos, [names[camera]] * count, values[:, camera], sd[:, camera]),
+            "point": Things(points, places, result.point_positions, result.point_sd),
         },
-        values={
-            "photo": values,
-            "pose": values[:, :POSE],
-            "camera": values[:, POSE:],
-            "point": result.point_positions,
-        },
-        sd={"photo": sd, "pose": sd[:, :POSE], "camera": sd[:, POSE:], "point": result.point_sd},
-        parts={"photo": ("photo", "camera"), "pose": ("photo",)},
         numbered=True,
     )
-
-
-CollectionSolution = AdjustedCollection
-"""The name that its arrays had when they were a class of their own."""

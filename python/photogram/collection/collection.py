@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -13,6 +14,8 @@ from photogram.arguments.arrays import indices, shaped
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.network.observations import Observation
+from photogram.network.tables import numbered
 from photogram.show.brief import Brief, Rows
 
 __all__ = ["PARAMETERS", "Collection"]
@@ -121,6 +124,31 @@ class Collection(Valued, Brief):
             ),
             ("camera", f"{self.camera}: {', '.join(self.parameters[len(POSE) :])}"),
         ]
+
+    @cached_property
+    def photo_ids(self) -> list[str]:
+        """P names: the numbers of the photos, from 0."""
+        return numbered(len(self.photo_parameters))
+
+    @cached_property
+    def point_ids(self) -> list[str]:
+        """N names: the numbers of the points, from 0."""
+        return numbered(len(self.point_positions))
+
+    @property
+    def observations(self) -> tuple[Observation, ...]:
+        """What else was observed: nothing."""
+        return ()
+
+    @property
+    def image_unit(self) -> str:
+        """What image coordinates are measured in: `px`."""
+        return "px"
+
+    @property
+    def geographic(self) -> bool:
+        """Whether positions are longitude, latitude and height: never."""
+        return False
 
     @property
     def _model(self) -> tuple[str, list[tuple[str, int]], int, str, str]:

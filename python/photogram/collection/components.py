@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from photogram import _photocore
-from photogram.adjustment.components import Weighing, scaled, weighing
+from photogram.adjustment.components import first_adjusted, scaled
 from photogram.arguments.types import Floats
-from photogram.collection.adjust import adjusted
+from photogram.collection.adjust import adjusted, options_of
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
-from photogram.collection.core import CollectionOptions, collection_network
-from photogram.results.group_sums import factored, observables
+from photogram.results.group_sums import observables
 from photogram.results.grouping import Grouping, Observables
 
 __all__: list[str] = []
 
 DECREASE = 1e-12
 """Part of the sum of squares by which steps still lower it: components want adjustments that are sharp."""
-_OPTIONS = CollectionOptions(DECREASE, 200, covariance=True, loss=None, ordering="auto")
 
 
 @observables.register
@@ -28,35 +23,17 @@ def collection_observables(collection: Collection) -> Observables:
     """Return what a collection has observations of: photos and points are called by their numbers."""
     photos = len(collection.photo_parameters)
     sd, point_sd = collection.photo_sd, collection.point_sd
-    names = [str(photo) for photo in range(photos)]
     return Observables(
-        image_photos=collection.image_photos,
-        image_points=collection.image_points,
-        photo_names=names,
+        given=collection,
         photo_cameras=np.arange(photos),
-        camera_names=names,
+        camera_names=collection.photo_ids,
         strips=lambda: [np.arange(photos)],
         point_classes=np.where(np.isfinite(point_sd).any(axis=1), "control", "pass"),
-        point_observed=(point_sd > 0) & np.isfinite(point_sd),
         # The core has parameters of cameras apart; they keep their weights.
         photo_observed=(sd > 0) & np.isfinite(sd) & (np.arange(sd.shape[1]) < 6),
         stations=("rotations",) * 3 + ("translations",) * 3 + ("cameras",) * (sd.shape[1] - 6),
-        observations=[],
         commons=0,
-        cameras=photos,
     )
-
-
-@observables.register
-def _(result: AdjustedCollection) -> Observables:
-    return collection_observables(result.collection)
-
-
-@factored.register
-def _(result: AdjustedCollection) -> _photocore.BlockCovariances:
-    options = replace(_OPTIONS, ordering=result.ordering, loss=result.loss)
-    network = collection_network(result.collection, options)
-    return network.covariances(result.state, threads=0, progress=None)
 
 
 @scaled.register
@@ -70,27 +47,7 @@ def scaled_collection(collection: Collection, grouping: Grouping, factors: Float
     )
 
 
-class _Collection(Weighing):
-    result: AdjustedCollection
-
-    def __init__(self, collection: Collection, threads: int | None) -> None:
-        self.given = self.network = collection
-        self.threads = threads
-        self.result = self.first = adjusted(collection, _OPTIONS, threads=threads)
-
-    def adjust(self, grouping: Grouping, factors: Floats) -> AdjustedCollection:
-        self.network = scaled_collection(self.given, grouping, factors)
-        self.result = adjusted(self.network, _OPTIONS, threads=self.threads, start=self.result.state)
-        return self.result
-
-    def total(self) -> tuple[float, float]:
-        return float(self.result.degrees_of_freedom), self.result.weighted_sum_of_squares
-
-    def factored(self) -> _photocore.BlockCovariances:
-        return factored(self.result)
-
-
-@weighing.register
-def _(network: Collection, *, threads: int | None, tolerance: float) -> Weighing:
+@first_adjusted.register
+def _(network: Collection, *, tolerance: float, threads: int | None) -> AdjustedCollection:
     del tolerance
-    return _Collection(network, threads)
+    return adjusted(network, options_of(DECREASE), threads=threads)

@@ -5,12 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.tables import collection_photos, costs
 from photogram.io import json
 from photogram.results.document import network_members
-from photogram.results.network_tables import images, points
-from photogram.results.weakest import weakest_photos, weakest_points
-from photogram.show.quantity import Quantity, records
 from photogram.show.ways import document_of
 
 __all__ = ["to_json"]
@@ -42,18 +38,10 @@ def _document(result: AdjustedCollection) -> dict[str, Any]:
         },
         "initial_cost": 0.5 * result.initial_weighted_sum_of_squares,
         "cost": result.cost,
-        "iterations": records(costs(result))[1:],
         "weighted_sum_of_squares": result.weighted_sum_of_squares,
-        "weakest": {
-            "points": [vars(each) | {"point": int(each.point)} for each in weakest_points(result)],
-            "photos": [vars(each) | {"photo": int(each.photo)} for each in weakest_photos(result)],
-        },
         "datum": [{"photo": photo, "parameter": parameter} for photo, parameter in result.datum],
         "camera": result.collection.camera,
         "parameters": result.collection.parameters,
-        "photos": _photos(result),
-        "points": _points(result),
-        "observations": _observations(result),
     }
 
 
@@ -68,18 +56,3 @@ def _units(result: AdjustedCollection) -> dict[str, str]:
         ", ".join([*lengths, "residual_px"]): "pixel",
         **({", ".join(plain): "1"} if plain else {}),
     }
-
-
-def _photos(result: AdjustedCollection) -> list[dict[str, Any]]:
-    return records([*collection_photos(result), Quantity(result.photo_covariances, member="covariance")])
-
-
-def _points(result: AdjustedCollection) -> list[dict[str, Any]]:
-    covariances = Quantity(result.point_covariances[result.used_points], member="covariance")
-    return records([*points(result), covariances])
-
-
-def _observations(result: AdjustedCollection) -> list[dict[str, Any]]:
-    return records(
-        [*images(result), Quantity(result.image_weights[result.used_images], member="weight_factor")]
-    )

@@ -8,9 +8,8 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import POSE
-from photogram.results.held import SUSPECTED, Held, held_tests, is_suspected
+from photogram.results.held import SUSPECTED, Held, held_tests
 from photogram.statistics.findings import Tested
-from photogram.statistics.limits import global_test
 
 __all__ = ["collection_held"]
 
@@ -23,18 +22,12 @@ POINTS = 3
 
 def collection_held(result: AdjustedCollection) -> list[Tested]:
     """Return tests of the held parameters and points with the worst images, where residuals are too large."""
-    test = global_test(result.weighted_sum_of_squares, result.degrees_of_freedom)
-    if result.loss or not is_suspected(result, test):
-        return []
-    suspected = _suspected(result)
-    return held_tests(result, suspected, result.collection.image_sd, _partials(result)) if suspected else []
+    return held_tests(result, lambda of_images: _suspected(result, of_images), lambda: _partials(result))
 
 
-def _suspected(result: AdjustedCollection) -> list[Held]:
+def _suspected(result: AdjustedCollection, of_images: Floats) -> list[Held]:
     """Return what is held and has the worst images, the worst first."""
     collection, used = result.collection, result.used_images
-    squares = np.where(used[:, np.newaxis], result.residuals / collection.image_sd, 0.0) ** 2
-    of_images = squares.sum(axis=1)
     rows: list[tuple[float, Held]] = []
 
     def add(name: str, own: Indices, which: int, partials: Indices) -> None:

@@ -5,16 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.findings import tested_observations
-from photogram.collection.report import problems_of, size_of
-from photogram.results.network_tables import control, points, stations
-from photogram.results.page.parts import highlights, network_sections, size_section
+from photogram.collection.report import size_of
+from photogram.results.page.parts import network_page, size_section
 from photogram.results.page.pictures import drawings
-from photogram.results.page.tables import observed_table
-from photogram.show.judgement import judged
+from photogram.results.page.tables import control_section, stations_section
 from photogram.show.page import Fact, Page, Section, significant
 from photogram.show.ways import page_of
-from photogram.statistics.findings import by_t
 
 __all__ = ["collection_page"]
 
@@ -23,26 +19,14 @@ __all__ = ["collection_page"]
 @np.errstate(over="ignore", invalid="ignore")
 def collection_page(result: AdjustedCollection) -> Page:
     """Return the report of an adjusted collection for the browser."""
-    omega, freedom = result.weighted_sum_of_squares, result.degrees_of_freedom
-    groups = [by_t(each, omega, freedom) for each in tested_observations(result)]
     pictures = drawings(result)
     cameras = Section("cameras", "Cameras", [pictures[name] for name in ("distortion", "correlations")])
-    sections = network_sections(
+    return network_page(
         result,
-        groups,
+        "Adjustment of a collection of photos",
         _size_section(result),
-        [_weighted_section(result), cameras],
-        points(result),
-        problems_of(result),
-    )
-    return Page(
-        what="Adjustment of a collection of photos",
-        title="",
-        judgements=[judged(result.verdict)],
-        advice=result.verdict.next,
-        highlights=highlights(result, int(np.count_nonzero(result.photo_images))),
-        sections=sections,
-        phases=result.seconds,
+        [control_section(result), stations_section(result), cameras],
+        photos=int(np.count_nonzero(result.photo_images)),
     )
 
 
@@ -61,12 +45,3 @@ def _size_section(result: AdjustedCollection) -> Section:
         Fact("Variance of unit weight", f"{variance:.6f}" if variance is not None else "undefined"),
     ]
     return size_section(result, size_of(result), more, good)
-
-
-def _weighted_section(result: AdjustedCollection) -> Section:
-    of_points, of_photos = "Weighted and fixed points", "Weighted and fixed parameters of photos"
-    tables = [
-        *observed_table(of_points, control(result), result.control, result.point_sd),
-        *observed_table(of_photos, stations(result), result.stations, result.photo_sd),
-    ]
-    return Section("weighted", "Given values as observations", tables)

@@ -10,11 +10,10 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import POSE
-from photogram.collection.findings import names, tested_observations
 from photogram.network.cameras import Camera
-from photogram.plots.pictured import Correlated, Curve, Curves, Images, Pictured, Plan, pictured
-from photogram.results.distortion import RADIAL, added_along, radial_part
-from photogram.statistics.outliers import Observations
+from photogram.plots.pictured import Correlated, Curve, Curves, Pictured, Plan, pictured
+from photogram.results.distortion import RADIAL, added_along, curve_deviations, radial_curve, radial_part
+from photogram.results.pictured import PicturedNetwork
 
 __all__ = ["PicturedCollection"]
 
@@ -26,7 +25,7 @@ SHOWN = 60
 """Photos whose own curves are drawn at most."""
 
 
-class PicturedCollection(Pictured):
+class PicturedCollection(PicturedNetwork):
     """What is drawn of an adjusted collection, whose photos have cameras of their own.
 
     Parameters
@@ -34,6 +33,8 @@ class PicturedCollection(Pictured):
     result
         The adjusted collection.
     """
+
+    result: AdjustedCollection
 
     def __init__(self, result: AdjustedCollection) -> None:
         self.result = result
@@ -47,16 +48,15 @@ class PicturedCollection(Pictured):
     def plan(self) -> Plan:
         """The network; a photo with P = R X + t stands at -R' t."""
         result = self.result
-        photos, points = names(result)
         rotations = _photocore.vector_rotations(np.ascontiguousarray(result.photo_parameters[:, :3]))
         used = result.used_points
         given = np.isfinite(result.point_given_sd).any(axis=1) & used
         return Plan(
             axes=("X", "Y", "Z"),
             unit="",
-            photo_ids=photos,
+            photo_ids=result.given.photo_ids,
             photos=-np.einsum("pji,pj->pi", rotations, result.photo_parameters[:, 3:6]),
-            point_ids=points,
+            point_ids=result.given.point_ids,
             points=np.where(used[:, np.newaxis], result.point_positions, np.nan),
             rays=result.point_rays,
             kinds=np.where(given, "control", "pass"),
@@ -72,33 +72,12 @@ class PicturedCollection(Pictured):
         """None: nothing says which way is up."""
         return np.empty((0, 1, 3))
 
-    @cached_property
-    def images(self) -> Images:
-        """The image observations that took part, in one frame for the cameras of all photos."""
-        result, collection = self.result, self.result.collection
-        used = result.used_images
-        camera = self._camera(0)
-        return Images(
-            unit="px",
-            photos=collection.image_photos[used],
-            points=collection.image_points[used],
-            xy=collection.image_xy[used],
-            residuals=result.residuals[used],
-            redundancy=result.redundancy[used],
-            cameras=np.zeros(int(used.sum()), dtype=np.int64),
-            names=[f"cameras of all {len(result.photo_parameters)} photos"],
-            down=camera.image_y == "down",
-        )
-
     @property
-    def tested(self) -> list[Observations]:
-        """All observations with their standardized residuals."""
-        return tested_observations(self.result)
-
-    @property
-    def unit_weight(self) -> float:
-        """The root of the variance of unit weight."""
-        return float(np.sqrt(self.result.covariance_scale))
+    def cameras(self) -> tuple[Indices, list[str], bool]:
+        """One frame for the cameras of all photos."""
+        photos = len(self.result.photo_parameters)
+        together = np.zeros(photos, dtype=np.int64)
+        return together, [f"cameras of all {photos} photos"], self._camera(0).image_y == "down"
 
     @property
     def correlations(self) -> list[Correlated]:
@@ -121,11 +100,11 @@ class PicturedCollection(Pictured):
     def distortion(self) -> list[Curves]:
         """One set of curves: of some photos faintly, and that of the photo whose distortion is the middle."""
         result = self.result
-        model = result.collection.camera
-        terms = [k for k, name in enumerate(result.collection.parameters) if RADIAL.fullmatch(name)]
-        terms = [k for k in terms if k >= len(POSE)]
+        model, values = result.collection.camera, result.photo_parameters[:, len(POSE) :]
+        names = result.collection.parameters[len(POSE) :]
+        terms = [k for k, name in enumerate(names) if RADIAL.fullmatch(name)]
         used = np.flatnonzero(result.photo_images > 0)
-        if not terms or not len(used) or not result.photo_parameters[:, terms].any():
+        if not terms or not len(used) or not values[:, terms].any():
             return []
         radii = np.linspace(0.0, BEYOND * self._reach, ROWS)
         chosen = used[:: -(-len(used) // SHOWN)]
@@ -136,7 +115,10 @@ class PicturedCollection(Pictured):
         chosen, curves = chosen[good], curves[good]
         middle = int(np.argsort(curves[:, -1])[len(curves) // 2])
         photo = int(chosen[middle])
-        band = self._band(photo, terms, radii)
+        own = slice(len(POSE), None)
+        covariance = result.photo_covariances[photo][own, own]
+        _, partials = radial_curve(self._camera(photo), result.photo_sd[photo, own], terms, radii)
+        band = curve_deviations(covariance, terms, partials)
         return [
             Curves(
                 camera=f"{len(chosen)} of {len(used)} photos ({model}); black: photo {photo}, their middle",
@@ -160,25 +142,6 @@ class PicturedCollection(Pictured):
         values = self.result.photo_parameters[photo, len(POSE) :].tolist()
         given = dict(zip(collection.parameters[len(POSE) :], values, strict=True))
         return radial_part(Camera(collection.camera, given))
-
-    def _band(self, photo: int, terms: list[int], radii: Floats) -> Floats:
-        """Return (r,) standard deviations of the curve of a photo, its focal length known."""
-        camera = self._camera(photo)
-        terms_by_name = [self.result.collection.parameters[k] for k in terms]
-        covariance = self.result.photo_covariances[photo][np.ix_(terms, terms)]
-        partials = np.empty((len(radii), len(terms)))
-        for column, (name, variance) in enumerate(zip(terms_by_name, np.diag(covariance), strict=True)):
-            value = camera.parameters[name]
-            step = 0.01 * (np.sqrt(variance) if variance > 0 else 1.0)
-            upper, lower = (
-                added_along(
-                    camera.replace(parameters={**camera.parameters, name: value + sign * step}), radii
-                )
-                for sign in (1, -1)
-            )
-            partials[:, column] = (upper - lower) / (2 * step)
-        variances = np.einsum("ni,ij,nj->n", partials, covariance, partials)
-        return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
 
 @pictured.register(AdjustedCollection)

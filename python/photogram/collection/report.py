@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.findings import tested_observations
-from photogram.collection.tables import collection_photos, costs
-from photogram.results.network_tables import control, stations
-from photogram.results.observed import NOTABLE, image_lines, observed_lines, suspect_lines
+from photogram.results.iteration import iteration_lines
+from photogram.results.network_tables import control, iterations, photos, stations
+from photogram.results.observed import image_lines, observed_lines
+from photogram.results.report import first_sections, reliability_lines, suspects_section
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, table_lines
-from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
+from photogram.show.sections import Section, composed, headline
 from photogram.show.ways import report_of
-from photogram.statistics.limits import externally_studentized, global_test, studentized_limit
-from photogram.statistics.outliers import outliers
 
-__all__ = ["problems_of", "report", "size_of", "summary"]
+__all__ = ["report", "size_of", "summary"]
 
 
 @report_of.register(AdjustedCollection)
@@ -27,8 +24,8 @@ def report(result: AdjustedCollection) -> str:
     """Return the report of an adjusted collection."""
     sections = [
         *summary(result),
-        ("Reliability", _reliability(result)),
-        ("Iterations", _iterations(result)),
+        ("Reliability", reliability_lines(result, "")),
+        ("Iterations", iteration_lines(iterations(result), ".6f")),
         (
             "Weighted and fixed points: adjusted minus given, redundancy, standardized difference",
             observed_lines(control(result), "point"),
@@ -48,41 +45,7 @@ def report(result: AdjustedCollection) -> str:
 
 def summary(result: AdjustedCollection) -> list[Section]:
     """Return what a reader wants first, as titled sections: verdict, problems, adjustment, suspects."""
-    return [
-        *verdict_sections(result.verdict),
-        ("Problems", problems_or_none(problems_of(result), result.verdict)),
-        ("Adjustment", _adjustment(result)),
-        (
-            f"Image coordinates with |t| > {NOTABLE:g} (externally studentized), largest first",
-            _suspects(result),
-        ),
-    ]
-
-
-def _reliability(result: AdjustedCollection) -> list[str]:
-    summary = result.reliability_summary
-    return [] if summary is None else summary.lines("")
-
-
-def problems_of(result: AdjustedCollection) -> list[str]:
-    """Return a failed test and outliers before other remarks.
-
-    Standard deviations of pixels are guesses: single residuals are tested against all others.
-    """
-    omega, freedom = result.weighted_sum_of_squares, result.degrees_of_freedom
-    groups = [
-        replace(each, values=externally_studentized(each.values, omega, freedom))
-        for each in tested_observations(result)
-    ]
-    found = outliers(
-        groups, lambda tests: studentized_limit(freedom, tests), "externally studentized residuals"
-    )
-    return problems(
-        [*found, *result.messages],
-        result.status,
-        result.variance_of_unit_weight,
-        global_test(omega, freedom),
-    )
+    return [*first_sections(result, _adjustment(result)), suspects_section(result)]
 
 
 def _adjustment(result: AdjustedCollection) -> list[str]:
@@ -118,25 +81,8 @@ def size_of(result: AdjustedCollection) -> list[tuple[str, str]]:
     return [(name, f"{np.count_nonzero(used)} used of {len(used)}") for name, used in counts.items()]
 
 
-def _suspects(result: AdjustedCollection) -> list[str]:
-    """List the image coordinates that fit worst, in units of what the others have."""
-    t = externally_studentized(result.standardized, result.weighted_sum_of_squares, result.degrees_of_freedom)
-    return suspect_lines(result, t, "t")
-
-
-def _iterations(result: AdjustedCollection) -> list[str]:
-    number, cost, damping = costs(result)
-    return table_lines(
-        [
-            *field(number, 4, ".0f", "no."),
-            *field(cost, 16, ".6e", "cost"),
-            *field(damping, 10, ".1e", "damping"),
-        ]
-    )
-
-
 def _photos(result: AdjustedCollection) -> list[str]:
-    own, count, values, sd = collection_photos(result)
+    own, count, values, sd = photos(result)
     rows = [[*field(own, 10, head="photo"), *field(count, 6, ".0f", "images"), *field(values, 14, ".6g")]]
     if np.isfinite(sd.values).any():
         rows.append([Field("", [f"{'sd':<16}"] * len(own.values)), *field(sd, 14, ".2g", "")])

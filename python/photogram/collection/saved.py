@@ -10,13 +10,13 @@ import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
-from photogram.collection.core import CollectionOptions
-from photogram.collection.tables import TABLES
 from photogram.io.parquet import Column
 from photogram.io.writing import Content
 from photogram.messages import Message
+from photogram.network.core import CoreOptions
 from photogram.network.frame import Frame
 from photogram.results.iteration import Iteration
+from photogram.results.network_tables import TABLES
 from photogram.results.saved import (
     GIVEN_SD,
     REDUNDANCY,
@@ -66,7 +66,7 @@ def read_collection_result(folder: Path, document: Mapping[str, Any]) -> Adjuste
     InputError
         Files that are missing, damaged or contradict each other.
     """
-    saved = read_saved(folder, (CollectionOptions, Iteration, Message), document)
+    saved = read_saved(folder, (CoreOptions, Iteration, Message), document)
     given = saved.members("collection", Collection)
     images = saved.sheets["images"]
     for kind in ("photo", "point"):

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,28 +11,26 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, core_threads
 from photogram.adjustment.robust import Loss, loss_row
-from photogram.adjustment.snooping import of_network, settings_of, used_images
-from photogram.arguments.arrays import one_of, truth_value
+from photogram.adjustment.snooping import finished, gone, snooped_network, used_images
+from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjust import adjust, adjusted
-from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.adjusted import POSE, AdjustedCollection
 from photogram.collection.as_block import as_block
 from photogram.collection.collection import Collection
-from photogram.collection.core import CollectionOptions, collection_network
+from photogram.collection.core import collection_network
 from photogram.collection.held import collection_held
 from photogram.collection.suspects import collection_trial
 from photogram.errors import AdjustmentError
-from photogram.messages import Message
+from photogram.network.core import CoreOptions
 from photogram.results.exchanged import exchanged_names
-from photogram.results.held import remark_on
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, NetworkTrial
 from photogram.results.snooped import Snooped
-from photogram.statistics.distributions import LEVEL
 from photogram.statistics.snooping.factors import MEDIAN_OF_TWO
-from photogram.statistics.snooping.snooping import Outcome, snooped
+from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 
-__all__ = ["snoop_collection"]
+__all__: list[str] = []
 
 LOSSES: tuple[Loss, ...] = ("huber", "cauchy")
 FAR = 5.0
@@ -41,30 +38,25 @@ FAR = 5.0
 BY_LOSSES = "a robust adjustment of the given values (Huber, then Cauchy)"
 
 
-@of_network.register
-def snoop_collection(
-    collection: Collection,
+@snooped_network.register
+def _snoop_collection(
+    network: Collection,
+    settings: Settings,
     *,
-    unit_variance: str = "constrained",
-    level: float = LEVEL,
-    fdr: float | None = None,
-    unit_weight: str = "known",
-    robust: bool | None = None,
-    parts: bool = True,
-    max_rounds: int = 20,
-    threads: int | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    parts: bool,
+    unit_variance: str,
+    threads: int | None,
+    progress: Callable[[Progress], None] | None,
     **options: Any,
 ) -> Snooped:
-    """Take gross errors out of a collection: `photogram.snoop` with the options of its adjustment."""
+    collection = network
     one_of("unit_variance", unit_variance, ("constrained",))
-    truth_value("parts", parts)
-    settings = settings_of(level, fdr, unit_weight, robust, max_rounds)
 
     def tried(covariance: bool) -> tuple[AdjustedCollection, NetworkTrial, Outcome]:
         first = adjust(collection, covariance=covariance, threads=threads, progress=progress, **options)
         own = dataclasses.replace(first.options, covariance=True, loss=None)
-        trial = collection_trial(collection, own, first.state, core_threads(threads), parts=parts)
+        core = collection_network(collection, own).trial(first.state, threads=core_threads(threads))
+        trial = collection_trial(collection, core, parts=parts)
 
         def afresh() -> Aside | None:
             found = started_robustly(collection, first.options, threads=threads)
@@ -89,35 +81,27 @@ def snoop_collection(
             raise AdjustmentError(f"the collection cannot be tested: {error.args[0]}") from error
     cleaned = _without(first, trial, outcome.out)
     result = adjust(cleaned, threads=threads, progress=progress, **options)
-    remarks = [Message(remark) for remark in [*outcome.remarks, *_held(collection, outcome, options)]]
-    result = dataclasses.replace(result, messages=[*remarks, *result.messages])
     placed = as_block(collection.replace(photo_parameters=result.photo_parameters))
     used = used_images(trial, outcome.out, len(collection.image_xy))
-    variance = max(result.variance_of_unit_weight or 1.0, 1.0)
-    return Snooped(
-        result=result,
-        outcome=outcome,
-        suspects=trial.suspects,
-        settings=settings,
-        exchanged=tuple(exchanged_names(placed, used, variance)),
+    return finished(
+        result,
+        trial,
+        outcome,
+        settings,
+        held=lambda: collection_held(adjust(collection, **options)) if _has_held(collection) else [],
+        exchanged=exchanged_names(placed, used, max(result.variance_of_unit_weight or 1.0, 1.0)),
     )
 
 
-def _held(collection: Collection, outcome: Outcome, options: Mapping[str, Any]) -> list[str]:
-    """Say of what is held that it explains more than what was taken out; see `results.held`."""
-    largest = max((entry.statistic for entry in outcome.log if entry.is_out), default=math.inf)
-    constant = (collection.photo_sd == 0).all(axis=0)
-    held = ((collection.photo_sd == 0) & ~constant).any() or (collection.photo_sd[:, :6] == 0).any()
-    if math.isinf(largest) or not (held or (collection.point_sd == 0).any()):
-        return []
-    try:
-        return remark_on(collection_held(adjust(collection, **options)), largest)
-    except AdjustmentError:
-        return []
+def _has_held(collection: Collection) -> bool:
+    """Whether anything is held but the constants of a camera."""
+    held = collection.photo_sd == 0
+    held[:, POSE:] &= ~held[:, POSE:].all(axis=0)
+    return bool(held.any() or (collection.point_sd == 0).any())
 
 
 def started_robustly(
-    collection: Collection, options: CollectionOptions, *, threads: int | None
+    collection: Collection, options: CoreOptions, *, threads: int | None
 ) -> tuple[_photocore.BlockState, Indices] | None:
     """Adjust a collection robustly from its given values on, and return the end and the images far from it.
 
@@ -149,21 +133,11 @@ def _without(first: AdjustedCollection, trial: NetworkTrial, out: Out) -> Collec
     for own, values in zip(parameters, core.photos, strict=True):
         own[: len(values)] = values
     points = np.where(np.isnan(points), given.point_positions, points)
-    kinds, subjects = core.subjects
-    starts, components = core.row_starts, core.components
-    group = np.repeat(np.arange(len(kinds)), np.diff(starts))
-    subject = subjects[group]
-
-    def gone(kind: int) -> tuple[Indices, Indices]:
-        rows = out.rows & (kinds[group] == kind)
-        return subject[rows], components[rows]
-
-    images = np.ones(len(given.image_xy), dtype=bool)
-    images[gone(IMAGE)[0]] = False
+    images = used_images(trial, out, len(given.image_xy))
     point_sd, photo_sd = given.point_sd.copy(), given.photo_sd.copy()
-    point_sd[gone(CONTROL)] = np.inf
+    point_sd[gone(trial, out, CONTROL)] = np.inf
     for kind, shift in ((POSITION, 3), (ATTITUDE, 0)):
-        photos, own = gone(kind)
+        photos, own = gone(trial, out, kind)
         photo_sd[photos, own + shift] = np.inf
     return given.replace(
         photo_parameters=np.where(np.isinf(photo_sd), parameters, given.photo_parameters),

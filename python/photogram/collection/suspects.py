@@ -9,16 +9,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Indices
 from photogram.collection.collection import POSE, Collection
-from photogram.collection.core import CollectionOptions, collection_network
-from photogram.results.network_trial import (
-    ATTITUDE,
-    CONTROL,
-    IMAGE,
-    KINDS,
-    POSITION,
-    NamedSuspects,
-    NetworkTrial,
-)
+from photogram.results.network_trial import CONTROL, IMAGE, KINDS, NamedSuspects, NetworkTrial
 
 __all__ = ["collection_trial"]
 
@@ -27,15 +18,9 @@ ROUGH, EXACT = 1e-7, 1e-12
 
 
 def collection_trial(
-    collection: Collection,
-    options: CollectionOptions,
-    state: _photocore.BlockState,
-    threads: int = 0,
-    *,
-    parts: bool = True,
+    collection: Collection, core: _photocore.NetworkTrial, *, parts: bool = True
 ) -> NetworkTrial:
-    """Return a collection as snooping asks it, from where an adjustment of it has ended."""
-    core = collection_network(collection, options).trial(state, threads=threads)
+    """Return a collection as tests ask it."""
     return NetworkTrial(
         core=core,
         suspects=_Named(collection, core, parts).suspects(),
@@ -46,19 +31,10 @@ def collection_trial(
 
 
 class _Named(NamedSuspects):
-    """What the groups of observations of a collection are called: photos and points have numbers."""
-
     def __init__(self, collection: Collection, core: _photocore.NetworkTrial, parts: bool) -> None:
-        super().__init__(core, collection.image_points, collection.image_photos, apart=parts)
-        self.collection = collection
-
-    def other_loads(self, kind: int, subject: int) -> Indices:
-        """Return the photo whose camera it is."""
-        return np.array([subject])
-
-    def photo_name(self, photo: int) -> str:
-        """Return what a photo is called."""
-        return f"photo {photo}"
+        components = ("XYZ", POSE[3:], POSE[:3])
+        super().__init__(collection, core, apart=parts, components=components, lengths=("",) * 3)
+        self.parameters = collection.parameters[len(POSE) :]
 
     def parts(self, group: int) -> Sequence[Sequence[int]] | None:
         """Return the rows that may go alone: of control single ones or all, of a station single ones."""
@@ -68,28 +44,14 @@ class _Named(NamedSuspects):
         single = [(row,) for row in range(size)]
         return [*single, tuple(range(size))] if int(self.kinds[group]) == CONTROL else single
 
-    def name(self, group: int) -> str:
-        """Return what a group is called."""
-        kind, subject = int(self.kinds[group]), int(self.subjects[group])
-        if kind == IMAGE:
-            point, photo = self.collection.image_points[subject], self.collection.image_photos[subject]
-            return f"image of point {point} on photo {photo}"
-        if kind == CONTROL:
-            return f"control point {subject}"
-        return f"{KINDS[kind]} of photo {subject}"
+    def other_loads(self, kind: int, subject: int) -> Indices:
+        """Return the photo whose camera it is."""
+        return np.array([subject])
 
-    def row_name(self, row: int) -> str:
-        """Return what a row is."""
-        group, component = self.group_of(row), int(self.components[row])
-        kind = int(self.kinds[group])
-        if kind == IMAGE:
-            return "xy"[component]
-        if kind == CONTROL:
-            return "XYZ"[component]
-        names = {POSITION: POSE[3:], ATTITUDE: POSE[:3]}.get(kind, self.collection.parameters[6:])
-        return str(names[component])
+    def other_name(self, kind: int, subject: int) -> str:
+        """Return what the camera of a photo is called."""
+        return f"{KINDS[kind]} of {self.photo_name(subject)}"
 
-    def unit(self, row: int) -> str:
-        """Return the unit of a row."""
-        kind = int(self.kinds[self.group_of(row)])
-        return {IMAGE: "px", ATTITUDE: "rad"}.get(kind, "")
+    def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]:
+        """Return a parameter of a camera."""
+        return self.parameters[component], ""

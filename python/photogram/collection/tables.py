@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.results.axes import image_axes
-from photogram.results.network_tables import (
-    Terms,
-    control,
-    images,
-    iterations,
-    photos,
-    points,
-    stations,
-    terms_of,
-)
+from photogram.results.network_tables import TABLES, Terms, terms_of
 from photogram.show.quantity import Axis, Quantity, frame
 from photogram.show.ways import columns_of
 
-__all__ = ["TABLES", "collection_photos", "costs"]
+__all__: list[str] = []
 
 
 @columns_of.register(AdjustedCollection)
@@ -38,38 +27,20 @@ def _terms(result: AdjustedCollection) -> Terms:
     return Terms(
         photos=np.arange(len(result.photo_parameters)),
         points=np.arange(len(result.point_positions)),
-        image_photos=given.image_photos,
         photo_axes=tuple(Axis.of(name, unit, f"_{unit}".rstrip("_")) for name, unit in named),
         point_axes=tuple(Axis.of(name, "") for name in "XYZ"),
         image_axes=image_axes("px"),
         photo_values=result.photo_parameters,
-        point_given=given.point_positions,
         layers={"Rotations": slice(0, 3), "Translations": slice(3, 6), "Cameras": slice(6, None)},
         parts={"parameters": slice(None)},
+        of_photos=(
+            Quantity(
+                result.photo_images,
+                name="images",
+                member="images",
+                about="number of images",
+                head="Images",
+                decimals=0,
+            ),
+        ),
     )
-
-
-def collection_photos(result: AdjustedCollection) -> list[Quantity]:
-    """Return adjusted photos with the number of their images."""
-    own, *rest = photos(result)
-    about = "number of images"
-    count = Quantity(
-        result.photo_images, name="images", member="images", about=about, head="Images", decimals=0
-    )
-    return [own, count, *rest]
-
-
-def costs(result: AdjustedCollection) -> list[Quantity]:
-    """Return the history: numbers, costs (half the sum that is minimised), damping; first the start."""
-    number, squares, _, damping = iterations(result)
-    return [number, replace(squares, values=0.5 * squares.values, member="cost"), damping]
-
-
-TABLES: dict[str, Callable[[AdjustedCollection], list[Quantity]]] = {
-    "photo": collection_photos,
-    "point": points,
-    "image": images,
-    "control": control,
-    "station": stations,
-}
-"""The tables by the kind of things that have their rows."""

@@ -7,7 +7,6 @@ import numpy as np
 from photogram import _photocore
 from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import POSE
-from photogram.collection.findings import names
 from photogram.results.weakest import Determined, determined
 
 __all__: list[str] = []
@@ -29,13 +28,9 @@ def _(result: AdjustedCollection) -> Determined:
     partials[:, :3, :3] = matrices @ np.cross(translations[:, np.newaxis, :], turns, axisb=1, axisc=1)
     partials[:, :3, 3:] = -matrices
     partials[:, 3:, :3] = turns
-    photo_ids, point_ids = names(result)
     return Determined(
-        photo_ids=photo_ids,
-        point_ids=point_ids,
         stations=-np.einsum("pij,pj->pi", matrices, translations),
         points=result.point_positions,
-        image_photos=result.collection.image_photos,
         poses=partials @ cofactors @ partials.transpose(0, 2, 1),
         ranks=(np.diagonal(cofactors, axis1=1, axis2=2) > 0).sum(axis=1),
         point_cofactors=result.point_cofactors,

@@ -11,14 +11,18 @@ from photogram.network.block import Block
 from photogram.network.observations import observation_rows
 from photogram.network.rigs import mount_rows
 from photogram.network.unknowns import Unknown
+from photogram.show.ways import Way
 
-__all__ = ["CoreOptions", "block_network"]
+__all__ = ["CoreNetwork", "CoreOptions", "block_network", "core_network"]
+
+CoreNetwork = _photocore.BlockNetwork | _photocore.CollectionNetwork
 
 
 @dataclass(frozen=True)
 class CoreOptions:
-    """How the core adjusts a block: the options of :func:`photogram.adjust` as it knows them.
+    """How the core adjusts a network: the options of :func:`photogram.adjust` as it knows them.
 
+    The criterion of a collection is `decrease`: the fraction by which a step must lower what is minimised.
     With `points_given` points start from their given coordinates where these are known, not from the
     intersection of their rays: of a block that starts where another adjustment has ended.
     """
@@ -32,6 +36,17 @@ class CoreOptions:
     unit_variance: str
     minimum: tuple[int, tuple[int, int] | None] | None
     points_given: bool = False
+
+
+@Way
+def core_network(given: object, options: CoreOptions) -> CoreNetwork:
+    """Return a network of any class as the core adjusts it, and answers questions about it afterwards."""
+    raise NotImplementedError(type(given).__name__)
+
+
+@core_network.register
+def _(given: Block, options: CoreOptions) -> CoreNetwork:
+    return block_network(given, options)
 
 
 def block_network(

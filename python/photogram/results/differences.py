@@ -96,7 +96,7 @@ def differences(first: Result, second: Result) -> Differences:
     for each in (first, second):
         if not isinstance(each, Result):
             raise InputError(f"results of blocks are compared, not what is of the type {type(each).__name__}")
-    one, two = adjusted(first), adjusted(second)
+    one, two = adjusted(first).things, adjusted(second).things
     values, deviations = Largest(), Largest()
     alone: dict[str, list[str]] = {}
     compared = 0
@@ -104,15 +104,15 @@ def differences(first: Result, second: Result) -> Differences:
         places = [
             {
                 (name, k): (row, part)
-                for row, name in enumerate(each.ids[kind])
-                for part, k in enumerate(each.components[kind][row])
+                for row, name in enumerate(each.ids)
+                for part, k in enumerate(each.components[row])
             }
-            for each in (one, two)
+            for each in (one[kind], two[kind])
         ]
         shared = [key for key in places[0] if key in places[1]]
         found = [
-            (_picked(each.values[kind], own, shared), _picked(each.sd[kind], own, shared))
-            for each, own in ((one, places[0]), (two, places[1]))
+            (_picked(each.values, own, shared), _picked(each.sd, own, shared))
+            for each, own in ((one[kind], places[0]), (two[kind], places[1]))
         ]
         (value, sd), (other, other_sd) = found
         known = np.isfinite(value) & np.isfinite(other)

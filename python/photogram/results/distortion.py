@@ -27,9 +27,11 @@ __all__ = [
     "RADIAL",
     "DistortionCurve",
     "added_along",
+    "curve_deviations",
     "distortion_curve",
     "largest_radius",
     "own_images",
+    "radial_curve",
     "radial_part",
 ]
 
@@ -127,7 +129,8 @@ def distortion_curve(
     at = np.linspace(0.0, BEYOND * observed, ROWS) if radii is None else np.asarray(radii, dtype=np.float64)
     r0 = BALANCED_AT * observed
     both = np.append(at, r0)
-    curve, partials = _radial(camera, terms, both)
+    curve, partials = radial_curve(camera.camera, camera.sd, terms, both)
+    covariance = camera.covariance
     distance = next(k for k, name in enumerate(camera.names) if name in DISTANCES)
     c = float(camera.values[distance])
     part = curve[-1] / r0
@@ -137,25 +140,38 @@ def distortion_curve(
         direction="backward" if _is_backward(camera.camera) else "forward",
         radii=at,
         values=curve[:-1],
-        sd=_deviations(camera, terms, partials)[:-1],
-        sd_mapping=_deviations(camera, [*terms, distance], with_distance)[:-1],
+        sd=curve_deviations(covariance, terms, partials)[:-1],
+        sd_mapping=curve_deviations(covariance, [*terms, distance], with_distance)[:-1],
         balanced=(curve - part * both)[:-1],
-        sd_balanced=_deviations(camera, terms, balanced)[:-1],
+        sd_balanced=curve_deviations(covariance, terms, balanced)[:-1],
         balanced_at=r0,
         balanced_distance=c / (1.0 + part) if _is_backward(camera.camera) else c * (1.0 + part),
         observed=observed,
     )
 
 
-def _deviations(camera: AdjustedCamera, terms: list[int], partials: Floats) -> Floats:
-    covariance = camera.covariance[np.ix_(terms, terms)]
-    variances = np.einsum("ni,ij,nj->n", partials, covariance, partials)
+def curve_deviations(covariance: Floats, terms: list[int], partials: Floats) -> Floats:
+    """Return (r,) standard deviations of a curve whose partials by some parameters are (r, t).
+
+    `covariance` is that of all parameters of the camera.
+    """
+    variances = np.einsum("ni,ij,nj->n", partials, covariance[np.ix_(terms, terms)], partials)
     return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
 
-def _radial(camera: AdjustedCamera, terms: list[int], radii: Floats) -> tuple[Floats, Floats]:
-    """Return the curve of the radial terms alone, and its partials by these: the curve is linear in them."""
-    own = radial_part(camera.camera)
+def radial_curve(camera: Camera, sd: Floats, terms: list[int], radii: Floats) -> tuple[Floats, Floats]:
+    """Return the curve of the radial terms alone, and its partials by these: the curve is linear in them.
+
+    Parameters
+    ----------
+    camera, sd
+        With its parameters, and (k,) their standard deviations.
+    terms
+        Which of them are radial.
+    radii
+        (r,) in the unit of image coordinates.
+    """
+    own = radial_part(camera)
     bare = own.parameters
     largest = radii.max()
 
@@ -165,7 +181,9 @@ def _radial(camera: AdjustedCamera, terms: list[int], radii: Floats) -> tuple[Fl
     partials = np.empty((len(radii), len(terms)))
     for column, k in enumerate(terms):
         name = camera.names[k]
-        step = camera.sd[k] or abs(camera.values[k]) or largest ** -(2 * (column + 1))
+        # Without covariances there are no standard deviations.
+        own_sd = sd[k] if sd[k] > 0 else 0.0
+        step = own_sd or abs(camera.values[k]) or largest ** -(2 * (column + 1))
         step *= 0.01
         upper, lower = (at({name: bare[name] + sign * step}) for sign in (1, -1))
         partials[:, column] = (upper - lower) / (2 * step)

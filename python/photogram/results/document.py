@@ -12,12 +12,12 @@ from photogram.io import json
 from photogram.results.calibration_report import calibration_members
 from photogram.results.features_report import features_document
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import control, images, iterations, photos, stations
+from photogram.results.network_tables import control, images, iterations, photos, points, stations, terms_of
 from photogram.results.report import problems_of
 from photogram.results.result import Result, SumsByKind
-from photogram.results.tables import block_points, camera_parameters, check_points, observations
+from photogram.results.tables import camera_parameters, check_points, observations
 from photogram.results.weakest import weakest_photos, weakest_points
-from photogram.show.quantity import Quantity, chosen, records
+from photogram.show.quantity import Quantity, Table, chosen, records
 from photogram.show.ways import document_of
 
 __all__ = ["network_members", "to_json"]
@@ -29,9 +29,13 @@ def to_json(result: Result) -> bytes:
     return json.to_json(_document(result))
 
 
-def network_members(result: AdjustedNetwork) -> dict[str, Any]:
-    """Return what the documents of all networks have."""
+def network_members(result: AdjustedNetwork, photo_members: Table = ()) -> dict[str, Any]:
+    """Return what the documents of all networks have, with more members of photos."""
     summary = result.reliability_summary
+    called = int if terms_of(result).identity == "number" else str
+    weights = Quantity(result.image_weights[result.used_images], member="weight_factor")
+    of_photos = Quantity(result.photo_covariances, member="covariance")
+    of_points = Quantity(result.point_covariances[result.used_points], member="covariance")
     return {
         "program": f"photogram {_photocore.__version__}",
         "status": result.status,
@@ -42,8 +46,16 @@ def network_members(result: AdjustedNetwork) -> dict[str, Any]:
         "covariance_scale": result.covariance_scale,
         "verdict": result.verdict.document(),
         "reliability": summary.document() if summary else None,
+        "iterations": records(iterations(result))[1:],
+        "photos": records([*photos(result), *photo_members, of_photos]),
+        "points": records([*points(result), of_points]),
+        "observations": records([*images(result), *([weights] if result.loss else [])]),
         "control": records(control(result)),
         "stations": records(stations(result)),
+        "weakest": {
+            "points": [vars(each) | {"point": called(each.point)} for each in weakest_points(result)],
+            "photos": [vars(each) | {"photo": called(each.photo)} for each in weakest_photos(result)],
+        },
         "ordering": result.ordering,
         "predictions": dict(result.predictions),
         "operations": dict(result.operations),
@@ -54,7 +66,7 @@ def network_members(result: AdjustedNetwork) -> dict[str, Any]:
 def _document(result: Result) -> dict[str, Any]:
     sums = result.sums_of_squares
     return {
-        **network_members(result),
+        **network_members(result, _of_photos(result)),
         "title": result.block.title,
         "units": _units(result),
         "conventions": {
@@ -71,12 +83,10 @@ def _document(result: Result) -> dict[str, Any]:
         "refraction": asdict(result.block.refraction) if result.block.refraction else None,
         "problems": problems_of(result),
         "initial_weighted_sum_of_squares": result.initial_weighted_sum_of_squares,
-        "iterations": records(iterations(result))[1:],
         "weighted_sum_of_squares": _by_kind(sums),
         "redundancy": None if result.redundancies is None else _by_kind(result.redundancies),
         "unit_variance": result.unit_variance,
         "global_test": _global_test(result),
-        "photos": _photos(result),
         **(
             {"cameras": _cameras(result), "calibrations": calibration_members(result)}
             if result.cameras
@@ -84,14 +94,8 @@ def _document(result: Result) -> dict[str, Any]:
         ),
         **({"unknowns": _unknowns(result)} if result.unknowns else {}),
         **({} if result.features is None else {"features": features_document(result.features)}),
-        "points": _points(result),
-        "observations": _observations(result),
         "observations_beside_images": _beside_images(result),
         "check_points": records(check_points(result)),
-        "weakest": {
-            "points": [vars(each) for each in weakest_points(result)],
-            "photos": [vars(each) for each in weakest_photos(result)],
-        },
         "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
     }
 
@@ -129,14 +133,12 @@ def _units(result: Result) -> dict[str, str]:
     }
 
 
-def _photos(result: Result) -> list[dict[str, Any]]:
+def _of_photos(result: Result) -> list[Quantity]:
     covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
-    own = [
+    return [
         Quantity(covariances[:, place, place], member="position_covariance"),
         Quantity(covariances[:, turn, turn], member="attitude_covariance"),
-        Quantity(covariances, member="covariance"),
     ]
-    return records([*photos(result), *own])
 
 
 def _cameras(result: Result) -> list[dict[str, Any]]:
@@ -174,16 +176,6 @@ def _unknowns(result: Result) -> list[dict[str, Any]]:
         }
         for each in result.unknowns
     ]
-
-
-def _points(result: Result) -> list[dict[str, Any]]:
-    covariances = Quantity(result.point_covariances[result.used_points], member="covariance")
-    return records([*block_points(result), covariances])
-
-
-def _observations(result: Result) -> list[dict[str, Any]]:
-    weights = Quantity(result.image_weights[result.used_images], member="weight_factor")
-    return records([*images(result), *([weights] if result.loss else [])])
 
 
 def _beside_images(result: Result) -> list[dict[str, Any]]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from photogram.arguments.arrays import chosen, finite_rows
@@ -9,19 +12,17 @@ from photogram.messages import Undetermined, counted
 from photogram.results.axes import point_axes
 from photogram.results.groups_tested import groups_tested
 from photogram.results.held import held_tested
-from photogram.results.kinds import tested_kind
 from photogram.results.lenses import fall_by_lens, how_to_calibrate
 from photogram.results.network import AdjustedNetwork
-from photogram.results.observed import tested
+from photogram.results.observed import tested_singly
 from photogram.results.patterns import CameraImages, patterns
 from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
 from photogram.show.ways import findings_of
-from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_w
-from photogram.statistics.outliers import Observations
+from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_f
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["HARMFUL", "block_findings", "has_redundancy", "tested_observations", "unseen"]
+__all__ = ["HARMFUL", "block_findings", "has_redundancy", "network_findings", "unseen"]
 
 ROBUST = "a robust loss changes the weights"
 """Why there is no global test with one."""
@@ -42,28 +43,63 @@ UNKNOWN = 1 / 3
 """A principal distance whose standard deviation is a larger part of it might be any."""
 
 
+def network_findings(
+    result: AdjustedNetwork,
+    held: Iterable[Tested],
+    systematic: Sequence[Systematic],
+    labels: Sequence[str] = (),
+) -> Findings:
+    """Return the tests that every network has.
+
+    Parameters
+    ----------
+    result
+        The adjusted network.
+    held, systematic
+        The tests of what is held, and of patterns.
+    labels
+        Of the observations beside images, in the order of the core.
+    """
+    unit_weight = None if result.KNOWN else result.sum_and_freedom
+    return Findings(
+        status=result.status,
+        observations=[
+            *_tested(result, labels, unit_weight),
+            *(each if unit_weight is None else by_f(each, *unit_weight) for each in held),
+        ],
+        degrees_of_freedom=result.degrees_of_freedom,
+        global_test=None if result.loss else result.global_test,
+        untested=ROBUST if result.loss else "no degrees of freedom",
+        computed=has_redundancy(result),
+        systematic=systematic,
+        remarks=unseen(result),
+        snoop="--snoop (photogram.snoop)",
+    )
+
+
 @findings_of.register(Result)
 def block_findings(result: Result) -> Findings:
     """Return the tests of a block: standard deviations are given, so the unit weight is known."""
     # Held to look for blunders before the photos are adjusted: nobody takes these places for true.
     intersected = not (result.block.photo_position_sd.any() or result.block.photo_attitude_sd.any())
-    return Findings(
-        status=result.status,
-        observations=[*_tested(result), *([] if intersected else held_tested(result))],
-        degrees_of_freedom=result.degrees_of_freedom,
-        global_test=None if result.loss else result.global_test,
-        untested=ROBUST if result.loss else "no degrees of freedom",
+    labels = [each.label for each in observations_of_core(result.block)]
+    found = network_findings(
+        result,
+        [] if intersected else held_tested(result),
+        [] if intersected else _patterns(result),
+        labels,
+    )
+    return replace(
+        found,
         undetermined=left_open(result),
-        computed=has_redundancy(result),
         checks=result.check_points.agreement,
-        systematic=[] if intersected else _patterns(result),
         intersected=intersected,
         scaled=result.unit_variance != "unity",
-        remarks=[*unseen(result), *_left_out(result), *_on_checks(result)],
+        remarks=[*found.remarks, *_left_out(result), *_on_checks(result)],
         hints=result.hints,
         exchanged=result.exchanged,
         set_aside=_set_aside(result),
-        snoop="" if intersected else "--snoop (photogram.snoop)",
+        snoop="" if intersected else found.snoop,
         weigh="--sd control=...",
         calibrate=how_to_calibrate(result.block),
         check="`photogram check` (`photogram.diagnose`)",
@@ -103,12 +139,12 @@ def left_open(result: AdjustedNetwork) -> list[str]:
     return said or lengths
 
 
-def _tested(result: Result) -> list[Tested]:
+def _tested(
+    result: AdjustedNetwork, labels: Sequence[str], unit_weight: tuple[float, float] | None
+) -> list[Tested]:
     """Return the tests of groups; of single coordinates where a loss has changed the weights."""
     summary = result.reliability_summary
-    if summary is None:
-        return [by_w(each) for each in tested_observations(result)]
-    return groups_tested(summary, [each.label for each in observations_of_core(result.block)])
+    return tested_singly(result) if summary is None else groups_tested(summary, labels, unit_weight)
 
 
 def _set_aside(result: Result) -> Removed | None:
@@ -155,26 +191,8 @@ def _patterns(result: Result) -> list[Systematic]:
             CameraImages(each.name, block.photo_cameras == row, int(np.count_nonzero(each.information)))
             for row, each in enumerate(result.cameras)
         ]
-    return patterns(
-        result,
-        block.image_photos,
-        block.image_xy,
-        block.image_sd,
-        cameras,
-        block.photo_ids,
-        ("um", 1000.0) if block.image_unit == "mm" else ("px", 1.0),
-        [axis.name for axis in point_axes(block)],
-        lambda own: fall_by_lens(result, own),
-    )
-
-
-def tested_observations(result: Result) -> list[Observations]:
-    """Return all observations of a block with their standardized residuals, kind by kind."""
-    block = result.block
     axes = [axis.name for axis in point_axes(block)]
-    unknowns = (*axes, "omega", "phi", "kappa")
-    of_unknowns = tested(result, block.image_photos, block.photo_ids, block.point_ids, unknowns, axes)
-    return of_unknowns + [tested_kind(each) for each in result.kinds.values()]
+    return patterns(result, cameras, axes, lambda own: fall_by_lens(result, own))
 
 
 def has_redundancy(result: AdjustedNetwork) -> bool:

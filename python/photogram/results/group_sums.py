@@ -10,7 +10,6 @@ redundancy.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +21,7 @@ from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.block import Block
-from photogram.network.core import block_network
+from photogram.network.core import core_network
 from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
@@ -211,12 +210,10 @@ class Left:
         self,
         result: AdjustedNetwork,
         grouping: Grouping,
-        freedom: float,
-        total: float,
-        factored: Callable[[], _photocore.BlockCovariances],
         probing: Probing,
     ) -> None:
-        self.result, self.grouping, self._factored, self._probing = result, grouping, factored, probing
+        self.result, self.grouping, self._probing = result, grouping, probing
+        total, freedom = result.sum_and_freedom
         counts, squares, redundancy = sums_of(result, grouping)
         self.counts: Indices = np.append(counts, 0)
         self.squares: Floats = np.append(squares, max(total - squares.sum(), 0.0))
@@ -226,7 +223,7 @@ class Left:
         """Return the (G + 1, G + 1) Helmert matrix."""
         options = self._probing.options(int(self.counts.sum()))
         g = self.grouping.count
-        _, found, exact = self._factored().group_squares(self.grouping.core(), classes=None, **options)
+        _, found, exact = factored(self.result).group_squares(self.grouping.core(), classes=None, **options)
         columns, r = found.reshape(g + 1, g), self.redundancy
         sums = columns.sum(axis=0)
         columns = columns * np.divide(r[:g], sums, out=np.ones(g), where=(sums > 0) & ~np.array(exact, bool))
@@ -290,37 +287,25 @@ def block_observables(block: Block) -> Observables:
     cameras, photo_cameras = block.core_cameras()
     names = block.camera_names if block.cameras else [str(number) for number in range(len(cameras))]
     return Observables(
-        image_photos=block.image_photos,
-        image_points=block.image_points,
-        photo_names=block.photo_ids,
+        given=block,
         photo_cameras=photo_cameras,
         camera_names=names,
         strips=lambda: strips_of(local_axes(block).positions(block.photo_positions)),
         point_classes=np.where(held, "control", np.where(known, "check", "pass")),
-        point_observed=(block.point_sd > 0) & np.isfinite(block.point_sd),
         photo_observed=observed,
         stations=("positions",) * 3 + ("attitudes",) * 3,
-        observations=[each.label for each in block.observations],
         commons=len(block.unknowns),
-        cameras=len(cameras),
     )
 
 
 @observables.register
-def _(result: Result) -> Observables:
-    return block_observables(result.block)
+def _(result: AdjustedNetwork) -> Observables:
+    return observables(result.given)
 
 
-@Way
-def factored(result: object) -> _photocore.BlockCovariances:
+def factored(result: AdjustedNetwork) -> _photocore.BlockCovariances:
     """Return the factor of the normal equations of an adjusted network."""
-    raise InputError(f"not the result of an adjustment: {shown(result)}")
-
-
-@factored.register
-def _(result: Result) -> _photocore.BlockCovariances:
-    network = block_network(result.block, result.options)
-    return network.covariances(result.state, threads=0, progress=None)
+    return core_network(result.given, result.options).covariances(result.state, threads=0, progress=None)
 
 
 def group_sums(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
+from photogram.network.given import Given
 from photogram.statistics.components import GroupsOf
 
 __all__ = ["BASES", "Grouping", "GroupsArgument", "Observables", "grouped"]
@@ -35,43 +36,35 @@ class Observables:
 
     Attributes
     ----------
-    image_photos, image_points
-        (m,) indices.
-    photo_names
-        (P,).
+    given
+        The network.
     photo_cameras, camera_names
         (P,) the camera of each photo, and their names.
     strips
         Tells the strips of the photos.
     point_classes
         (n,) `control`, `check` or `pass`.
-    point_observed
-        (n, 3) whether a coordinate is weighted.
     photo_observed
         (P, k) whether an unknown of a photo is.
     stations
         (k,) what the unknowns of a photo are called as observations.
-    observations
-        The kinds of the observations beside images.
     commons
         How many common unknowns there are.
-    cameras
-        How many cameras there are.
     """
 
-    image_photos: Indices
-    image_points: Indices
-    photo_names: Sequence[str]
+    given: Given
     photo_cameras: Indices
     camera_names: Sequence[str]
     strips: Callable[[], list[Indices]]
     point_classes: NDArray[np.str_]
-    point_observed: Bools
     photo_observed: Bools
     stations: tuple[str, ...]
-    observations: Sequence[str]
     commons: int
-    cameras: int
+
+    @property
+    def point_observed(self) -> Bools:
+        """(n, 3) whether a coordinate is weighted."""
+        return (self.given.point_sd > 0) & np.isfinite(self.given.point_sd)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +175,7 @@ def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
     components = "component" in bases
     of_images = [_images_by(of, basis) for basis in bases if basis not in ("kind", "component")]
     head = [", ".join(parts) for parts in zip(*of_images, strict=True)] if of_images else None
-    plain = np.array(head if head is not None else [""] * len(of.image_photos), dtype=object)
+    plain = np.array(head if head is not None else [""] * len(of.given.image_photos), dtype=object)
     named = np.array([f"images, {each}" if each else "images" for each in plain.tolist()], dtype=object)
     images = np.stack([named, named], axis=1)
     parents: dict[str, str] = {}
@@ -199,25 +192,25 @@ def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
     photos = np.empty(of.photo_observed.shape, dtype=object)
     photos[:] = of.stations
     parents |= dict.fromkeys(of.stations, "stations")
-    observations = np.array(list(of.observations), dtype=object)
+    observations = np.array([each.label for each in of.given.observations], dtype=object)
     return _Labelled(images, points, photos, observations, parents)
 
 
 def _images_by(of: Observables, basis: str) -> list[str]:
     """Label the images by one basis."""
-    photos = of.image_photos.tolist()
+    photos, seen = of.given.image_photos.tolist(), of.given.image_points
     if basis == "photo":
-        return [f"photo {of.photo_names[photo]}" for photo in photos]
+        return [f"photo {of.given.photo_ids[photo]}" for photo in photos]
     if basis == "camera":
         return [f"camera {of.camera_names[of.photo_cameras[photo]]}" for photo in photos]
     if basis == "strip":
-        number = np.empty(len(of.photo_names), dtype=np.int64)
+        number = np.empty(len(of.photo_cameras), dtype=np.int64)
         for strip, members in enumerate(of.strips(), 1):
             number[members] = strip
         return [f"strip {number[photo]}" for photo in photos]
     if basis == "point class":
-        return [f"{each} points" for each in of.point_classes[of.image_points].tolist()]
-    rays = np.bincount(of.image_points, minlength=len(of.point_classes))[of.image_points]
+        return [f"{each} points" for each in of.point_classes[seen].tolist()]
+    rays = np.bincount(seen, minlength=len(of.point_classes))[seen]
     return [f"{each} rays" if each < MANY_RAYS else f"{MANY_RAYS} rays and more" for each in rays.tolist()]
 
 
@@ -264,7 +257,7 @@ def _numbered(of: Observables, labels: _Labelled) -> Grouping:
         return np.fromiter(map(numbers.__getitem__, flat), np.int64, len(flat)).reshape(part.shape)
 
     # In the order of the photos, whatever that of the images is.
-    enter(labels.images[np.argsort(of.image_photos, kind="stable")].ravel().tolist())
+    enter(labels.images[np.argsort(of.given.image_photos, kind="stable")].ravel().tolist())
     images = number(labels.images)
     of_images = len(numbers) - 1
     points, photos = number(labels.points, of.point_observed), number(labels.photos, of.photo_observed)
@@ -275,4 +268,4 @@ def _numbered(of: Observables, labels: _Labelled) -> Grouping:
         tuple(labels.parents.get(name, "") for name in names),
         tuple(number < of_images for number in range(len(names))),
     )
-    return Grouping(groups, images, points, photos, observations, of.commons, of.cameras)
+    return Grouping(groups, images, points, photos, observations, of.commons, len(of.camera_names))

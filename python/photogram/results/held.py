@@ -8,7 +8,7 @@ residuals, c = B' ~v and C = B' R B: the weighted sum of squares would fall by T
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +21,6 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.results.scores import score
 from photogram.statistics.findings import Tested
-from photogram.statistics.limits import GlobalTest
 
 __all__ = [
     "HELD",
@@ -31,7 +30,6 @@ __all__ = [
     "held_tested",
     "held_tests",
     "is_suspected",
-    "remark_on",
 ]
 
 HELD = "held values"
@@ -58,35 +56,35 @@ def held_tested(result: Result) -> list[Tested]:
 
     None where the adjustment is accepted, has not converged, has no covariances, or was done in parts.
     """
-    if result.loss or not result.WHOLE or not is_suspected(result, result.global_test):
+    if not result.WHOLE:
         return []
-    suspected = _suspected(result)
-    return held_tests(result, suspected, result.block.image_sd, _partials(result)) if suspected else []
-
-
-def is_suspected(result: AdjustedNetwork, test: GlobalTest | None) -> bool:
-    """Return whether residuals are too large, and covariances there to ask for the reason."""
-    if test is None or not test.rejected_high or not result.converged:
-        return False
-    return bool(np.isfinite(result.redundancy[result.used_images]).all())
+    return held_tests(result, lambda of_images: _suspected(result, of_images), lambda: _partials(result))
 
 
 def held_tests(
-    result: AdjustedNetwork, suspected: Sequence[Held], image_sd: Floats, partials: Floats
+    result: AdjustedNetwork,
+    suspected_by: Callable[[Floats], Sequence[Held]],
+    partials_of: Callable[[], Floats],
 ) -> list[Tested]:
-    """Return the tests of what is held, T each.
+    """Return the tests of what is held, T each, where residuals are too large and covariances there.
 
     Parameters
     ----------
-    result, suspected
-        The adjusted network, and what is to be tested.
-    image_sd
-        (m, 2) of the images.
-    partials
+    result
+        The adjusted network.
+    suspected_by
+        What is to be tested, by (m,) the weighted squares of the images.
+    partials_of
         (p, m, 2) of the images by the unknowns of their photos, to which each has its places.
     """
-    used = result.used_images[:, np.newaxis]
-    residuals = np.where(used, result.residuals / image_sd, 0.0)
+    if result.loss or not is_suspected(result):
+        return []
+    image_sd = result.image_given_sd
+    residuals = np.where(result.used_images[:, np.newaxis], result.residuals / image_sd, 0.0)
+    suspected = suspected_by((residuals**2).sum(axis=1))
+    if not suspected:
+        return []
+    partials = partials_of()
     factor = factored(result)
     found: list[tuple[str, float, float]] = []
     for each in suspected:
@@ -105,21 +103,24 @@ def held_tests(
     return [tested]
 
 
-def held_remark(result: Result, largest: float) -> list[str]:
+def is_suspected(result: AdjustedNetwork) -> bool:
+    """Return whether residuals are too large, and covariances there to ask for the reason."""
+    test = result.global_test
+    if test is None or not test.rejected_high or not result.converged:
+        return False
+    return bool(np.isfinite(result.redundancy[result.used_images]).all())
+
+
+def held_remark(found: Sequence[Tested], largest: float) -> list[str]:
     """Say of what is held that it explains more than anything that was taken out.
 
     Parameters
     ----------
-    result
-        The adjustment of everything.
+    found
+        Its tests, in the adjustment of everything.
     largest
         The largest T of what was taken out.
     """
-    return remark_on(held_tested(result), largest)
-
-
-def remark_on(found: Sequence[Tested], largest: float) -> list[str]:
-    """Say the same of tests that were made."""
     place = found[0].largest() if found else None
     if place is None or not found[0].values[place] > largest:
         return []
@@ -130,11 +131,9 @@ def remark_on(found: Sequence[Tested], largest: float) -> list[str]:
     ]
 
 
-def _suspected(result: Result) -> list[Held]:
+def _suspected(result: Result, of_images: Floats) -> list[Held]:
     """Return what is held and has the worst images, the worst first."""
     block, used = result.block, result.used_images
-    squares = np.where(used[:, np.newaxis], result.residuals / block.image_sd, 0.0) ** 2
-    of_images = squares.sum(axis=1)
     photos, points = len(block.photo_ids), len(block.point_ids)
     counts = np.bincount(block.image_photos[used], minlength=photos)
     of_photos = np.bincount(block.image_photos, of_images, photos) / np.maximum(counts, 1)

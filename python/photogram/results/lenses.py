@@ -32,7 +32,7 @@ def fall_by_lens(result: Result, images: Bools) -> float:
     images
         (m,) those of the camera.
     """
-    if result.loss or not result.WHOLE or not is_suspected(result, result.global_test):
+    if result.loss or not result.WHOLE or not is_suspected(result):
         return 0.0
     block, own = result.block, images & result.used_images
     xy = block.image_xy[own]

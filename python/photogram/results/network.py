@@ -19,13 +19,16 @@ from photogram.arguments.arrays import finite_rows, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
-from photogram.results.covariance import Covariances, Propagated
+from photogram.network.core import CoreOptions, core_network
+from photogram.network.given import Given
+from photogram.results.covariance import Covariances, Failure, Propagated
 from photogram.results.iteration import Iteration
 from photogram.results.reliability import Reliability, reliability_of
 from photogram.results.reliability_summary import ReliabilitySummary, reliability_summary
-from photogram.results.selection import Selection
+from photogram.results.selection import Adjusted, Selection
 from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown, files_of
+from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
 from photogram.statistics.snooping.suspects import LostSupportError
 
@@ -124,6 +127,8 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
     operations, formations, seconds
         Predicted multiply-adds of each phase, the number of formations of the normal equations, and seconds
         spent in each phase.
+    options, state
+        How the core adjusted the network, and where that ended: what covariances are computed from.
     """
 
     status: str
@@ -148,6 +153,8 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
     operations: Mapping[str, float]
     formations: int
     seconds: Mapping[str, float]
+    options: CoreOptions
+    state: _photocore.BlockState
 
     KNOWN: ClassVar[bool] = True
     """Whether standard deviations are given, so that the unit weight is known."""
@@ -172,7 +179,7 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
             ("photos", f"{len(self.photo_cofactors):,}"),
             ("points", f"{int(self.used_points.sum()):,} of {len(self.point_rays):,} took part"),
             ("images", f"{int(used.sum()):,} of {len(used):,} took part"),
-            ("residuals", f"rms {rms[0]:.3g}, {rms[1]:.3g} {self._image_unit}"),
+            ("residuals", f"rms {rms[0]:.3g}, {rms[1]:.3g} {self.given.image_unit}"),
             ("freedom", f"{self.degrees_of_freedom:,.6g}"),
             ("sigma0", "a priori: there are no degrees of freedom" if s0 is None else f"{math.sqrt(s0):.4g}"),
         ]
@@ -194,8 +201,8 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
 
     @property
     @abstractmethod
-    def _image_unit(self) -> str:
-        """Unit of image coordinates."""
+    def given(self) -> Given:
+        """What was adjusted."""
 
     @classmethod
     def taken_over(cls, solution: _photocore._NetworkSolution, **found: Any) -> Self:
@@ -208,7 +215,17 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
     @property
     def geographic(self) -> bool:
         """Whether plan coordinates are angles."""
-        return False
+        return self.given.geographic
+
+    @property
+    @abstractmethod
+    def sum_and_freedom(self) -> tuple[float, float]:
+        """The weighted sum of squares of all observations, and its degrees of freedom."""
+
+    @property
+    def global_test(self) -> GlobalTest | None:
+        """The test of all residuals together; None without degrees of freedom."""
+        return global_test(*self.sum_and_freedom)
 
     @abstractmethod
     def _trial(self) -> NetworkTrial:
@@ -256,14 +273,14 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         return reliability_summary(found, heights=self.geographic)
 
     @property
-    @abstractmethod
     def image_points(self) -> Indices:
         """(m,) the point of each image."""
+        return self.given.image_points
 
     @property
-    @abstractmethod
     def image_given_sd(self) -> Floats:
         """(m, 2) standard deviations a priori of the image coordinates."""
+        return self.given.image_sd
 
     @property
     @abstractmethod
@@ -281,9 +298,9 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         """(n, 3) observed minus adjusted held components; 0 where fixed, NaN where not held."""
 
     @property
-    @abstractmethod
     def point_given_sd(self) -> Floats:
         """(n, 3) standard deviations of coordinates as observations: infinite not held, zero fixed."""
+        return self.given.point_sd
 
     @property
     def photo_standardized(self) -> Floats:
@@ -352,6 +369,13 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         return standard_deviations(self.point_covariances)
 
     @abstractmethod
+    def _adjusted(self) -> Adjusted:
+        """Return the adjusted values by kinds and names."""
+
+    @abstractmethod
+    def _refused(self, error: Failure) -> Exception:
+        """Put into words what the core has refused."""
+
     def covariances(self) -> Covariances:
         """Return an object that answers for covariances of anything with anything, from one factor.
 
@@ -367,6 +391,13 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         KeyboardInterrupt
             Ctrl-C.
         """
+        network = core_network(self.given, self.options)
+        return Covariances(
+            self._adjusted(),
+            lambda: network.covariances(self.state, threads=0, progress=None),
+            self._refused,
+            self.covariance_scale,
+        )
 
     def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
         """Return the joint covariance matrix of a selection, or that of one with another.

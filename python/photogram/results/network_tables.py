@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,11 +10,13 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.results.iteration import iteration_table
+from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.show.quantity import Axis, Link, Quantity
 from photogram.show.ways import Way
 
 __all__ = [
+    "TABLES",
     "Terms",
     "control",
     "deviation",
@@ -42,30 +44,31 @@ class Terms:
     ----------
     photos, points
         (P,), (n,) names, or numbers from 0.
-    image_photos
-        (m,) the photo of each image.
     photo_axes, point_axes, image_axes
         Unknowns of a photo, coordinates of a point, image coordinates.
     photo_values
         (P, k) adjusted unknowns.
-    point_given
-        (n, 3) coordinates as they were given.
     layers, parts
         What the unknowns of a photo consist of: how people call it, and JSON documents.
+    of_photos, of_points
+        What tables tell first: of photos, of points that took part.
+    kinds
+        Observations beside images.
     split
         Whether JSON documents tell differences of positions from those of attitudes.
     """
 
     photos: np.ndarray
     points: np.ndarray
-    image_photos: Indices
     photo_axes: tuple[Axis, ...]
     point_axes: tuple[Axis, ...]
     image_axes: tuple[Axis, ...]
     photo_values: Floats
-    point_given: Floats
     layers: Mapping[str, slice]
     parts: Mapping[str, slice]
+    of_photos: tuple[Quantity, ...] = ()
+    of_points: tuple[Quantity, ...] = ()
+    kinds: Iterable[ObservedKind] = ()
     split: bool = False
 
     @property
@@ -105,6 +108,7 @@ def photos(result: AdjustedNetwork) -> list[Quantity]:
     rows = np.arange(len(terms.photos))
     return [
         names(terms, "photo", rows, "id" if terms.identity == "id" else "", here=True),
+        *terms.of_photos,
         Quantity(
             terms.photo_values, terms.photo_axes, "value", name="", member=terms.parts, head="{}", figures=6
         ),
@@ -118,6 +122,7 @@ def points(result: AdjustedNetwork) -> list[Quantity]:
     rays, places, sd = result.point_rays[used], result.point_positions[used], result.point_sd[used]
     return [
         names(terms, "point", used, terms.identity, here=True),
+        *terms.of_points,
         Quantity(rays, name="rays", member="rays", head="Rays", decimals=0),
         Quantity(places, terms.point_axes, "value", name="", member="position", head="{}", figures=7),
         deviation(sd, terms.point_axes, member=""),
@@ -129,7 +134,7 @@ def images(result: AdjustedNetwork, rows: Indices | None = None) -> list[Quantit
     terms, used = terms_of(result), np.flatnonzero(result.used_images) if rows is None else rows
     axes = terms.image_axes
     return [
-        names(terms, "photo", terms.image_photos[used], "photo"),
+        names(terms, "photo", result.given.image_photos[used], "photo"),
         names(terms, "point", result.image_points[used], "point"),
         Quantity(
             result.residuals[used], axes, "deviation", name="residual", member=f"residual_{axes[0].unit}"
@@ -148,7 +153,7 @@ def control(result: AdjustedNetwork) -> list[Quantity]:
     """Return points as observations of their own coordinates."""
     terms, own = terms_of(result), result.control
     values = result.point_positions, result.point_sd
-    return _observed("point", terms, own, terms.point_axes, terms.point_given[own.rows], *values)
+    return _observed("point", terms, own, terms.point_axes, result.given.point_positions[own.rows], *values)
 
 
 def stations(result: AdjustedNetwork) -> list[Quantity]:
@@ -213,3 +218,13 @@ def test_value(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
     own: dict[str, Any] = dict.fromkeys(("name", "member", "label"), "standardized")
     about = "residual over its standard deviation, a priori unit weight: {}"
     return Quantity(values, axes, **own, about=about, head="Test value w", decimals=2, **more)
+
+
+TABLES: dict[str, Callable[[AdjustedNetwork], list[Quantity]]] = {
+    "photo": photos,
+    "point": points,
+    "image": images,
+    "control": control,
+    "station": stations,
+}
+"""The tables of every network by the kind of things that have their rows."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, TypeVar
@@ -11,6 +12,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.network.given import Given
 from photogram.statistics.groups import INVISIBLE
 from photogram.statistics.snooping.suspects import (
     LostSupportError,
@@ -262,28 +264,42 @@ class NetworkTrial:
         return int(self._are_in(out, images).sum() - gone) < SUPPORT
 
 
-class NamedSuspects:
+class NamedSuspects(ABC):
     """The groups of observations of a network as the core has them, with what each is called.
 
     It keeps arrays, not the core, so that names last longer than what was tested. Classes of networks say
-    what their points and photos are called, and what may go alone.
+    what may go alone, and what else than images, control and poses there is.
 
     Parameters
     ----------
+    given
+        The network.
     core
-        The network in the core.
-    image_points, image_photos
-        (m,) the point and the photo of each image.
+        The same in the core.
     apart
         Whether parts of a control point or of a station may go alone.
+    components
+        What the coordinates of points, and the components of positions and attitudes, are called.
+    lengths
+        Units of coordinates and of positions.
     """
 
     def __init__(
-        self, core: _photocore.NetworkTrial, image_points: Indices, image_photos: Indices, *, apart: bool
+        self,
+        given: Given,
+        core: _photocore.NetworkTrial,
+        *,
+        apart: bool,
+        components: tuple[Sequence[str], Sequence[str], Sequence[str]],
+        lengths: Sequence[str],
     ) -> None:
         self.kinds, self.subjects = core.subjects
         self.starts, self.components = core.row_starts, core.components
-        self.image_points, self.image_photos, self.apart = image_points, image_photos, apart
+        self.given, self.apart = given, apart
+        self.image_points, self.image_photos = given.image_points, given.image_photos
+        self._names = dict(zip((CONTROL, POSITION, ATTITUDE), components, strict=True)) | {IMAGE: "xy"}
+        images, angles = (given.image_unit,) * 2, ("rad",) * 3
+        self._units = {IMAGE: images, CONTROL: lengths, POSITION: lengths, ATTITUDE: angles}
 
     def suspects(self) -> Suspects:
         """Return the groups."""
@@ -338,26 +354,49 @@ class NamedSuspects:
         """Return the group of a row."""
         return int(np.searchsorted(self.starts, row, "right")) - 1
 
-    def other_loads(self, kind: int, subject: int) -> Indices:
-        """Return the same for what is neither an image, nor control, nor of a station."""
-        raise NotImplementedError
-
-    def parts(self, group: int) -> Sequence[Sequence[int]] | None:
-        """Return the rows that may go alone, of a group by its number; None where it goes as a whole."""
-        raise NotImplementedError
+    def photo_name(self, photo: int) -> str:
+        """Return what a photo is called."""
+        return f"photo {self.given.photo_ids[photo]}"
 
     def name(self, group: int) -> str:
         """Return what a group is called."""
-        raise NotImplementedError
+        kind, subject = int(self.kinds[group]), int(self.subjects[group])
+        if kind == IMAGE:
+            point = self.given.point_ids[self.image_points[subject]]
+            return f"image of point {point} on {self.photo_name(int(self.image_photos[subject]))}"
+        if kind == CONTROL:
+            return f"control point {self.given.point_ids[subject]}"
+        if kind in (POSITION, ATTITUDE):
+            return f"{KINDS[kind]} of {self.photo_name(subject)}"
+        return self.other_name(kind, subject)
 
     def row_name(self, row: int) -> str:
         """Return what a row is."""
-        raise NotImplementedError
+        return self._row(row)[0]
 
     def unit(self, row: int) -> str:
         """Return the unit of a row."""
-        raise NotImplementedError
+        return self._row(row)[1]
 
-    def photo_name(self, photo: int) -> str:
-        """Return what a photo is called."""
-        raise NotImplementedError
+    def _row(self, row: int) -> tuple[str, str]:
+        group, component = self.group_of(row), int(self.components[row])
+        kind = int(self.kinds[group])
+        if kind in self._names:
+            return self._names[kind][component], self._units[kind][component]
+        return self.other_row(kind, int(self.subjects[group]), component)
+
+    @abstractmethod
+    def parts(self, group: int) -> Sequence[Sequence[int]] | None:
+        """Return the rows that may go alone, of a group by its number; None where it goes as a whole."""
+
+    @abstractmethod
+    def other_loads(self, kind: int, subject: int) -> Indices:
+        """Return the photos of what is neither an image, nor control, nor of a station."""
+
+    @abstractmethod
+    def other_name(self, kind: int, subject: int) -> str:
+        """Return what that is called."""
+
+    @abstractmethod
+    def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]:
+        """Return what one of its components is called, and its unit."""

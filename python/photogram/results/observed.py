@@ -8,15 +8,24 @@ from itertools import chain
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
+from photogram.results.kinds import tested_kind
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import images, part
+from photogram.results.network_tables import images, part, terms_of
 from photogram.show.lines import field, stacked, table_lines
 from photogram.show.quantity import Quantity, labelled, long
+from photogram.statistics.findings import Tested, by_t, by_w
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["NOTABLE", "image_lines", "observed_lines", "suspect_lines", "tested"]
+__all__ = [
+    "NOTABLE",
+    "image_lines",
+    "observed_lines",
+    "suspect_lines",
+    "tested_observations",
+    "tested_singly",
+]
 
 NOTABLE = 3.0
 """Test values above are listed; what decides is the limit of the tests, which stands in the verdict."""
@@ -26,28 +35,13 @@ LISTED = 10_000
 """Image points that a report lists at most; tables and documents have every one."""
 
 
-def tested(
-    result: AdjustedNetwork,
-    image_photos: Indices,
-    photos: Sequence[str],
-    points: Sequence[str],
-    unknowns: Sequence[str],
-    axes: Sequence[str],
-) -> list[Observations]:
-    """Return all observations with their standardized residuals, where these say something.
-
-    Parameters
-    ----------
-    image_photos
-        (m,) the photo of each image.
-    photos, points
-        Their names.
-    unknowns, axes
-        What the unknowns of a photo and the coordinates of a point are called.
-    """
+def tested_observations(result: AdjustedNetwork) -> list[Observations]:
+    """Return all observations with their standardized residuals, where these say something, kind by kind."""
+    terms = terms_of(result)
+    photos, points = terms.photos, terms.points
 
     def image(index: tuple[int, ...]) -> str:
-        point, photo = result.image_points[index[0]], image_photos[index[0]]
+        point, photo = result.image_points[index[0]], result.given.image_photos[index[0]]
         return f"{'xy'[index[1]]} of point {points[point]} on photo {photos[photo]}"
 
     def kind(
@@ -61,15 +55,24 @@ def tested(
             "components of control",
             result.point_standardized,
             result.point_redundancy,
-            lambda index: f"{axes[index[1]]} of control point {points[index[0]]}",
+            lambda index: f"{terms.point_axes[index[1]].name} of control point {points[index[0]]}",
         ),
         kind(
             "components of stations",
             result.photo_standardized,
             result.photo_redundancy,
-            lambda index: f"{unknowns[index[1]]} of photo {photos[index[0]]}",
+            lambda index: f"{terms.photo_axes[index[1]].name} of photo {photos[index[0]]}",
         ),
+        *map(tested_kind, terms.kinds),
     ]
+
+
+def tested_singly(result: AdjustedNetwork) -> list[Tested]:
+    """Return their tests: w where standard deviations are given, t where they hold but for a factor."""
+    observations = tested_observations(result)
+    if result.KNOWN:
+        return [by_w(each) for each in observations]
+    return [by_t(each, *result.sum_and_freedom) for each in observations]
 
 
 def image_lines(result: AdjustedNetwork) -> list[str]:

@@ -15,6 +15,7 @@ import numpy as np
 from photogram.arguments.arrays import chosen, finite_rows
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.results.network import AdjustedNetwork
+from photogram.results.network_tables import terms_of
 from photogram.statistics.distributions import LEVEL, bonferroni
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import Systematic
@@ -63,12 +64,7 @@ class CameraImages:
 
 def patterns(
     result: AdjustedNetwork,
-    image_photos: Indices,
-    xy: Floats,
-    sd: Floats,
     cameras: Sequence[CameraImages],
-    photos: Sequence[str],
-    unit: tuple[str, float],
     axes: Sequence[str] = (),
     fall: Callable[[Bools], float] = lambda _: 0.0,
 ) -> list[Systematic]:
@@ -76,14 +72,8 @@ def patterns(
 
     Parameters
     ----------
-    image_photos, xy, sd
-        (m,), (m, 2), (m, 2) of the images: photo, image coordinates, standard deviations.
     cameras
         With the photos of each.
-    photos
-        Names.
-    unit
-        Of residuals in the report, and what leads from image coordinates to it.
     axes
         What the coordinates of stations and points are called, the height last; none where they mean nothing
         on the ground.
@@ -101,15 +91,17 @@ def patterns(
     # ~v = w sqrt(r), of w that are clipped; 0 where nothing is tested.
     redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
     residuals = np.nan_to_num(np.clip(w / factor, -CLIPPED, CLIPPED)) * np.sqrt(redundancy)
-    scale = factor * np.asarray(sd[used]).mean(axis=0) * unit[1]
+    given, (axis, _) = result.given, terms_of(result).image_axes
+    image_photos, xy = given.image_photos, given.image_xy
+    scale = factor * given.image_sd[used].mean(axis=0) * axis.factor
     found: list[Systematic | None] = [
-        _of_camera(each, image_photos[used], xy[used], residuals, redundancy, scale, unit[0])
+        _of_camera(each, image_photos[used], xy[used], residuals, redundancy, scale, axis.small)
         for each in cameras
     ]
     for row, (each, camera) in enumerate(zip(found, cameras, strict=True)):
         if each is not None and each.significant and each.large:
             found[row] = replace(each, fall=fall(camera.photos[image_photos]))
-    found.append(_of_photos(image_photos[used], photos, xy[used], residuals, redundancy))
+    found.append(_of_photos(image_photos[used], given.photo_ids, xy[used], residuals, redundancy))
     found.append(_distribution(result, used))
     if axes:
         found += [*_of_stations(result, axes), _of_heights(result)]

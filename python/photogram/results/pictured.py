@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -14,15 +16,54 @@ from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.ellipses import metric_covariances
 from photogram.results.features import Features, directions
-from photogram.results.findings import tested_observations
 from photogram.results.footprints import footprints
+from photogram.results.network import AdjustedNetwork
+from photogram.results.observed import tested_observations
 from photogram.results.result import Result
 from photogram.statistics.outliers import Observations
 
-__all__ = ["PicturedBlock", "curves_of"]
+__all__ = ["PicturedBlock", "PicturedNetwork", "curves_of"]
 
 
-class PicturedBlock(Pictured):
+class PicturedNetwork(Pictured):
+    """What is drawn alike of all adjusted networks."""
+
+    result: AdjustedNetwork
+
+    @property
+    @abstractmethod
+    def cameras(self) -> tuple[Indices, Sequence[str], bool]:
+        """(P,) cameras of the photos, their names, and whether y counts downwards in their images."""
+
+    @cached_property
+    def images(self) -> Images:
+        """The image observations that took part."""
+        result, given, used = self.result, self.result.given, self.result.used_images
+        cameras, names, down = self.cameras
+        return Images(
+            unit=given.image_unit,
+            photos=given.image_photos[used],
+            points=given.image_points[used],
+            xy=given.image_xy[used],
+            residuals=result.residuals[used],
+            redundancy=result.redundancy[used],
+            cameras=cameras[given.image_photos[used]],
+            names=names,
+            down=down,
+        )
+
+    @property
+    def tested(self) -> list[Observations]:
+        """All observations with their standardized residuals."""
+        return tested_observations(self.result)
+
+    @property
+    def unit_weight(self) -> float:
+        """The root of the variance of unit weight."""
+        return float(np.sqrt(self.result.covariance_scale))
+
+
+class PicturedBlock(PicturedNetwork):
     """What is drawn of an adjusted block: geographic space in axes to east, north and up amid its stations.
 
     Parameters
@@ -30,6 +71,8 @@ class PicturedBlock(Pictured):
     result
         The adjusted block.
     """
+
+    result: Result
 
     def __init__(self, result: Result) -> None:
         self.result = result
@@ -75,37 +118,16 @@ class PicturedBlock(Pictured):
         found = footprints(self.result).positions()
         return self._metric(found.reshape(-1, 3)).reshape(found.shape)
 
-    @cached_property
-    def images(self) -> Images:
-        """The image observations that took part."""
-        result, block = self.result, self.result.block
-        used = result.used_images
+    @property
+    def cameras(self) -> tuple[Indices, Sequence[str], bool]:
+        """(P,) cameras of the photos, their names, and whether y counts downwards in their images."""
+        block = self.result.block
         _, cameras = block.core_cameras()
         names = block.camera_names
         if not names:
             distances = dict.fromkeys(block.known_distances("pictures").tolist())
             names = [f"c = {distance:g} {block.image_unit}" for distance in distances]
-        return Images(
-            unit=block.image_unit,
-            photos=block.image_photos[used],
-            points=block.image_points[used],
-            xy=block.image_xy[used],
-            residuals=result.residuals[used],
-            redundancy=result.redundancy[used],
-            cameras=cameras[block.image_photos[used]],
-            names=names,
-            down=bool(block.cameras) and block.cameras[0].image_y == "down",
-        )
-
-    @property
-    def tested(self) -> list[Observations]:
-        """All observations with their standardized residuals."""
-        return tested_observations(self.result)
-
-    @property
-    def unit_weight(self) -> float:
-        """The root of the variance of unit weight."""
-        return float(np.sqrt(self.result.covariance_scale))
+        return cameras, names, bool(block.cameras) and block.cameras[0].image_y == "down"
 
     @property
     def correlations(self) -> list[Correlated]:
@@ -143,8 +165,10 @@ class PicturedBlock(Pictured):
 
 
 def _bands(**sds: Floats) -> dict[str, Floats]:
-    """Return standard deviations by what they are of, without those that are zero (a camera that is held)."""
-    return {name.replace("_", " "): sd for name, sd in sds.items() if np.any(sd != 0)}
+    """Return standard deviations by what they are of, where there are any: a camera that is held has none."""
+    return {
+        name.replace("_", " "): sd for name, sd in sds.items() if np.isfinite(sd).all() and np.any(sd != 0)
+    }
 
 
 def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:

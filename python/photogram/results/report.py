@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -15,14 +16,19 @@ from photogram.network.structuring import structure
 from photogram.results.axes import image_axes, point_axes
 from photogram.results.calibration_report import calibration_sections
 from photogram.results.features_report import features_sections
-from photogram.results.findings import tested_observations
 from photogram.results.iteration import iteration_lines
 from photogram.results.kinds import ObservedKind
-from photogram.results.network_tables import control, iterations, part, photos, stations
-from photogram.results.observed import NOTABLE, image_lines, observed_lines, suspect_lines
+from photogram.results.network import AdjustedNetwork
+from photogram.results.network_tables import control, iterations, part, photos, points, stations
+from photogram.results.observed import (
+    NOTABLE,
+    image_lines,
+    observed_lines,
+    suspect_lines,
+    tested_observations,
+)
 from photogram.results.result import Result
 from photogram.results.tables import (
-    block_points,
     check_points,
     observed_components,
     redundancy_by_kind,
@@ -34,13 +40,23 @@ from photogram.show.lines import Field, field, stacked, table_lines
 from photogram.show.quantity import Axis, Quantity, labelled
 from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
 from photogram.show.ways import report_of
-from photogram.statistics.limits import normal_limit
+from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
 from photogram.statistics.outliers import outliers
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
 
-__all__ = ["ORDERINGS", "bandwidths", "problems_of", "report", "size_of", "summary"]
+__all__ = [
+    "ORDERINGS",
+    "bandwidths",
+    "first_sections",
+    "problems_of",
+    "reliability_lines",
+    "report",
+    "size_of",
+    "summary",
+    "suspects_section",
+]
 
 ORDERINGS = {
     "input": "in input order",
@@ -59,7 +75,7 @@ def report(result: Result) -> str:
     sections = [
         *summary(result),
         ("Redundancy by kind of observation", _redundancy(result)),
-        ("Reliability", _reliability(result)),
+        ("Reliability", reliability_lines(result, result.block.linear_unit)),
         ("Iterations", iteration_lines(iterations(result), ".6f")),
         ("Check points: adjusted minus given, standard deviations, test", _check_points(result)),
         (
@@ -93,23 +109,45 @@ def report(result: Result) -> str:
 @np.errstate(over="ignore")
 def summary(result: Result) -> list[Section]:
     """Return what a reader wants first, as titled sections: verdict, problems, adjustment, residuals."""
-    suspects = suspect_lines(result, result.standardized, "standardized")
+    more = [*features_sections(result.features), ("Residuals", _residuals(result))]
+    title, suspects = suspects_section(result)
+    return [*first_sections(result, _adjustment(result)), *more, (title, suspects or ["none"])]
+
+
+def first_sections(result: AdjustedNetwork, adjustment: list[str]) -> list[Section]:
+    """Return what the summary of every network begins with: verdict, problems, adjustment."""
     return [
         *verdict_sections(result.verdict),
         ("Problems", problems_or_none(problems_of(result), result.verdict)),
-        ("Adjustment", _adjustment(result)),
-        *features_sections(result.features),
-        ("Residuals", _residuals(result)),
-        (
-            f"Image coordinates with |standardized residual| > {NOTABLE:g}, largest first",
-            suspects or ["none"],
-        ),
+        ("Adjustment", adjustment),
     ]
 
 
-def problems_of(result: Result) -> list[str]:
-    """Return what keeps a reader from using the values: a failed test and outliers before other remarks."""
-    found = outliers(tested_observations(result), normal_limit, "standardized residuals")
+def suspects_section(result: AdjustedNetwork) -> Section:
+    """List the image coordinates that fit worst; where unit weight is not known, in units of the others."""
+    if result.KNOWN:
+        name, title, tests = "standardized", "|standardized residual| > {}", result.standardized
+    else:
+        name, title = "t", "|t| > {} (externally studentized)"
+        tests = externally_studentized(result.standardized, *result.sum_and_freedom)
+    head = f"Image coordinates with {title.format(f'{NOTABLE:g}')}, largest first"
+    return head, suspect_lines(result, tests, name)
+
+
+def problems_of(result: AdjustedNetwork) -> list[str]:
+    """Return what keeps a reader from using the values: a failed test and outliers before other remarks.
+
+    Where standard deviations may be guesses, single residuals are tested against all others.
+    """
+    groups, (omega, freedom) = tested_observations(result), result.sum_and_freedom
+    if result.KNOWN:
+        found = outliers(groups, normal_limit, "standardized residuals")
+    else:
+        groups = [
+            replace(each, values=externally_studentized(each.values, omega, freedom)) for each in groups
+        ]
+        limit = partial(studentized_limit, freedom)
+        found = outliers(groups, limit, "externally studentized residuals")
     messages = [*found, *result.messages]
     return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
 
@@ -208,9 +246,10 @@ def _redundancy(result: Result) -> list[str]:
     return table_lines([*field(names, 36, head="kind"), *chain(*fields)])
 
 
-def _reliability(result: Result) -> list[str]:
+def reliability_lines(result: AdjustedNetwork, unit: str) -> list[str]:
+    """Return what a report says of reliability, lengths in a unit."""
     summary = result.reliability_summary
-    return [] if summary is None else summary.lines(result.block.linear_unit)
+    return [] if summary is None else summary.lines(unit)
 
 
 def _unheld(result: Result) -> list[str]:
@@ -278,7 +317,7 @@ def _held_cameras(result: Result) -> list[str]:
 
 
 def _points(result: Result) -> list[str]:
-    names, kinds, rays, values, sd = block_points(result)
+    names, kinds, rays, values, sd = points(result)
     blank = Field(f"{'':<10}", [f"{'':<10}"] * len(names.values))
     rest = [*field(rays, 4, ".0f", "rays", "  "), *field(kinds, 0, head="kind", gap="  ")]
     first = [*field(names, 10, head="point"), *field(values, 20, ".4f"), *rest]

@@ -19,7 +19,7 @@ from photogram.network.core import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
 from photogram.results.check_points import CheckPoints, check_points
-from photogram.results.covariance import Covariances
+from photogram.results.covariance import Failure
 from photogram.results.datum import (
     ResultDatum,
     datum_messages,
@@ -30,7 +30,7 @@ from photogram.results.datum import (
 )
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
-from photogram.results.selection import Adjusted, photo_components, point_components
+from photogram.results.selection import Adjusted, Things, photo_components, point_components
 from photogram.results.suspects import network_trial
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
@@ -122,8 +122,6 @@ class Result(AdjustedNetwork):
         Points left out, with the reason.
     datum
         What coordinates and standard deviations refer to.
-    options, state
-        How the core adjusted the block, and where that ended: what covariances are computed from.
     hints
         Mistakes in conventions (units, axes, signs, angles) that would explain why images do not fit, as
         sentences, as :func:`photogram.diagnose` finds them; none before. They head the verdict.
@@ -151,8 +149,6 @@ class Result(AdjustedNetwork):
     unknowns: tuple[AdjustedUnknown, ...]
     dropped: Mapping[str, str]
     datum: ResultDatum
-    options: CoreOptions
-    state: _photocore.BlockState
     hints: tuple[str, ...] = ()
     exchanged: tuple[str, ...] = ()
     set_aside: tuple[str, ...] = ()
@@ -200,18 +196,20 @@ class Result(AdjustedNetwork):
         return f"block: {self.block.title}" if self.block.title else "block"
 
     @property
-    def _image_unit(self) -> str:
-        return self.block.image_unit
+    def given(self) -> Block:
+        """What was adjusted: the block."""
+        return self.block
 
-    def covariances(self) -> Covariances:
-        """Return an object that answers for covariances of anything with anything: see `AdjustedNetwork`."""
-        network, state = block_network(self.block, self.options), self.state
-        return Covariances(
-            adjusted(self),
-            lambda: network.covariances(state, threads=0, progress=None),
-            lambda error: refused(self.block, network, state, error),
-            self.covariance_scale,
-        )
+    @property
+    def sum_and_freedom(self) -> tuple[float, float]:
+        """The weighted sum of squares of all observations, and the degrees of freedom of the unit weight."""
+        return self.sums_of_squares.total, self.degrees_of_freedom
+
+    def _adjusted(self) -> Adjusted:
+        return adjusted(self)
+
+    def _refused(self, error: Failure) -> Exception:
+        return refused(self.block, block_network(self.block, self.options), self.state, error)
 
     def _trial(self) -> NetworkTrial:
         core = block_network(self.block, self.options).trial(self.state, threads=0, kept=True)
@@ -295,21 +293,6 @@ class Result(AdjustedNetwork):
         return table
 
     @property
-    def geographic(self) -> bool:
-        """Whether plan coordinates are angles."""
-        return self.block.geographic
-
-    @property
-    def image_points(self) -> Indices:
-        """(m,) the point of each image."""
-        return self.block.image_points
-
-    @property
-    def image_given_sd(self) -> Floats:
-        """(m, 2) standard deviations a priori of the image coordinates."""
-        return self.block.image_sd
-
-    @property
     def global_test(self) -> GlobalTest | None:
         """The test of all residuals together; None without degrees of freedom.
 
@@ -318,7 +301,7 @@ class Result(AdjustedNetwork):
         where there are no covariances (docs/tests.md).
         """
         if self.unit_variance == "constrained":
-            return global_test(self.sums_of_squares.total, self.degrees_of_freedom)
+            return super().global_test
         if self.redundancies is None:
             return None
         return global_test(self.sums_of_squares.measured, self.redundancies.measured)
@@ -349,11 +332,6 @@ class Result(AdjustedNetwork):
     def photo_given_sd(self) -> Floats:
         """(P, 6) standard deviations of observed positions and attitudes: infinite free, zero fixed."""
         return np.hstack([self.block.photo_position_sd, self.block.photo_attitude_sd])
-
-    @property
-    def point_given_sd(self) -> Floats:
-        """(n, 3) standard deviations of supplied coordinates: infinite not held, zero fixed."""
-        return self.block.point_sd
 
     @property
     def point_residuals(self) -> Floats:
@@ -422,43 +400,29 @@ def _least_turns(angles: Floats) -> Floats:
 def adjusted(result: Result) -> Adjusted:
     """Return the adjusted values of a result by kinds and names."""
     block = result.block
-    photos = np.hstack([result.photo_positions, result.photo_attitudes])
-    of_photos = [photo_components(block)] * len(photos)
-    steps = (*point_components(block), "rho x", "rho y", "rho z")
+    photos, sd = np.hstack([result.photo_positions, result.photo_attitudes]), result.photo_sd
+    places, count = point_components(block), len(photos)
+    steps = (*places, "rho x", "rho y", "rho z")
+    points = [places] * len(block.point_ids)
     # Blocks with principal distances have a camera for each: they are known, and nobody asks for them.
     cameras, unknowns = result.cameras, result.unknowns
     return Adjusted(
         network="block",
-        ids={
-            "photo": block.photo_ids,
-            "step": block.photo_ids,
-            "point": block.point_ids,
-            "camera": [each.name for each in cameras],
-            "unknown": [each.name for each in unknowns],
-        },
-        components={
-            "photo": of_photos,
-            "step": [steps] * len(photos),
-            "point": [point_components(block)] * len(block.point_ids),
-            "camera": [each.names for each in cameras],
-            "unknown": [each.components for each in unknowns],
-        },
-        values={
-            "photo": photos,
-            "step": photos,
-            "point": result.point_positions,
-            "camera": [each.values for each in cameras],
-            "unknown": [each.values for each in unknowns],
-        },
-        sd={
-            "photo": result.photo_sd,
-            "step": result.photo_sd,
-            "point": result.point_sd,
-            "camera": [each.sd for each in cameras],
-            "unknown": [each.sd for each in unknowns],
+        things={
+            "photo": Things(block.photo_ids, [photo_components(block)] * count, photos, sd),
+            "step": Things(block.photo_ids, [steps] * count, photos, sd),
+            "point": Things(block.point_ids, points, result.point_positions, result.point_sd),
+            "camera": Things(
+                [each.name for each in cameras],
+                [each.names for each in cameras],
+                [each.values for each in cameras],
+                [each.sd for each in cameras],
+            ),
+            "unknown": Things(
+                [each.name for each in unknowns],
+                [each.components for each in unknowns],
+                [each.values for each in unknowns],
+                [each.sd for each in unknowns],
+            ),
         },
     )
-
-
-AdjustedBlock = Result
-"""The name that its arrays had when they were a class of their own."""

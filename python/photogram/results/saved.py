@@ -294,7 +294,7 @@ def written(
     summary
         What a reader wants first.
     """
-    unknowns, *state = result.state.__getnewargs__()  # type: ignore[attr-defined]
+    unknowns, *state = result.state.__getnewargs__()
     about = _about(result, frame)
     sheets: dict[str, Sequence[Column]] = {
         table: [*leading[table], *(column for each in own for column in each.columns(result))]

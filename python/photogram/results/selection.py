@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from numbers import Integral
 from typing import Any
 
@@ -14,7 +14,16 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 
-__all__ = ["Adjusted", "Item", "Selected", "Selection", "Wanted", "photo_components", "point_components"]
+__all__ = [
+    "Adjusted",
+    "Item",
+    "Selected",
+    "Selection",
+    "Things",
+    "Wanted",
+    "photo_components",
+    "point_components",
+]
 
 Wanted = str | int | Sequence[str] | Sequence[int] | None
 """A name, names, or None for all; the photos and points of collections are called by their numbers."""
@@ -59,27 +68,40 @@ class Selected:
 
 
 @dataclass(frozen=True, eq=False)
+class Things:
+    """Things of one kind, one after the other.
+
+    Attributes
+    ----------
+    ids, components, values, sd
+        Of each its name, the names of its unknowns, their values and standard deviations.
+    parts
+        What the core calls the parts of such a thing; none where it is called as it is.
+    """
+
+    ids: Sequence[str]
+    components: Sequence[tuple[str, ...]]
+    values: Sequence[Floats] | Floats
+    sd: Sequence[Floats] | Floats
+    parts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Adjusted:
-    """Adjusted values and standard deviations of a network, by kind; names and values one for each thing.
+    """Adjusted values and standard deviations of a network.
 
     Attributes
     ----------
     network
         What it is called: a block, or a collection.
-    ids, components, values, sd
-        By kind, for each thing: its name, the names of its unknowns, their values and standard deviations.
-    parts
-        By kind, what the core calls the parts of such a thing; those without are called as they are.
+    things
+        By their kinds.
     numbered
-        Whether things are called by their numbers.
+        Whether they are called by their numbers.
     """
 
     network: str
-    ids: Mapping[str, Sequence[str]]
-    components: Mapping[str, Sequence[tuple[str, ...]]]
-    values: Mapping[str, Sequence[Floats] | Floats]
-    sd: Mapping[str, Sequence[Floats] | Floats]
-    parts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    things: Mapping[str, Things]
     numbered: bool = False
 
     def selected(self, selection: Selection) -> Selected:
@@ -97,25 +119,25 @@ class Adjusted:
         deviations: list[Floats] = []
         shapes: list[tuple[int, ...]] = []
         for item in items:
-            if not (isinstance(item, tuple) and len(item) == 2) or item[0] not in self.ids:
-                raise InputError(
-                    f"{shown(item)} is no kind ({', '.join(self.ids)}) with a name, several, or None for all"
-                )
+            if not (isinstance(item, tuple) and len(item) == 2) or item[0] not in self.things:
+                kinds = ", ".join(self.things)
+                raise InputError(f"{shown(item)} is no kind ({kinds}) with a name, several, or None for all")
             kind, wanted = str(item[0]), item[1]
+            own = self.things[kind]
             chosen = self._indices(kind, wanted)
-            rows += [(part, index) for index in chosen for part in self.parts.get(kind, (kind,))]
+            rows += [(part, index) for index in chosen for part in own.parts or (kind,)]
             for index in chosen:
-                components = self.components[kind][index]
-                labels += [(kind, self.ids[kind][index], component) for component in components]
-                values.append(np.asarray(self.values[kind][index], dtype=float))
-                deviations.append(np.asarray(self.sd[kind][index], dtype=float))
-            widths = {len(self.components[kind][index]) for index in chosen}
+                labels += [(kind, own.ids[index], component) for component in own.components[index]]
+                values.append(np.asarray(own.values[index], dtype=float))
+                deviations.append(np.asarray(own.sd[index], dtype=float))
+            counts = [len(own.components[index]) for index in chosen]
+            widths = set(counts)
             if self._is_one(wanted):
-                shapes.append((len(self.components[kind][chosen[0]]),))
+                shapes.append((counts[0],))
             elif len(widths) <= 1:
                 shapes.append((len(chosen), *widths) if widths else (0,))
             else:
-                shapes.append((sum(len(self.components[kind][index]) for index in chosen),))
+                shapes.append((sum(counts),))
         together = [np.concatenate(part) if part else np.empty(0) for part in (values, deviations)]
         return Selected(rows, labels, together[0], together[1], shapes)
 
@@ -125,9 +147,9 @@ class Adjusted:
         )
 
     def _indices(self, kind: str, wanted: Wanted) -> list[int]:
-        ids = self.ids[kind]
+        ids = self.things[kind].ids
         if wanted is None:
-            used = ~np.isnan([each[0] if len(each) else 0.0 for each in self.values[kind]])
+            used = ~np.isnan([each[0] if len(each) else 0.0 for each in self.things[kind].values])
             return np.flatnonzero(used).tolist()
         index = {name: i for i, name in enumerate(ids)}
         several: Any = [wanted] if self._is_one(wanted) else wanted

@@ -13,7 +13,6 @@ from photogram.network.observations import Observation, observation_rows
 from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,
-    IMAGE,
     KINDS,
     OBSERVATION,
     POSITION,
@@ -65,25 +64,19 @@ def observations_of_core(block: Block) -> list[Observation]:
 
 class _Named(NamedSuspects):
     def __init__(self, block: Block, core: _photocore.NetworkTrial, parts: bool) -> None:
-        super().__init__(core, block.image_points, block.image_photos, apart=parts)
+        axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
+        plan = "rad" if block.geographic else block.linear_unit
+        super().__init__(
+            block,
+            core,
+            apart=parts,
+            components=(axes, axes, ANGLES),
+            lengths=(plan, plan, block.linear_unit),
+        )
         self.block = block
-        self.axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
         self.point_row = {name: row for row, name in enumerate(block.point_ids)}
         self.photo_row = {name: row for row, name in enumerate(block.photo_ids)}
         self.observations = observations_of_core(block)
-
-    def other_loads(self, kind: int, subject: int) -> Indices:
-        """Return the photos that an observation beside images has to do with; of what is common, all."""
-        if kind != OBSERVATION:
-            return np.arange(len(self.block.photo_ids))
-        observation = self.observations[subject]
-        seen = [self.photos_of_point(self.point_row[name]) for name in observation.points]
-        own = np.array([self.photo_row[name] for name in observation.photos], dtype=np.int64)
-        return np.unique(np.concatenate([own, *seen]))
-
-    def photo_name(self, photo: int) -> str:
-        """Return what a photo is called."""
-        return f"photo {self.block.photo_ids[photo]}"
 
     def parts(self, group: int) -> Sequence[Sequence[int]] | None:
         """Return what may go alone: plan, height or all of control, single components of stations."""
@@ -97,48 +90,27 @@ class _Named(NamedSuspects):
             return [(row,) for row in range(len(components))]
         return None
 
-    def name(self, group: int) -> str:
-        """Return what a group is called."""
-        kind, subject = int(self.kinds[group]), int(self.subjects[group])
-        block = self.block
-        if kind == IMAGE:
-            point = block.point_ids[block.image_points[subject]]
-            return f"image of point {point} on photo {block.photo_ids[block.image_photos[subject]]}"
-        if kind == CONTROL:
-            return f"control point {block.point_ids[subject]}"
-        if kind in (POSITION, ATTITUDE):
-            return f"{KINDS[kind]} of photo {block.photo_ids[subject]}"
+    def other_loads(self, kind: int, subject: int) -> Indices:
+        """Return the photos that an observation beside images has to do with; of what is common, all."""
+        if kind != OBSERVATION:
+            return np.arange(len(self.block.photo_ids))
+        observation = self.observations[subject]
+        seen = [self.photos_of_point(self.point_row[name]) for name in observation.points]
+        own = np.array([self.photo_row[name] for name in observation.photos], dtype=np.int64)
+        return np.unique(np.concatenate([own, *seen]))
+
+    def other_name(self, kind: int, subject: int) -> str:
+        """Return what an observation beside images, a camera or a common unknown is called."""
         if kind == OBSERVATION:
             return self.observations[subject].name
         if KINDS[kind] == "camera":
-            return f"parameters of {block.camera_names[subject]}"
-        return f"unknown {block.unknowns[subject].name}"
+            return f"parameters of {self.block.camera_names[subject]}"
+        return f"unknown {self.block.unknowns[subject].name}"
 
-    def row_name(self, row: int) -> str:
-        """Return what a row is."""
-        group, component = self.group_of(row), int(self.components[row])
-        kind = int(self.kinds[group])
-        if kind == IMAGE:
-            return "xy"[component]
-        if kind in (CONTROL, POSITION):
-            return self.axes[component]
-        if kind == ATTITUDE:
-            return ANGLES[component]
-        if kind == OBSERVATION:
-            observation = self.observations[int(self.subjects[group])]
-            return observation.components(geographic=self.block.geographic)[component]
-        return str(component)
-
-    def unit(self, row: int) -> str:
-        """Return the unit of a row."""
-        group, component = self.group_of(row), int(self.components[row])
-        kind, linear = int(self.kinds[group]), self.block.linear_unit
-        if kind == IMAGE:
-            return self.block.image_unit
-        if kind in (CONTROL, POSITION):
-            return "rad" if self.block.geographic and component < 2 else linear
-        if kind == ATTITUDE:
-            return "rad"
-        if kind == OBSERVATION:
-            return self.observations[int(self.subjects[group])].units(linear)[component]
-        return ""
+    def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]:
+        """Return the name and unit of a component; parameters and common unknowns have numbers."""
+        if kind != OBSERVATION:
+            return str(component), ""
+        observation = self.observations[subject]
+        names = observation.components(geographic=self.block.geographic)
+        return names[component], observation.units(self.block.linear_unit)[component]

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.results import network_tables
 from photogram.results.axes import TURNS, component_axis, image_axes, point_axes
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.features import Features
@@ -18,15 +19,10 @@ from photogram.results.grouping import grouped
 from photogram.results.kinds import ObservedKind
 from photogram.results.network_tables import (
     Terms,
-    control,
     deviation,
     difference,
-    images,
     names,
-    photos,
-    points,
     redundancy,
-    stations,
     terms_of,
     test_value,
 )
@@ -38,7 +34,6 @@ from photogram.statistics.reliability import TESTABLE
 
 __all__ = [
     "TABLES",
-    "block_points",
     "camera_parameters",
     "check_points",
     "observations",
@@ -77,27 +72,25 @@ def _terms(result: Result) -> Terms:
     return Terms(
         photos=np.array(block.photo_ids, dtype=object),
         points=np.array(block.point_ids, dtype=object),
-        image_photos=block.image_photos,
         photo_axes=(*axes, *TURNS),
         point_axes=axes,
         image_axes=image_axes(block.image_unit),
         photo_values=np.hstack([result.photo_positions, result.photo_attitudes]),
-        point_given=block.point_positions,
         layers={"Positions": slice(0, 3), "Attitudes": slice(3, 6)},
         parts={"position": slice(0, 3), "attitude_rad": slice(3, 6)},
+        of_points=(
+            Quantity(
+                result.point_kinds[result.used_points],
+                kind="name",
+                name="kind",
+                member="kind",
+                about="what it is",
+                head="Kind",
+            ),
+        ),
+        kinds=result.kinds.values(),
         split=True,
     )
-
-
-def block_points(result: Result) -> list[Quantity]:
-    """Return the points that took part, with what they are."""
-    own, *rest = points(result)
-    kinds = result.point_kinds[result.used_points]
-    return [
-        own,
-        Quantity(kinds, kind="name", name="kind", member="kind", about="what it is", head="Kind"),
-        *rest,
-    ]
 
 
 def check_points(result: Result) -> list[Quantity]:
@@ -141,7 +134,7 @@ def _compared(
         tests = differences / np.hypot(sd, np.nan_to_num(given_sd))
     return [
         names(terms, "point", rows, "id"),
-        Quantity(terms.point_given[rows], axes, "value", head="Given"),
+        Quantity(result.given.point_positions[rows], axes, "value", head="Given"),
         Quantity(result.point_positions[rows], axes, "value", head="Adjusted"),
         difference(differences, axes),
         deviation(sd, axes, label="sd adjusted", head="sd adjusted"),
@@ -294,12 +287,8 @@ def _told(columns: Mapping[str, Any]) -> list[Quantity]:
 
 
 TABLES: dict[str, Callable[[Result], list[Quantity]]] = {
-    "photo": photos,
-    "point": block_points,
-    "image": images,
+    **network_tables.TABLES,
     "check": check_points,
-    "control": control,
-    "station": stations,
     "observation": lambda result: observed_components(result.kinds.values()),
     "camera": lambda result: camera_parameters(result.cameras),
     "unknown": lambda result: unknowns(result.unknowns),

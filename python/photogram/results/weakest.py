@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,12 +77,8 @@ class Determined:
 
     Attributes
     ----------
-    photo_ids, point_ids
-        What they are called.
     stations, points
         (P, 3), (n, 3) places, with axes of equal units.
-    image_photos
-        (m,) the photo of each image.
     poses
         (P, 6, 6) cofactors of position and attitude.
     ranks
@@ -92,11 +87,8 @@ class Determined:
         (n, 3, 3) with axes of equal units.
     """
 
-    photo_ids: Sequence[str]
-    point_ids: Sequence[str]
     stations: Floats
     points: Floats
-    image_photos: Indices
     poses: Floats
     ranks: Indices
     point_cofactors: Floats
@@ -120,9 +112,7 @@ def _(result: Result) -> Determined:
         )
     poses = result.photo_cofactors[:, :6, :6]
     ranks = (np.diagonal(poses, axis1=1, axis2=2) > 0).sum(axis=1)
-    return Determined(
-        block.photo_ids, block.point_ids, stations, points, block.image_photos, poses, ranks, cofactors
-    )
+    return Determined(stations, points, poses, ranks, cofactors)
 
 
 @np.errstate(all="ignore")
@@ -149,7 +139,7 @@ def weakest_points(result: AdjustedNetwork, count: int = WORST) -> list[WeakestP
     chosen = [*near[np.argsort(distance[near])], *order[np.isfinite(ratio[order]) | np.isinf(ratio[order])]]
     return [
         WeakestPoint(
-            network.point_ids[row], float(ratio[row]), float(distance[row]), int(result.point_rays[row])
+            result.given.point_ids[row], float(ratio[row]), float(distance[row]), int(result.point_rays[row])
         )
         for row in list(dict.fromkeys(int(each) for each in chosen))[:count]
     ]
@@ -162,14 +152,15 @@ def weakest_photos(result: AdjustedNetwork, count: int = WORST) -> list[WeakestP
     Fixed unknowns of a photo do not count; those of which all are fixed are left out.
     """
     network = determined(result)
-    images = np.bincount(network.image_photos[result.used_images], minlength=len(network.photo_ids))
+    names, photos = result.given.photo_ids, result.given.image_photos
+    images = np.bincount(photos[result.used_images], minlength=len(names))
     known = (images > 0) & np.isfinite(network.poses).all(axis=(1, 2)) & (network.ranks > 0)
     poses, rows = network.poses[known], np.flatnonzero(known)
     variances = np.diagonal(poses, axis1=1, axis2=2)
     sd = np.sqrt(np.where(variances > 0, variances, 1.0))
     condition = _condition(poses / (sd[:, :, np.newaxis] * sd[:, np.newaxis, :]), network.ranks[known])
     return [
-        WeakestPhoto(network.photo_ids[rows[each]], float(condition[each]), int(images[rows[each]]))
+        WeakestPhoto(names[rows[each]], float(condition[each]), int(images[rows[each]]))
         for each in np.argsort(-condition, kind="stable")[:count].tolist()
     ]
 
@@ -213,7 +204,7 @@ def _distances(result: AdjustedNetwork, network: Determined) -> Floats:
     """Return the distances of all points from the nearest station that sees them, in their median."""
     used = result.used_images
     own = result.image_points[used]
-    of_images = network.points[own] - network.stations[network.image_photos[used]]
+    of_images = network.points[own] - network.stations[result.given.image_photos[used]]
     nearest = np.full(len(network.points), np.inf)
     np.minimum.at(nearest, own, np.linalg.norm(of_images, axis=1))
     seen = np.isfinite(nearest)

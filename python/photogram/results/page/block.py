@@ -7,20 +7,17 @@ import math
 import numpy as np
 
 from photogram.results.axes import point_axes
-from photogram.results.findings import tested_observations
 from photogram.results.page.cameras import cameras_section
 from photogram.results.page.features import features_section
-from photogram.results.page.parts import highlights, network_sections, size_section
+from photogram.results.page.parts import network_page, size_section
 from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import beside_section, check_section, control_section, stations_section
-from photogram.results.report import problems_of, size_of
+from photogram.results.report import size_of
 from photogram.results.result import Result
-from photogram.results.tables import block_points, redundancy_by_kind, unknowns
+from photogram.results.tables import redundancy_by_kind, unknowns
 from photogram.show.cells import page_table, unit_written
-from photogram.show.judgement import judged
 from photogram.show.page import Fact, Page, Section, Table, significant
 from photogram.show.ways import page_of
-from photogram.statistics.findings import by_w
 
 __all__ = ["block_page"]
 
@@ -29,7 +26,6 @@ __all__ = ["block_page"]
 @np.errstate(over="ignore", invalid="ignore")
 def block_page(result: Result) -> Page:
     """Return the report of an adjusted block for the browser."""
-    groups = [by_w(each) for each in tested_observations(result)]
     pictures = drawings(result)
     given = [
         control_section(result),
@@ -39,25 +35,17 @@ def block_page(result: Result) -> Page:
         cameras_section(result, [pictures[name] for name in ("correlations", "distortion")]),
         _unknowns_section(result),
     ]
-    sections = network_sections(
+    return network_page(
         result,
-        groups,
+        "Adjustment of a block of photos",
         _size_section(result),
         given,
-        block_points(result),
-        problems_of(result),
+        photos=len(result.block.photo_ids),
+        title=result.block.title,
+        more=_accuracy(result),
         redundancy=_redundancy_tables(result),
         beside=[features_section(result.features, pictures["features"])],
         datum=_datum(result),
-    )
-    return Page(
-        what="Adjustment of a block of photos",
-        title=result.block.title,
-        judgements=[judged(result.verdict)],
-        advice=result.verdict.next,
-        highlights=[*highlights(result, len(result.block.photo_ids)), *_accuracy(result)],
-        sections=sections,
-        phases=result.seconds,
     )
 
 

@@ -40,7 +40,7 @@ def worst_of(groups: Sequence[Tested], count: int = WORST) -> list[Worst]:
 def worst_images(result: AdjustedNetwork, worst: Sequence[Worst]) -> tuple[list[int], list[int]]:
     """Return photos and points of the images among the worst observations."""
     own = [place[0] for _, tested, place in worst if tested.kind == "image coordinates"]
-    return terms_of(result).image_photos[own].tolist(), result.image_points[own].tolist()
+    return result.given.image_photos[own].tolist(), result.image_points[own].tolist()
 
 
 def worst_table(result: AdjustedNetwork, limit: float | None, worst: Sequence[Worst]) -> Table:
@@ -52,7 +52,11 @@ def worst_table(result: AdjustedNetwork, limit: float | None, worst: Sequence[Wo
         value = Cell(float(tested.values[place]), tone="look" if beyond else "")
         if tested.kind == "image coordinates":
             image, k = place
-            photo, point, axis = terms.image_photos[image], result.image_points[image], terms.image_axes[k]
+            photo, point, axis = (
+                result.given.image_photos[image],
+                result.image_points[image],
+                terms.image_axes[k],
+            )
             rows.append(
                 [
                     f"image {axis.name}",

@@ -1,4 +1,4 @@
-"""Sections that every adjusted network has: how good it is, how it went, what was remarked."""
+"""The page of every adjusted network: how good it is, how it went, what was remarked."""
 
 from __future__ import annotations
 
@@ -9,49 +9,47 @@ import numpy as np
 
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import iterations, terms_of
+from photogram.results.observed import tested_singly
 from photogram.results.page.observed import Worst, limit_of, worst_images, worst_of, worst_table
 from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import photos_section, points_section
-from photogram.results.report import ORDERINGS
+from photogram.results.report import ORDERINGS, problems_of
 from photogram.show.cells import page_table, unit_written
-from photogram.show.judgement import remarks_section, verdict_table
-from photogram.show.page import Column, Drawing, Fact, Facts, Part, Row, Section, Table, significant
-from photogram.show.quantity import Quantity
+from photogram.show.judgement import judged, remarks_section, verdict_table
+from photogram.show.page import Column, Drawing, Fact, Facts, Page, Part, Row, Section, Table, significant
 from photogram.statistics.findings import Tested
 
 __all__ = [
-    "highlights",
-    "network_sections",
+    "network_page",
     "size_section",
 ]
 
 _NOT_CHECKED = 0.01
 
 
-def network_sections(
+def network_page(
     result: AdjustedNetwork,
-    groups: Sequence[Tested],
+    what: str,
     size: Section,
     given: Sequence[Section],
-    table: Sequence[Quantity],
-    problems: Sequence[str],
     *,
+    photos: int,
+    title: str = "",
+    more: Sequence[Fact] = (),
     redundancy: Sequence[Table] = (),
     beside: Sequence[Section] = (),
     datum: str = "",
-) -> list[Section]:
-    """Return the sections of the page of a network.
+) -> Page:
+    """Return the page of a network.
 
     Parameters
     ----------
-    result, groups
-        The network, and its tested observations.
+    result, what, title
+        The network, and what it is called.
     size, given
         How much and how good it is, and the sections of what was given.
-    table
-        Its points.
-    problems
-        Remarks at the end.
+    photos, more
+        The number of its photos, and what a reader wants first besides.
     redundancy
         Beside the picture of redundancy numbers.
     beside
@@ -59,7 +57,27 @@ def network_sections(
     datum
         What coordinates refer to.
     """
-    pictures, found = drawings(result), worst_of(groups)
+    return Page(
+        what=what,
+        title=title,
+        judgements=[judged(result.verdict)],
+        advice=result.verdict.next,
+        highlights=[*highlights(result, photos), *more],
+        sections=_sections(result, size, given, redundancy, beside, datum),
+        phases=result.seconds,
+    )
+
+
+def _sections(
+    result: AdjustedNetwork,
+    size: Section,
+    given: Sequence[Section],
+    redundancy: Sequence[Table],
+    beside: Sequence[Section],
+    datum: str,
+) -> list[Section]:
+    pictures, groups = drawings(result), tested_singly(result)
+    found = worst_of(groups)
     photos, points = worst_images(result, found)
     intro = (
         "The redundancy number of an observation is the share of its error that shows in its own"
@@ -76,9 +94,9 @@ def network_sections(
         worst_section(result, groups, found),
         *given,
         photos_section(result, photos, datum),
-        points_section(result, table, points, datum),
+        points_section(result, points, datum),
         iterations_section(result),
-        remarks_section(problems),
+        remarks_section(problems_of(result)),
     ]
 
 

@@ -11,7 +11,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.results.axes import point_axes
 from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork, Observed
-from photogram.results.network_tables import Terms, control, part, photos, stations, terms_of
+from photogram.results.network_tables import Terms, control, part, photos, points, stations, terms_of
 from photogram.results.result import Result
 from photogram.results.tables import check_points, observations, unheld
 from photogram.results.weakest import weakest_photos, weakest_points
@@ -23,7 +23,6 @@ __all__ = [
     "beside_section",
     "check_section",
     "control_section",
-    "observed_table",
     "photos_section",
     "points_section",
     "stations_section",
@@ -42,10 +41,11 @@ RATIO_NOTE = (
 )
 
 
-def control_section(result: Result) -> Section:
+def control_section(result: AdjustedNetwork) -> Section:
     """Return control: prior, posterior, difference, test."""
-    tables = observed_table("Control points", control(result), result.control, result.point_sd)
-    tables += _compared("Components of control that are not held", unheld(result))
+    tables = _observed("Control points", control(result), result.control, result.point_sd)
+    if isinstance(result, Result):
+        tables += _compared("Components of control that are not held", unheld(result))
     intro = (
         "What was given for the control points, and what the adjustment made of it. A component with a"
         " redundancy"
@@ -55,7 +55,7 @@ def control_section(result: Result) -> Section:
     return Section("control", "Control points", tables, intro)
 
 
-def observed_table(caption: str, table: Sequence[Quantity], given: Observed, sd: Floats) -> list[Table]:
+def _observed(caption: str, table: Sequence[Quantity], given: Observed, sd: Floats) -> list[Table]:
     """Return prior, posterior, difference and test of every observed component; none where there are none.
 
     Parameters
@@ -134,14 +134,16 @@ def _compared(caption: str, table: Sequence[Quantity]) -> list[Table]:
     return long_table(caption, table, _tested(there, tests), own)
 
 
-def stations_section(result: Result) -> Section:
-    """Return positions and attitudes of photos as observations."""
+def stations_section(result: AdjustedNetwork) -> Section:
+    """Return what was given of photos as observations, layer by layer."""
     tables: list[Table] = []
-    for of, caption in ((slice(0, 3), "Positions"), (slice(3, 6), "Attitudes")):
+    layers = terms_of(result).layers
+    for caption, of in layers.items():
         given, table = result.stations, [part(each, of) if each.axes else each for each in stations(result)]
         own = replace(given, sd=given.sd[:, of], standardized=given.standardized[:, of])
-        tables += observed_table(f"{caption} of photos", table, own, result.photo_sd[:, of])
-    intro = "Positions and attitudes that were given with standard deviations."
+        tables += _observed(f"{caption} of photos", table, own, result.photo_sd[:, of])
+    *others, last = [caption.lower() for caption in layers]
+    intro = f"{', '.join(others).capitalize()} and {last} that were given with standard deviations."
     return Section("stations", "Observed photos", _layers("stations", tables), intro)
 
 
@@ -198,7 +200,7 @@ def photos_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "
         else f"{len(rows)} of {len(terms.photos)}: those that other tables name, the largest"
         " residuals and test values, and the weakest. The table of photos has all."
     )
-    own, values, sd = photos(result)
+    own, *_, values, sd = photos(result)
     tables = []
     for caption, of in terms.layers.items():
         by = result.photo_sd[:, of] if terms.split else None
@@ -230,7 +232,7 @@ def photos_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "
 def _fit_of_photos(result: AdjustedNetwork, terms: Terms) -> Floats:
     """Return (P, 6) rms x and y, mean redundancy, longest residual, largest |w|, number of images."""
     used = result.used_images
-    photos, count = terms.image_photos[used], len(terms.photos)
+    photos, count = result.given.image_photos[used], len(terms.photos)
     images = np.bincount(photos, minlength=count)
     residuals = result.residuals[used]
     found = np.full((count, 6), np.nan)
@@ -248,15 +250,13 @@ def _fit_of_photos(result: AdjustedNetwork, terms: Terms) -> Floats:
     return found
 
 
-def points_section(
-    result: AdjustedNetwork, table: Sequence[Quantity], named: Iterable[int], intro: str = ""
-) -> Section:
+def points_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "") -> Section:
     """Return points with their standard deviations.
 
     Parameters
     ----------
-    result, table
-        The adjusted network, and the points that took part.
+    result
+        The adjusted network.
     named
         Points that other tables name.
     intro
@@ -280,5 +280,5 @@ def points_section(
     few_of = f"{len(rows)} of {len(used)}: those that other tables name, those of the largest sd"
     note = f"{'' if every else few_of + ', and the weakest. The table of points has all. '}{RATIO_NOTE}"
     by = result.point_sd[used] if terms.split else None
-    shown = [*chosen(table, np.searchsorted(used, rows)), ratios]
+    shown = [*chosen(points(result), np.searchsorted(used, rows)), ratios]
     return Section("points", "Points", [page_table("Points", shown, note, by)], intro)
