@@ -19,17 +19,11 @@ from photogram.cli.components import (
     with_weights,
 )
 from photogram.cli.console import ON_TOP, print_sections
-from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
+from photogram.cli.documents import NONE_ASKED, Documents
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.maps import CloudFile, CloudOrigin, point_clouds
 from photogram.cli.options import (
-    JsonFile,
     Ordering,
     OrderingName,
-    ParquetFolder,
-    PictureFormat,
-    PlotFormat,
-    Plots,
     Quiet,
     Snoop,
     SnoopLevel,
@@ -37,12 +31,11 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
-    as_data,
     example_out,
     out_option,
 )
-from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
+from photogram.cli.projects import with_options
 
 if TYPE_CHECKING:
     from photogram.adjustment import robust
@@ -67,6 +60,7 @@ _LOSSES: dict[Loss, robust.Loss | None] = {Loss.SQUARES: None, Loss.HUBER: "hube
 
 
 @with_job
+@with_options("documents", Documents, "xlsx", "crs", "map")
 def collection(
     job: Job,
     problem: Annotated[
@@ -92,14 +86,7 @@ def collection(
             " Default: no files."
         ),
     ] = None,
-    json: JsonFile = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
-    plots: Plots = False,
-    plot_format: PlotFormat = PictureFormat.PNG,
-    parquet: ParquetFolder = None,
-    ply: CloudFile = None,
-    ply_origin: CloudOrigin = None,
+    documents: Documents = NONE_ASKED,
     loss: Annotated[
         Loss, typer.Option(help="What is minimised: squares, or a robust loss of them.")
     ] = Loss.SQUARES,
@@ -148,16 +135,16 @@ def collection(
 
         if problem is None:
             problem = job.packaged(*EXAMPLE)
-            out = example_out(out, plots, "example-adjusted")
+            out = example_out(out, documents.plots, "example-adjusted")
             job.reads(problem)
         packing = problem.suffix if problem.suffix in PACKED else ""
         photos, found = recognised(problem)
         names = [] if out is None else [out / "report.txt", out / f"adjusted{found.suffix}{packing}"]
         if components and out is not None:
             names.append(out / COMPONENTS)
-        place = html_place(html, no_html, out)
+        place = documents.place(out)
         job.writes(*names, *([place] if place else []))
-        pictures = Pictures(job, plots, plot_format, out)
+        pictures = documents.pictures(job, out)
         photos = photos.replace(image_sd=sd)
         if snoop and loss is not Loss.SQUARES:
             raise typer.BadParameter("not with a robust loss", param_hint="--snoop")
@@ -193,9 +180,8 @@ def collection(
         def page() -> Page:
             return with_components_page(replace(page_of(told), title=problem.name), estimates, made)
 
-        written |= html_files(job, "collection", place, html is not None, page)
-        if json is not None:
-            written[json] = told.to_json()
+        written |= documents.page(job, "collection", out, page)
+        written |= documents.as_json(told)
         sections = [
             ("File", [f"{job.shown(problem)}: {found.title}"]),
             *with_weights(log.sections() if log else [], made),
@@ -203,8 +189,8 @@ def collection(
         ]
         job.finish(
             written,
-            as_data(result, parquet),
-            point_clouds(result, ply, ply_origin),
+            documents.data(result),
+            documents.charts(result),
             summary=lambda: print_sections(sections, "the report"),
             code=(estimates or told).verdict.exit_code(strict=strict),
         )
