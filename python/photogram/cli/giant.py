@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from photogram.cli.check import EXAMPLE
-from photogram.cli.components import COMPONENTS, estimated
+from photogram.cli.components import COMPONENTS, Found
 from photogram.cli.console import print_sections
 from photogram.cli.documents import NONE_ASKED, Documents
-from photogram.cli.giant_project import AS_TOLD, Found, How, adjusted_project, project_and_block
+from photogram.cli.giant_project import AS_TOLD, How, adjusted_project, project_and_block
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.maps import check_maps
 from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option
 from photogram.cli.projects import with_options
 
 if TYPE_CHECKING:
-    from photogram import Block
+    from photogram import Block, Result
     from photogram.giant import Project
 
 __all__ = ["giant"]
@@ -91,6 +90,8 @@ def giant(
     and report.txt.
     """
     with job:
+        from photogram.results.report import summary
+
         check_maps(documents.map)
         if directory is None:
             directory = job.packaged(EXAMPLE)
@@ -107,12 +108,8 @@ def giant(
             raise typer.BadParameter(refused, param_hint="--snoop")
         found = adjusted_project(job, project, block, how, threads, snooping)
         written = _result_files(project, block, found, out, how.as_published)
-        if not found.made:
-            found = replace(found, components=estimated(job, block, how.components, threads))
-        weights = found.made or found.components
-        if weights is not None:
-            written[out / COMPONENTS] = weights.report().encode()
-        written |= pictures.of(found.result)
+        found = found.estimated(job, block, how.components, threads)
+        written |= found.files(out) | pictures.of(found.result)
         asked = documents.page(job, "giant", out, found.page) | documents.as_json(found.told)
         if listing is not None:
             from photogram.giant import listing as printout
@@ -124,8 +121,8 @@ def giant(
             asked,
             documents.data(found.result),
             documents.charts(found.result, quiet=quiet),
-            summary=lambda: print_sections(found.summary(), "report.txt"),
-            code=(found.components or found.told).verdict.exit_code(strict=strict),
+            summary=lambda: print_sections(found.summary(summary(found.result)), "report.txt"),
+            code=found.verdict.exit_code(strict=strict),
         )
 
 
@@ -150,7 +147,7 @@ def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Pat
 
 
 def _result_files(
-    project: Project, block: Block, found: Found, out: Path, as_published: bool
+    project: Project, block: Block, found: Found[Result], out: Path, as_published: bool
 ) -> dict[Path, bytes]:
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.giant.export import adjusted_records

@@ -10,31 +10,20 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from photogram.cli.components import (
-    Components,
-    UnitVarianceName,
-    cleaned,
-    with_components,
-    with_components_page,
-    with_weights,
-)
-from photogram.cli.console import ON_TOP, SHOWN, errors
+from photogram.cli.components import Components, Found, UnitVarianceName, cleaned
+from photogram.cli.console import SHOWN, errors
 from photogram.cli.job import Job
 from photogram.cli.options import Ordering, OrderingName, Snooping
 from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
 
 if TYPE_CHECKING:
-    from photogram import Block, Progress, Result, Snooped
+    from photogram import Block, Progress, Result
     from photogram.adjustment.adjustment import UnitVariance
-    from photogram.adjustment.cleaning import Cleaned
     from photogram.giant import Limits, Project
     from photogram.giant.common import Common
-    from photogram.results.components import VarianceComponents
-    from photogram.show.page import Page
-    from photogram.show.sections import Section
 
-__all__ = ["AS_TOLD", "Found", "How", "adjusted_project", "project_and_block"]
+__all__ = ["AS_TOLD", "How", "adjusted_project", "project_and_block"]
 
 
 @dataclass(frozen=True)
@@ -86,40 +75,6 @@ AS_TOLD = How()
 """As COMMON says."""
 
 
-@dataclass(frozen=True)
-class Found:
-    """What an adjustment gave: the result, and of what else was asked for."""
-
-    result: Result
-    log: Snooped | None
-    """What was taken out."""
-    made: Cleaned | None
-    """Weights and what was taken out, found together."""
-    components: VarianceComponents | None = None
-    """Of the given weights, which the result keeps."""
-
-    @property
-    def told(self) -> Snooped | Result:
-        """What reports are of."""
-        return self.log or self.result
-
-    def page(self) -> Page:
-        """Return the report for the browser."""
-        from photogram.show.ways import page_of
-
-        return with_components_page(page_of(self.told), self.components, self.made)
-
-    def summary(self) -> list[Section]:
-        """Return what a reader wants first."""
-        from photogram.results.report import summary
-
-        removed = with_weights(self.log.sections() if self.log else [], self.made)
-        return [
-            *removed,
-            *with_components(summary(self.result), self.components)[ON_TOP if self.log else 0 :],
-        ]
-
-
 def project_and_block(
     job: Job, directory: Path, limits: str | None, how: How
 ) -> tuple[Project, Block, Limits | None]:
@@ -149,7 +104,7 @@ def _refracted(block: Block, common: Common, how: How) -> Block:
 
 def adjusted_project(
     job: Job, project: Project, block: Block, how: How, threads: int | None, snooping: Snooping
-) -> Found:
+) -> Found[Result]:
     """Adjust the block as COMMON asks, or snoop it, and find the components that are asked for."""
     from photogram.diagnosis.adjusted import errors_explained
     from photogram.errors import AdjustmentError
@@ -185,7 +140,7 @@ def _snooped(
     threads: int | None,
     snooping: Snooping,
     progress: Callable[[Progress], None] | None,
-) -> Found:
+) -> Found[Result]:
     """Take gross errors out of the block, with its weights where components are asked for."""
     from photogram import Result, snoop
     from photogram.diagnosis.adjusted import diagnosed
@@ -200,7 +155,7 @@ def _snooped(
 
 def _adjusted(
     project: Project, block: Block, how: How, threads: int | None, progress: Callable[[Progress], None] | None
-) -> Found:
+) -> Found[Result]:
     """Adjust the block by the rules of today, or those of 1987."""
     from photogram import AsPublished, adjust
     from photogram.diagnosis.adjusted import diagnosed
@@ -217,4 +172,4 @@ def _adjusted(
         threads=threads,
         verdict=True,
     )
-    return Found(diagnosed(result), None, None)
+    return Found(diagnosed(result))
