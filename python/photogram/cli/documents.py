@@ -1,4 +1,4 @@
-"""What the commands that adjust networks write of a result for whoever asks: options, and their files."""
+"""What commands write of a result for whoever asks: options, and their files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from photogram.results.network import AdjustedNetwork
     from photogram.show.page import Page
 
-__all__ = ["NONE_ASKED", "Documents"]
+__all__ = ["NONE_ASKED", "OF_NETWORKS", "Documents"]
 
 Workbook = Annotated[
     Path | None,
@@ -33,9 +33,13 @@ Workbook = Annotated[
 ]
 
 
+OF_NETWORKS = ("xlsx", "parquet", "crs", "map", "ply", "ply_origin")
+"""Options that programs without a network do without."""
+
+
 @dataclass(frozen=True)
 class Documents:
-    """In which forms a user wants the result of a network, with the options that say it."""
+    """In which forms a user wants a result, with the options that say it."""
 
     json: JsonFile = None
     xlsx: Workbook = None
@@ -53,9 +57,11 @@ class Documents:
         """Return where the report for the browser goes, of results in a directory."""
         return html_place(self.html, self.no_html, out)
 
-    def page(self, job: Job, command: str, out: Path | None, make: Callable[[], Page]) -> dict[Path, bytes]:
+    def page(
+        self, job: Job, command: str, out: Path | None, make: Callable[[], Page], mark: str = ""
+    ) -> dict[Path, bytes]:
         """Return the report for the browser; see :func:`photogram.cli.html.html_files`."""
-        return html_files(job, command, self.place(out), self.html is not None, make)
+        return html_files(job, command, self.place(out), self.html is not None, make, mark)
 
     def pictures(self, job: Job, out: Path | None) -> Pictures:
         """Return the pictures that are to be drawn; see :class:`photogram.cli.pictures.Pictures`."""
