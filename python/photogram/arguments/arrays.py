@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
@@ -19,6 +20,7 @@ from photogram.errors import InputError
 __all__ = [
     "chosen",
     "finite_rows",
+    "freeze_fields",
     "frozen",
     "indices",
     "is_covariance",
@@ -133,6 +135,14 @@ def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
         array = np.array(array, order="C", subok=False)
         array.flags.writeable = False
     return array
+
+
+def freeze_fields(owner: Any) -> None:
+    """Let nobody write the arrays that the fields of a dataclass hold."""
+    for each in fields(owner):
+        value = getattr(owner, each.name)
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
 
 
 def length(name: str, value: ArrayLike) -> int:

@@ -13,19 +13,10 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import output, print_sections
-from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
+from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import (
-    JsonFile,
-    PictureFormat,
-    PlotFormat,
-    Plots,
-    Quiet,
-    Strict,
-    example_out,
-    out_option,
-    picture_places,
-)
+from photogram.cli.options import Quiet, Strict, example_out, out_option, picture_places
+from photogram.cli.projects import with_options
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, Similarity
@@ -74,6 +65,7 @@ class UnitVariance(StrEnum):
 
 
 @with_job
+@with_options("documents", Documents, *OF_NETWORKS)
 def absolute_orientation(
     job: Job,
     file: Annotated[
@@ -111,11 +103,7 @@ def absolute_orientation(
         Writes.DIRECTORY,
         out_option("Directory for report.html and report.txt. Default: no report."),
     ] = None,
-    json: JsonFile = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
-    plots: Plots = False,
-    plot_format: PlotFormat = PictureFormat.PNG,
+    documents: Documents = NONE_ASKED,
     trace: Annotated[
         Path | None,
         Writes.FILE,
@@ -226,7 +214,7 @@ def absolute_orientation(
         target = points_out
         if file is None:
             directory = job.packaged(EXAMPLE)
-            out = example_out(out, plots, "example-oriented")
+            out = example_out(out, documents.plots, "example-oriented")
             file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
             if points is None:
                 points, target = directory / "points.csv", target or (out or Path()) / TRANSFORMED
@@ -234,8 +222,8 @@ def absolute_orientation(
         if points and not target:
             target = (out or points.parent) / f"{points.stem}-transformed.csv"
         reports = [out / "report.txt"] if out else []
-        pictures = picture_places("residuals", plots, plot_format, out)
-        place = html_place(html, no_html, out)
+        pictures = picture_places("residuals", documents.plots, documents.plot_format, out)
+        place = documents.place(out)
         job.writes(
             *reports,
             *pictures,
@@ -257,21 +245,18 @@ def absolute_orientation(
         if points and not result.usable:
             result.messages.append(Message("no points were transformed: the orientation is not to be used"))
             points = None
-        made = _small_files(result, reports, pictures, trace, None if points else json)
+        made = _small_files(result, reports, pictures, trace, None if points else documents.json)
         name = deck.identification if ident is None else ident
         made |= _records(result, part_two, restart_out, name)
-        made |= html_files(
-            job,
-            "absolute-orientation",
-            place,
-            html is not None,
-            lambda: replace(page_of(result), title=file.name),
+        title = file.name
+        made |= documents.page(
+            job, "absolute-orientation", out, lambda: replace(page_of(result), title=title)
         )
         written = list(made)
         with job.outputs() as outputs:
             if points and target:
-                _stream(job, outputs, result, points, target, json, point_sd, decimals)
-                written = [target, *([json] if json else []), *written]
+                _stream(job, outputs, result, points, target, documents.json, point_sd, decimals)
+                written = [target, *([documents.json] if documents.json else []), *written]
             for path, content in made.items():
                 outputs.write(path, content)
         job.conclude(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
@@ -13,27 +14,20 @@ import typer
 from photogram.cli.components import UnitVarianceName
 from photogram.cli.console import NOT_CONVERGED, ON_TOP, output, print_remark, print_sections
 from photogram.cli.division import WHOLE, Parts
-from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
+from photogram.cli.documents import NONE_ASKED, Documents
 from photogram.cli.job import Job, Writes, with_job
-from photogram.cli.maps import CloudFile, CloudOrigin, Crs, MapFile, check_maps, drawn_maps, point_clouds
+from photogram.cli.maps import check_maps
 from photogram.cli.options import (
     KEPT,
-    JsonFile,
     Ordering,
     OrderingName,
-    ParquetFolder,
-    PictureFormat,
-    PlotFormat,
-    Plots,
     Quiet,
     Snooping,
     Strict,
     Threads,
-    as_data,
     default_out,
     out_option,
 )
-from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
 from photogram.cli.projects import (
     NOTHING,
@@ -49,7 +43,7 @@ from photogram.cli.projects import (
 
 if TYPE_CHECKING:
     from photogram import Block, FirstValues, Result
-    from photogram.adjustment.elsewhere import Division
+    from photogram.cli.pictures import Pictures
     from photogram.formats import Project
     from photogram.results.snooped import Snooped
 
@@ -72,10 +66,69 @@ class LossName(StrEnum):
     CAUCHY = "cauchy"
 
 
+@dataclass(frozen=True)
+class Choices:
+    """What a user chooses where a project says it otherwise, or not at all, with the options that say it."""
+
+    datum: Annotated[
+        DatumName | None,
+        typer.Option(
+            help="What coordinates refer to. Default: what PATH says, else control, or minimum constraints.",
+            show_default=False,
+        ),
+    ] = None
+    hold: Annotated[
+        str | None,
+        typer.Option(
+            metavar="POINT=AXES,...",
+            help="Held coordinates, in the place of control: A=XYZ,B=YZ,C=Z (3-2-1).",
+            show_default=False,
+        ),
+    ] = None
+    loss: Annotated[
+        LossName | None,
+        typer.Option(help="Robust loss of image coordinates. Default: what PATH says.", show_default=False),
+    ] = None
+    unit_variance: Annotated[
+        UnitVarianceName | None,
+        typer.Option(
+            metavar="NAME",
+            help="What the variance of unit weight is based on: `constrained` (all weighted values),"
+            " `redundancy` (numbers), or `unity`: 1. Default: what PATH says, else constrained.",
+            show_default=False,
+        ),
+    ] = None
+    self_calibrate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME",
+            help="Parameters of cameras that are unknown (f,cx,cy,k1 ...), or `all`.",
+            show_default=False,
+        ),
+    ] = None
+
+    def of(self, project: Project) -> Project:
+        """Return the project with what is chosen of cameras, coordinates and the variance of unit weight."""
+        from photogram.formats.additions import held_points, self_calibrated
+
+        wanted = [name.strip() for name in self.self_calibrate.split(",")] if self.self_calibrate else []
+        project = self_calibrated(project, wanted)
+        project = held_points(project, [each.strip() for each in self.hold.split(",")] if self.hold else [])
+        if self.unit_variance is None:
+            return project
+        return project.replace(options=replace(project.options, unit_variance=self.unit_variance.value))
+
+
+AS_SAID = Choices()
+"""As the project says."""
+
+
 @with_job
 @with_options("divided", Parts)
 @with_options("snooping", Snooping)
+@with_options("choices", Choices)
 @with_additions()
+@with_options("documents", Documents)
 def adjust(
     job: Job,
     path: ProjectPath = None,
@@ -85,62 +138,9 @@ def adjust(
         Writes.DIRECTORY,
         out_option("Directory for reports, tables, and the adjusted project. Default: PATH-adjusted."),
     ] = None,
-    json: JsonFile = None,
-    xlsx: Annotated[
-        Path | None,
-        Writes.FILE,
-        typer.Option(
-            metavar="FILE",
-            help="Write the tables of the result as an Excel workbook, a sheet each; needs openpyxl.",
-            show_default=False,
-        ),
-    ] = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
-    plots: Plots = False,
-    plot_format: PlotFormat = PictureFormat.PNG,
-    parquet: ParquetFolder = None,
-    crs: Crs = None,
-    map: MapFile = None,  # noqa: A002  # as the option is called
-    ply: CloudFile = None,
-    ply_origin: CloudOrigin = None,
+    documents: Documents = NONE_ASKED,
     added: Additions = NOTHING,
-    datum: Annotated[
-        DatumName | None,
-        typer.Option(
-            help="What coordinates refer to. Default: what PATH says, else control, or minimum constraints.",
-            show_default=False,
-        ),
-    ] = None,
-    hold: Annotated[
-        str | None,
-        typer.Option(
-            metavar="POINT=AXES,...",
-            help="Held coordinates, in the place of control: A=XYZ,B=YZ,C=Z (3-2-1).",
-            show_default=False,
-        ),
-    ] = None,
-    loss: Annotated[
-        LossName | None,
-        typer.Option(help="Robust loss of image coordinates. Default: what PATH says.", show_default=False),
-    ] = None,
-    unit_variance: Annotated[
-        UnitVarianceName | None,
-        typer.Option(
-            metavar="NAME",
-            help="What the variance of unit weight is based on: `constrained` (all weighted values),"
-            " `redundancy` (numbers), or `unity`: 1. Default: what PATH says, else constrained.",
-            show_default=False,
-        ),
-    ] = None,
-    self_calibrate: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,NAME",
-            help="Parameters of cameras that are unknown (f,cx,cy,k1 ...), or `all`.",
-            show_default=False,
-        ),
-    ] = None,
+    choices: Choices = AS_SAID,
     snooping: Snooping = KEPT,
     keep_all: Annotated[
         bool,
@@ -163,86 +163,89 @@ def adjust(
     """
     path = project_path(job, path)
     target = out or (Path("example-adjusted") if example else default_out(path, "-adjusted"))
-    place = html_place(html, no_html, target)
+    documents.place(target)  # refused before anything is read
     with job:
-        from photogram import Result
-        from photogram.formats.additions import held_points, self_calibrated
-        from photogram.results.fitting import with_features
-        from photogram.show.ways import page_of
-
-        pictures = Pictures(job, plots, plot_format, target)
-        if (
-            divided.division.is_asked_for
-            and added == NOTHING
-            and _on_disk(job, path, target, divided, threads)
-        ):
+        pictures = documents.pictures(job, target)
+        whole = not divided.division.is_asked_for or added != NOTHING
+        if not whole and _on_disk(job, path, target, divided, threads):
             return
         project = read_project(job, path, added)
-        check_maps(map)  # now that all inputs are known, which it must not be
-        wanted = [name.strip() for name in self_calibrate.split(",")] if self_calibrate else []
-        project = self_calibrated(project, wanted)
-        project = held_points(project, [each.strip() for each in hold.split(",")] if hold else [])
-        if unit_variance is not None:
-            project = project.replace(options=replace(project.options, unit_variance=unit_variance.value))
+        check_maps(documents.map)  # now that all inputs are known, which it must not be
+        project = choices.of(project)
         sections = described(project)
         if not quiet:
             print_sections(sections, "`photogram info`")
-        if crs is not None:
+        if documents.crs is not None:
             from photogram.formats.placing import check_place
 
-            check_place(project.block, crs)
+            check_place(project.block, documents.crs)
         block, started = started_block(project, keep_all=keep_all)
         if divided.plan:
-            from photogram.distributed.entrance import plan_in_parts
-
-            plan = plan_in_parts(block, divided.division, unit_variance=project.options.unit_variance)
-            output.print("\n".join(plan.lines()))
-            plan.check()
+            _planned(project, block, divided)
             return
         for remark in started.messages if started is not None and not quiet else ():
             print_remark(str(remark))
-        removed = None
+        run = partial(
+            adjusted_block, job, project, choices=choices, ordering=ordering, threads=threads, parts=divided
+        )
         if snooping.snoop:
-            if divided.division.is_asked_for:
-                raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--snoop")
-            if datum is not None or loss is not None or project.options.datum in ("inner", "minimum"):
-                raise typer.BadParameter("goes without --datum and --loss", param_hint="--snoop")
-            aside: tuple[str, ...] = ()
-            if started is not None and (started.set_aside.any() or started.missing):
-                first = adjusted_block(
-                    job, project, started, datum, loss, ordering, threads, divided.division
-                )
-                block, aside = first.block, first.set_aside
-            removed = _snooped(job, project, block, threads, snooping.options)
-            assert isinstance(removed.result, Result)
-            kept = with_features(replace(removed.result, set_aside=aside), project.features)
-            removed = replace(removed, result=kept)
+            _check_snooping(project, choices, divided)
+            removed = _snooped(job, project, block, started, run, threads, snooping)
             result = cast("Result", removed.judged)
         else:
-            result = adjusted_block(
-                job, project, started or block, datum, loss, ordering, threads, divided.division
-            )
-        told = removed or result
-        files = _files(project, result, told.report(), sections)
-        if crs is not None:
-            from photogram.formats.placing import placed, placed_files
+            removed, result = None, run(started or block)
+        _finish(job, project, result, removed, target, documents, pictures, sections, strict=strict)
 
-            found = placed_files(placed(result, crs))
-            files |= {f"in_crs/{name}": content for name, content in found.items()}
-        if removed is not None:
-            files["removed.csv"] = removed.table().to_csv(index=False).encode()
-        taken = [] if removed is None else removed.sections()[ON_TOP:]
-        sheets = {} if xlsx is None else {xlsx: _workbook(result)}
-        page = html_files(job, "adjust", place, html is not None, lambda: page_of(told))
-        job.finish(
-            {target / name: content for name, content in files.items()} | pictures.of(result) | page | sheets,
-            {} if json is None else {json: told.to_json()},
-            as_data(result, parquet),
-            drawn_maps(result, map, crs, _sizes(project), quiet=quiet),
-            point_clouds(result, ply, ply_origin, crs),
-            summary=lambda: print_sections(_summary(result, taken), "report.txt"),
-            code=result.verdict.exit_code(strict=strict),
-        )
+
+def _planned(project: Project, block: Block, divided: Parts) -> None:
+    """Print how a block would be adjusted in parts."""
+    from photogram.distributed.entrance import plan_in_parts
+
+    plan = plan_in_parts(block, divided.division, unit_variance=project.options.unit_variance)
+    output.print("\n".join(plan.lines()))
+    plan.check()
+
+
+def _finish(
+    job: Job,
+    project: Project,
+    result: Result,
+    removed: Snooped | None,
+    target: Path,
+    documents: Documents,
+    pictures: Pictures,
+    sections: list[tuple[str, list[str]]],
+    *,
+    strict: bool,
+) -> None:
+    """Write all that was found and asked for, say it in short, and end by the verdict."""
+    from photogram.formats.adjusted import excel_file
+    from photogram.show.ways import page_of
+
+    told = removed or result
+    files = _files(project, result, told.report(), sections) | _in_system(result, documents.crs)
+    if removed is not None:
+        files["removed.csv"] = removed.table().to_csv(index=False).encode()
+    taken = [] if removed is None else removed.sections()[ON_TOP:]
+    sheets = {} if documents.xlsx is None else {documents.xlsx: excel_file(result)}
+    page = documents.page(job, "adjust", target, lambda: page_of(told))
+    job.finish(
+        {target / name: content for name, content in files.items()} | pictures.of(result) | page | sheets,
+        documents.as_json(told),
+        documents.data(result),
+        documents.charts(result, _sizes(project), quiet=job.quiet),
+        summary=lambda: print_sections(_summary(result, taken), "report.txt"),
+        code=result.verdict.exit_code(strict=strict),
+    )
+
+
+def _in_system(result: Result, crs: str | None) -> dict[str, bytes]:
+    """Return the tables of a result in another system of coordinates, where one is asked for."""
+    if crs is None:
+        return {}
+    from photogram.formats.placing import placed, placed_files
+
+    return {f"in_crs/{name}": content for name, content in placed_files(placed(result, crs)).items()}
 
 
 def _on_disk(job: Job, path: Path, target: Path, divided: Parts, threads: int | None) -> bool:
@@ -285,32 +288,55 @@ def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValu
     return found.usable(), found
 
 
-def _snooped(
-    job: Job, project: Project, block: Block, threads: int | None, options: dict[str, Any]
-) -> Snooped:
-    from photogram import snoop
-    from photogram.diagnosis.adjusted import diagnosed, errors_explained
+def _check_snooping(project: Project, choices: Choices, divided: Parts) -> None:
+    """Refuse what does not go with taking gross errors out."""
+    if divided.division.is_asked_for:
+        raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--snoop")
+    chosen = choices.datum is not None or choices.loss is not None
+    if chosen or project.options.datum in ("inner", "minimum"):
+        raise typer.BadParameter("goes without --datum and --loss", param_hint="--snoop")
 
+
+def _snooped(
+    job: Job,
+    project: Project,
+    block: Block,
+    started: FirstValues | None,
+    run: Callable[[FirstValues], Result],
+    threads: int | None,
+    snooping: Snooping,
+) -> Snooped:
+    """Take gross errors out of a block, of what is kept where first values have set images aside."""
+    from photogram import Result, snoop
+    from photogram.diagnosis.adjusted import diagnosed, errors_explained
+    from photogram.results.fitting import with_features
+
+    aside: tuple[str, ...] = ()
+    if started is not None and (started.set_aside.any() or started.missing):
+        first = run(started)
+        block, aside = first.block, first.set_aside
     with job.status("adjusting and testing") as status, errors_explained(block):
         found = snoop(
             block,
             unit_variance=project.options.unit_variance,
             threads=threads,
-            **options,
+            **snooping.options,
             progress=shown(status, "weighted sum of squares", 1.0) if status is not None else None,
         )
-        return replace(found, result=diagnosed(cast("Result", found.result)))
+        result = diagnosed(cast("Result", found.result))
+    assert isinstance(result, Result)
+    return replace(found, result=with_features(replace(result, set_aside=aside), project.features))
 
 
 def adjusted_block(
     job: Job,
     project: Project,
     block: Block | FirstValues,
-    datum: DatumName | None,
-    loss: LossName | None,
-    ordering: OrderingName,
-    threads: int | None,
-    division: Division,
+    *,
+    choices: Choices = AS_SAID,
+    ordering: OrderingName = OrderingName.AUTO,
+    threads: int | None = None,
+    parts: Parts = WHOLE,
 ) -> Result:
     """Adjust a block as its project says, but for what a user chooses, with its features."""
     from photogram import FirstValues, InnerConstraints, InputError, MinimumConstraints, adjust_started
@@ -320,10 +346,10 @@ def adjusted_block(
     from photogram.results.fitting import with_features
 
     options = project.options
-    chosen = datum.value if datum is not None else options.datum
-    robust = (
-        options.loss if loss is None else {"none": None, "huber": "huber", "cauchy": "cauchy"}[loss.value]
-    )
+    chosen = choices.datum.value if choices.datum is not None else options.datum
+    robust = options.loss
+    if choices.loss is not None:
+        robust = {"none": None, "huber": "huber", "cauchy": "cauchy"}[choices.loss.value]
     with job.status("adjusting") as status:
         how: dict[str, Any] = {
             "unit_variance": options.unit_variance,
@@ -332,7 +358,7 @@ def adjusted_block(
             "ordering": ordering.value,
             "threads": threads,
             "progress": shown(status, "weighted sum of squares", 1.0) if status is not None else None,
-            **vars(division),
+            **vars(parts.division),
             "verdict": True,
         }
         with errors_explained(block):
@@ -371,12 +397,6 @@ def _files(
         if beside is not None:
             files |= {f"adjusted-{own}/{name}": content for name, content in beside(after, result).items()}
     return files
-
-
-def _workbook(result: Result) -> bytes:
-    from photogram.formats.adjusted import excel_file
-
-    return excel_file(result)
 
 
 def _sizes(project: Project) -> Sequence[tuple[float, float] | None]:

@@ -2,51 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.components import (
-    COMPONENTS,
-    Components,
-    cleaned,
-    estimated,
-    with_components,
-    with_components_page,
-    with_weights,
-)
-from photogram.cli.console import ON_TOP, print_sections
-from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
+from photogram.cli.components import COMPONENTS, Components, Found, cleaned
+from photogram.cli.console import print_sections
+from photogram.cli.documents import NONE_ASKED, Documents
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.maps import CloudFile, CloudOrigin, point_clouds
 from photogram.cli.options import (
-    JsonFile,
+    KEPT,
     Ordering,
     OrderingName,
-    ParquetFolder,
-    PictureFormat,
-    PlotFormat,
-    Plots,
     Quiet,
-    Snoop,
-    SnoopLevel,
-    SnoopRate,
+    Snooping,
     Strict,
     Threads,
     UnitWeight,
-    as_data,
     example_out,
     out_option,
 )
-from photogram.cli.pictures import Pictures
 from photogram.cli.progress import shown
+from photogram.cli.projects import with_options
 
 if TYPE_CHECKING:
     from photogram.adjustment import robust
-    from photogram.show.page import Page
+    from photogram.collection import AdjustedCollection, Collection
 
 __all__ = ["collection"]
 
@@ -66,7 +50,43 @@ class Loss(StrEnum):
 _LOSSES: dict[Loss, robust.Loss | None] = {Loss.SQUARES: None, Loss.HUBER: "huber", Loss.CAUCHY: "cauchy"}
 
 
+@dataclass(frozen=True)
+class Fit:
+    """What is minimised, and when that ends, with the options that say it."""
+
+    loss: Annotated[Loss, typer.Option(help="What is minimised: squares, or a robust loss of them.")] = (
+        Loss.SQUARES
+    )
+    scale: Annotated[
+        float | None,
+        typer.Option(
+            help="Where the loss sets in, in standard deviations. Default: 1.50 (huber), 2.55 (cauchy).",
+            show_default=False,
+        ),
+    ] = None
+    sd: Annotated[float, typer.Option(help="Standard deviation of image coordinates, pixels.")] = 1.0
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            help="Stop when a step lowers the cost by less than this fraction."
+            " Default: 1e-8, with a loss 1e-6.",
+            show_default=False,
+        ),
+    ] = None
+    max_iterations: Annotated[int, typer.Option(min=1, help="Iterations at the most.")] = 200
+    covariance: Annotated[
+        bool, typer.Option("--covariance/--no-covariance", help="Compute covariances and redundancy numbers.")
+    ] = True
+
+
+SQUARES = Fit()
+"""Squares, with covariances."""
+
+
 @with_job
+@with_options("documents", Documents, "xlsx", "crs", "map")
+@with_options("fit", Fit)
+@with_options("snooping", Snooping, "unit_weight")
 def collection(
     job: Job,
     problem: Annotated[
@@ -92,43 +112,12 @@ def collection(
             " Default: no files."
         ),
     ] = None,
-    json: JsonFile = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
-    plots: Plots = False,
-    plot_format: PlotFormat = PictureFormat.PNG,
-    parquet: ParquetFolder = None,
-    ply: CloudFile = None,
-    ply_origin: CloudOrigin = None,
-    loss: Annotated[
-        Loss, typer.Option(help="What is minimised: squares, or a robust loss of them.")
-    ] = Loss.SQUARES,
-    scale: Annotated[
-        float | None,
-        typer.Option(
-            help="Where the loss sets in, in standard deviations. Default: 1.50 (huber), 2.55 (cauchy).",
-            show_default=False,
-        ),
-    ] = None,
-    sd: Annotated[float, typer.Option(help="Standard deviation of image coordinates, pixels.")] = 1.0,
-    tolerance: Annotated[
-        float | None,
-        typer.Option(
-            help="Stop when a step lowers the cost by less than this fraction."
-            " Default: 1e-8, with a loss 1e-6.",
-            show_default=False,
-        ),
-    ] = None,
-    max_iterations: Annotated[int, typer.Option(min=1, help="Iterations at the most.")] = 200,
-    covariance: Annotated[
-        bool, typer.Option("--covariance/--no-covariance", help="Compute covariances and redundancy numbers.")
-    ] = True,
+    documents: Documents = NONE_ASKED,
+    fit: Fit = SQUARES,
     components: Components = None,
     ordering: Ordering = OrderingName.AUTO,
     threads: Threads = None,
-    snoop: Snoop = False,
-    level: SnoopLevel = 0.05,
-    fdr: SnoopRate = None,
+    snooping: Snooping = KEPT,
     unit_weight: Annotated[
         UnitWeight,
         typer.Option(help="With --snoop: whether --sd is right, or but for a common factor."),
@@ -140,71 +129,85 @@ def collection(
     if out is not None and out.suffix in (".txt", *PACKED) and not out.exists():
         raise typer.BadParameter("names a directory; adjusted.txt goes there", param_hint="--out")
     with job:
-        from photogram.adjustment import snooping
-        from photogram.collection import AdjustedCollection, adjust, to_bytes
+        from photogram.collection import to_bytes
         from photogram.collection.formats import recognised
         from photogram.collection.report import summary
-        from photogram.show.ways import page_of
 
         if problem is None:
             problem = job.packaged(*EXAMPLE)
-            out = example_out(out, plots, "example-adjusted")
+            out = example_out(out, documents.plots, "example-adjusted")
             job.reads(problem)
         packing = problem.suffix if problem.suffix in PACKED else ""
         photos, found = recognised(problem)
         names = [] if out is None else [out / "report.txt", out / f"adjusted{found.suffix}{packing}"]
         if components and out is not None:
             names.append(out / COMPONENTS)
-        place = html_place(html, no_html, out)
+        place = documents.place(out)
         job.writes(*names, *([place] if place else []))
-        pictures = Pictures(job, plots, plot_format, out)
-        photos = photos.replace(image_sd=sd)
-        if snoop and loss is not Loss.SQUARES:
+        pictures = documents.pictures(job, out)
+        photos = photos.replace(image_sd=fit.sd)
+        if snooping.snoop and fit.loss is not Loss.SQUARES:
             raise typer.BadParameter("not with a robust loss", param_hint="--snoop")
-        log, made = None, None
-        with job.status("adjusting") as status:
-            options: dict[str, Any] = {
-                "tolerance": tolerance,
-                "max_iterations": max_iterations,
-                "ordering": ordering.value,
-                "threads": threads,
-                "progress": shown(status, "cost", 0.5) if status is not None else None,
-            }
-            if snoop:
-                options |= {"level": level, "fdr": fdr, "unit_weight": unit_weight.value}
-                if components:
-                    made = cleaned(photos, components, options.pop("threads"), options)
-                log = made.snooped if made else snooping.snoop(photos, **options)
-                if not isinstance(log.result, AdjustedCollection):
-                    raise TypeError("a collection gives the result of a collection")
-                result = log.result
-            else:
-                result = adjust(photos, loss=_LOSSES[loss], scale=scale, covariance=covariance, **options)
-        told = log or result
-        estimates = None if made else estimated(job, photos, components, threads)
-        weights = made or estimates
-        written = pictures.of(result)
-        if names:
-            written[names[0]] = told.report().encode()
-            written[names[1]] = to_bytes(result.adjusted(), packing, found.name)
-        if weights is not None and out is not None:
-            written[out / COMPONENTS] = weights.report().encode()
-
-        def page() -> Page:
-            return with_components_page(replace(page_of(told), title=problem.name), estimates, made)
-
-        written |= html_files(job, "collection", place, html is not None, page)
-        if json is not None:
-            written[json] = told.to_json()
+        # Nothing vouches for --sd: the default is not that of blocks.
+        snooping = replace(snooping, unit_weight=unit_weight)
+        result = _adjusted(job, photos, fit, snooping, components, ordering, threads)
+        result = result.estimated(job, photos, components, threads)
+        written = pictures.of(result.result)
+        if out is not None:
+            written[names[0]] = result.told.report().encode()
+            written[names[1]] = to_bytes(result.result.adjusted(), packing, found.name)
+            written |= result.files(out)
+        title = problem.name
+        written |= documents.page(job, "collection", out, lambda: replace(result.page(), title=title))
+        written |= documents.as_json(result.told)
         sections = [
             ("File", [f"{job.shown(problem)}: {found.title}"]),
-            *with_weights(log.sections() if log else [], made),
-            *with_components(summary(result), estimates)[ON_TOP if log else 0 :],
+            *result.summary(summary(result.result)),
         ]
         job.finish(
             written,
-            as_data(result, parquet),
-            point_clouds(result, ply, ply_origin),
+            documents.data(result.result),
+            documents.charts(result.result),
             summary=lambda: print_sections(sections, "the report"),
-            code=(estimates or told).verdict.exit_code(strict=strict),
+            code=result.verdict.exit_code(strict=strict),
         )
+
+
+def _adjusted(
+    job: Job,
+    photos: Collection,
+    fit: Fit,
+    snooping: Snooping,
+    components: Components,
+    ordering: OrderingName,
+    threads: int | None,
+) -> Found[AdjustedCollection]:
+    """Adjust a collection, or take gross errors out of it, with the progress on standard error."""
+    from photogram.adjustment.snooping import snoop
+    from photogram.collection import AdjustedCollection, adjust
+
+    with job.status("adjusting") as status:
+        options: dict[str, Any] = {
+            "tolerance": fit.tolerance,
+            "max_iterations": fit.max_iterations,
+            "ordering": ordering.value,
+            "progress": shown(status, "cost", 0.5) if status is not None else None,
+        }
+        if not snooping.snoop:
+            loss = _LOSSES[fit.loss]
+            return Found(
+                adjust(
+                    photos,
+                    loss=loss,
+                    scale=fit.scale,
+                    covariance=fit.covariance,
+                    threads=threads,
+                    **options,
+                )
+            )
+        options |= snooping.options
+        made = cleaned(photos, components, threads, options) if components else None
+        log = made.snooped if made else snoop(photos, threads=threads, **options)
+        if not isinstance(log.result, AdjustedCollection):
+            raise TypeError("a collection gives the result of a collection")
+        return Found(log.result, log, made)

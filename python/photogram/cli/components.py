@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
 
 import typer
 
@@ -14,20 +16,21 @@ from photogram.cli.job import Job
 if TYPE_CHECKING:
     from photogram.adjustment.cleaning import Cleaned
     from photogram.results.components import VarianceComponents
+    from photogram.results.network import AdjustedNetwork
+    from photogram.results.snooped import Snooped
     from photogram.show.page import Page
     from photogram.show.sections import Section
+    from photogram.statistics.verdict import Verdict
 
 __all__ = [
     "COMPONENTS",
     "Components",
+    "Found",
     "UnitVarianceName",
     "cleaned",
-    "estimated",
-    "with_components",
-    "with_components_page",
-    "with_weights",
 ]
 
+Network = TypeVar("Network", bound="AdjustedNetwork")
 COMPONENTS = "components.txt"
 """What goes to the output directory where variance components are asked for."""
 
@@ -82,15 +85,6 @@ def estimated(
         return variance_components(network, groups, threads=threads, progress=tell)
 
 
-def with_components_page(page: Page, found: VarianceComponents | None, made: Cleaned | None) -> Page:
-    """Return the report for the browser with what components say, if any were estimated."""
-    from photogram.results.page.weights import reweighed_page, weighed_page
-
-    if made is not None:
-        return reweighed_page(made.changes, made.components, page)
-    return page if found is None else weighed_page(found, page)
-
-
 def cleaned(network: object, bases: list[Basis], threads: int | None, options: Mapping[str, Any]) -> Cleaned:
     """Take gross errors out and estimate weights in turn, with options of snooping."""
     from photogram.adjustment.cleaning import clean
@@ -98,17 +92,62 @@ def cleaned(network: object, bases: list[Basis], threads: int | None, options: M
     return clean(network, [basis.value.replace("-", " ") for basis in bases], threads=threads, **options)
 
 
-def with_weights(sections: list[Section], made: Cleaned | None) -> list[Section]:
-    """Return the sections of snooping, with what became of the weights below its verdict."""
-    if made is None:
-        return sections
-    return [*sections[:ON_TOP], ("Weights", made.report().splitlines()), *sections[ON_TOP:]]
+@dataclass(frozen=True)
+class Found(Generic[Network]):
+    """What the adjustment of a network gave: the result, and of what else was asked for."""
 
+    result: Network
+    log: Snooped | None = None
+    """What was taken out."""
+    made: Cleaned | None = None
+    """Weights and what was taken out, found in turn."""
+    components: VarianceComponents | None = None
+    """Of the given weights, which the result keeps."""
 
-def with_components(sections: list[Section], found: VarianceComponents | None) -> list[Section]:
-    """Return a summary, on top of which the verdict stands, with what components say in its place."""
-    if found is None:
-        return sections
-    from photogram.results.components import component_sections
+    @property
+    def told(self) -> Snooped | Network:
+        """What reports are of."""
+        return self.log or self.result
 
-    return [*component_sections(found), *sections[ON_TOP:]]
+    @property
+    def verdict(self) -> Verdict:
+        """What the command ends by."""
+        return (self.components or self.told).verdict
+
+    def estimated(
+        self, job: Job, network: object, bases: list[Basis] | None, threads: int | None
+    ) -> Found[Network]:
+        """Return it with the components that are asked for, where they are not found already."""
+        if self.made is not None:
+            return self
+        return replace(self, components=estimated(job, network, bases, threads))
+
+    def files(self, out: Path) -> dict[Path, bytes]:
+        """Return what goes to the output directory of variance components."""
+        weights = self.made or self.components
+        return {} if weights is None else {out / COMPONENTS: weights.report().encode()}
+
+    def page(self) -> Page:
+        """Return the report for the browser, with what components say."""
+        from photogram.results.page.weights import reweighed_page, weighed_page
+        from photogram.show.ways import page_of
+
+        page = page_of(self.told)
+        if self.made is not None:
+            return reweighed_page(self.made.changes, self.made.components, page)
+        return page if self.components is None else weighed_page(self.components, page)
+
+    def summary(self, sections: list[Section]) -> list[Section]:
+        """Return what a reader wants first, of a summary of the result on top of which its verdict stands.
+
+        What was taken out comes before, with what became of the weights below its verdict; what components
+        say is in the place of the verdict of the result.
+        """
+        from photogram.results.components import component_sections
+
+        removed = [] if self.log is None else list(self.log.sections())
+        if self.made is not None:
+            removed[ON_TOP:ON_TOP] = [("Weights", self.made.report().splitlines())]
+        if self.components is not None:
+            sections = [*component_sections(self.components), *sections[ON_TOP:]]
+        return [*removed, *sections[ON_TOP if self.log else 0 :]]

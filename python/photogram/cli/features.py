@@ -10,9 +10,8 @@ import typer
 
 from photogram.cli.adjust import adjusted_block, started_block
 from photogram.cli.console import print_sections
-from photogram.cli.division import WHOLE
 from photogram.cli.job import Job, Writes, with_job
-from photogram.cli.options import JsonFile, OrderingName, Quiet, Strict, Threads, out_option
+from photogram.cli.options import JsonFile, Quiet, Strict, Threads, out_option
 from photogram.cli.projects import (
     NOTHING,
     Additions,
@@ -135,6 +134,4 @@ def features(
 
 def _adjusted(job: Job, project: Project, threads: int | None) -> Result:
     block, started = started_block(project, keep_all=False)
-    return adjusted_block(
-        job, project, started or block, None, None, OrderingName.AUTO, threads, WHOLE.division
-    )
+    return adjusted_block(job, project, started or block, threads=threads)

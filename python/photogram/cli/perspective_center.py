@@ -10,19 +10,10 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.console import output, print_remark
-from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
+from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import (
-    JsonFile,
-    PictureFormat,
-    PlotFormat,
-    Plots,
-    Quiet,
-    Strict,
-    example_out,
-    out_option,
-    picture_places,
-)
+from photogram.cli.options import Quiet, Strict, example_out, out_option, picture_places
+from photogram.cli.projects import with_options
 
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
@@ -42,6 +33,7 @@ class Weights(StrEnum):
 
 
 @with_job
+@with_options("documents", Documents, *OF_NETWORKS)
 def perspective_center(
     job: Job,
     deck: Annotated[
@@ -59,11 +51,7 @@ def perspective_center(
             "Directory for report.html, and listing.txt, what the 1969 program printed. Default: no files."
         ),
     ] = None,
-    json: JsonFile = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
-    plots: Plots = False,
-    plot_format: PlotFormat = PictureFormat.PNG,
+    documents: Documents = NONE_ASKED,
     as_published: Annotated[
         bool,
         typer.Option(
@@ -102,11 +90,11 @@ def perspective_center(
 
         if deck is None:
             deck = job.packaged(*EXAMPLE)
-            out = example_out(out, plots, "example-resected")
+            out = example_out(out, documents.plots, "example-resected")
             job.reads(deck)
         listings = [out / "listing.txt"] if out else []
-        pictures = picture_places("residuals", plots, plot_format, out)
-        place = html_place(html, no_html, out)
+        pictures = picture_places("residuals", documents.plots, documents.plot_format, out)
+        place = documents.place(out)
         job.writes(*listings, *pictures, *([place] if place else []))
         unknown = [name.strip() for name in calibrate.split(",")] if calibrate else []
         run = run_deck(
@@ -118,8 +106,8 @@ def perspective_center(
         )
         stopped = run.stop is not None
         job.finish(
-            _files(run, json, listings, pictures),
-            html_files(job, "perspective-center", place, html is not None, lambda: page_of(run)),
+            _files(run, documents.json, listings, pictures),
+            documents.page(job, "perspective-center", out, lambda: page_of(run)),
             summary=lambda: _summarize(run),
             code=0 if stopped else worst((each.verdict for each in run.results), strict=strict),
         )

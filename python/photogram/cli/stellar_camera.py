@@ -11,18 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from photogram.cli.console import output, print_sections, print_withheld
-from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
+from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import (
-    JsonFile,
-    PictureFormat,
-    PlotFormat,
-    Plots,
-    Quiet,
-    Strict,
-    Threads,
-    out_option,
-)
+from photogram.cli.options import Quiet, Strict, Threads, out_option
+from photogram.cli.projects import with_options
 
 if TYPE_CHECKING:
     from photogram.stellar.night import CalibratedNight
@@ -59,6 +51,7 @@ class Effect(StrEnum):
 
 
 @with_job
+@with_options("documents", Documents, *OF_NETWORKS)
 def stellar_camera(
     job: Job,
     deck: Annotated[
@@ -75,14 +68,10 @@ def stellar_camera(
         typer.Option("--example", help="Calibrate the packaged example instead: 75 stars in three groups."),
     ] = False,
     out: Out = None,
-    json: JsonFile = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
+    documents: Documents = NONE_ASKED,
     as_published: Annotated[
         bool, typer.Option("--as-published", help="Iterate with the report's partials and stop rules.")
     ] = False,
-    plots: Plots = False,
-    plot_format: PlotFormat = PictureFormat.PNG,
     strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
@@ -103,11 +92,11 @@ def stellar_camera(
             deck = job.packaged("stellar") / "plate.toml"
         problems, inputs = _read(deck)
         job.reads(*inputs)
-        pictures = plot_format.value if plots else ""
+        pictures = documents.plot_format.value if documents.plots else ""
         target = out or Path(f"{deck.stem}-calibrated")
-        place = html_place(html, no_html, target)
+        documents.place(target)  # refused before anything is computed
         written: dict[Path, bytes] = {}
-        documents: dict[Path, bytes] = {}
+        asked: dict[Path, bytes] = {}
         results = []
         for number, problem in enumerate(problems, 1):
             if as_published:
@@ -118,18 +107,19 @@ def stellar_camera(
             written |= _files(result, target, mark, pictures)
             written |= _cameras(result, {target / f"camera{mark}.json": camera_document(result)})
             make = partial(page_of, result)
-            written |= html_files(job, "stellar-camera", place, html is not None, make, mark)
-            if json is not None:
-                documents[json.with_stem(json.stem + mark)] = to_json(result)
+            written |= documents.page(job, "stellar-camera", target, make, mark)
+            if documents.json is not None:
+                asked[documents.json.with_stem(documents.json.stem + mark)] = to_json(result)
         job.finish(
             written,
-            documents,
+            asked,
             summary=lambda: _summarize(results),
             code=worst((result.verdict for result in results), strict=strict),
         )
 
 
 @with_job
+@with_options("documents", Documents, *OF_NETWORKS)
 def exposures(
     job: Job,
     night: Annotated[
@@ -177,11 +167,7 @@ def exposures(
         ),
     ] = None,
     out: Out = None,
-    json: JsonFile = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
-    plots: Plots = False,
-    plot_format: PlotFormat = PictureFormat.PNG,
+    documents: Documents = NONE_ASKED,
     threads: Threads = None,
     strict: Strict = False,
     quiet: Quiet = False,
@@ -198,21 +184,19 @@ def exposures(
         if night is None:
             night = job.packaged("exposures") / "night.toml"
         job.reads(*inputs(night))
-        pictures = plot_format.value if plots else ""
+        pictures = documents.plot_format.value if documents.plots else ""
         said = _said(lens, common_scale, without or [], any_roll, blind)
         try:
             result = calibrate_night(read_night(night, said), threads)
         except InputError as error:
             raise error if error.file else InputError(error.message, file=night) from None
         target = out or Path(f"{night.stem}-calibrated")
-        place = html_place(html, no_html, target)
         written = _night_files(result, target, pictures)
         make = partial(page_of, result)
-        written |= html_files(job, "stellar-camera exposures", place, html is not None, make)
-        documents = {json: to_json(result)} if json is not None else {}
+        written |= documents.page(job, "stellar-camera exposures", target, make)
         job.finish(
             written,
-            documents,
+            {documents.json: to_json(result)} if documents.json is not None else {},
             summary=lambda: print_sections(summary(result), "the report"),
             code=result.verdict.exit_code(strict=strict),
         )

@@ -31,6 +31,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.observations import Control
 from photogram.network.rays import LocalAxes, local_axes
+from photogram.network.similarity import turn_and_scale
 from photogram.results.result import Result
 from photogram.statistics.likelihood import judged
 
@@ -151,7 +152,7 @@ class FreeModel:
         starts = [_Similarity.start(self.model, target)]
         full = self.held.all(axis=1)
         if full.sum() >= FEWEST:
-            starts.append(_closest(self.model[full], target[full]).about(self.model[full], self.model))
+            starts.append(self._closest(np.flatnonzero(full), target))
         rows = np.flatnonzero(self.held.ravel())
         return min((self._fitted(each, target, rows) for each in starts), key=lambda each: each[0])
 
@@ -195,7 +196,7 @@ class FreeModel:
         for _ in range(GROWTHS):
             rows = np.flatnonzero((self.held & right[:, np.newaxis]).ravel())
             some = full[right[full]]
-            start = _closest(self.model[some], target[some]).about(self.model[some], self.model)
+            start = self._closest(some, target)
             omega, similarity = self._fitted(start, target, rows)
             misses = np.where(self.held, (target - similarity.of(self.model)) / deviations, 0.0)
             now = np.abs(misses).max(axis=1) < NEAR
@@ -218,7 +219,7 @@ class FreeModel:
         deviations = self._deviations
         best, nearest = math.inf, (np.zeros(target.shape), _Similarity.start(self.model, target))
         for three in _triples(np.flatnonzero(self.held.all(axis=1))):
-            similarity = _closest(self.model[three], target[three]).about(self.model[three], self.model)
+            similarity = self._closest(three, target)
             misses = np.where(self.held, (target - similarity.of(self.model)) / deviations, 0.0)
             cost = float(np.log1p(misses**2).sum())
             if cost < best:
@@ -253,6 +254,11 @@ class FreeModel:
         meant = supplied if change is None else change(supplied)
         # A component that is not held says nothing: it is where the model has it.
         return self.axes.positions(np.where(self.held, meant, self.given))
+
+    def _closest(self, which: Indices, target: Floats) -> _Similarity:
+        """Return the similarity that brings some points closest to their targets."""
+        some = self.model[which]
+        return _Similarity.closest(some, target[which]).about(some, self.model)
 
     def _fitted(self, similarity: _Similarity, target: Floats, rows: Indices) -> tuple[float, _Similarity]:
         """Return Omega of some rows, and the similarity, after Gauss-Newton steps."""
@@ -294,6 +300,12 @@ class _Similarity:
         """Return the shift that brings points onto others in the mean."""
         return cls(1.0, np.eye(3), target.mean(axis=0) - model.mean(axis=0))
 
+    @classmethod
+    def closest(cls, model: Floats, target: Floats) -> _Similarity:
+        """Return the one that brings points closest to others, unweighted."""
+        scale, rotation, _ = turn_and_scale(model, target)
+        return cls(max(scale, 1e-6), rotation, target.mean(axis=0) - model.mean(axis=0))
+
     def of(self, model: Floats) -> Floats:
         """(k, 3) where points of the model come; turned and scaled about their mean."""
         centre = model.mean(axis=0)
@@ -313,15 +325,6 @@ class _Similarity:
             Attitudes.of("rotation_vector", step[np.newaxis, 4:]).matrices[0] @ self.rotation,
             self.shift + step[:3],
         )
-
-
-def _closest(model: Floats, target: Floats) -> _Similarity:
-    """Return the similarity that brings points closest to others, unweighted (Umeyama 1991)."""
-    x, y = model - model.mean(axis=0), target - target.mean(axis=0)
-    left, sizes, right = np.linalg.svd(y.T @ x)
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    scale = float((sizes * signs).sum() / max((x**2).sum(), np.finfo(np.float64).tiny))
-    return _Similarity(max(scale, 1e-6), (left * signs) @ right, target.mean(axis=0) - model.mean(axis=0))
 
 
 def doubtful(first: Result | None, *kinds: str) -> bool:

@@ -22,10 +22,10 @@ from photogram.formats.plain.transform import Transform
 from photogram.formats.plain.writing import attitude_matrices
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
-from photogram.formats.similarity import similarity
 from photogram.io.delimited import ColumnTable, Names
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
+from photogram.network.similarity import similarity
 from photogram.results.result import Result
 
 if TYPE_CHECKING:

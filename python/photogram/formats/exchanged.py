@@ -19,10 +19,10 @@ from photogram.formats.intersection import intersected
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project
-from photogram.formats.similarity import similarity
 from photogram.io.delimited import ColumnTable
 from photogram.messages import Message, quoted
 from photogram.network.observations import Position
+from photogram.network.similarity import similarity
 
 __all__ = ["check_systems"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.arrays import standard_deviations
+from photogram.arguments.arrays import freeze_fields, standard_deviations
 from photogram.arguments.types import Floats
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -56,8 +56,7 @@ class AdjustedCamera(Brief):
     images: int
 
     def __post_init__(self) -> None:
-        for array in (self.cofactors, self.covariance, self.redundancy, self.information):
-            array.flags.writeable = False
+        freeze_fields(self)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.arrays import freeze_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.network.block import Block
 from photogram.network.observations import observation_rows
@@ -65,9 +66,7 @@ class ObservedKind:
     weights: Floats
 
     def __post_init__(self) -> None:
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+        freeze_fields(self)
 
     @property
     def used(self) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.arrays import finite_rows, standard_deviations
+from photogram.arguments.arrays import finite_rows, freeze_fields, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Message
@@ -160,10 +160,7 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
     """Whether standard deviations are given, so that the unit weight is known."""
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+        freeze_fields(self)
 
     _BESIDE: ClassVar[frozenset[str]] = frozenset(
         {"seconds", "operations", "predictions", "formations", "state"}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.arrays import standard_deviations
+from photogram.arguments.arrays import freeze_fields, standard_deviations
 from photogram.arguments.types import Floats
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
@@ -59,9 +59,7 @@ class AdjustedUnknown:
     observations: int
 
     def __post_init__(self) -> None:
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+        freeze_fields(self)
 
     @property
     def name(self) -> str:
