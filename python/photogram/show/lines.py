@@ -88,7 +88,8 @@ def _numbers(
         texts = [degrees_written(value, 5) if math.isfinite(value) else "-" for value in values.tolist()]
         return Field(named, [f"{gap}{text:>{width}}" for text in texts])
     plain = values.tolist()
-    texts = [f"{gap}%{width}{form}" % value for form, value in zip(forms, plain, strict=True)]
+    patterns = {form: f"{gap}%{width}{form}" for form in set(forms)}
+    texts = [patterns[form] % value for form, value in zip(forms, plain, strict=True)]
     if width and any(len(text) > width + len(gap) for text in texts):
         short = f"{gap}%{width}.{max(width - 8, 1)}g"
         texts = [

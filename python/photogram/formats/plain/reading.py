@@ -148,7 +148,8 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         from photogram.formats.exchanged import check_systems
 
         raw = control.vectors(AXES)
-        rows = np.array([points.names.index(name) for name in given.names], dtype=np.int64)
+        places = {name: row for row, name in enumerate(points.names)}
+        rows = np.array([places[name] for name in given.names], dtype=np.int64)
         check_systems(project, settings, control, rows, raw, free=False)
     return project
 
