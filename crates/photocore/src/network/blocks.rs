@@ -31,12 +31,11 @@ impl Blocks {
         }
         shared.iter().for_each(|&camera| add(network.cameras[camera].sd.len()));
         let photos = network.photos.len();
-        let mut count = photos + shared.len();
         let mut of_common = vec![None; network.commons.len()];
-        for (index, common) in network.commons.iter().enumerate().filter(|(_, common)| !common.is_held()) {
-            of_common[index] = Some(count);
+        let unknown = network.commons.iter().enumerate().filter(|(_, common)| !common.is_held());
+        for (block, (index, common)) in (photos + shared.len()..).zip(unknown) {
+            of_common[index] = Some(block);
             add(common.sd.len());
-            count += 1;
         }
         let mut squares = vec![0];
         let widths = first.windows(2).map(|ends| ends[1] - ends[0]);
