@@ -118,7 +118,7 @@ impl<'a> Candidates<'a> {
         self.add_to_row(sums, row);
     }
 
-    /// Adds the rows of a tie, without what the motions make of the displacement that it misses by (see [`Model::carried`]).
+    /// Adds the rows of a tie, without what the motions make of the displacement that it misses by (see [`Evaluated::carried`]).
     pub fn add_tie(
         &self,
         sums: &mut Sums,

@@ -78,7 +78,7 @@ pub struct Adjustment {
     pub(super) selected: Option<SelectedInverse>,
     /// Why the last values give no cofactors although they were asked for.
     pub undetermined: Option<AdjustError>,
-    /// Local blocks that the last step has led to where they harm all others (see [`super::Model::collapsed`]): the iterations
+    /// Local blocks that the last step has led to where they harm all others (see [`super::Evaluated::collapsed`]): the iterations
     /// have stopped there, for the adjustment to be begun again without them.
     pub collapsed: Vec<usize>,
     /// The unknowns, none of them local, that a combination moves which is determined so weakly that the sum of squares stood still

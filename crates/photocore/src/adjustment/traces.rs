@@ -23,7 +23,7 @@ impl Default for Probing {
     }
 }
 
-/// Groups of the equations of a problem (see [`Problem::equations`]).
+/// Groups of the equations of a problem (see [`AnyProblem::equations`]).
 #[derive(Debug, Clone)]
 pub struct EquationGroups {
     /// How many there are.

@@ -173,7 +173,7 @@ impl Bundle {
         preferred
     }
 
-    /// The first of the motions of an observation's part, and what each makes of the displacement that it misses by (see [`Model::carried`]).
+    /// The first of the motions of an observation's part, and what each makes of the displacement that it misses by (see [`Evaluated::carried`]).
     pub(super) fn carried_by_motions(
         &self,
         stations: &Stations,

@@ -29,7 +29,7 @@ pub trait ObservationModel: Sized {
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>);
 
     /// The axes, as rows, in which observed minus computed is a displacement of a place; None where it is none. A displacement turns and
-    /// grows with a network that moves as a whole, and says nothing about that (see [`crate::adjustment::Model::carried`]).
+    /// grows with a network that moves as a whole, and says nothing about that (see [`crate::adjustment::Evaluated::carried`]).
     fn axes(&self, _sites: &Sites<'_>) -> Option<DMatrix<f64>> {
         None
     }

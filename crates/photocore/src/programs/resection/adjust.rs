@@ -24,7 +24,7 @@ impl Resection {
     /// The same on threads of the caller.
     ///
     /// Without initial values, every distinct pose that a direct method finds is adjusted. The one with the least sum of squares
-    /// is the solution; the others that fit about as well are told too (see [`Alternative`]).
+    /// is the solution; the others that fit about as well are told too (see [`Alternative`](super::Alternative)).
     ///
     /// # Errors
     /// A configuration that determines no pose, or an interruption by `watch`.
