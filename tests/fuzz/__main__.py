@@ -63,9 +63,9 @@ def main() -> int:
     told: dict[str, list[int]] = {}
     for number, outcome in figures.faults:
         told.setdefault(cause(outcome), []).append(number)
-    for what, numbers in sorted(told.items(), key=lambda each: -len(each[1])):
-        again = ", ".join(f"{asked.seed}:{number}" for number in numbers[:SHOWN])
-        print(f"\n{len(numbers)} failed ({again}): {what}")
+    for what, failed in sorted(told.items(), key=lambda each: -len(each[1])):
+        again = ", ".join(f"{asked.seed}:{number}" for number in failed[:SHOWN])
+        print(f"\n{len(failed)} failed ({again}): {what}")
     for warning, count in figures.warnings.most_common():
         print(f"{count} warnings: {warning}")
     if asked.page:
