@@ -59,7 +59,7 @@ def watched() -> Clock:
     clock.watch(command, "_files", "tables")
     clock.watch(Job, "write", "tables")
     clock.watch(Result, "report", "report")
-    clock.watch(command, "html_files", "page with pictures")
+    clock.watch(import_module("photogram.cli.documents"), "html_files", "page with pictures")
     return clock
 
 

@@ -33,12 +33,8 @@ PHASES = (
 )  # fmt: skip
 REST, WHOLE, GTSAM = "everything else", "**whole command**", "gtsam, bare solution"
 FIRST_SIX = """
-import time
 from photogram import adjust, simulate
-block = simulate(strips=2, photos_per_strip=3, seed=1).block
-began = time.perf_counter()
-adjust(block)
-print(time.perf_counter() - began)
+adjust(simulate(strips=2, photos_per_strip=3, seed=1).block)
 """
 
 Seconds = dict[str, float]
@@ -113,7 +109,10 @@ def small_rows(repetitions: int) -> Iterator[list[str]]:
     with tempfile.TemporaryDirectory() as name:
         for what, call in (
             ("`photogram --help`", lambda: of_process([*PHOTOGRAM, "--help"], name)),
-            ("first six photographs of a process, `adjust` alone", lambda: first_six(name)),
+            (
+                "from the start of Python to six photographs adjusted",
+                lambda: of_process([sys.executable, "-c", FIRST_SIX], name),
+            ),
             (
                 "`photogram adjust --example`, with its page",
                 lambda: of_process([*PHOTOGRAM, "adjust", "--example"], name),
@@ -127,12 +126,6 @@ def of_process(command: list[str], folder: str) -> float:
     began = time.perf_counter()
     subprocess.run(command, check=True, capture_output=True, cwd=folder)
     return time.perf_counter() - began
-
-
-def first_six(folder: str) -> float:
-    """Return the seconds of the first adjustment of a process, with what it loads."""
-    command = [sys.executable, "-c", FIRST_SIX]
-    return float(subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder).stdout)
 
 
 def least(call: Callable[[], float], repetitions: int) -> float:

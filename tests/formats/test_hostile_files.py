@@ -12,10 +12,10 @@ import photogram
 from photogram import InputError, formats
 from photogram.cli.options import default_out
 from photogram.formats import crs
-from photogram.formats.similarity import similarity
 from photogram.formats.xml_stream import LONGEST, MOST, read_stream, root_of
 from photogram.io.delimited import read_columns
 from photogram.network.directions import without_lenses
+from photogram.network.similarity import similarity
 
 EXAMPLE = formats.__path__[0].replace("formats", "examples/project")
 
