@@ -10,13 +10,13 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from photogram.arguments.naming import natural_order
 from photogram.giant.fields import (
     format_angle,
     format_deviations,
     format_name,
     format_principal_distance,
     format_real,
-    natural_order,
     parse_angle,
     parse_name,
 )

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.naming import natural_order
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.giant.cameras import Camera
 from photogram.giant.common import Common
-from photogram.giant.fields import natural_order, printed_order
+from photogram.giant.fields import printed_order
 from photogram.giant.files import written
 from photogram.giant.frames import Frame, frame_records
 from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records

@@ -7,7 +7,6 @@ adds the file, the record and the columns. Rules: GIANT guide, section II.B.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable
 from decimal import Decimal
 
@@ -21,7 +20,6 @@ __all__ = [
     "format_name",
     "format_principal_distance",
     "format_real",
-    "natural_order",
     "pack_dms",
     "parse_angle",
     "parse_name",
@@ -34,8 +32,6 @@ MOST_ANGLE = (360 * 3600 + 3599) * ARCSEC
 
 LARGEST_PACKED = 10**8
 """Far beyond every angle, and well within what decimal arithmetic divides."""
-
-_DIGITS = re.compile(r"(\d+)", re.ASCII)
 
 
 def parse_name(field: str, strip: str = "") -> str:
@@ -198,12 +194,6 @@ def printed_order(name: str) -> tuple[int, str]:
     A blank sorts before every character that a name begins with, so that the shorter name comes first.
     """
     return len(name), name
-
-
-def natural_order(name: str) -> list[tuple[int, str]]:
-    """Return the key by which people sort names: character by character, but runs of digits as numbers."""
-    parts = _DIGITS.split(name)
-    return [(int(part), "") if place % 2 else (-1, part) for place, part in enumerate(parts)]
 
 
 def format_principal_distance(value: float) -> str:

@@ -123,4 +123,4 @@ def _drawn(section: Section) -> Section:
             parts += own if len(own) < 2 else [Layers(part.name, own)]
         else:
             parts.append(part)
-    return Section(section.id, section.title, parts, section.intro)
+    return replace(section, parts=parts)

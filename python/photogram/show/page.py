@@ -219,12 +219,13 @@ Part = Table | Facts | Drawing | Picture | Layers | Text | Remarks
 
 @dataclass(frozen=True)
 class Section:
-    """A section; one without parts is left out."""
+    """A section; one without parts is left out. An annex begins on a sheet of its own."""
 
     id: str
     title: str
     parts: Sequence[Part]
     intro: str = ""
+    annex: bool = False
 
 
 @dataclass(frozen=True)
@@ -268,6 +269,10 @@ class Page:
         The others.
     phases
         Seconds that the engine spent in its phases.
+    head
+        For whom and by whom it is.
+    language, first
+        Of its words, and what the link to its top is called.
     """
 
     what: str
@@ -277,6 +282,9 @@ class Page:
     highlights: Sequence[Fact]
     sections: Sequence[Section]
     phases: Mapping[str, float] = field(default_factory=dict)
+    head: Sequence[Fact] = ()
+    language: str = "en"
+    first: str = "Verdict"
 
     def with_sections(self, *more: Section) -> Page:
         """Return the page with more sections at its end."""

@@ -100,9 +100,8 @@ impl Trial {
         of: &[Of],
         threads: &Threads,
     ) -> Result<Vec<f64>, NetworkError> {
-        let found = self.found()?;
         let problem = &self.assembled.problem;
-        let rows = ObservationRows::new(problem, &found.values, &found.held, threads);
+        let rows = ObservationRows::new(problem, covariances.linearized.values(), &self.held, threads);
         let all = self.rows_of(0..self.suspects.len());
         let mut influences = Vec::new();
         for solution in covariances.solutions(partials, of, threads)? {

@@ -27,7 +27,7 @@ pub struct Trial {
     /// The suspects at each local point, by its place.
     pub(super) on_place: Vec<Vec<usize>>,
     /// What was held for a datum where the adjustment has ended.
-    held: Vec<usize>,
+    pub(super) held: Vec<usize>,
     found: Option<Leverages>,
     /// Whether that is the network as its adjustment has ended, with everything in it.
     stands: bool,

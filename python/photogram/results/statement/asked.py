@@ -1,0 +1,168 @@
+"""What is asked of an accuracy statement."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from photogram.errors import InputError
+from photogram.messages import nearest
+
+__all__ = ["INDEPENDENT", "STANDARDS", "Asked", "length_of", "lengths_in"]
+
+STANDARDS = ("plain", "asprs-2023", "nssda", "vdi-2634", "iso-19157")
+INDEPENDENT = ("yes", "same-base", "no")
+"""What may be declared of the survey of check points."""
+_METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
+_METRES["us-ft"] = 1200 / 3937
+_LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([A-Za-z-]*?)(2?)\s*")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of a statement; lengths in the linear unit of the block, areas in its square.
+
+    Attributes
+    ----------
+    standards
+        Which of `plain`, `asprs-2023`, `nssda`, `vdi-2634`, `iso-19157`.
+    classes
+        Accuracy classes that are to be met: by `h` (horizontal), `v` (vertical), `3d`.
+    area
+        Of the product; None: the hull of all adjusted points in plan.
+    sd
+        Standard deviations (east, north, up) of the survey of check points that have none; None: that is
+        refused.
+    without
+        Check points without which figures are given beside those of all, with the reason of each.
+    independent
+        Whether the survey of check points is independent of the block: a declaration, `yes`, `same-base`,
+        `no`.
+    vegetated
+        Check points in vegetation: their heights are stated apart (VVA).
+    survey_common_sd
+        Of an error that all check points share, east, north, up (a base station, a levelling datum).
+    survey_common_in_control
+        Whether control has the same error: it then cancels in differences.
+    language, text
+        Of the sentences, and sentences that stand for those of the language.
+    budgets
+        Quantities whose uncertainty is taken apart, such as `point C08 z`; None: three are chosen.
+    coverage
+        Probability of expanded uncertainties.
+    lengths, limit
+        Calibrated lengths, and (A, K, B) of their limit A + K L <= B; see `statement.lengths`.
+    title, project, client, firm, surveyor, date
+        What the head of the page says.
+    """
+
+    standards: tuple[str, ...] = ("asprs-2023", "plain")
+    classes: Mapping[str, float] = field(default_factory=dict)
+    area: float | None = None
+    sd: tuple[float, ...] | None = None
+    without: Mapping[str, str] = field(default_factory=dict)
+    independent: str | None = None
+    vegetated: frozenset[str] = frozenset()
+    survey_common_sd: tuple[float, ...] = (0.0, 0.0, 0.0)
+    survey_common_in_control: bool = False
+    language: str = "en"
+    text: Mapping[str, str] = field(default_factory=dict)
+    budgets: tuple[Any, ...] | None = None
+    coverage: float = 0.95
+    title: str = ""
+    project: str = ""
+    client: str = ""
+    firm: str = ""
+    surveyor: str = ""
+    date: str = ""
+
+    @classmethod
+    def checked(cls, **given: Any) -> Asked:
+        """Return what is asked, checked.
+
+        Raises
+        ------
+        InputError
+            What there is not, or cannot be.
+        """
+        known = [each.name for each in fields(cls)]
+        for name in given:
+            if name not in known:
+                raise InputError(f"a statement has no {name}{nearest(name, known)}")
+        asked = cls(**{name: value for name, value in given.items() if value is not None})
+        asked = replace(
+            asked,
+            standards=tuple(asked.standards),
+            without=dict(asked.without),
+            vegetated=frozenset(asked.vegetated),
+            sd=None if asked.sd is None else _three("sd", asked.sd),
+            survey_common_sd=_three("survey_common_sd", asked.survey_common_sd),
+            budgets=None if asked.budgets is None else tuple(asked.budgets),
+        )
+        asked._check()
+        return asked
+
+    def _check(self) -> None:
+        for each in self.standards:
+            if each not in STANDARDS:
+                raise InputError(f"there is no standard {each!r}{nearest(each, STANDARDS)}")
+        for name, size in self.classes.items():
+            if name not in ("h", "v", "3d"):
+                raise InputError(f"a class is horizontal (h), vertical (v) or 3d, not {name!r}")
+            if not 0 < size < math.inf:
+                raise InputError(f"the class {name} is a length, not {size}")
+        if self.independent is not None and self.independent not in INDEPENDENT:
+            raise InputError(f"independent is one of {', '.join(INDEPENDENT)}, not {self.independent!r}")
+        if not 0 < self.coverage < 1:
+            raise InputError(f"coverage is a probability between 0 and 1, not {self.coverage}")
+        if self.area is not None and not 0 < self.area < math.inf:
+            raise InputError(f"the area is a positive number, not {self.area}")
+        for point, reason in self.without.items():
+            if not reason.strip():
+                raise InputError(f'{point} is left out for a reason: --without {point}="target moved"')
+
+
+def _three(name: str, given: float | Sequence[float]) -> tuple[float, ...]:
+    """Return one number, or three, for east, north and up."""
+    values = (given,) * 3 if isinstance(given, int | float) else tuple(given)
+    values = values * 3 if len(values) == 1 else values
+    if len(values) != 3 or not all(isinstance(each, int | float) and 0 <= each < math.inf for each in values):
+        raise InputError(f"{name} is one standard deviation, or three (east, north, up), not {given}")
+    return tuple(float(each) for each in values)
+
+
+def lengths_in(unit: str) -> float:
+    """Return how many metres a linear unit has.
+
+    Raises
+    ------
+    InputError
+        A unit that nobody knows.
+    """
+    try:
+        return _METRES[unit]
+    except KeyError:
+        raise InputError(f"there is no unit of length {unit!r}{nearest(unit, _METRES)}") from None
+
+
+def length_of(given: str, unit: str, *, area: bool = False) -> float:
+    """Return a length such as `5cm`, or an area such as `12.5km2`, in the linear unit or its square.
+
+    Raises
+    ------
+    InputError
+        No length, or one without its unit.
+    """
+    found = _LENGTH.fullmatch(given)
+    what = "an area with its unit: 12.5km2" if area else "a length with its unit: 5cm"
+    if found is None or not found[2] or bool(found[3]) != area:
+        raise InputError(f"{given!r} is not {what}")
+    try:
+        value = float(found[1])
+    except ValueError:
+        raise InputError(f"{given!r} is not {what}") from None
+    factor = lengths_in(found[2]) / lengths_in(unit)
+    return value * (factor**2 if area else factor)

@@ -1,0 +1,261 @@
+"""Figures of accuracy of check points: by component, horizontal and 3D, with intervals and radii.
+
+RMSE of n differences is the root of their mean square: a bias is in it. Horizontal figures take points with
+both plan coordinates, 3D figures those with all three.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.results.statement.compared import Compared
+from photogram.results.statement.honest import (
+    Bias,
+    PointTests,
+    Prediction,
+    Surface,
+    bias,
+    point_tests,
+    prediction,
+    surface,
+)
+from photogram.statistics.distributions import critical_normal, critical_student
+from photogram.statistics.error_radii import (
+    circular_error,
+    mixture_circular,
+    mixture_linear,
+    sample_radius,
+    upper_order,
+)
+
+__all__ = ["Figures", "Radius", "Sized", "figures"]
+
+PROBABILITIES = (0.9, 0.95)
+INSIDE = 0.95
+
+
+@dataclass(frozen=True)
+class Sized:
+    """The differences of a component (`e`, `n`, `h`), radial in plan (`plan`) or in space (`all`).
+
+    Attributes
+    ----------
+    n
+        How many.
+    mean, sd
+        Of components; NaN for radial figures, and the sd of one point.
+    rmse
+        Root mean square.
+    largest, point
+        The largest, and whose it is.
+    """
+
+    n: int
+    mean: float
+    sd: float
+    rmse: float
+    largest: float
+    point: str
+
+
+@dataclass(frozen=True)
+class Radius:
+    """A radius of a probability from a sample.
+
+    Attributes
+    ----------
+    order, sample
+        k = ceil(p n), and the k-th smallest: NaN without points.
+    upper_order, upper
+        The order whose value exceeds the quantile with 95 percent, points taken as independent; None where
+        there are too few.
+    """
+
+    order: int
+    sample: float
+    upper_order: int | None
+    upper: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Figures:
+    """All figures of check points.
+
+    Attributes
+    ----------
+    n
+        How many points.
+    parts
+        By `e`, `n`, `h`, `plan`, `all`.
+    rmse_h1, rmse_v1, rmse_h2, rmse_v2
+        Found in plan (radial) and in height, and of the survey.
+    prediction
+        By part; see :mod:`photogram.results.statement.honest`.
+    bias
+        By component.
+    points
+        Tests of single points.
+    inside
+        How many points lie inside 95 percent in height, and in space.
+    radii
+        `ce90`, `le90`, `ce95`, `le95` of the sample.
+    moments, of_moments
+        (2, 2) `sum d d' / n` in plan, and the same radii from moments, the bias inside.
+    mixture
+        `ce90`, `le90` for which the mean probability over the points is 90 percent, by s2 Q_ii.
+    surface
+        Of the heights.
+    """
+
+    n: int
+    parts: dict[str, Sized | None]
+    rmse_h1: float
+    rmse_v1: float
+    rmse_h2: float
+    rmse_v2: float
+    prediction: dict[str, Prediction | None]
+    bias: dict[str, Bias | None]
+    points: PointTests
+    inside: dict[str, int]
+    radii: dict[str, Radius | None]
+    moments: Floats
+    of_moments: dict[str, float]
+    mixture: dict[str, float]
+    surface: Surface | None
+
+    @property
+    def rmse_h(self) -> float:
+        """`sqrt(RMSE_H1^2 + RMSE_H2^2)`."""
+        return math.hypot(self.rmse_h1, self.rmse_h2)
+
+    @property
+    def rmse_v(self) -> float:
+        """`sqrt(RMSE_V1^2 + RMSE_V2^2)`."""
+        return math.hypot(self.rmse_v1, self.rmse_v2)
+
+    @property
+    def rmse_3d(self) -> float:
+        """`sqrt(RMSE_H^2 + RMSE_V^2)`."""
+        return math.hypot(self.rmse_h, self.rmse_v)
+
+    def without_survey(self, part: str) -> float:
+        """Return `sqrt(RMSE_1^2 - RMSE_2^2)` of `h` or `v`; NaN below the survey's own accuracy."""
+        first, second = (self.rmse_h1, self.rmse_h2) if part == "h" else (self.rmse_v1, self.rmse_v2)
+        square = first**2 - second**2
+        return math.sqrt(square) if square >= 0 else math.nan
+
+
+def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
+    """Return the figures of check points; None where there are none.
+
+    Parameters
+    ----------
+    coverage
+        Probability of the expanded uncertainty of biases.
+    """
+    if not len(found):
+        return None
+    k = critical_student(1.0 - coverage, found.second)
+    d = np.where(found.counted, found.differences, np.nan)
+    plan, heights = np.hypot(d[:, 0], d[:, 1]), d[:, 2]
+    in_plan, in_height = np.isfinite(plan), np.isfinite(heights)
+    survey = found.survey.diagonal().reshape(-1, 3)
+    tests = point_tests(found)
+    return Figures(
+        n=len(found),
+        parts={
+            "e": _sized(d[:, 0], found.names),
+            "n": _sized(d[:, 1], found.names),
+            "h": _sized(heights, found.names),
+            "plan": _sized(plan, found.names, radial=True),
+            "all": _sized(np.sqrt((d**2).sum(axis=1)), found.names, radial=True),
+        },
+        rmse_h1=_root(plan**2),
+        rmse_v1=_root(heights**2),
+        rmse_h2=_root(np.where(in_plan, survey[:, 0] + survey[:, 1], np.nan)),
+        rmse_v2=_root(np.where(in_height, survey[:, 2], np.nan)),
+        prediction={part: prediction(found, part) for part in ("e", "n", "h", "plan", "all")},
+        bias={part: bias(found, part, k) for part in ("e", "n", "h")},
+        points=tests,
+        inside=_inside(tests, heights, in_height),
+        radii=_radii(plan[in_plan], np.abs(heights[in_height])),
+        moments=_moments(d[in_plan, :2]),
+        of_moments=_of_moments(_moments(d[in_plan, :2]), _root(heights**2)),
+        mixture=_mixture(found, in_plan, in_height),
+        surface=surface(found),
+    )
+
+
+def _sized(values: Floats, names: tuple[str, ...], *, radial: bool = False) -> Sized | None:
+    own = np.flatnonzero(np.isfinite(values))
+    if not len(own):
+        return None
+    some = values[own]
+    worst = int(own[np.argmax(np.abs(some))])
+    mean = math.nan if radial else float(some.mean())
+    sd = math.nan if radial or len(own) < 2 else float(some.std(ddof=1))
+    return Sized(len(own), mean, sd, _root(some**2), float(abs(values[worst])), names[worst])
+
+
+def _root(squares: Floats) -> float:
+    """Return the root of the mean of what is known; NaN where nothing is."""
+    known = squares[np.isfinite(squares)]
+    return math.sqrt(float(known.mean())) if known.size else math.nan
+
+
+def _inside(tests: PointTests, heights: Floats, in_height: np.ndarray) -> dict[str, int]:
+    limits = {
+        k: _photocore.chi_square_quantile(1 - INSIDE, k, upper=True)
+        for k in np.unique(tests.dimension[tests.dimension > 0]).tolist()
+    }
+    of_points = np.array([limits.get(k, math.nan) for k in tests.dimension.tolist()])
+    one = math.sqrt(_photocore.chi_square_quantile(1 - INSIDE, 1, upper=True))
+    with np.errstate(invalid="ignore"):
+        return {
+            "h": int((np.abs(tests.normalised[:, 2]) <= one)[in_height].sum()),
+            "three": int((of_points >= tests.T).sum()),
+        }
+
+
+def _radii(plan: Floats, heights: Floats) -> dict[str, Radius | None]:
+    found: dict[str, Radius | None] = {}
+    for p in PROBABILITIES:
+        for name, values in (("ce", plan), ("le", heights)):
+            key = f"{name}{round(100 * p)}"
+            if not len(values):
+                found[key] = None
+                continue
+            order, sample = sample_radius(values, p)
+            upper = upper_order(len(values), p)
+            found[key] = Radius(
+                order, sample, upper, None if upper is None else float(np.sort(values)[upper - 1])
+            )
+    return found
+
+
+def _moments(plan: Floats) -> Floats:
+    return plan.T @ plan / len(plan) if len(plan) else np.full((2, 2), np.nan)
+
+
+def _of_moments(moments: Floats, height: float) -> dict[str, float]:
+    found = {}
+    for p in PROBABILITIES:
+        name = str(round(100 * p))
+        known = np.isfinite(moments).all()
+        found[f"ce{name}"] = float(circular_error(moments[np.newaxis], p)[0]) if known else math.nan
+        found[f"le{name}"] = height * critical_normal(1.0 - p)
+    return found
+
+
+def _mixture(found: Compared, in_plan: np.ndarray, in_height: np.ndarray) -> dict[str, float]:
+    own = found.blocks(found.product)
+    plan, heights = own[in_plan, :2, :2], np.sqrt(own[in_height, 2, 2])
+    return {
+        "ce90": mixture_circular(plan, 0.9) if len(plan) else math.nan,
+        "le90": mixture_linear(heights, 0.9) if len(heights) else math.nan,
+    }

@@ -1,0 +1,304 @@
+"""Whether the predicted accuracy is honest: differences at check points against their joint covariance.
+
+Whole and by component T = d' C^-1 d, chi-square with as many degrees of freedom as rows (F(m, f) for T / m
+where s2 is posterior, approximately: the survey's part of C is not estimated); bias z = n mean / sqrt(1' C_c
+1); heights on 1, x, y, x^2 + y^2 by generalised least squares; single points by T_i = d_i' C_ii^-1 d_i, and
+given all others by y_i' (C^-1)_ii^-1 y_i, y = C^-1 d.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.results.statement.compared import PARTS, Compared
+from photogram.statistics.distributions import critical_normal
+from photogram.statistics.error_radii import circular_error
+from photogram.statistics.freedom import effective_freedom, rmse_interval
+
+__all__ = ["Bias", "PointTests", "Prediction", "Surface", "bias", "point_tests", "prediction", "surface"]
+
+LEVEL = 0.05
+SINGULAR = 1e-12
+"""Variance, in those of the components, below which a direction has none."""
+LEAST = 6
+"""Points with heights that a surface takes."""
+FLAT = 1e-6
+"""Of the extent of points, how far they reach across where they lie on a line."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The differences of a part of the components against their covariance.
+
+    Attributes
+    ----------
+    rows, points, rank
+        How many differences, of how many points, and the rank of their covariance.
+    predicted_rmse, predicted_rmse_of_product, found_rmse
+        `sqrt(tr C / n)` of n points, the same of s2 Q alone, and what was found; linear unit.
+    effective_dof, rmse_interval
+        `tr(C)^2 / tr(C^2)`, and the interval of 95 percent that follows for what was found.
+    T, p_high
+        d' C^-1 d and the probability of more (chi-square, C taken as known).
+    p_low, p_high_f
+        Of less, and of more by F where s2 is posterior (else as `p_high`): these decide.
+    factor, factor_interval
+        `sqrt(T / rows)`: by how much differences are larger than predicted, with its interval of 95 percent.
+    sum_of_squares_without_correlations
+        Sum of d^2 / C_ii.
+    """
+
+    rows: int
+    points: int
+    rank: int
+    predicted_rmse: float
+    predicted_rmse_of_product: float
+    found_rmse: float
+    effective_dof: float
+    rmse_interval: tuple[float, float]
+    T: float
+    p_high: float
+    p_low: float
+    p_high_f: float
+    factor: float
+    factor_interval: tuple[float, float]
+    sum_of_squares_without_correlations: float
+
+    @property
+    def rejected_high(self) -> bool:
+        """Whether differences are larger than predicted."""
+        return self.rank > 0 and not self.p_high_f >= LEVEL / 2
+
+    @property
+    def rejected_low(self) -> bool:
+        """Whether differences are smaller than predicted."""
+        return self.rank > 0 and self.p_low < LEVEL / 2
+
+
+@dataclass(frozen=True)
+class Bias:
+    """The mean difference of a component, with its standard deviation by all covariances, or variances."""
+
+    mean: float
+    sd_of_mean: float
+    sd_of_mean_without_correlations: float
+    z: float
+    p: float
+    expanded: float
+
+    @property
+    def rejected(self) -> bool:
+        """Whether the product is shifted against the check survey."""
+        return self.p < LEVEL
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Differences of heights as a surface: 1, x, y, x^2 + y^2.
+
+    Attributes
+    ----------
+    origin, scale
+        x, y are those of the adjusted points less (2,) `origin`, over `scale`.
+    estimate, sd, t
+        (4,) coefficients in the linear unit, their standard deviations, and the one over the other.
+    T, dof, p
+        x' N x of all four, 4, and the probability of more.
+    """
+
+    origin: tuple[float, float]
+    scale: float
+    estimate: Floats
+    sd: Floats
+    t: Floats
+    T: float
+    dof: int
+    p: float
+
+    @property
+    def rejected(self) -> bool:
+        """Whether heights are shifted, tilted or bent by more than errors explain."""
+        return self.p < LEVEL
+
+
+@dataclass(frozen=True, eq=False)
+class PointTests:
+    """Each of the n check points by itself.
+
+    Attributes
+    ----------
+    sd_predicted, sd_adjusted
+        (n, 3) roots of C_ii and of s2 Q_ii.
+    normalised
+        (n, 3) d over `sd_predicted`.
+    T, p
+        (n,) d_i' C_ii^-1 d_i and the probability of more, with as many degrees of freedom as components.
+    others, p_others
+        (n,) the same of the point predicted from all others.
+    dimension
+        (n,) how many components.
+    ce90, le90
+        (n,) radii of 90 percent that s2 Q_ii predicts for the product; linear unit.
+    """
+
+    sd_predicted: Floats
+    sd_adjusted: Floats
+    normalised: Floats
+    T: Floats
+    p: Floats
+    others: Floats
+    p_others: Floats
+    dimension: Floats
+    ce90: Floats
+    le90: Floats
+
+    @property
+    def limit(self) -> float:
+        """Probability below which one of the n points is wrong, or wrongly placed (Bonferroni)."""
+        return LEVEL / max(len(self.T), 1)
+
+
+def prediction(found: Compared, part: str) -> Prediction | None:
+    """Test a part of the components, `e`, `n`, `h`, `plan` or `all`; None without differences."""
+    d, covariance = found.of(part)
+    if not d.size:
+        return None
+    rows = found.rows(part)
+    product = found.product[np.ix_(rows, rows)]
+    points = len(d) // len(PARTS[part])
+    statistic, rank = _quadratic(d, covariance)
+    rmse = math.sqrt(float(d @ d) / points)
+    freedom = effective_freedom(covariance)
+    low, high = (_limit(rank, upper) for upper in (False, True))
+    variances = np.diag(covariance)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        alone = float((d**2 / variances).sum())
+    p_high = _photocore.chi_square(statistic, rank, upper=True) if rank else math.nan
+    below, above = 1.0 - p_high, p_high
+    if math.isfinite(found.second) and rank:
+        above = _photocore.fisher(statistic / rank, rank, found.second)
+        below = 1.0 - above
+    return Prediction(
+        rows=len(d),
+        points=points,
+        rank=rank,
+        predicted_rmse=math.sqrt(float(variances.sum()) / points),
+        predicted_rmse_of_product=math.sqrt(float(np.trace(product)) / points),
+        found_rmse=rmse,
+        effective_dof=freedom,
+        rmse_interval=rmse_interval(rmse, freedom),
+        T=statistic,
+        p_high=p_high,
+        p_low=below,
+        p_high_f=above,
+        factor=math.sqrt(statistic / rank) if rank else math.nan,
+        factor_interval=(math.sqrt(statistic / high), math.sqrt(statistic / low))
+        if rank
+        else (math.nan,) * 2,
+        sum_of_squares_without_correlations=alone,
+    )
+
+
+def _limit(freedom: int, upper: bool) -> float:
+    return _photocore.chi_square_quantile(LEVEL / 2, freedom, upper=upper) if freedom else math.nan
+
+
+def _quadratic(d: Floats, covariance: Floats) -> tuple[float, int]:
+    """Return d' C^+ d and the rank of C."""
+    scale = np.sqrt(np.diag(covariance))
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    free = values > SINGULAR
+    along = vectors.T @ (d / scale)
+    return float((along[free] ** 2 / values[free]).sum()), int(free.sum())
+
+
+def bias(found: Compared, component: str, k: float) -> Bias | None:
+    """Test the mean of a component, `e`, `n` or `h`, with the coverage factor k; None without differences."""
+    d, covariance = found.of(component)
+    if not d.size:
+        return None
+    mean, n = float(d.mean()), len(d)
+    sd = math.sqrt(max(float(covariance.sum()), 0.0)) / n
+    z = mean / sd if sd > 0 else math.nan
+    return Bias(
+        mean=mean,
+        sd_of_mean=sd,
+        sd_of_mean_without_correlations=math.sqrt(float(np.trace(covariance))) / n,
+        z=z,
+        p=math.erfc(abs(z) / math.sqrt(2.0)),
+        expanded=k * sd,
+    )
+
+
+def surface(found: Compared) -> Surface | None:
+    """Fit 1, x, y, x^2 + y^2 to the differences of heights; None with fewer than 6, or all on a line."""
+    d, covariance = found.of("h")
+    if len(d) < LEAST:
+        return None
+    plan = found.places[found.rows("h") // 3, :2]
+    origin = plan.mean(axis=0)
+    plan = plan - origin
+    scale = float(np.abs(plan).max())
+    across = np.linalg.svd(plan, compute_uv=False)
+    if not scale > 0 or across[1] < FLAT * across[0]:
+        return None
+    x, y = (plan / scale).T
+    columns = np.column_stack([np.ones(len(x)), x, y, x**2 + y**2])
+    try:
+        factor = np.linalg.cholesky(covariance)
+        weighted, right = (np.linalg.solve(factor, each) for each in (columns, d))
+        normal = weighted.T @ weighted
+        estimate = np.linalg.solve(normal, weighted.T @ right)
+        sd = np.sqrt(np.diag(np.linalg.inv(normal)))
+    except np.linalg.LinAlgError:  # heights that have no error, or points on a circle
+        return None
+    statistic = float(estimate @ normal @ estimate)
+    p = _photocore.chi_square(statistic, 4, upper=True)
+    return Surface((float(origin[0]), float(origin[1])), scale, estimate, sd, estimate / sd, statistic, 4, p)
+
+
+def point_tests(found: Compared) -> PointTests:
+    """Test every point by itself, and against what all others predict for it."""
+    n = len(found)
+    sd = np.sqrt(np.diag(found.covariance)).reshape(n, 3)
+    adjusted = found.blocks(found.product)
+    counted = np.isfinite(found.differences)
+    statistic, others, dimension = np.full(n, np.nan), np.full(n, np.nan), counted.sum(axis=1).astype(float)
+    rows = np.flatnonzero(counted.ravel())
+    whole = found.covariance[np.ix_(rows, rows)]
+    d = found.differences.ravel()[rows]
+    inverse = np.linalg.pinv(whole, rcond=SINGULAR, hermitian=True) if len(rows) else whole
+    y = inverse @ d
+    for point in range(n):
+        own = np.flatnonzero(rows // 3 == point)
+        if len(own):
+            grid = np.ix_(own, own)
+            statistic[point], _ = _quadratic(d[own], whole[grid])
+            others[point] = float(y[own] @ np.linalg.pinv(inverse[grid], hermitian=True) @ y[own])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        normalised = np.where(counted, found.differences / sd, np.nan)
+    sd_adjusted = np.sqrt(np.diagonal(adjusted, axis1=1, axis2=2))
+    return PointTests(
+        sd_predicted=np.where(counted, sd, np.nan),
+        sd_adjusted=sd_adjusted,
+        normalised=normalised,
+        T=statistic,
+        p=_above(statistic, dimension),
+        others=others,
+        p_others=_above(others, dimension),
+        dimension=dimension,
+        ce90=circular_error(adjusted[:, :2, :2], 0.9) if n else np.zeros(0),
+        le90=sd_adjusted[:, 2] * critical_normal(0.1),
+    )
+
+
+def _above(values: Floats, freedom: Floats) -> Floats:
+    """Return probabilities of more, chi-square."""
+    both = zip(values.tolist(), freedom.tolist(), strict=True)
+    return np.array([_photocore.chi_square(v, f, upper=True) if f else math.nan for v, f in both])

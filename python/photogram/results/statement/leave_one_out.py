@@ -1,0 +1,119 @@
+"""Control points as check points: each predicted by all other observations.
+
+With R_g the cofactors of the residuals ~v of a control point, both over its standard deviations (statistics:
+2.3), survey - predicted = sd R_g^- ~v, its covariance is sd R_g^- sd s2, and T = ~v' R_g^- ~v / s2 is
+chi-square with the rank. The survey's own variance is in it. These are no independent check: what all control
+has in common stays hidden.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.network.observations import Control
+from photogram.results.result import Result
+from photogram.results.statement.compared import in_order, turned_to_east
+
+__all__ = ["LeftOut", "leave_one_out"]
+
+PREDICTABLE = 0.01
+"""Eigenvalue of R_g below which the rest does not predict a direction: the point holds the datum along it."""
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """A control point, predicted by the rest.
+
+    Attributes
+    ----------
+    point
+        Its name.
+    difference
+        (3,) predicted minus survey, east, north, up; NaN for what is not held or not predictable. Linear
+        unit.
+    sd
+        (3,) its standard deviations.
+    covariance
+        (3, 3), of the same; zero where there is none.
+    T, rank, p
+        The test, directions that are predictable, and the probability of more.
+    redundancy, eigenvalues
+        Redundancy numbers of the k held components, and the eigenvalues of R_g in rising order.
+    """
+
+    point: str
+    difference: Floats
+    sd: Floats
+    covariance: Floats
+    T: float
+    rank: int
+    p: float
+    redundancy: Floats
+    eigenvalues: Floats
+
+
+def leave_one_out(result: Result) -> list[LeftOut]:
+    """Return every control point that took part as the others predict it, in the order of their names."""
+    block, found = result.block, []
+    observed = {each.point: each for each in block.observations if isinstance(each, Control)}
+    held_by = np.isfinite(block.point_sd).any(axis=1) | np.isin(
+        np.array(block.point_ids, dtype=object), [*observed]
+    )
+    control = np.flatnonzero(result.used_points & held_by)
+    for row in in_order(block, control).tolist():
+        name = block.point_ids[row]
+        q = result.point_cofactors[row]
+        turn = turned_to_east(block, result.point_positions[row : row + 1])[0]
+        if name in observed:
+            given, own = np.asarray(observed[name].position, dtype=float), observed[name].precision
+            root = np.asarray(np.linalg.cholesky(own), dtype=np.float64)
+            # In geographic blocks they are along east, north, up already.
+            factor = root if block.geographic else turn @ root
+            v = turn @ (given - result.point_positions[row])
+            found.append(_predicted(name, np.arange(3), v, factor, turn @ q @ turn.T, result))
+            continue
+        held = np.flatnonzero(np.isfinite(block.point_sd[row]) & (block.point_sd[row] > 0))
+        if len(held):
+            # Held along the axes of the block; those of geocentric blocks are turned together.
+            sd, v = block.point_sd[row, held], result.point_residuals[row, held]
+            if len(held) == 3:
+                whole = turn @ np.diag(sd)
+                found.append(_predicted(name, held, turn @ v, whole, turn @ q @ turn.T, result))
+            else:
+                units = np.diag(turn)[held]
+                inside = np.outer(units, units) * q[np.ix_(held, held)]
+                found.append(_predicted(name, held, units * v, np.diag(units * sd), inside, result))
+    return found
+
+
+def _predicted(name: str, held: np.ndarray, v: Floats, factor: Floats, q: Floats, result: Result) -> LeftOut:
+    """Return a point: residuals v of held components, a root F of their covariance, cofactors q."""
+    inverse = np.linalg.inv(factor)
+    residual, redundancy = inverse @ v, np.eye(len(v)) - inverse @ q @ inverse.T
+    values, vectors = np.linalg.eigh((redundancy + redundancy.T) / 2)
+    shown = values > PREDICTABLE
+    pseudo = (vectors[:, shown] / values[shown]) @ vectors[:, shown].T
+    statistic = float(residual @ pseudo @ residual) / result.covariance_scale
+    rank = int(shown.sum())
+    # Components with a notable part in a direction that the rest does not predict.
+    blind = (np.abs(factor @ vectors[:, ~shown]) > 1e-6 * np.abs(factor).max()).any(axis=1)
+    difference, sd, covariance = np.full(3, np.nan), np.full(3, np.nan), np.zeros((3, 3))
+    own = factor @ pseudo @ factor.T * result.covariance_scale
+    difference[held] = np.where(blind, np.nan, -(factor @ pseudo @ residual))
+    sd[held] = np.where(blind, np.nan, np.sqrt(np.diag(own)))
+    covariance[np.ix_(held, held)] = own
+    return LeftOut(
+        name,
+        difference,
+        sd,
+        covariance,
+        statistic,
+        rank,
+        _photocore.chi_square(statistic, rank, upper=True) if rank else float("nan"),
+        np.diag(redundancy),
+        values,
+    )

@@ -1,0 +1,200 @@
+"""Quantities of an adjusted block whose uncertainty is taken apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Indices
+from photogram.errors import InputError
+from photogram.messages import nearest
+from photogram.network.block import Block
+from photogram.network.rays import local_axes
+from photogram.results.cameras import units
+from photogram.results.result import Result, adjusted
+from photogram.results.selection import Item
+
+__all__ = ["Wanted", "chosen", "wanted"]
+
+_AXES = {"x": 0, "y": 1, "z": 2, "e": 0, "n": 1, "h": 2, "east": 0, "north": 1, "height": 2}
+"""What coordinates may be called, beside the names that they have in the block."""
+PRINCIPAL = ("f", "fx", "c")
+"""Parameters that are principal distances."""
+TOGETHER = 256
+"""Points whose distances to all others are computed at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """A quantity f(x).
+
+    Attributes
+    ----------
+    name
+        As it was asked for: `point C08 z`.
+    items
+        What it is a function of: see :class:`photogram.results.covariance.Covariances`.
+    function
+        Takes an array for each item; complex ones too.
+    unit
+        Of its value; empty for plain numbers.
+    """
+
+    name: str
+    items: tuple[Item, ...]
+    function: Callable[..., Any]
+    unit: str
+
+
+def wanted(result: Result, asked: Any) -> Wanted:
+    """Return a quantity as it is asked for.
+
+    Parameters
+    ----------
+    asked
+        `point NAME z`, `distance NAME NAME`, `camera NAME f`, `photo NAME x`, `unknown NAME x`; or a mapping
+        of items to gradients, `{("point", "C08"): [0, 0, 1]}`, which is linear.
+
+    Raises
+    ------
+    InputError
+        Kinds, names or components that are not there; points that took no part.
+    """
+    if isinstance(asked, Mapping):
+        return _linear(result, asked)
+    words = str(asked).split()
+    if len(words) < 3:
+        raise InputError(f"{asked!r} is no quantity: 'point C08 z', 'distance C01 C30', 'camera drone f'")
+    kind = words[0]
+    if kind == "distance":
+        return _distance(result, str(asked), _two(result.block, words[1:]))
+    kinds = adjusted(result).things
+    if kind not in kinds or kind == "step":
+        raise InputError(f"there are no quantities of the kind {kind!r}{nearest(kind, kinds)}")
+    name, component = " ".join(words[1:-1]), words[-1]
+    things = kinds[kind]
+    if name not in things.ids:
+        raise InputError(f"there is no {kind} {name!r}{nearest(name, things.ids)}")
+    names = things.components[list(things.ids).index(name)]
+    lower = [each.lower() for each in names]
+    own = _AXES.get(component.lower()) if kind in ("point", "photo") and component not in names else None
+    if own is None:
+        if component.lower() not in lower:
+            raise InputError(f"{kind} {name} has no {component!r}: it has {', '.join(names)}")
+        own = names.index(component) if component in names else lower.index(component.lower())
+    _check(result, kind, [name])
+    return Wanted(str(asked), ((kind, name),), lambda x: x[own], _unit(result, kind, name, own))
+
+
+def chosen(result: Result, checks: Sequence[str]) -> list[Wanted]:
+    """Return three quantities for the first page.
+
+    The check point, else tie point, with the median standard deviation of its height; the longest distance
+    between these points; the principal distance where it was estimated.
+    """
+    block = result.block
+    rows = np.flatnonzero(np.isin(np.array(block.point_ids, dtype=object), list(checks)))
+    if not len(rows):
+        rows = np.flatnonzero(result.used_points & (result.point_kinds == "pass"))
+    found = []
+    if len(rows):
+        order = rows[np.argsort(result.point_sd[rows, 2], kind="stable")]
+        found.append(wanted(result, f"point {block.point_ids[order[(len(order) - 1) // 2]]} z"))
+    if len(rows) > 1:
+        first, second = _farthest(result, rows)
+        found.append(_distance(result, f"distance {first} {second}", (first, second)))
+    for camera in result.cameras:
+        own = [name for name, sd in zip(camera.names, camera.sd.tolist(), strict=True) if sd > 0]
+        for name in PRINCIPAL:
+            if name in own:
+                return [*found, wanted(result, f"camera {camera.name} {name}")]
+    return found
+
+
+def _farthest(result: Result, rows: Indices) -> tuple[str, str]:
+    places = local_axes(result.block).positions(result.point_positions[rows])
+    best, ends = -1.0, (0, 0)
+    for first in range(0, len(rows), TOGETHER):
+        squares = ((places[first : first + TOGETHER, np.newaxis] - places) ** 2).sum(axis=2)
+        own = np.unravel_index(int(np.argmax(squares)), squares.shape)
+        if squares[own] > best:
+            best, ends = float(squares[own]), (first + int(own[0]), int(own[1]))
+    names = result.block.point_ids
+    return names[rows[min(ends)]], names[rows[max(ends)]]
+
+
+def _two(block: Block, words: Sequence[str]) -> tuple[str, str]:
+    """Return the names of two points, which may have blanks in them."""
+    known = set(block.point_ids)
+    for cut in range(1, len(words)):
+        names = " ".join(words[:cut]), " ".join(words[cut:])
+        if known.issuperset(names):
+            return names
+    lacking = next((word for word in words if word not in known), words[0])
+    raise InputError(f"there is no point {lacking!r}{nearest(lacking, block.point_ids)}")
+
+
+def _distance(result: Result, name: str, ends: tuple[str, str]) -> Wanted:
+    _check(result, "point", ends)
+    if ends[0] == ends[1]:
+        raise InputError(f"{name!r}: a distance is between two points")
+    spheroid = result.block.spheroid
+
+    def between(x: Any, y: Any) -> Any:
+        if spheroid is not None:
+            x, y = (_geocentric(each, spheroid.a, spheroid.b) for each in (x, y))
+        return (((x - y) ** 2).sum()) ** 0.5
+
+    items = tuple(("point", each) for each in ends)
+    return Wanted(name, items, between, result.block.linear_unit)
+
+
+def _geocentric(x: Any, a: float, b: float) -> Any:
+    """Return geocentric coordinates of longitude, latitude, height; for complex numbers too."""
+    sp, cp = np.sin(x[1]), np.cos(x[1])
+    across = a / (1 - (1 - (b / a) ** 2) * sp**2) ** 0.5
+    level = (across + x[2]) * cp
+    return np.array([level * np.cos(x[0]), level * np.sin(x[0]), ((b / a) ** 2 * across + x[2]) * sp])
+
+
+def _linear(result: Result, gradients: Mapping[Any, Any]) -> Wanted:
+    """Return a linear function by its gradient."""
+    items, parts = [], []
+    for item, gradient in gradients.items():
+        values = np.asarray(gradient, dtype=float)
+        if not (isinstance(item, tuple) and len(item) == 2) or not np.isfinite(values).all():
+            raise InputError(
+                f"{item!r} with {gradient!r} is no part of a gradient: ('point', 'C08'): [0, 0, 1]"
+            )
+        _check(result, str(item[0]), [str(item[1])])
+        width = len(adjusted(result).selected(item).values)
+        if values.shape != (width,):
+            raise InputError(f"the gradient of {item[0]} {item[1]} has {values.size} numbers, not {width}")
+        items.append(item)
+        parts.append(values)
+    if not items:
+        raise InputError("a gradient of nothing is no quantity")
+    name = "linear function of " + ", ".join(f"{kind} {own}" for kind, own in items)
+    return Wanted(name, tuple(items), lambda *x: sum(g @ v for g, v in zip(parts, x, strict=True)), "")
+
+
+def _check(result: Result, kind: str, names: Sequence[str]) -> None:
+    if kind != "point":
+        return
+    places = {name: row for row, name in enumerate(result.block.point_ids)}
+    for name in names:
+        if name in places and not result.used_points[places[name]]:
+            raise InputError(f"the point {name} took no part in the adjustment")
+
+
+def _unit(result: Result, kind: str, name: str, component: int) -> str:
+    block = result.block
+    if kind in ("point", "photo"):
+        angle = component >= 3 or (block.geographic and component < 2)
+        return "rad" if angle else block.linear_unit
+    if kind == "camera":
+        return units(next(each.camera for each in result.cameras if each.name == name))[component]
+    return next(each.units[component] for each in result.unknowns if each.name == name)

@@ -1,0 +1,142 @@
+"""The words of a statement: one table of sentences for each language, and those that a firm puts in their place."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from datetime import date
+from functools import cache
+from importlib.resources import files
+from string import Formatter
+from typing import Any
+
+from photogram.errors import InputError
+from photogram.messages import nearest
+from photogram.show.page import fixed
+
+__all__ = ["LANGUAGES", "Texts", "fields_of", "table_of"]
+
+LANGUAGES = ("en", "de")
+NOTHING = "–"
+"""What stands for a number that there is not."""
+
+
+@cache
+def table_of(language: str) -> Mapping[str, str]:
+    """Return the table of a language: sentences by key."""
+    source = files("photogram.results.statement").joinpath("text", f"{language}.toml")
+    return dict(tomllib.loads(source.read_text(encoding="utf-8")))
+
+
+def fields_of(sentence: str) -> set[str]:
+    """Return the names of the fields of a sentence.
+
+    Raises
+    ------
+    InputError
+        Braces that do not close, or that hold more than a name.
+    """
+    try:
+        parts = list(Formatter().parse(sentence))
+    except ValueError as error:
+        raise InputError(f"{sentence!r}: {error}") from None
+    if any(form or conversion for _, name, form, conversion in parts if name is not None):
+        raise InputError(f"{sentence!r}: a field is a name in braces, such as {{n}}")
+    return {name for _, name, _, _ in parts if name is not None}
+
+
+class Texts:
+    """Sentences in a language, with numbers as the language writes them.
+
+    Parameters
+    ----------
+    language
+        `en`, `de`.
+    own
+        Sentences by key that stand for those of the language.
+    unit
+        The linear unit of the block.
+
+    Raises
+    ------
+    InputError
+        A language or a key that there is not, fields that a sentence does not have.
+    """
+
+    def __init__(self, language: str = "en", own: Mapping[str, str] | None = None, unit: str = "m") -> None:
+        if language not in LANGUAGES:
+            raise InputError(f"there is no language {language!r}: {', '.join(LANGUAGES)}")
+        self.language, self.unit = language, unit
+        english = table_of("en")
+        for key, sentence in (own or {}).items():
+            if key not in english:
+                raise InputError(f"there is no sentence {key!r}{nearest(key, english)}")
+            if not isinstance(sentence, str):
+                raise InputError(f"{key} is no sentence: {sentence!r}")
+            if strange := fields_of(sentence) - fields_of(english[key]):
+                raise InputError(f"{key} has no field {sorted(strange)[0]!r}")
+        local = table_of(language)
+        self.missing = sorted(set(english) - set(local))
+        """Keys that are said in English for want of a sentence in the language."""
+        self._table = {**english, **local, **(own or {})}
+
+    def __call__(self, key: str, **values: Any) -> str:
+        """Return a sentence with its fields."""
+        return self._table[key].format(**{name: self._field(value) for name, value in values.items()})
+
+    def _field(self, value: Any) -> str:
+        if isinstance(value, str):
+            return value
+        if isinstance(value, int):
+            return self.number(float(value), 0)
+        return self.significant(value)
+
+    def number(self, value: float, decimals: int) -> str:
+        """Return a number with so many decimals."""
+        if not math.isfinite(value):
+            return NOTHING if math.isnan(value) else "∞" if value > 0 else "-∞"
+        return self._local(fixed(value, decimals))
+
+    def significant(self, value: float, figures: int = 3) -> str:
+        """Return a number with so many significant figures, at least."""
+        if not math.isfinite(value) or value == 0:
+            return self.number(value, 0)
+        return self.number(value, max(0, figures - 1 - math.floor(math.log10(abs(value)))))
+
+    def _local(self, written: str) -> str:
+        sign = written[:1] if written[:1] in "-+" else ""
+        whole, point, decimals = written.removeprefix(sign).partition(".")
+        group = self._table["number.group"]
+        head = ""
+        while len(whole) > 4 or (head and len(whole) > 3):
+            whole, head = whole[:-3], group + whole[-3:] + head
+        return sign.replace("-", "−") + whole + head + (self._table["number.decimal"] if point else "") + decimals
+
+    def length(self, value: float, figures: int = 2) -> str:
+        """Return a length with its unit: centimetres where it is less than a metre, millimetres for less."""
+        unit, factor = self.small(value)
+        digits = value * factor
+        return f"{self.significant(digits, figures)} {unit}"
+
+    def small(self, value: float) -> tuple[str, float]:
+        """Return the unit in which people read a length of this size, and what leads to it."""
+        if self.unit != "m" or not math.isfinite(value):
+            return self.unit, 1.0
+        size = abs(value)
+        return ("m", 1.0) if size >= 1 else ("cm", 100.0) if size >= 0.01 else ("mm", 1000.0)
+
+    def percent(self, probability: float) -> str:
+        """Return a probability in percent, without its sign."""
+        return self.significant(100 * probability, 2) if probability < 0.1 else f"{100 * probability:g}"
+
+    def day(self, given: str) -> str:
+        """Return a date (ISO) as the language writes it; anything else as it is."""
+        try:
+            return date.fromisoformat(given).strftime(self._table["date.format"])
+        except ValueError:
+            return given
+
+    def has(self, key: str) -> bool:
+        """Return whether there is a sentence."""
+        return key in self._table
