@@ -1,11 +1,11 @@
 """Linear, circular and spherical errors: tables, properties, and errors that were drawn."""
 
-import json
 import math
 import time
 
 import numpy as np
 import pytest
+from golden_statement import cofactors, differences, golden
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -20,24 +20,6 @@ from photogram.statistics.error_radii import (
     spherical_error,
     upper_order,
 )
-from shared_data import SHARED
-
-CIRCLES = SHARED / "statement" / "circles.json"
-STATEMENT = SHARED / "statement" / "statement.json"
-
-
-@pytest.fixture(scope="module")
-def circles():
-    if not CIRCLES.exists():
-        pytest.skip("the golden data of the statement are not here")
-    return json.loads(CIRCLES.read_text())
-
-
-@pytest.fixture(scope="module")
-def statement():
-    if not STATEMENT.exists():
-        pytest.skip("the golden data of the statement are not here")
-    return json.loads(STATEMENT.read_text())
 
 
 def turned(sds, angle):
@@ -47,46 +29,39 @@ def turned(sds, angle):
     return axes @ np.diag(np.square(sds)) @ axes.T
 
 
-def joint(triangle, size):
-    """Return a symmetric matrix of its lower triangle by rows."""
-    found = np.zeros((size, size))
-    found[np.tril_indices(size)] = triangle
-    return found + np.tril(found, -1).T
-
-
 @pytest.mark.parametrize("p", [0.3935, 0.5, 0.9, 0.95, 0.99])
-def test_circles_of_ellipses_have_the_radii_of_the_table(circles, p):
-    rows = circles["ellipses"]
+def test_circles_of_ellipses_have_the_radii_of_the_table(p):
+    rows = golden("circles.json")["ellipses"]
     covariances = [np.diag([1.0, row["ratio"] ** 2]) for row in rows]
     assert circular_error(covariances, p) == pytest.approx([row[str(p)] for row in rows], rel=1e-8)
 
 
-def test_an_offset_widens_the_circle_as_in_the_table(circles):
-    rows = circles["offset"]
+def test_an_offset_widens_the_circle_as_in_the_table():
+    rows = golden("circles.json")["offset"]
     for p, key in ((0.90, "ce90"), (0.95, "ce95")):
         found = circular_error([row["covariance"] for row in rows], p, [row["mean"] for row in rows])
         assert found == pytest.approx([row[key] for row in rows], rel=1e-8)
 
 
-def test_spheres_have_the_radii_of_the_table(circles):
-    rows = circles["spheres"]
+def test_spheres_have_the_radii_of_the_table():
+    rows = golden("circles.json")["spheres"]
     for p, key in ((0.90, "se90"), (0.50, "se50")):
         found = spherical_error([row["covariance"] for row in rows], p)
         assert found == pytest.approx([row[key] for row in rows], rel=1e-7)
 
 
-def test_order_statistics_are_those_of_the_table(circles):
-    for row in circles["order"]:
+def test_order_statistics_are_those_of_the_table():
+    for row in golden("circles.json")["order"]:
         order, value = sample_radius(-np.arange(row["n"], 0.0, -1), row["p"])
         assert (order, value) == (row["order"], row["order"])
         assert upper_order(row["n"], row["p"]) == row["upper_95"]
 
 
 @pytest.mark.parametrize("which", ["statement_unity", "statement_free"])
-def test_figures_of_check_points_are_those_of_the_golden_statement(statement, which):
-    figures = statement[which]["circular_linear"]
-    differences = np.array([row["difference"] for row in statement["statement_unity"]["points"]])
-    radial, heights = np.hypot(differences[:, 0], differences[:, 1]), differences[:, 2]
+def test_figures_of_check_points_are_those_of_the_golden_statement(which):
+    figures = golden("statement.json")[which]["circular_linear"]
+    d = differences()
+    radial, heights = np.hypot(d[:, 0], d[:, 1]), d[:, 2]
     for p, name in ((0.90, "90"), (0.95, "95")):
         for values, key in ((radial, f"ce{name}"), (heights, f"le{name}")):
             order, value = sample_radius(values, p)
@@ -96,23 +71,21 @@ def test_figures_of_check_points_are_those_of_the_golden_statement(statement, wh
             assert upper == figures[key]["upper_order"]
             if upper is not None:
                 assert np.sort(np.abs(values))[upper - 1] == pytest.approx(figures[key]["upper"], rel=1e-6)
-        moments = differences.T @ differences / len(differences)
+        moments = d.T @ d / len(d)
         of = figures["from_moments"]
         assert circular_error([moments[:2, :2]], p)[0] == pytest.approx(of[f"ce{name}"], rel=1e-6)
         assert linear_error([math.sqrt(moments[2, 2])], p)[0] == pytest.approx(of[f"le{name}"], rel=1e-6)
 
 
 @pytest.mark.parametrize("which", ["statement_unity", "statement_free"])
-def test_predicted_radii_are_those_of_the_golden_statement(statement, which):
-    adjusted = statement["adjustment"]
-    cofactors = joint(adjusted["check_points_cofactors_lower_triangle"], 90)
-    own = np.array([cofactors[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] for i in range(30)])
-    own *= adjusted["variance_of_unit_weight"] if which == "statement_free" else 1.0
-    figures = statement[which]["circular_linear"]["predicted_mixture"]
+def test_predicted_radii_are_those_of_the_golden_statement(which):
+    s2 = golden("statement.json")["adjustment"]["variance_of_unit_weight"] if "free" in which else 1.0
+    own = s2 * np.array([cofactors()[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] for i in range(30)])
+    figures = golden("statement.json")[which]["circular_linear"]["predicted_mixture"]
     assert mixture_circular(own[:, :2, :2], 0.9) == pytest.approx(figures["ce90"], rel=1e-6)
     assert mixture_linear(np.sqrt(own[:, 2, 2]), 0.9) == pytest.approx(figures["le90"], rel=1e-6)
     if which == "statement_unity":
-        rows = statement[which]["points"]
+        rows = golden("statement.json")[which]["points"]
         ce90 = circular_error(own[:, :2, :2], 0.9)
         assert ce90 == pytest.approx([row["ce90_predicted"] for row in rows], rel=1e-6)
         le90 = linear_error(np.sqrt(own[:, 2, 2]), 0.9)
