@@ -1,0 +1,204 @@
+"""Degrees of freedom of what is made of several variances, and the intervals and factors that follow.
+
+A sum of squares of correlated errors with the covariance C has the mean tr C and the variance 2 tr C^2: near
+enough it is chi-square with k = (tr C)^2 / tr C^2 degrees of freedom, fewer than there are errors
+(Satterthwaite 1946, Welch 1947). The variance u^2 of a quantity is a sum of parts of groups of observations,
+of which some were given and others estimated, with components of variance that have a covariance.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram import _photocore
+from photogram.arguments.arrays import is_covariance, numbers
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.statistics.distributions import LEVEL, critical_student
+
+__all__ = [
+    "coverage_factor",
+    "effective_freedom",
+    "joint_freedom",
+    "rmse_interval",
+    "welch_satterthwaite",
+]
+
+ROUNDING = 1e-9
+"""Of a number of degrees of freedom that is whole but for rounding, and of traces, in their size."""
+
+
+def effective_freedom(covariance: ArrayLike) -> float:
+    """Return the degrees of freedom of a sum of squares of correlated errors: (tr C)^2 / tr C^2.
+
+    Parameters
+    ----------
+    covariance
+        (m, m) of the errors, of one unit; possibly singular.
+
+    Returns
+    -------
+    Between 1 and m; NaN where there is no error, or one is not known.
+
+    Raises
+    ------
+    InputError
+        No square matrix of numbers, or one that is no covariance.
+    """
+    matrix = numbers("covariance", covariance, missing=True)
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise InputError(f"covariance has the shape {matrix.shape}, not (m, m)")
+    trace = float(np.trace(matrix))
+    if trace == 0 or not np.isfinite(matrix).all():
+        return math.nan
+    unit = matrix / trace
+    if np.diag(unit).min() < 0 or np.abs(unit - unit.T).max() > ROUNDING:
+        raise InputError("covariance is not symmetric and positive semidefinite")
+    return 1 / float(np.sum(unit**2))
+
+
+def rmse_interval(rmse: float, freedom: float, level: float = LEVEL) -> tuple[float, float]:
+    """Return the interval of the expected root mean square error behind one that was found.
+
+    Section 2.1 of the specification of the statement: found sqrt(k / chi2), both sides.
+
+    Parameters
+    ----------
+    rmse
+        Found, in any unit.
+    freedom
+        Its degrees of freedom k; see :func:`effective_freedom`.
+    level
+        Probability that the interval fails, half of it on each side.
+
+    Returns
+    -------
+    Lower and upper end in the same unit; NaN where the degrees of freedom are.
+
+    Raises
+    ------
+    InputError
+        A negative error, degrees of freedom that are not positive, a level that is no probability.
+    """
+    if not 0 < level < 1:
+        raise InputError(f"a level is a probability between 0 and 1, not {level:g}")
+    if rmse < 0:
+        raise InputError(f"a root mean square error is not negative: {rmse:g}")
+    if freedom <= 0:
+        raise InputError(f"degrees of freedom are positive: {freedom:g}")
+    if math.isnan(freedom):
+        return math.nan, math.nan
+    if math.isinf(freedom):
+        return rmse, rmse
+    high, low = (_photocore.chi_square_quantile(level / 2, freedom, upper=side) for side in (True, False))
+    return rmse * math.sqrt(freedom / high), rmse * math.sqrt(freedom / low)
+
+
+def welch_satterthwaite(u: ArrayLike, freedom: ArrayLike) -> float:
+    """Return the degrees of freedom of a combined uncertainty: u^4 / sum(u_k^4 / nu_k) (JCGM 100:2008, G.4).
+
+    Parameters
+    ----------
+    u
+        (k,) standard uncertainties of the contributions, of one unit, independent of each other.
+    freedom
+        (k,) their degrees of freedom; infinite for what was given.
+
+    Returns
+    -------
+    Infinite where nothing was estimated.
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes, negative uncertainties, degrees of freedom that are not positive.
+    """
+    own, dof = _contributions("u", u), numbers("freedom", freedom)
+    if dof.shape != own.shape:
+        raise InputError(f"freedom has the shape {dof.shape}, not {own.shape}")
+    if not (dof > 0).all():
+        raise InputError(f"freedom[{np.argmin(dof > 0)}] is not positive")
+    return _freedom(float(np.sum(own**2)), float(np.sum(own**4 / dof)))
+
+
+def joint_freedom(contributions: ArrayLike, covariance_of_components: ArrayLike, given: float = 0.0) -> float:
+    """Return the degrees of freedom of a variance whose groups have estimated components.
+
+    nu = 2 u^4 / (c' cov c), section 3 of the specification of the statement: unlike that of Welch and
+    Satterthwaite it knows that components are correlated.
+
+    Parameters
+    ----------
+    contributions
+        (k,) c = u_k^2, the parts of u^2 of the groups whose components were estimated.
+    covariance_of_components
+        (k, k) of their components, relative to those with which the contributions were computed.
+    given
+        The part of u^2 of all groups that were given.
+
+    Returns
+    -------
+    Infinite where nothing was estimated.
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes, negative contributions, a matrix that is no covariance.
+    """
+    c = _contributions("contributions", contributions)
+    matrix = numbers("covariance_of_components", covariance_of_components)
+    if matrix.shape != 2 * c.shape:
+        raise InputError(f"covariance_of_components has the shape {matrix.shape}, not {2 * c.shape}")
+    if not is_covariance(matrix, singular=True):
+        raise InputError("covariance_of_components is not symmetric and positive semidefinite")
+    if not 0 <= given < math.inf:
+        raise InputError(f"given is not a variance: {given:g}")
+    return _freedom(float(np.sum(c)) + given, float(c @ matrix @ c) / 2)
+
+
+def coverage_factor(probability: float, freedom: float, truncated: bool = True) -> float:
+    """Return the factor k of an expanded uncertainty U = k u (JCGM 100:2008, G.6.4).
+
+    Parameters
+    ----------
+    probability
+        Of the interval: 0.95 gives 1.96 where u is known.
+    freedom
+        Degrees of freedom of u, infinite where it is known.
+    truncated
+        Whether they are truncated to a whole number first, as the GUM does.
+
+    Returns
+    -------
+    The quantile of Student's distribution, both sides; infinite below one degree of freedom if truncated.
+
+    Raises
+    ------
+    InputError
+        What is no probability, degrees of freedom that are not positive.
+    """
+    if not 0 < probability < 1:
+        raise InputError(f"a probability lies between 0 and 1: {probability:g}")
+    if not freedom > 0:
+        raise InputError(f"degrees of freedom are positive: {freedom:g}")
+    whole = truncated and math.isfinite(freedom)
+    return critical_student(1 - probability, math.floor(freedom + ROUNDING) if whole else freedom)
+
+
+def _contributions(name: str, values: ArrayLike) -> Floats:
+    """Return (k,) finite values that are not negative."""
+    found = numbers(name, values)
+    if found.ndim != 1:
+        raise InputError(f"{name} has the shape {found.shape}, not (k,)")
+    bad = ~(np.isfinite(found) & (found >= 0))
+    if bad.any():
+        raise InputError(f"{name}[{np.argmax(bad)}] is not a number of zero or more: {found[bad][0]:g}")
+    return found
+
+
+def _freedom(variance: float, half: float) -> float:
+    """Return the degrees of freedom of a variance, given half of its own variance."""
+    return variance**2 / half if half > 0 else math.inf
