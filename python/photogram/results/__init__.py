@@ -9,6 +9,7 @@ WAYS = {
     "page_of": ("page",),
     "pictured": ("pictured",),
     "report_of": ("report",),
+    "statement_of": ("statement.made",),
     "terms_of": ("tables",),
 }
 """The files that show a result, by the names of the ways: see `photogram.show.ways`."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.selection import Adjusted, Things, photo_components, point_components
 from photogram.results.suspects import network_trial
+from photogram.show.ways import statement_of
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.statistics.limits import GlobalTest, global_test
 
@@ -374,6 +375,14 @@ class Result(AdjustedNetwork):
             untested=untested,
             whole=self.WHOLE,
         )
+
+    def statement(self, **asked: Any) -> Any:
+        """Return the accuracy statement that one may hand over (docs/statement.md).
+
+        It has `figures`, `sentences`, `assumptions`, `exit`, `budget(..)`, `check_points`, `leave_one_out`,
+        `to_html()`, `to_pdf()` and `to_json()`; options and errors are those of :func:`photogram.statement`.
+        """
+        return statement_of(self, **asked)
 
     def check_table(self) -> pd.DataFrame:
         """Return check points as a data frame: adjusted minus supplied coordinates, standard deviations."""

@@ -34,6 +34,7 @@ __all__ = [
     "findings_of",
     "page_of",
     "report_of",
+    "statement_of",
 ]
 
 
@@ -121,6 +122,12 @@ def page_of(result: object) -> Page:
 def findings_of(result: object) -> Findings:
     """Return what the verdict on a result rests on."""
     _undefined(result, "verdict")
+
+
+@Way
+def statement_of(result: object, **asked: Any) -> Any:
+    """Return the accuracy statement of a result, by what is asked for."""
+    _undefined(result, "statement")
 
 
 def _undefined(result: object, way: str) -> NoReturn:

@@ -53,8 +53,14 @@ class Asked:
         Quantities whose uncertainty is taken apart, such as `point C08 z`; None: three are chosen.
     coverage
         Probability of expanded uncertainties.
-    lengths, limit
-        Calibrated lengths, and (A, K, B) of their limit A + K L <= B; see `statement.lengths`.
+    components
+        The :class:`photogram.VarianceComponents` whose result it is, where weights were estimated.
+    lengths
+        Calibrated lengths: mappings of `line`, `from`, `to` (names of points), `length`, `sd`, `temperature` (deg
+        C, may be left out).
+    limit, expansion
+        (A, K, B) of the limit A + K L <= B of their errors, and what takes measured lengths to 20 deg C: of the
+        object, per kelvin.
     title, project, client, firm, surveyor, date
         What the head of the page says.
     """
@@ -72,6 +78,10 @@ class Asked:
     text: Mapping[str, str] = field(default_factory=dict)
     budgets: tuple[Any, ...] | None = None
     coverage: float = 0.95
+    components: Any = None
+    lengths: tuple[Mapping[str, Any], ...] = ()
+    limit: tuple[float, float, float] | None = None
+    expansion: float | None = None
     title: str = ""
     project: str = ""
     client: str = ""
@@ -100,6 +110,7 @@ class Asked:
             vegetated=frozenset(asked.vegetated),
             sd=None if asked.sd is None else _three("sd", asked.sd),
             survey_common_sd=_three("survey_common_sd", asked.survey_common_sd),
+            lengths=tuple(asked.lengths),
             budgets=None if asked.budgets is None else tuple(asked.budgets),
         )
         asked._check()
@@ -118,6 +129,10 @@ class Asked:
             raise InputError(f"independent is one of {', '.join(INDEPENDENT)}, not {self.independent!r}")
         if not 0 < self.coverage < 1:
             raise InputError(f"coverage is a probability between 0 and 1, not {self.coverage}")
+        if self.limit is not None and (len(self.limit) != 3 or not all(each >= 0 for each in self.limit)):
+            raise InputError(f"the limit of lengths is A, K and B of A + K L <= B, not {self.limit}")
+        if "vdi-2634" in self.standards and not self.lengths:
+            raise InputError("vdi-2634 is about calibrated lengths: a table of lengths lacks")
         if self.area is not None and not 0 < self.area < math.inf:
             raise InputError(f"the area is a positive number, not {self.area}")
         for point, reason in self.without.items():

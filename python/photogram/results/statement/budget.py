@@ -22,10 +22,11 @@ from photogram.results.grouping import grouped
 from photogram.results.result import Result
 from photogram.results.statement.quantities import Wanted
 from photogram.results.statement.sources import Rows, kind_of
+from photogram.results.statement.texts import Texts
 from photogram.results.suspects import network_trial
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 
-__all__ = ["Budget", "Freedom", "Single", "Source", "budgets"]
+__all__ = ["Budget", "Freedom", "Single", "Source", "budgets", "written"]
 
 LARGEST = 5
 """Single observations that are listed."""
@@ -233,6 +234,16 @@ def _budget(
     )
 
 
+def written(texts: Texts, found: Budget) -> tuple[str, str, str]:
+    """Return value, standard deviation and U with their unit: two significant digits of the standard deviation."""
+    factor, unit = (1.0, found.unit) if found.unit != "rad" else (math.degrees(1.0), "°")
+    sd = found.sd * factor
+    decimals = max(0, 1 - math.floor(math.log10(sd))) if 0 < sd < math.inf else 6
+    numbers = (texts.number(each * factor, decimals) for each in (found.value, found.sd, found.expanded))
+    value, u, expanded = (f"{each} {unit}".rstrip() for each in numbers)
+    return value, u, expanded
+
+
 class _Freedoms:
     """Effective degrees of freedom of variances, by what standard deviations rest on."""
 
@@ -264,8 +275,10 @@ class _Freedoms:
         nu = 2.0 / np.diag(self._covariance)
         joint = welch = math.nan
         if len(nu) and variance > 0:
-            joint = joint_freedom(contributions, self._covariance, variance)
-            welch = welch_satterthwaite(np.sqrt(contributions), nu, math.sqrt(variance))
+            given = max(variance - float(contributions.sum()), 0.0)
+            joint = joint_freedom(contributions, self._covariance, given)
+            u = np.sqrt(np.append(contributions, given))
+            welch = welch_satterthwaite(u, np.append(nu, math.inf))
         used = {"given": math.inf, "unit variance": self._common, "components": joint}[self._basis]
         names = dict(zip(self._names, nu.tolist(), strict=True))
         return Freedom(self._basis, used, self._common, names, joint, welch)

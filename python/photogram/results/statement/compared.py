@@ -30,6 +30,7 @@ __all__ = [
     "PARTS",
     "Compared",
     "compared",
+    "control_places",
     "in_order",
     "plan_positions",
     "turned_to_east",
@@ -53,9 +54,10 @@ class Compared:
         What they are called.
     vegetated
         (n,) whether they lie in vegetation.
-    given, places
-        (n, 3) coordinates as given, in the axes of the block, and (n, 3) of the adjusted points in its local
-        axes.
+    given
+        (n, 3) coordinates as given, in the axes of the block.
+    given_places, places
+        (n, 3) of them, and of the adjusted points, as east, north and height.
     differences
         (n, 3) adjusted minus given; NaN where nothing is given.
     product, survey
@@ -72,6 +74,7 @@ class Compared:
     names: tuple[str, ...]
     vegetated: Bools
     given: Floats
+    given_places: Floats
     places: Floats
     differences: Floats
     product: Floats
@@ -125,7 +128,7 @@ class Compared:
             survey=self.survey[grid],
             **{
                 each: getattr(self, each)[keep]
-                for each in ("vegetated", "given", "places", "differences", "survey_sd")
+                for each in ("vegetated", "given", "given_places", "places", "differences", "survey_sd")
             },
         )
 
@@ -184,6 +187,7 @@ def compared(result: Result, asked: Asked) -> Compared:
         names=names,
         vegetated=np.array([name in asked.vegetated for name in names], dtype=bool),
         given=given,
+        given_places=plan_positions(block, given),
         places=plan_positions(block, result.point_positions[rows]),
         differences=differences,
         product=blocks.reshape(3 * n, 3 * n),
@@ -284,6 +288,13 @@ def _control_positions(block: Block) -> dict[str, Floats]:
     found = {block.point_ids[row]: block.point_positions[row] for row in held.tolist()}
     observed = [each for each in block.observations if isinstance(each, Control)]
     return found | {each.point: np.asarray(each.position, dtype=float) for each in observed}
+
+
+def control_places(block: Block) -> Floats:
+    """Return (k, 3) places of control points with both coordinates in plan, as they were given."""
+    found = list(_control_positions(block).values())
+    places = plan_positions(block, np.array(found).reshape(-1, 3))
+    return places[np.isfinite(places[:, :2]).all(axis=1)]
 
 
 def _check_apart(block: Block, rows: Indices) -> None:

@@ -119,6 +119,11 @@ class Texts:
         digits = value * factor
         return f"{self.significant(digits, figures)} {unit}"
 
+    def size(self, value: float) -> str:
+        """Return a class as it was asked for: `5 cm`."""
+        unit, factor = self.small(value)
+        return f"{self._local(f'{value * factor:.6g}')} {unit}"
+
     def small(self, value: float) -> tuple[str, float]:
         """Return the unit in which people read a length of this size, and what leads to it."""
         if self.unit != "m" or not math.isfinite(value):

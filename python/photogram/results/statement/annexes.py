@@ -1,0 +1,326 @@
+"""The annexes of a statement: check points, control left out, budgets, cameras, adjustment, survey, files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.results.cameras import AdjustedCamera, units
+from photogram.results.distortion import distortion_curve
+from photogram.results.statement.budget import Budget, written
+from photogram.results.statement.compared import in_order
+from photogram.results.statement.document import kinds_of
+from photogram.results.statement.sheets import Written, decimals_for
+from photogram.results.statement.sources import held_names
+from photogram.results.statement.statement import Statement
+from photogram.show.judgement import verdict_table
+from photogram.show.page import Cell, Column, Fact, Facts, Part, Remarks, Row, Section, Table
+
+__all__ = [
+    "adjustment_annex",
+    "budgets_annex",
+    "camera_annex",
+    "checks_annex",
+    "files_annex",
+    "left_out_annex",
+    "survey_annex",
+]
+
+_AXES = ("e", "n", "h")
+SOURCES = 25
+"""Sources of a budget at a finer level than kinds that the page lists, those that contribute most."""
+RADII = 11
+"""Of the table of distortion."""
+
+
+def checks_annex(found: Statement) -> Section:
+    """Return annex A: every check point."""
+    texts, cells, own = found.texts, Written(found.texts), found.compared
+    if found.of_all is None:
+        return Section("annex-a", texts("annex.a"), [], annex=True)
+    tests, unit = found.of_all.points, found.result.block.linear_unit
+    decimals = decimals_for(tests.sd_adjusted)
+    columns = [
+        cells.column("point", text=True),
+        cells.column("cover", text=True),
+        *cells.columns(("difference", "sd"), unit, ""),
+        *cells.columns(("normalised",), "", ""),
+        cells.column("T"),
+        cells.column("p"),
+        cells.column("others"),
+        Column("CE90", unit),
+        Column("LE90", unit),
+    ]
+    rows: list[Row] = [
+        [
+            Cell(name, tone="look" if name in found.asked.without else ""),
+            texts(f"cover.{'vegetated' if own.vegetated[k] else 'open'}"),
+            *cells.vector(own.differences[k], decimals),
+            *cells.vector(tests.sd_predicted[k], decimals),
+            *cells.vector(tests.normalised[k], 1),
+            cells.number(float(tests.T[k]), 1),
+            cells.p(float(tests.p[k]), tests.limit),
+            cells.number(float(tests.others[k]), 1),
+            cells.number(float(tests.ce90[k]), decimals),
+            cells.number(float(tests.le90[k]), decimals),
+        ]
+        for k, name in enumerate(own.names)
+    ]
+    return Section("annex-a", texts("annex.a"), [Table(texts("annex.a"), columns, rows)], annex=True)
+
+
+def left_out_annex(found: Statement) -> Section:
+    """Return annex B: control points as the others predict them."""
+    texts, cells = found.texts, Written(found.texts)
+    if not found.left_out:
+        return Section("annex-b", texts("annex.b"), [], annex=True)
+    unit = found.result.block.linear_unit
+    decimals = decimals_for(np.array([each.sd for each in found.left_out]))
+    columns = [
+        cells.column("point", text=True),
+        *cells.columns(("difference", "sd"), unit, ""),
+        cells.column("T"),
+        cells.column("p"),
+    ]
+    rows: list[Row] = [
+        [
+            each.point,
+            *cells.vector(each.difference, decimals),
+            *cells.vector(each.sd, decimals),
+            cells.number(each.T, 1),
+            cells.p(each.p, 0.05 / len(found.left_out)),
+        ]
+        for each in found.left_out
+    ]
+    table = Table(texts("annex.b"), columns, rows)
+    return Section("annex-b", texts("annex.b"), [table], texts("annex.b.note"), annex=True)
+
+
+def budgets_annex(found: Statement) -> Section:
+    """Return annex C: what every source of error contributes."""
+    texts = found.texts
+    held = held_names(found.result) or texts("annex.c.nothing")
+    parts: list[Part] = []
+    for each in found.taken_apart:
+        parts += _budget(found, each)
+    return Section("annex-c", texts("annex.c"), parts, texts("annex.c.note", held=held), annex=True)
+
+
+def _budget(found: Statement, own: Budget) -> list[Part]:
+    texts, cells = found.texts, Written(found.texts)
+    value, u, expanded = written(texts, own)
+    columns = [
+        cells.column("source", text=True),
+        cells.column("number"),
+        cells.column("u", own.unit),
+        cells.column("share", "%"),
+        cells.column("dof"),
+        cells.column("from", text=True),
+    ]
+    estimated = own.freedom.basis == "components"
+    rows: list[Row] = []
+    for each in own.at("kind"):
+        key = f"kind.{each.name}"
+        nu = own.freedom.of_kind.get(each.name, math.inf) if estimated else math.inf
+        rows.append(
+            [
+                texts(key) if texts.has(key) else each.name,
+                each.number,
+                cells.figures(each.u, 2),
+                cells.number(100 * each.share, 1),
+                texts.number(nu, 1),
+                texts("from.estimated" if estimated and math.isfinite(nu) else "from.given"),
+            ]
+        )
+    finer = [each for level in ("strip", "camera", "point", "parameter") for each in own.at(level)]
+    if len(own.at("camera")) < 2:
+        finer = [each for each in finer if each.level != "camera"]
+    for each in sorted(finer, key=lambda one: -one.contribution)[:SOURCES]:
+        name = texts(f"level.{each.level}", name=each.name)
+        share = cells.number(100 * each.share, 1)
+        rows.append([f"– {name}", each.number, cells.figures(each.u, 2), share, None, ""])
+    title = texts(
+        "budget.line",
+        quantity=own.quantity,
+        value=value,
+        u=u,
+        expanded=expanded,
+        k=texts.number(own.k, 2),
+        p=texts.percent(own.coverage),
+    )
+    single = [
+        cells.column("observation", text=True),
+        cells.column("sd"),
+        cells.column("sensitivity"),
+        cells.column("u", own.unit),
+        cells.column("share", "%"),
+    ]
+    observed: list[Row] = [
+        [
+            " ".join(each.observation),
+            cells.figures(each.sd),
+            cells.figures(each.sensitivity),
+            cells.figures(math.sqrt(each.contribution), 2),
+            cells.number(100 * each.share, 1),
+        ]
+        for each in own.largest
+    ]
+    return [Table(title, columns, rows), Table(texts("table.single", quantity=own.quantity), single, observed)]
+
+
+def camera_annex(found: Statement) -> Section:
+    """Return annex D: values, standard deviations and correlations of cameras, distortion with its band."""
+    parts: list[Part] = []
+    for each in found.result.cameras:
+        parts += _camera(found, each)
+    return Section("annex-d", found.texts("annex.d"), parts, annex=True)
+
+
+def _camera(found: Statement, camera: AdjustedCamera) -> list[Part]:
+    texts, cells = found.texts, Written(found.texts)
+    columns = [
+        cells.column("parameter", text=True),
+        Column("", text=True),
+        cells.column("value"),
+        cells.column("sd"),
+        cells.column("from", text=True),
+    ]
+    estimated = set(camera.estimated)
+    rows: list[Row] = []
+    for k, (name, unit) in enumerate(zip(camera.names, units(camera.camera), strict=True)):
+        sd = float(camera.sd[k])
+        decimals = max(0, 1 - math.floor(math.log10(sd))) if 0 < sd < math.inf else 6
+        own = "from.estimated" if k in estimated else "from.given"
+        rows.append(
+            [name, unit, cells.number(float(camera.values[k]), decimals), cells.figures(sd, 2), texts(own)]
+        )
+    parts: list[Part] = [Table(texts("table.camera", camera=camera.name), columns, rows)]
+    names = [camera.names[k] for k in camera.estimated]
+    if len(names) > 1:
+        matrix = camera.correlations[np.ix_(camera.estimated, camera.estimated)]
+        between: list[Row] = [
+            [name, *(cells.number(float(value), 2) for value in row)]
+            for name, row in zip(names, matrix, strict=True)
+        ]
+        heads = [cells.column("parameter", text=True), *(Column(name) for name in names)]
+        parts.append(Table(texts("table.correlations", camera=camera.name), heads, between))
+    return [*parts, *_distortion(found, camera)]
+
+
+def _distortion(found: Statement, camera: AdjustedCamera) -> list[Part]:
+    texts, cells = found.texts, Written(found.texts)
+    curve = distortion_curve(found.result, camera)
+    if curve is None:
+        return []
+    unit = found.result.block.image_unit
+    inside = np.flatnonzero(curve.radii <= curve.observed)
+    rows_at = inside[np.unique(np.linspace(0, len(inside) - 1, RADII).round().astype(int))]
+    decimals = decimals_for(curve.sd[rows_at])
+    columns = [cells.column("radius", unit), cells.column("correction", unit), cells.column("sd", unit)]
+    rows: list[Row] = [
+        [cells.figures(float(curve.radii[k])), *cells.vector(np.array([curve.values[k], curve.sd[k]]), decimals)]
+        for k in rows_at.tolist()
+    ]
+    return [Table(texts("table.distortion", camera=camera.name), columns, rows)]
+
+
+def adjustment_annex(found: Statement) -> Section:
+    """Return annex E: what was adjusted, how well it fits, what was taken out, residuals of markers."""
+    texts, cells, result = found.texts, Written(found.texts), found.result
+    columns = [
+        cells.column("kind", text=True),
+        cells.column("number"),
+        cells.column("redundancy"),
+        cells.column("squares"),
+    ]
+    rows: list[Row] = []
+    for name, (count, redundancy, squares) in kinds_of(result).items():
+        key = f"kind.{name}"
+        label = texts(key) if texts.has(key) else name
+        rows.append([label, count, cells.number(redundancy, 1), cells.number(squares, 1)])
+    parts: list[Part] = [Table(texts("table.kinds"), columns, rows)]
+    if result.verdict.tests:
+        parts.append(verdict_table(result.verdict))
+    if found.removed:
+        parts += [Facts(texts("table.removed"), []), Remarks(list(found.removed), 60)]
+    parts += _markers(found)
+    return Section("annex-e", texts("annex.e"), parts, result.verdict.headline, annex=True)
+
+
+def _markers(found: Statement) -> list[Part]:
+    """Return rms and largest residual of the images of every control and check point."""
+    texts, cells, result = found.texts, Written(found.texts), found.result
+    kinds, unit = result.point_kinds, result.block.image_unit
+    squares = np.where(result.used_images[:, np.newaxis], result.residuals, 0.0) ** 2
+    points, n = result.image_points[result.used_images], len(kinds)
+    total = np.bincount(result.image_points, weights=squares.sum(axis=1), minlength=n)
+    counts = np.bincount(points, minlength=n)
+    largest = np.zeros(n)
+    np.maximum.at(largest, result.image_points, np.sqrt(squares.sum(axis=1)))
+    own = np.flatnonzero((kinds != "pass") & (counts > 0))
+    if not len(own):
+        return []
+    columns = [
+        cells.column("point", text=True),
+        cells.column("use", text=True),
+        cells.column("photos"),
+        Column("rms", unit),
+        cells.column("largest", unit),
+    ]
+    rows: list[Row] = [
+        [
+            result.block.point_ids[row],
+            texts(f"use.{kinds[row]}"),
+            int(counts[row]),
+            cells.number(math.sqrt(float(total[row]) / float(counts[row])), 2),
+            cells.number(float(largest[row]), 2),
+        ]
+        for row in in_order(result.block, own).tolist()
+    ]
+    return [Table(texts("table.markers"), columns, rows)]
+
+
+def survey_annex(found: Statement) -> Section:
+    """Return annex F: control and check points as they were given, in the client's system where one is asked for."""
+    texts, cells, block = found.texts, Written(found.texts), found.result.block
+    names, values, deviations, kinds = found.survey
+    if not len(names):
+        return Section("annex-f", texts("annex.f"), [], annex=True)
+    decimals = max(3, decimals_for(deviations))
+    axes = found.axes
+    unit = block.linear_unit
+    columns = [
+        cells.column("point", text=True),
+        cells.column("use", text=True),
+        *(Column(name, own) for name, own in axes),
+        *cells.columns(("sd",), unit, ""),
+    ]
+    degrees = [8 if own == "deg" else decimals for _, own in axes]
+    rows: list[Row] = [
+        [name, texts(f"use.{kinds[k]}"), *_mixed(cells, values[k], degrees), *cells.vector(deviations[k], decimals)]
+        for k, name in enumerate(names)
+    ]
+    note = texts("assume.crs", crs=found.crs) if found.crs else ""
+    return Section("annex-f", texts("annex.f"), [Table(texts("annex.f"), columns, rows, note)], annex=True)
+
+
+def _mixed(cells: Written, values: Floats, decimals: Sequence[int]) -> list[Cell]:
+    return [cells.number(float(value), own) for value, own in zip(values, decimals, strict=True)]
+
+
+def files_annex(found: Statement) -> Section:
+    """Return annex G: what it was made of, so that it can be made again."""
+    texts, cells = found.texts, Written(found.texts)
+    facts = [Fact(texts("page.program"), f"photogram {_photocore.__version__}")]
+    if found.command:
+        facts.append(Fact(texts("page.command"), found.command))
+    parts: list[Part] = [Facts(texts("page.program"), facts)]
+    if found.inputs:
+        columns = [Column(texts("page.file"), text=True), cells.column("size", "bytes"), Column("SHA-256", text=True)]
+        rows: list[Row] = [[each.path.name, each.size, each.sha256] for each in found.inputs]
+        parts.append(Table(texts("table.files"), columns, rows))
+    return Section("annex-g", texts("annex.g"), parts, annex=True)

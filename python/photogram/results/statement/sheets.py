@@ -1,0 +1,142 @@
+"""Tables of a statement: files of commas, and cells of the page as its language writes numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.io.csv_text import csv_text
+from photogram.results.statement.budget import Budget
+from photogram.results.statement.compared import Compared
+from photogram.results.statement.figures import Figures
+from photogram.results.statement.leave_one_out import LeftOut
+from photogram.results.statement.texts import Texts
+from photogram.show.page import Cell, Column, Row
+
+__all__ = ["Written", "budget_file", "check_file", "decimals_for", "left_out_file"]
+
+_AXES = ("e", "n", "h")
+
+
+def check_file(
+    found: Compared, of_all: Figures | None, coordinates: Floats, without: dict[str, str], unit: str
+) -> bytes:
+    """Return `check_points.csv`: a row for each check point, and for known points that say nothing."""
+    n = len(found)
+    columns: dict[str, Any] = {"point": list(found.names)}
+    columns["cover"] = ["vegetated" if each else "open" for each in found.vegetated]
+    columns |= dict(zip(("east", "north", "up"), coordinates.T, strict=True))
+    tests = None if of_all is None else of_all.points
+    nothing = np.full((n, 3), np.nan)
+    for name, values in (
+        ("d", found.differences),
+        ("sd", nothing if tests is None else tests.sd_predicted),
+        ("sd_adjusted", nothing if tests is None else tests.sd_adjusted),
+        ("sd_survey", found.survey_sd),
+        ("normalised", nothing if tests is None else tests.normalised),
+    ):
+        columns |= {f"{name}_{axis}": column for axis, column in zip(_AXES, values.T, strict=True)}
+    single = ("T", "p", "others", "ce90", "le90")
+    titles = ("T", "p", "T_from_the_others", "ce90_predicted", "le90_predicted")
+    for title, name in zip(titles, single, strict=True):
+        columns[title] = np.full(n, np.nan) if tests is None else getattr(tests, name)
+    columns["used"] = ["no" if name in without else "yes" for name in found.names]
+    columns["reason"] = [without.get(name, "") for name in found.names]
+    for name, reason in found.not_usable:
+        for key, values in columns.items():
+            own = {"point": name, "used": "no", "reason": reason, "cover": ""}.get(key, math.nan)
+            columns[key] = [*list(values), own]
+    return csv_text(columns, [f"lengths in {unit}; d: adjusted minus given, to the east, north and up"])
+
+
+def left_out_file(found: Sequence[LeftOut], unit: str) -> bytes:
+    """Return `leave_one_out.csv`: control points as the others predict them."""
+    columns: dict[str, Any] = {"point": [each.point for each in found]}
+    for name, values in (("d", [each.difference for each in found]), ("sd", [each.sd for each in found])):
+        table = np.array(values).reshape(len(found), 3)
+        columns |= {f"{name}_{axis}": column for axis, column in zip(_AXES, table.T, strict=True)}
+    columns |= {
+        "T": [each.T for each in found],
+        "rank": [each.rank for each in found],
+        "p": [each.p for each in found],
+        "least_eigenvalue": [float(each.eigenvalues.min(initial=math.nan)) for each in found],
+    }
+    return csv_text(columns, [f"lengths in {unit}; d: predicted by all others minus survey; no independent check"])
+
+
+def budget_file(found: Sequence[Budget]) -> bytes:
+    """Return `budget.csv`: a row for each source of each quantity at each level."""
+    rows: list[tuple[Any, ...]] = []
+    for each in found:
+        head = (each.quantity, each.unit, each.value, each.sd)
+        basis = "estimated" if each.freedom.basis == "components" else "given"
+        for own in each.sources:
+            nu = each.freedom.of_kind.get(own.name, math.nan) if own.level == "kind" else math.nan
+            named = basis if own.name in each.freedom.of_kind or basis == "given" else "given"
+            rows.append((*head, own.level, own.name, own.number, own.u, own.share, math.nan, math.nan, nu, named))
+        for one in each.largest:
+            source = " ".join(one.observation)
+            u = math.sqrt(one.contribution)
+            last = (1, u, one.share, one.sensitivity, one.sd, math.nan, basis)
+            rows.append((*head, "observation", source, *last))
+    names = (
+        *("quantity", "unit", "value", "u", "level", "source", "number", "u_k", "share"),
+        *("sensitivity", "sd", "dof", "taken_from"),
+    )
+    return csv_text({name: [row[k] for row in rows] for k, name in enumerate(names)}, [])
+
+
+def decimals_for(deviations: Floats) -> int:
+    """Return with how many decimals a table is written: two significant digits of the smallest deviation."""
+    known = deviations[np.isfinite(deviations) & (deviations > 0)]
+    if not known.size:
+        return 3
+    return int(np.clip(1 - math.floor(math.log10(float(known.min()))), 0, 6))
+
+
+class Written:
+    """Cells and columns in the words and numbers of a language."""
+
+    def __init__(self, texts: Texts) -> None:
+        self._texts = texts
+
+    def column(self, key: str, unit: str = "", *, text: bool = False) -> Column:
+        """Return a column by the key of its head."""
+        return Column(self._texts(f"column.{key}"), unit, text=text)
+
+    def columns(self, keys: Sequence[str], unit: str, component: str) -> list[Column]:
+        """Return columns for east, north and height of several things, `component` before each."""
+        del component
+        return [
+            Column(f"{self._texts(f'column.{key}')} {self._texts(f'component.{axis}')}", unit)
+            for key in keys
+            for axis in _AXES
+        ]
+
+    def number(self, value: float | None, decimals: int) -> Cell:
+        """Return a number with so many decimals; what there is not as a dash."""
+        if value is None:
+            return Cell("")
+        known = math.isfinite(value)
+        return Cell(self._texts.number(value, decimals), sorts=value if known else None)
+
+    def figures(self, value: float | None, figures: int = 3) -> Cell:
+        """Return a number with so many significant figures."""
+        if value is None:
+            return Cell("")
+        return Cell(self._texts.significant(value, figures), sorts=value if math.isfinite(value) else None)
+
+    def p(self, value: float, level: float = 0.05) -> Cell:
+        """Return a probability; one below its level is to be looked at."""
+        if not math.isfinite(value):
+            return Cell("")
+        text = self._texts.significant(value, 2) if value >= 1e-4 else f"< {self._texts.number(1e-4, 4)}"
+        return Cell(text, tone="look" if value < level else "", sorts=value)
+
+    def vector(self, values: Floats, decimals: int) -> Row:
+        """Return numbers, one after the other."""
+        return [self.number(float(each), decimals) for each in values]

@@ -1,0 +1,338 @@
+"""What standards say of the figures of a statement: those that were asked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.messages import nearest
+from photogram.network.observations import Control
+from photogram.results.result import Result
+from photogram.results.statement import asprs
+from photogram.results.statement.asked import Asked, lengths_in
+from photogram.results.statement.compared import Compared, plan_positions, turned_to_east
+from photogram.results.statement.figures import Figures
+from photogram.results.statement.iso_19157 import measures
+from photogram.results.statement.layout import area_in_plan
+from photogram.results.statement.leave_one_out import LeftOut
+from photogram.results.statement.lengths import LengthTest, Limit, at_reference, length_test, measured_lengths
+from photogram.results.statement.nssda import Nssda, nssda
+
+__all__ = ["Asprs", "Lengths", "Standards", "standards"]
+
+_METRES_OF = {"h": "class_h_m", "v": "class_v_m", "3d": "class_3d_m"}
+_NAMES = {"h": "horizontal", "v": "vertical", "3d": "three_d"}
+
+
+@dataclass(frozen=True, eq=False)
+class Asprs:
+    """ASPRS Positional Accuracy Standards, Edition 2.
+
+    Attributes
+    ----------
+    figures
+        By `h`, `v`, `3d`, `vva`; None where there are no points.
+    verdicts
+        Of the classes that were asked for.
+    words
+        `tested`, `produced` or `none`.
+    area, points_asked
+        Square kilometres, and how many check points the standard asks for there.
+    survey, control
+        Whether check survey and control are good enough for the classes, by `h` and `v`.
+    control_rmse
+        Root mean squares of the standard deviations of control, radial in plan, and in height; linear unit.
+    remarks
+        Means and differences to be investigated first.
+    left_out
+        RMSE of control predicted by the others, `h` and `v`; NaN without.
+    """
+
+    figures: Mapping[str, asprs.Accuracy | None]
+    verdicts: Mapping[str, str]
+    words: str
+    area: float
+    points_asked: int
+    survey: Mapping[str, bool]
+    control: Mapping[str, bool]
+    control_rmse: tuple[float, float]
+    remarks: tuple[asprs.Remark, ...]
+    left_out: Mapping[str, float]
+
+    def member(self, asked: Asked, metre: float) -> dict[str, Any]:
+        """Return what the JSON document has; `metre` is the linear unit in metres."""
+        found: dict[str, Any] = {key: None for key in _METRES_OF.values()}
+        found |= {_METRES_OF[name]: size * metre for name, size in asked.classes.items()}
+        for name, each in self.figures.items():
+            found[f"upper_{name}"] = None if each is None else each.upper
+            found[f"rmse_{name}"] = None if each is None else each.rmse
+        found |= {own: self.verdicts.get(name) for name, own in _NAMES.items()}
+        return found | {
+            "words": self.words,
+            "enough_points": self.words == "tested",
+            "survey_good_enough": dict(self.survey),
+            "control_good_enough": dict(self.control),
+            "control_rmse": {"h": self.control_rmse[0], "v": self.control_rmse[1]},
+            "points_asked_for": {f"{self.area:g} km2": self.points_asked},
+            "remarks": [vars(each) for each in self.remarks],
+            "leave_one_out": dict(self.left_out),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Lengths:
+    """Calibrated lengths: which they are, and their test."""
+
+    lines: Sequence[str]
+    ends: Sequence[tuple[str, str]]
+    calibrated: Floats
+    limit: Limit | None
+    test: LengthTest
+    at_reference: bool
+
+    def member(self) -> dict[str, Any]:
+        """Return what the JSON document has."""
+        test = self.test
+        rows = [
+            {
+                "line": line,
+                "from": ends[0],
+                "to": ends[1],
+                "calibrated": self.calibrated[k],
+                "error": test.errors[k],
+                "sd": test.sd[k],
+                "normalised": test.normalised[k],
+                "limit": None if test.limits is None else test.limits[k],
+            }
+            for k, (line, ends) in enumerate(zip(self.lines, self.ends, strict=True))
+        ]
+        together = test.together
+        return {
+            "lengths": rows,
+            "largest": test.largest,
+            "rmse": test.rms,
+            "met": test.met,
+            "lines": test.lines,
+            "arrangement": test.enough and test.long_enough,
+            "at_reference_temperature": self.at_reference,
+            "T": None if together is None else together.weighted_sum_of_squares,
+            "rank": None if together is None else together.degrees_of_freedom,
+            "p_high": None if together is None else together.probability_above,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Standards:
+    """What standards say; None for those that were not asked for, or that have nothing to say."""
+
+    asprs: Asprs | None = None
+    nssda: Nssda | None = None
+    lengths: Lengths | None = None
+    iso_19157: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def nssda_member(self) -> dict[str, Any] | None:
+        """What the JSON document has of the NSSDA."""
+        if self.nssda is None:
+            return None
+        found = self.nssda
+        return {
+            "ratio": found.ratio,
+            "accuracy_r_equal": found.accuracy_r_equal,
+            "accuracy_r_unequal": found.accuracy_r,
+            "ce95": found.ce95,
+            "accuracy_z": found.accuracy_z,
+        }
+
+
+def standards(
+    result: Result,
+    asked: Asked,
+    found: Compared,
+    of_all: Figures | None,
+    of_vegetated: Figures | None,
+    left_out: Sequence[LeftOut],
+) -> Standards:
+    """Return what the standards say that are asked for.
+
+    Raises
+    ------
+    InputError
+        Lengths between points that there are not; classes that cannot be.
+    """
+    return Standards(
+        asprs=_asprs(result, asked, found, of_all, of_vegetated, left_out)
+        if "asprs-2023" in asked.standards
+        else None,
+        nssda=_nssda(of_all),
+        lengths=_lengths(result, asked) if asked.lengths else None,
+        iso_19157=_iso(result, asked, of_all) if "iso-19157" in asked.standards else [],
+    )
+
+
+def _asprs(
+    result: Result,
+    asked: Asked,
+    found: Compared,
+    of_all: Figures | None,
+    of_vegetated: Figures | None,
+    left_out: Sequence[LeftOut],
+) -> Asprs:
+    metre = lengths_in(result.block.linear_unit)
+    area = asked.area
+    if area is None:
+        area = area_in_plan(plan_positions(result.block, result.point_positions[result.used_points]))
+    km2 = area * metre**2 / 1e6
+    figures = _accuracies(of_all, of_vegetated)
+    classes = asked.classes
+    verdicts = {name: asprs.verdict(own, size) for name, size in classes.items() if (own := figures[name])}
+    plan, height = _control_rmse(result)
+    control: dict[str, bool] = {}
+    if "h" in classes:
+        good = asprs.control_good_enough(plan, height, classes["h"], classes.get("v"))
+        control = dict(zip(("h", "v"), good, strict=True))
+    return Asprs(
+        figures=figures,
+        verdicts=verdicts,
+        words=asprs.wording(0 if of_all is None else of_all.n),
+        area=km2,
+        points_asked=asprs.points_asked_for(km2),
+        survey={
+            name: asprs.survey_good_enough(own.survey, size)
+            for name, size in classes.items()
+            if name != "3d" and (own := figures[name])
+        },
+        control=control,
+        control_rmse=(plan, height),
+        remarks=()
+        if of_all is None
+        else asprs.remarks(
+            np.where(found.counted, found.differences, np.nan), classes.get("h"), classes.get("v")
+        ),
+        left_out=_left_out(left_out),
+    )
+
+
+def _accuracies(of_all: Figures | None, of_vegetated: Figures | None) -> dict[str, asprs.Accuracy | None]:
+    found: dict[str, asprs.Accuracy | None] = dict.fromkeys(("h", "v", "3d", "vva"))
+    for key, own, part in (("h", of_all, "plan"), ("v", of_all, "h"), ("vva", of_vegetated, "h")):
+        predicted = None if own is None else own.prediction[part]
+        if own is not None and predicted is not None:
+            pair = (own.rmse_h1, own.rmse_h2) if part == "plan" else (own.rmse_v1, own.rmse_v2)
+            found[key] = asprs.accuracy(*pair, predicted.effective_dof, predicted.points)
+    whole = None if of_all is None else of_all.prediction["all"]
+    if found["h"] is not None and found["v"] is not None and whole is not None:
+        found["3d"] = asprs.three_d(found["h"], found["v"], whole.effective_dof)
+    return found
+
+
+def _control_rmse(result: Result) -> tuple[float, float]:
+    """Return root mean squares of the standard deviations of control: radial in plan, and in height."""
+    block, found = result.block, []
+    turns = turned_to_east(block, block.point_positions)
+    for row in np.flatnonzero(np.isfinite(block.point_sd).any(axis=1) & result.used_points).tolist():
+        known = np.isfinite(block.point_sd[row])
+        own = np.abs(turns[row]) @ np.where(known, block.point_sd[row], 0.0)
+        found.append(np.where(known, own, np.nan))
+    found += [np.sqrt(np.diag(each.precision)) for each in block.observations if isinstance(each, Control)]
+    if not found:
+        return math.nan, math.nan
+    squares = np.array(found) ** 2
+    plan, height = squares[:, :2].sum(axis=1), squares[:, 2]
+    return tuple(  # type: ignore[return-value]
+        math.sqrt(float(own[np.isfinite(own)].mean())) if np.isfinite(own).any() else math.nan
+        for own in (plan, height)
+    )
+
+
+def _left_out(found: Sequence[LeftOut]) -> dict[str, float]:
+    if not found:
+        return {"h": math.nan, "v": math.nan}
+    d = np.array([each.difference for each in found])
+    parts = {"h": (d[:, :2] ** 2).sum(axis=1), "v": d[:, 2] ** 2}
+    return {
+        name: math.sqrt(float(own[np.isfinite(own)].mean())) if np.isfinite(own).any() else math.nan
+        for name, own in parts.items()
+    }
+
+
+def _nssda(of_all: Figures | None) -> Nssda | None:
+    if of_all is None:
+        return None
+    moments = of_all.moments if np.isfinite(of_all.moments).all() else None
+    return nssda(moments, of_all.rmse_v1 if math.isfinite(of_all.rmse_v1) else None, of_all.n)
+
+
+def _lengths(result: Result, asked: Asked) -> Lengths:
+    block = result.block
+    names = list(dict.fromkeys(end for each in asked.lengths for end in (each["from"], each["to"])))
+    places = {name: row for row, name in enumerate(block.point_ids)}
+    for name in names:
+        if name not in places:
+            raise InputError(f"a length ends in {name!r}, which is no point{nearest(name, block.point_ids)}")
+        if not result.used_points[places[name]]:
+            raise InputError(f"a length ends in {name}, which took no part in the adjustment")
+    rows = np.array([places[name] for name in names], dtype=np.int64)
+    positions, joint = result.point_positions[rows], result.covariance(("point", names))
+    if block.geographic:
+        turn = turned_to_east(block, positions)
+        n = len(names)
+        joint = np.einsum("iab,ibjc,jdc->iajd", turn, joint.reshape(n, 3, n, 3), turn).reshape(3 * n, 3 * n)
+        positions = plan_positions(block, positions)
+    pairs = np.array([[names.index(each["from"]), names.index(each["to"])] for each in asked.lengths])
+    measured, covariance = measured_lengths(positions, joint, pairs)
+    temperatures = np.array([each.get("temperature", math.nan) for each in asked.lengths], dtype=float)
+    turned = asked.expansion is not None and bool(np.isfinite(temperatures).all())
+    if turned and asked.expansion is not None:
+        measured = at_reference(measured, temperatures, asked.expansion)
+    limit = None if asked.limit is None else Limit(*asked.limit)
+    every = plan_positions(block, result.point_positions[result.used_points])
+    known = result.unit_variance == "unity" or result.variance_of_unit_weight is None
+    lines = [str(each["line"]) for each in asked.lengths]
+    calibrated = np.array([each["length"] for each in asked.lengths], dtype=float)
+    test = length_test(
+        measured,
+        calibrated,
+        covariance=covariance,
+        sd=np.array([each["sd"] for each in asked.lengths], dtype=float),
+        lines=lines,
+        limit=limit,
+        diagonal=float(np.linalg.norm(np.ptp(every, axis=0))),
+        freedom=math.inf if known else result.degrees_of_freedom,
+    )
+    ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]
+    return Lengths(lines, ends, calibrated, limit, test, turned)
+
+
+def _iso(result: Result, asked: Asked, of_all: Figures | None) -> list[dict[str, Any]]:
+    if of_all is None:
+        return []
+    bias = [None if each is None else each.mean for each in (of_all.parts[part] for part in "enh")]
+    whole = of_all.parts["all"]
+    values: dict[str, Any] = {
+        "bias": bias,
+        "rmse": None if whole is None else whole.rmse,
+        "rmse_plan": of_all.rmse_h1,
+        "ce90": of_all.of_moments["ce90"],
+        "ce95": of_all.of_moments["ce95"],
+        "le90": of_all.of_moments["le90"],
+        "le95": of_all.of_moments["le95"],
+        "ellipse": _ellipse(of_all.moments),
+    }
+    scope = f"{of_all.n} check points"
+    return measures(values, unit=result.block.linear_unit, date=asked.date, scope=scope)
+
+
+def _ellipse(moments: Floats) -> list[float] | None:
+    """Return half-axes, and the azimuth of the larger one (rad, from north to east), of errors in plan."""
+    if not np.isfinite(moments).all():
+        return None
+    values, vectors = np.linalg.eigh(moments)
+    a, b = (math.sqrt(max(float(each), 0.0)) for each in values[::-1])
+    return [a, b, math.atan2(vectors[0, 1], vectors[1, 1]) % math.pi]

@@ -1,0 +1,180 @@
+"""An accuracy statement of an adjusted block: figures, sentences, assumptions, and what they are written to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from photogram.errors import InputError
+from photogram.messages import nearest
+from photogram.results.result import Result
+from photogram.results.statement.asked import Asked
+from photogram.results.statement.budget import Budget, budgets
+from photogram.results.statement.compared import Compared
+from photogram.results.statement.figures import Figures
+from photogram.results.statement.judged import Judged
+from photogram.results.statement.layout import Layout
+from photogram.results.statement.leave_one_out import LeftOut
+from photogram.results.statement.members import budget_member, figures_member, left_out_rows, point_rows
+from photogram.results.statement.quantities import wanted
+from photogram.results.statement.standards import Standards
+from photogram.results.statement.texts import Texts
+from photogram.show.brief import Brief, Rows
+from photogram.show.run import InputFile
+from photogram.show.ways import document_of, page_of
+
+__all__ = ["Statement"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Statement(Brief):
+    """What a surveyor hands to a client: how accurate, by whose standard, found how, assuming what.
+
+    Lengths are in the linear unit of the block, along east, north and up.
+
+    Attributes
+    ----------
+    result, asked, texts
+        The adjusted block, what was asked for, and its words.
+    compared
+        Check points with their joint covariance.
+    of_all, of_rest, of_vegetated
+        Figures of all check points, of those that are left without some, and of heights in vegetation; None where
+        there are none.
+    left_out
+        Control points as the others predict them.
+    taken_apart
+        Budgets of uncertainty.
+    standards
+        What standards say.
+    layout
+        How check points lie; None without any.
+    judged
+        Headline, sentences, assumptions, remarks and exit code: one judgement for all that is written.
+    removed
+        Observations that were taken out before.
+    inputs, command
+        What it was made of, where a command has made it.
+    """
+
+    result: Result
+    asked: Asked
+    texts: Texts
+    compared: Compared
+    of_all: Figures | None
+    of_rest: Figures | None
+    of_vegetated: Figures | None
+    left_out: tuple[LeftOut, ...]
+    taken_apart: tuple[Budget, ...]
+    standards: Standards
+    layout: Layout | None
+    judged: Judged
+    removed: tuple[str, ...] = ()
+    inputs: tuple[InputFile, ...] = ()
+    command: str = ""
+
+    @property
+    def exit(self) -> int:
+        """0: nothing speaks against it; 4: a class is missed, differences are larger than predicted, or the verdict.
+
+        Differences that are smaller than predicted are 4 with `strict`.
+        """
+        return self.judged.exit
+
+    @property
+    def headline(self) -> str:
+        """What the page says first."""
+        return self.judged.headline
+
+    @property
+    def figures(self) -> dict[str, Any] | None:
+        """All figures, by the names that they have in the JSON document; None without check points."""
+        return figures_member(self.of_all, self.standards.nssda_member)
+
+    @property
+    def sentences(self) -> list[dict[str, str]]:
+        """What is stated: a key of the table of words and a text each."""
+        return [{"key": key, "text": text} for key, text in self.judged.sentences]
+
+    @property
+    def assumptions(self) -> list[dict[str, str]]:
+        """What was assumed, likewise."""
+        return [{"key": key, "text": text} for key, text in self.judged.assumptions]
+
+    @property
+    def check_points(self) -> list[dict[str, Any]]:
+        """The check points, as in the JSON document."""
+        return point_rows(self.compared, None if self.of_all is None else self.of_all.points)
+
+    @property
+    def leave_one_out(self) -> list[dict[str, Any]]:
+        """Control points predicted by the others, likewise."""
+        return left_out_rows(self.left_out)
+
+    def budget(self, quantity: str | Mapping[Any, Sequence[float]]) -> dict[str, Any]:
+        """Return the budget of a quantity: one of the page, or any other.
+
+        Parameters
+        ----------
+        quantity
+            `point C08 z`, `distance C01 C30`, `camera drone f`, `photo 101 z`, or a linear function by its gradient,
+            `{("point", "C08"): [0, 0, 1]}`.
+
+        Raises
+        ------
+        InputError
+            A quantity that there is not.
+        AdjustmentError, OutOfMemoryError, KeyboardInterrupt
+            As :meth:`photogram.Result.covariances`.
+        """
+        for each in self.taken_apart:
+            if each.quantity == quantity:
+                return budget_member(each)
+        made = budgets(self.result, [wanted(self.result, quantity)], coverage=self.asked.coverage)
+        return budget_member(made[0])
+
+    def __getitem__(self, name: str) -> dict[str, Any]:
+        """Return a budget of the page by the name of its quantity."""
+        for each in self.taken_apart:
+            if each.quantity == name:
+                return budget_member(each)
+        names = [each.quantity for each in self.taken_apart]
+        raise InputError(f"the statement has no budget {name!r}{nearest(name, names)}")
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return the statement in a few lines."""
+        rows = [("headline", self.headline), *((key, text) for key, text in self.judged.sentences)]
+        return "Accuracy statement", [*rows, ("see", ".figures, .check_points, .budget(..), .to_html(), .to_pdf()")]
+
+    def to_html(self, path: str | PathLike[str] | None = None) -> bytes:
+        """Return the page as one HTML file that needs nothing else, and write it where a path is given.
+
+        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        """
+        from photogram.show.html import page_html
+
+        return _written(page_html(page_of(self)), path)
+
+    def to_pdf(self, path: str | PathLike[str] | None = None) -> bytes:
+        """Return the page as a PDF document, and write it where a path is given; equal statements, equal bytes.
+
+        Needs reportlab and matplotlib (`pip install 'photogram[pdf]'`).
+        """
+        from photogram.show.pdf import page_pdf
+
+        return _written(page_pdf(page_of(self), author=self.asked.firm), path)
+
+    def to_json(self, path: str | PathLike[str] | None = None) -> bytes:
+        """Return everything as a JSON document (UTF-8), and write it where a path is given."""
+        return _written(document_of(self), path)
+
+
+def _written(content: bytes, path: str | PathLike[str] | None) -> bytes:
+    if path is not None:
+        from photogram.io.writing import write_whole
+
+        write_whole({Path(path): content})
+    return content
