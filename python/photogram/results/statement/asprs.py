@@ -1,0 +1,303 @@
+"""ASPRS Positional Accuracy Standards, Edition 2 (2023; Version 2, 2024): figures, classes and what is asked.
+
+Section 2.2 of the specification of the statement, which says what further texts confirm and what is still to
+be checked against the standard. Differences hold the errors of the product and of the check survey; the
+standard adds those of the survey once more: right for errors that both share, else on the safe side.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import numbers
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.statistics.freedom import rmse_interval
+
+__all__ = [
+    "ENOUGH",
+    "Accuracy",
+    "Remark",
+    "accuracy",
+    "control_good_enough",
+    "points_asked_for",
+    "remarks",
+    "survey_good_enough",
+    "three_d",
+    "verdict",
+    "wording",
+]
+
+ENOUGH = 30
+"""Check points with which a product is tested (7.13); with fewer it is produced to meet a class."""
+POINTS_BY_AREA = (
+    (1_000.0, 30),
+    (2_000.0, 40),
+    (3_000.0, 50),
+    (4_000.0, 60),
+    (5_000.0, 70),
+    (6_000.0, 80),
+    (7_000.0, 90),
+    (8_000.0, 100),
+    (9_000.0, 110),
+    (math.inf, 120),
+)
+"""Check points up to an area in km2 (table C.1): least and most are confirmed, the steps between are not."""
+MEAN_SHARE, MOST_TIMES = 0.25, 3.0
+"""Of a class: a mean, and a difference, beyond which are to be investigated (7.2)."""
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """A figure of the standard, with what it is made of, in the linear unit.
+
+    Attributes
+    ----------
+    count
+        Check points.
+    found, survey
+        RMSE of the differences (RMSE_1), and of the check survey as its standard deviations have it (RMSE_2).
+    rmse
+        The figure: the root of the sum of both squares.
+    upper
+        Its upper end: that of the interval of the found RMSE, with the survey's; NaN where there is none.
+    product
+        Estimate for the product alone, the root of the difference of both squares; None where differences are
+        smaller than the survey's standard deviations.
+    """
+
+    count: int
+    found: float
+    survey: float
+    rmse: float
+    upper: float
+    product: float | None
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A mean or a difference that is to be investigated before anything is stated.
+
+    Attributes
+    ----------
+    kind
+        `mean` or `difference`.
+    component
+        `e`, `n` or `h`.
+    value, limit
+        In the linear unit.
+    point
+        Row of the difference; None for a mean.
+    """
+
+    kind: str
+    component: str
+    value: float
+    limit: float
+    point: int | None = None
+
+
+def points_asked_for(area: float | None) -> int:
+    """Return how many check points the standard asks for, for each of NVA and VVA (7.13, table C.1).
+
+    Parameters
+    ----------
+    area
+        Of the project in km2; None where it is not known: the least.
+
+    Raises
+    ------
+    InputError
+        A negative area, or one that is no number.
+    """
+    if area is None:
+        return POINTS_BY_AREA[0][1]
+    if not area >= 0:
+        raise InputError(f"the area of a project is not negative: {area:g} km2")
+    return next(count for most, count in POINTS_BY_AREA if area <= most)
+
+
+def accuracy(found: float, survey: float, freedom: float, count: int) -> Accuracy:
+    """Return a figure of the standard: RMSE_H (7.11), RMSE_V of NVA or VVA, RMSE_3D.
+
+    Parameters
+    ----------
+    found, survey
+        RMSE_1 of the differences and RMSE_2 of the check survey in the linear unit: horizontal ones radial,
+        both axes in one figure.
+    freedom
+        Effective degrees of freedom of RMSE_1, of the joint covariance of its rows; see
+        :func:`photogram.statistics.freedom.effective_freedom`.
+    count
+        Check points.
+
+    Raises
+    ------
+    InputError
+        What is negative, or no number of degrees of freedom.
+    """
+    if not survey >= 0:
+        raise InputError(f"the survey's root mean square error is not negative: {survey:g}")
+    rest = (found - survey) * (found + survey)
+    return Accuracy(
+        count,
+        found,
+        survey,
+        math.hypot(found, survey),
+        math.hypot(rmse_interval(found, freedom)[1], survey),
+        math.sqrt(rest) if rest >= 0 else None,
+    )
+
+
+def three_d(horizontal: Accuracy, vertical: Accuracy, freedom: float) -> Accuracy:
+    """Return RMSE_3D, the root of RMSE_H^2 + RMSE_V^2, of the NVA or of the VVA area.
+
+    Parameters
+    ----------
+    horizontal, vertical
+        Of :func:`accuracy`.
+    freedom
+        Effective degrees of freedom of all rows together.
+
+    Raises
+    ------
+    InputError
+        No number of degrees of freedom.
+    """
+    found = math.hypot(horizontal.found, vertical.found)
+    survey = math.hypot(horizontal.survey, vertical.survey)
+    return accuracy(found, survey, freedom, min(horizontal.count, vertical.count))
+
+
+def verdict(figure: Accuracy, limit: float) -> str:
+    """Return what can be said of a class.
+
+    Parameters
+    ----------
+    figure
+        Of :func:`accuracy`.
+    limit
+        The class, in the linear unit.
+
+    Returns
+    -------
+    `missed` where the figure is larger. Else, by the upper end of its interval, `met with confidence` or
+    `met`; with fewer than 30 points `produced to meet` or `not decided` in their places.
+
+    Raises
+    ------
+    InputError
+        A class that is not positive.
+    """
+    if figure.rmse > _class(limit):
+        return "missed"
+    sure = figure.upper <= limit
+    if figure.count < ENOUGH:
+        return "produced to meet" if sure else "not decided"
+    return "met with confidence" if sure else "met"
+
+
+def wording(count: int) -> str:
+    """Return which of the standard's three sentences holds (7.16): `tested`, `produced`, or `none`.
+
+    Parameters
+    ----------
+    count
+        Check points.
+    """
+    if count >= ENOUGH:
+        return "tested"
+    return "produced" if count else "none"
+
+
+def survey_good_enough(survey: float, limit: float) -> bool:
+    """Return whether a check survey is twice as accurate as the class at least (7.12): RMSE_2 <= N/2.
+
+    Parameters
+    ----------
+    survey, limit
+        RMSE_H2 (radial) or RMSE_V2, and the class, in the linear unit.
+
+    Raises
+    ------
+    InputError
+        A class that is not positive.
+    """
+    return survey <= _class(limit) / 2
+
+
+def control_good_enough(
+    plan: float, height: float, class_h: float, class_v: float | None = None
+) -> tuple[bool, bool]:
+    """Return whether the control of a triangulation is good enough in plan and in height (7.9).
+
+    Parameters
+    ----------
+    plan, height
+        Root mean squares of its standard deviations, radial in plan, in the linear unit.
+    class_h
+        Horizontal class: half of it holds in plan, and the whole in height where heights are no product.
+    class_v
+        Vertical class, where they are: half of it holds in height.
+
+    Raises
+    ------
+    InputError
+        A class that is not positive.
+    """
+    limit = _class(class_h) if class_v is None else _class(class_v) / 2
+    return plan <= _class(class_h) / 2, height <= limit
+
+
+def remarks(
+    differences: ArrayLike, class_h: float | None = None, class_v: float | None = None
+) -> tuple[Remark, ...]:
+    """Return what is to be investigated before a class is stated (7.2); nothing is removed for it.
+
+    A mean beyond a quarter of the class, a difference beyond three times the class; in plan by axis, of which
+    the class is that over the root of 2.
+
+    Parameters
+    ----------
+    differences
+        (n, 3) east, north, height: adjusted minus given, in the linear unit; NaN where nothing is given.
+    class_h, class_v
+        None where no class is asked for.
+
+    Raises
+    ------
+    InputError
+        An array of another shape, a class that is not positive.
+    """
+    found = numbers("differences", differences, missing=True)
+    if found.ndim != 2 or found.shape[1] != 3:
+        raise InputError(f"differences has the shape {found.shape}, not (n, 3)")
+    axis = None if class_h is None else _class(class_h) / math.sqrt(2)
+    limits = {"e": axis, "n": axis, "h": None if class_v is None else _class(class_v)}
+    return tuple(
+        remark
+        for (component, limit), column in zip(limits.items(), found.T, strict=True)
+        if limit is not None
+        for remark in _beyond(component, limit, column)
+    )
+
+
+def _beyond(component: str, limit: float, values: Floats) -> Iterator[Remark]:
+    """Yield what is beyond the class of an axis: the mean, then single differences."""
+    known = np.flatnonzero(np.isfinite(values))
+    mean = float(values[known].mean()) if known.size else 0.0
+    if abs(mean) > MEAN_SHARE * limit:
+        yield Remark("mean", component, mean, MEAN_SHARE * limit)
+    for row in known[np.abs(values[known]) > MOST_TIMES * limit].tolist():
+        yield Remark("difference", component, float(values[row]), MOST_TIMES * limit, row)
+
+
+def _class(limit: float) -> float:
+    if not 0 < limit < math.inf:
+        raise InputError(f"an accuracy class is positive: {limit:g}")
+    return limit

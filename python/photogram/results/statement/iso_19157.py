@@ -1,0 +1,79 @@
+"""Figures of accuracy in the words of ISO 19157 (data quality): elements, measures, numbers of measures.
+
+Section 2.6 of the specification of the statement. Numbers are those of the edition of 2013, annex D; names as
+the same table in GeoAPI has them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from photogram.errors import InputError
+
+__all__ = ["ABSOLUTE", "MEASURES", "RELATIVE", "measures"]
+
+ABSOLUTE = "absolute (external) positional accuracy"
+"""Of check points."""
+RELATIVE = "relative (internal) positional accuracy"
+"""Of lengths, and of differences between points."""
+MEASURES = {
+    "bias": (128, "bias of positions"),
+    "le90": (35, "linear map accuracy at 90 % significance level"),
+    "le95": (36, "linear map accuracy at 95 % significance level"),
+    "rmse": (39, "root mean square error"),
+    "ce90": (44, "circular error at 90 % significance level"),
+    "ce95": (45, "circular error at 95 % significance level"),
+    "rmse_plan": (47, "root mean square error of planimetry"),
+    "ellipse": (50, "uncertainty ellipse"),
+}
+"""Number and name of each."""
+
+
+def measures(
+    values: Mapping[str, object],
+    *,
+    unit: str,
+    date: str,
+    scope: str,
+    element: str = ABSOLUTE,
+    evaluation: str = "direct external",
+) -> list[dict[str, Any]]:
+    """Return figures as measures of data quality, for JSON, in the order in which they are given.
+
+    Parameters
+    ----------
+    values
+        Figures by their keys in `MEASURES`: numbers, or lists of them (components of a bias; semi-axes and
+        azimuth of an ellipse). None is left out.
+    unit, date, scope
+        Of the figures, of their evaluation, and of what they hold for.
+    element
+        `ABSOLUTE` or `RELATIVE`.
+    evaluation
+        How they were found.
+
+    Raises
+    ------
+    InputError
+        A measure that is none of these, or another element.
+    """
+    if element not in (ABSOLUTE, RELATIVE):
+        raise InputError(f"element is {ABSOLUTE!r} or {RELATIVE!r}, not {element!r}")
+    unknown = next((key for key in values if key not in MEASURES), None)
+    if unknown is not None:
+        raise InputError(f"{unknown!r} is no measure of ISO 19157; there are {', '.join(MEASURES)}")
+    return [
+        {
+            "element": element,
+            "measure": MEASURES[key][1],
+            "measure_id": MEASURES[key][0],
+            "value": value,
+            "unit": unit,
+            "evaluation": evaluation,
+            "date": date,
+            "scope": scope,
+        }
+        for key, value in values.items()
+        if value is not None
+    ]

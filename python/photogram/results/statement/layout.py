@@ -1,0 +1,156 @@
+"""How check points lie in a block: in all quadrants of it, apart, near to all of its area and heights.
+
+Asked for are a fifth of the points in each quadrant and a spacing of a tenth of the diagonal (NSSDA,
+FGDC-STD-007.3-1998); the rest is of section 4 of the specification of the statement. Failures are remarks.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import numbers
+from photogram.arguments.types import Bools, Floats
+from photogram.errors import InputError
+from photogram.network.hull import area, hull, outside
+from photogram.network.neighbours import nearest
+
+__all__ = ["Layout", "area_in_plan", "layout"]
+
+SHARE_ASKED, SPACING_ASKED = 0.2, 0.1
+FAR = 1 / 3
+"""Of the diagonal: farther from a check point the block is not checked."""
+CELLS = 200
+"""Of the box on each side, at whose middles the area that is far from check points is counted."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How n check points lie in a block.
+
+    Attributes
+    ----------
+    count
+        n.
+    diagonal
+        Of the block's box in plan, in the linear unit.
+    quadrants
+        Shares of the points: x and y low, x high and y low, x low and y high, both high. Points on a middle
+        line count as low.
+    least_spacing
+        Between two points, over the diagonal; NaN with less than two.
+    far
+        Share of the block's area that is farther from all points than a third of the diagonal; NaN
+        where the block is a line.
+    heights
+        Range of the heights of the points over that of the block; NaN where that is level.
+    beyond_control
+        The number of points outside the hull of the control points in plan.
+    """
+
+    count: int
+    diagonal: float
+    quadrants: tuple[float, float, float, float]
+    least_spacing: float
+    far: float
+    heights: float
+    beyond_control: int
+
+    @property
+    def even(self) -> bool:
+        """Whether each quadrant has the share of points that is asked for."""
+        return min(self.quadrants) >= SHARE_ASKED
+
+    @property
+    def apart(self) -> bool:
+        """Whether no two points are nearer than is asked for."""
+        return not self.least_spacing < SPACING_ASKED
+
+
+def layout(points: ArrayLike, extent: ArrayLike, control: ArrayLike) -> Layout:
+    """Return how check points lie in a block.
+
+    Parameters
+    ----------
+    points
+        (n, 3) east, north, height of the check points, n at least 1; a height that is not known is NaN.
+    extent
+        (m, 3) positions of all that the block has, m at least 1: its box and its hull are the block's.
+    control
+        (k, 3) positions of the control points; perhaps none.
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes, no point, positions in plan that are not finite, or all at one place.
+    """
+    own, block, held = _plan("points", points, 1), _plan("extent", extent, 1), _plan("control", control, 0)
+    low, high = block[:, :2].min(axis=0), block[:, :2].max(axis=0)
+    diagonal = math.hypot(*(high - low))
+    if not diagonal > 0:
+        raise InputError("extent: all positions lie at one place in plan")
+    above = own[:, :2] > (low + high) / 2
+    quadrants = np.bincount(above[:, 0] + 2 * above[:, 1], minlength=4) / len(own)
+    return Layout(
+        len(own),
+        diagonal,
+        (float(quadrants[0]), float(quadrants[1]), float(quadrants[2]), float(quadrants[3])),
+        _least_spacing(own[:, :2]) / diagonal,
+        _far(own[:, :2], block[:, :2], FAR * diagonal),
+        _heights(own[:, 2], block[:, 2]),
+        int(outside(own[:, :2], hull(held[:, :2])).sum()) if len(held) else len(own),
+    )
+
+
+def area_in_plan(positions: ArrayLike) -> float:
+    """Return the area of the hull of (n, 2) or (n, 3) positions in plan, in the square of their unit.
+
+    Raises
+    ------
+    InputError
+        Another shape, no position, or one that is not finite.
+    """
+    return area(hull(_plan("positions", positions, 1)[:, :2]))
+
+
+def _plan(name: str, given: ArrayLike, least: int) -> Floats:
+    """Return (n, 2 or more) positions that are finite in plan."""
+    found = numbers(name, given, missing=True)
+    if found.ndim != 2 or found.shape[1] not in (2, 3):
+        raise InputError(f"{name} has the shape {found.shape}, not (n, 3)")
+    if len(found) < least:
+        raise InputError(f"{name} has no position")
+    bad = ~np.isfinite(found[:, :2]).all(axis=1)
+    if bad.any():
+        raise InputError(f"{name}[{np.argmax(bad)}] is not finite in plan")
+    return found
+
+
+def _least_spacing(plan: Floats) -> float:
+    """Return the least distance between two of some points; NaN with less than two."""
+    if len(plan) < 2:
+        return math.nan
+    reach = 1.001 * float(np.linalg.norm(np.ptp(plan, axis=0)))
+    if not reach > 0:
+        return 0.0
+    neighbours = nearest(plan, plan, reach, np.arange(len(plan)))
+    return float(np.hypot(*(plan - plan[neighbours]).T).min())
+
+
+def _far(plan: Floats, block: Floats, limit: float) -> float:
+    """Return the share of the area of a block that is farther from all points than a limit."""
+    low, extent = block.min(axis=0), np.ptp(block, axis=0)
+    middles = (np.arange(CELLS) + 0.5) / CELLS
+    grid = low + extent * np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
+    inside: Bools = ~outside(grid, hull(block))
+    return float(np.mean(nearest(grid[inside], plan, limit) < 0)) if inside.any() else math.nan
+
+
+def _heights(own: Floats, block: Floats) -> float:
+    """Return the range of some heights over that of a block, as far as they are known."""
+    whole, known = block[np.isfinite(block)], own[np.isfinite(own)]
+    extent = np.ptp(whole) if whole.size else 0.0
+    return float(np.ptp(known) / extent) if known.size and extent > 0 else math.nan

@@ -1,0 +1,245 @@
+"""Measured lengths against calibrated ones: VDI/VDE 2634 part 1, optical measuring systems by single points.
+
+Section 2.5 of the specification of the statement: in at least seven lines with at least five lengths each,
+every error stays within E = A + K L, no more than B, of which the user decides; the longest length is two
+thirds of the diagonal of the volume at least.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import frozen, indices, is_covariance, names, numbers, shaped
+from photogram.arguments.types import Bools, Floats
+from photogram.errors import InputError
+from photogram.statistics.agreement import agreement
+from photogram.statistics.limits import GlobalTest
+
+__all__ = ["LengthTest", "Limit", "at_reference", "length_test", "measured_lengths"]
+
+LINES, LENGTHS, LONGEST = 7, 5, 2 / 3
+"""Asked for: lines, lengths on each, and the longest of all over the diagonal of the volume."""
+REFERENCE = 20.0
+"""Degrees Celsius: the temperature of which calibrated lengths are."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The largest error allowed of a length L: A + K L, no more than B; A, B and L of one unit.
+
+    Attributes
+    ----------
+    constant, slope, most
+        A, K and B; B may be infinite.
+    """
+
+    constant: float
+    slope: float
+    most: float = math.inf
+
+    def of(self, lengths: Floats) -> Floats:
+        """Return (m,) largest errors allowed of lengths, in their unit."""
+        return np.minimum(self.constant + self.slope * lengths, self.most)
+
+
+@dataclass(frozen=True, eq=False)
+class LengthTest:
+    """m measured lengths against calibrated ones.
+
+    Attributes
+    ----------
+    errors
+        (m,) measured minus calibrated.
+    sd
+        (m,) their standard deviations, with those of the calibration.
+    normalised
+        (m,) errors over these; NaN where a standard deviation is zero.
+    limits
+        (m,) of the errors; None where none was given.
+    together
+        The test of all errors with their joint covariance; None where that has none.
+    lines, least
+        Lines, and lengths on the line that has the fewest.
+    longest
+        The longest calibrated length over the diagonal of the volume; NaN where that is not known.
+    """
+
+    errors: Floats
+    sd: Floats
+    normalised: Floats
+    limits: Floats | None
+    together: GlobalTest | None
+    lines: int
+    least: int
+    longest: float
+
+    @property
+    def largest(self) -> float:
+        """Size of the largest error."""
+        return float(np.abs(self.errors).max())
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the errors."""
+        return math.sqrt(float(np.mean(self.errors**2)))
+
+    @property
+    def within(self) -> Bools | None:
+        """(m,) whether errors are within their limits; None where none were given."""
+        return None if self.limits is None else np.asarray(np.abs(self.errors) <= self.limits)
+
+    @property
+    def met(self) -> bool | None:
+        """Whether every error is within its limit; None where none were given."""
+        return None if self.within is None else bool(self.within.all())
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are as many lines and lengths on each as are asked for."""
+        return self.lines >= LINES and self.least >= LENGTHS
+
+    @property
+    def long_enough(self) -> bool:
+        """Whether the longest length is two thirds of the diagonal at least, as far as that is known."""
+        return not self.longest < LONGEST * (1 - 1e-9)
+
+
+def measured_lengths(positions: ArrayLike, covariance: ArrayLike, pairs: ArrayLike) -> tuple[Floats, Floats]:
+    """Return distances between points, and their joint covariance J C J'.
+
+    Parameters
+    ----------
+    positions
+        (p, 3) of the points in the linear unit.
+    covariance
+        (3 p, 3 p) joint covariance of the positions, point by point, cross blocks included.
+    pairs
+        (m, 2) rows of the points of each length.
+
+    Returns
+    -------
+    (m,) in the linear unit, and (m, m).
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes, a pair of points at one place.
+    """
+    own = numbers("positions", positions)
+    if own.ndim != 2 or own.shape[1] != 3:
+        raise InputError(f"positions has the shape {own.shape}, not (p, 3)")
+    joint = shaped("covariance", covariance, (own.size, own.size))
+    ends = numbers("pairs", pairs)
+    if ends.ndim != 2 or ends.shape[1] != 2:
+        raise InputError(f"pairs has the shape {ends.shape}, not (m, 2)")
+    count = len(ends)
+    first, second = (
+        indices(f"pairs[:, {end}]", np.asarray(pairs)[:, end], count, len(own)) for end in (0, 1)
+    )
+    steps = own[second] - own[first]
+    found = np.linalg.norm(steps, axis=1)
+    if not (found > 0).all():
+        raise InputError(f"pairs[{np.argmin(found > 0)}]: its two points lie at one place")
+    along = steps / found[:, np.newaxis]
+    gradient = np.zeros((count, len(own), 3))
+    rows = np.arange(count)
+    gradient[rows, second] += along
+    gradient[rows, first] -= along
+    flat = gradient.reshape(count, own.size)
+    return found, np.asarray(flat @ joint @ flat.T)
+
+
+def at_reference(lengths: ArrayLike, temperatures: ArrayLike, expansion: float) -> Floats:
+    """Return what lengths of a body that was measured at some temperature are at 20 degrees Celsius.
+
+    Parameters
+    ----------
+    lengths
+        (m,) measured.
+    temperatures
+        (m,) of the body, in degrees Celsius.
+    expansion
+        Its coefficient of thermal expansion, per kelvin: 11.5e-6 of steel.
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes; an expansion that is not finite, or makes a length of zero.
+    """
+    own = numbers("lengths", lengths)
+    grown = 1 + expansion * (shaped("temperatures", temperatures, own.shape) - REFERENCE)
+    if not (np.isfinite(grown) & (grown > 0)).all():
+        raise InputError(f"expansion and temperatures make no length: {expansion:g} per kelvin")
+    return own / grown
+
+
+def length_test(
+    measured: ArrayLike,
+    calibrated: ArrayLike,
+    *,
+    covariance: ArrayLike,
+    sd: ArrayLike,
+    lines: Sequence[object],
+    limit: Limit | None = None,
+    diagonal: float = math.nan,
+    freedom: float = math.inf,
+) -> LengthTest:
+    """Test measured lengths against calibrated ones.
+
+    Parameters
+    ----------
+    measured, calibrated
+        (m,) lengths of one unit, both at 20 degrees; m at least 1. See :func:`at_reference`.
+    covariance
+        (m, m) joint covariance of the measured ones; see :func:`measured_lengths`.
+    sd
+        (m,) standard deviations of the calibrated ones.
+    lines
+        (m,) names of the lines on which they lie.
+    limit
+        Of the errors.
+    diagonal
+        Of the volume that was measured, in the same unit; NaN where it is not known.
+    freedom
+        Degrees of freedom with which the unit weight of the covariance was estimated.
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes, no length, one that is not finite, a negative standard deviation.
+    """
+    own = numbers("measured", measured)
+    if own.ndim != 1 or not own.size:
+        raise InputError(f"measured has the shape {own.shape}, not (m,) with one length at least")
+    given = shaped("calibrated", calibrated, own.shape)
+    joint, deviations = shaped("covariance", covariance, 2 * own.shape), shaped("sd", sd, own.shape)
+    for name, values in (("measured", own), ("calibrated", given), ("sd", deviations)):
+        bad = ~(np.isfinite(values) & (values >= 0))
+        if bad.any():
+            raise InputError(f"{name}[{np.argmax(bad)}] is not a length: {values[bad][0]:g}")
+    if not is_covariance(joint, singular=True):
+        raise InputError("covariance is not symmetric and positive semidefinite")
+    on = names("lines", lines)
+    if len(on) != own.size:
+        raise InputError(f"lines has {len(on)} names, not {own.size}")
+    errors = own - given
+    found = agreement(
+        errors[:, np.newaxis], joint, deviations[:, np.newaxis, np.newaxis] ** 2, second=freedom
+    )
+    spread = found.sd[:, 0]
+    normalised = np.divide(errors, spread, out=np.full(own.shape, math.nan), where=spread > 0)
+    return LengthTest(
+        frozen(errors),
+        frozen(spread),
+        frozen(normalised),
+        None if limit is None else frozen(limit.of(given)),
+        found.together,
+        len(set(on)),
+        min(on.count(each) for each in set(on)),
+        float(given.max()) / diagonal,
+    )

@@ -1,0 +1,98 @@
+"""National Standard for Spatial Data Accuracy (FGDC-STD-007.3-1998): accuracy at 95 %.
+
+Section 2.3 of the specification of the statement. Its factors hold for axes of nearly equal RMSE; beyond, and
+beside, the radius stands that holds 95 % of errors with the matrix of mean products that was found.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import numbers
+from photogram.errors import InputError
+from photogram.statistics.error_radii import circular_error
+
+__all__ = ["ENOUGH", "Nssda", "nssda"]
+
+ENOUGH = 20
+"""Check points that are asked for."""
+VERTICAL, RADIAL, EITHER = 1.9600, 1.7308, 2.4477
+"""Factors of RMSE_z, of the radial RMSE, and of the mean of the RMSE of both axes."""
+LEAST_RATIO = 0.6
+"""Of the smaller RMSE of an axis to the larger: below it no factor holds."""
+
+
+@dataclass(frozen=True)
+class Nssda:
+    """Accuracy of n check points at 95 %, in the linear unit; None where there is no figure.
+
+    Attributes
+    ----------
+    count
+        n.
+    ratio
+        Of the smaller RMSE of an axis to the larger.
+    accuracy_r
+        Horizontal, by the mean RMSE of the axes; none where the ratio is below 0.6.
+    accuracy_r_equal
+        Horizontal, by the radial RMSE, as if both axes had the same.
+    ce95
+        The radius that holds 95 % of errors of the mean products that were found, whatever the ratio.
+    accuracy_z
+        Vertical.
+    """
+
+    count: int
+    ratio: float | None
+    accuracy_r: float | None
+    accuracy_r_equal: float | None
+    ce95: float | None
+    accuracy_z: float | None
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are as many check points as are asked for."""
+        return self.count >= ENOUGH
+
+    @property
+    def wording(self) -> str:
+        """Which sentence holds: `tested` with check points, `compiled` (to meet) without."""
+        return "tested" if self.count else "compiled"
+
+
+def nssda(moments: ArrayLike | None, rmse_z: float | None, count: int) -> Nssda:
+    """Return the accuracy at 95 %.
+
+    Parameters
+    ----------
+    moments
+        (2, 2) mean products of the differences in plan, sum d d' / n: squares of RMSE_x and RMSE_y on its
+        diagonal. None where there are none in plan.
+    rmse_z
+        Of the heights, in the linear unit; None where there are none.
+    count
+        Check points.
+
+    Raises
+    ------
+    InputError
+        A matrix of another shape, or one of no mean products; a negative RMSE.
+    """
+    if rmse_z is not None and not rmse_z >= 0:
+        raise InputError(f"a root mean square error is not negative: {rmse_z:g}")
+    vertical = None if rmse_z is None else VERTICAL * rmse_z
+    if moments is None:
+        return Nssda(count, None, None, None, None, vertical)
+    matrix = numbers("moments", moments)
+    if matrix.shape != (2, 2):
+        raise InputError(f"moments has the shape {matrix.shape}, not (2, 2)")
+    ce95 = float(circular_error(matrix[np.newaxis], 0.95)[0])
+    small, large = sorted(math.sqrt(each) for each in np.diag(matrix).tolist())
+    ratio = small / large if large > 0 else 1.0
+    mean = EITHER * (small + large) / 2
+    equal = RADIAL * math.hypot(small, large)
+    return Nssda(count, ratio, mean if ratio >= LEAST_RATIO else None, equal, ce95, vertical)
