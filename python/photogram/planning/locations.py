@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
+from photogram.network.hull import hull
 
 __all__ = ["LOCATIONS", "locations"]
 
@@ -37,31 +38,13 @@ def _axes(points: Floats) -> Floats:
 
     One of its sides lies along a side of the convex hull (Freeman and Shapira, 1975).
     """
-    hull = _hull(points)
-    sides = np.roll(hull, -1, axis=0) - hull
+    corners = hull(points)
+    sides = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(*sides.T)
     if not (lengths > 0).any():
         return np.eye(2)
     c, s = (sides[lengths > 0] / lengths[lengths > 0, np.newaxis]).T
     frames = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
-    extents = np.ptp(np.einsum("kij,nj->kin", frames, hull), axis=2)
+    extents = np.ptp(np.einsum("kij,nj->kin", frames, corners), axis=2)
     axes: Floats = frames[np.argmin(extents.prod(axis=1))]
     return axes
-
-
-def _hull(points: Floats) -> Floats:
-    """Corners of the convex hull, counterclockwise (Andrew's monotone chain)."""
-    order = points[np.lexsort((points[:, 1], points[:, 0]))].tolist()
-
-    def chain(ordered: list[list[float]]) -> list[list[float]]:
-        kept: list[list[float]] = []
-        for x, y in ordered:
-            while len(kept) > 1:
-                (x0, y0), (x1, y1) = kept[-2:]
-                if (x1 - x0) * (y - y0) > (y1 - y0) * (x - x0):
-                    break
-                kept.pop()
-            kept.append([x, y])
-        return kept
-
-    return np.array(chain(order)[:-1] + chain(order[::-1])[:-1] or order[:1])

@@ -8,12 +8,14 @@ standard adds those of the survey once more: right for errors that both share, e
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import numbers
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.statistics.freedom import rmse_interval
 
@@ -276,19 +278,23 @@ def remarks(
     if found.ndim != 2 or found.shape[1] != 3:
         raise InputError(f"differences has the shape {found.shape}, not (n, 3)")
     axis = None if class_h is None else _class(class_h) / math.sqrt(2)
-    said = []
-    for component, limit, column in zip(
-        "enh", (axis, axis, None if class_v is None else _class(class_v)), found.T, strict=True
-    ):
-        known = np.flatnonzero(np.isfinite(column))
-        if limit is None or not known.size:
-            continue
-        mean = float(column[known].mean())
-        if abs(mean) > MEAN_SHARE * limit:
-            said.append(Remark("mean", component, mean, MEAN_SHARE * limit))
-        for row in known[np.abs(column[known]) > MOST_TIMES * limit].tolist():
-            said.append(Remark("difference", component, float(column[row]), MOST_TIMES * limit, row))
-    return tuple(said)
+    limits = {"e": axis, "n": axis, "h": None if class_v is None else _class(class_v)}
+    return tuple(
+        remark
+        for (component, limit), column in zip(limits.items(), found.T, strict=True)
+        if limit is not None
+        for remark in _beyond(component, limit, column)
+    )
+
+
+def _beyond(component: str, limit: float, values: Floats) -> Iterator[Remark]:
+    """Yield what is beyond the class of an axis: the mean, then single differences."""
+    known = np.flatnonzero(np.isfinite(values))
+    mean = float(values[known].mean()) if known.size else 0.0
+    if abs(mean) > MEAN_SHARE * limit:
+        yield Remark("mean", component, mean, MEAN_SHARE * limit)
+    for row in known[np.abs(values[known]) > MOST_TIMES * limit].tolist():
+        yield Remark("difference", component, float(values[row]), MOST_TIMES * limit, row)
 
 
 def _class(limit: float) -> float:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import frozen, indices, names, numbers, shaped
+from photogram.arguments.arrays import frozen, indices, is_covariance, names, numbers, shaped
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.statistics.agreement import agreement
@@ -134,11 +134,12 @@ def measured_lengths(positions: ArrayLike, covariance: ArrayLike, pairs: ArrayLi
     if own.ndim != 2 or own.shape[1] != 3:
         raise InputError(f"positions has the shape {own.shape}, not (p, 3)")
     joint = shaped("covariance", covariance, (own.size, own.size))
-    ends = np.asarray(pairs)
-    count = len(ends) if ends.ndim else 0
+    ends = numbers("pairs", pairs)
+    if ends.ndim != 2 or ends.shape[1] != 2:
+        raise InputError(f"pairs has the shape {ends.shape}, not (m, 2)")
+    count = len(ends)
     first, second = (
-        indices("pairs", ends[:, end] if ends.shape == (count, 2) else ends, count, len(own))
-        for end in (0, 1)
+        indices(f"pairs[:, {end}]", np.asarray(pairs)[:, end], count, len(own)) for end in (0, 1)
     )
     steps = own[second] - own[first]
     found = np.linalg.norm(steps, axis=1)
@@ -221,6 +222,8 @@ def length_test(
         bad = ~(np.isfinite(values) & (values >= 0))
         if bad.any():
             raise InputError(f"{name}[{np.argmax(bad)}] is not a length: {values[bad][0]:g}")
+    if not is_covariance(joint, singular=True):
+        raise InputError("covariance is not symmetric and positive semidefinite")
     on = names("lines", lines)
     if len(on) != own.size:
         raise InputError(f"lines has {len(on)} names, not {own.size}")

@@ -1,0 +1,315 @@
+"""Figures by standard: ASPRS, NSSDA, VDI/VDE 2634, ISO 19157: golden figures, examples, verdicts."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from golden_statement import cofactors, control, differences, golden
+from hypothesis import given
+from hypothesis import strategies as st
+
+from photogram.errors import InputError
+from photogram.results.statement import asprs, iso_19157
+from photogram.results.statement.asprs import accuracy, three_d, verdict
+from photogram.results.statement.lengths import Limit, at_reference, length_test, measured_lengths
+from photogram.results.statement.nssda import nssda
+from photogram.statistics.freedom import effective_freedom
+
+
+def root_mean_square(rows):
+    """Return the root of the mean square length of rows."""
+    return math.sqrt(np.mean(np.sum(np.square(rows), axis=1)))
+
+
+@pytest.fixture(scope="module")
+def figures():
+    """Return horizontal, vertical and 3D figures of the golden block."""
+    d, sd = differences(), control()["check"][2]
+    joint = cofactors() + np.diag(sd.ravel() ** 2)
+    found = []
+    for components in ([0, 1], [2]):
+        rows = (3 * np.arange(30)[:, np.newaxis] + components).ravel()
+        freedom = effective_freedom(joint[np.ix_(rows, rows)])
+        own = root_mean_square(d[:, components]), root_mean_square(sd[:, components])
+        found.append(accuracy(*own, freedom, 30))
+    return (*found, three_d(*found, effective_freedom(joint)))
+
+
+def test_figures_of_the_asprs_are_those_of_the_golden_statement(figures):
+    horizontal, vertical, space = figures
+    expected, verdicts = golden("statement.json")["statement_unity"], golden("statement.json")["asprs"]
+    for figure, axis in ((horizontal, "h"), (vertical, "v")):
+        assert figure.found == pytest.approx(expected[f"rmse_{axis}1"], rel=1e-6)
+        assert figure.survey == pytest.approx(expected[f"rmse_{axis}2"], rel=1e-6)
+        assert figure.rmse == pytest.approx(expected[f"rmse_{axis}"], rel=1e-6)
+        assert figure.product == pytest.approx(expected["without_survey"][axis], rel=1e-6)
+        assert figure.upper == pytest.approx(verdicts[f"upper_{axis}"], rel=1e-6)
+        limit = verdicts[f"class_{axis}_m"]
+        good = verdicts["survey_good_enough"][axis]
+        assert asprs.survey_good_enough(figure.survey, limit) is good
+    assert verdict(horizontal, 0.05) == verdicts["horizontal"]
+    assert verdict(vertical, 0.05) == verdicts["vertical"]
+    assert space.rmse == pytest.approx(expected["rmse_3d"], rel=1e-6)
+    low, high = expected["prediction"]["all"]["rmse_interval_95"]
+    assert low < space.found < high
+    assert space.upper == pytest.approx(math.hypot(high, space.survey), rel=1e-6)
+
+
+def test_points_asked_for_by_area_are_those_of_the_golden_statement():
+    for area, count in golden("statement.json")["asprs"]["points_asked_for"].items():
+        assert asprs.points_asked_for(float(area.removesuffix(" km2"))) == count
+    assert asprs.points_asked_for(None) == asprs.points_asked_for(0.0) == 30
+
+
+def test_the_survey_is_added_as_in_table_7_4_of_the_standard():
+    assert accuracy(1.00, 2.0, 30, 30).rmse == pytest.approx(2.24, abs=0.005)
+    assert accuracy(10.00, 2.0, 30, 30).rmse == pytest.approx(10.20, abs=0.005)
+
+
+def test_a_product_below_the_accuracy_of_the_survey_has_no_figure_of_its_own():
+    assert accuracy(0.01, 0.02, 30, 30).product is None
+    assert accuracy(0.05, 0.03, 30, 30).product == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize(
+    ("limit", "with_thirty", "with_fewer"),
+    [
+        (0.050, "missed", "missed"),
+        (0.051, "met", "not decided"),
+        (0.065, "met", "not decided"),
+        (0.070, "met with confidence", "produced to meet"),
+    ],
+)
+def test_a_verdict_says_how_sure_a_class_is_met(limit, with_thirty, with_fewer):
+    # RMSE 5.0 cm with the survey's 1 cm; the upper end with 30 degrees of freedom is 6.6 cm.
+    found = math.sqrt(0.0501**2 - 0.01**2)
+    assert accuracy(found, 0.01, 30, 30).upper == pytest.approx(0.0664, abs=5e-5)
+    assert verdict(accuracy(found, 0.01, 30, 30), limit) == with_thirty
+    assert verdict(accuracy(found, 0.01, 30, 29), limit) == with_fewer
+
+
+def test_the_words_follow_the_number_of_check_points():
+    assert [asprs.wording(count) for count in (0, 1, 29, 30, 120)] == [
+        "none",
+        "produced",
+        "produced",
+        "tested",
+        "tested",
+    ]
+
+
+def test_control_is_to_be_twice_as_accurate_as_the_class():
+    # In height the horizontal class holds, unless heights are a product.
+    assert asprs.control_good_enough(0.025, 0.05, 0.05) == (True, True)
+    assert asprs.control_good_enough(0.026, 0.051, 0.05) == (False, False)
+    assert asprs.control_good_enough(0.01, 0.05, 0.05, 0.10) == (True, True)
+    assert asprs.control_good_enough(0.01, 0.051, 0.05, 0.10) == (True, False)
+
+
+def test_means_and_differences_beyond_the_class_are_remarks():
+    axis = 0.10 / math.sqrt(2)
+    d = np.zeros((4, 3))
+    d[:, 0] = 0.26 * axis
+    d[2, 1] = -3.01 * axis
+    d[:, 2] = [0.299, -0.299, math.nan, 0.0]
+    found = asprs.remarks(d, 0.10, 0.10)
+    assert [(each.kind, each.component, each.point) for each in found] == [
+        ("mean", "e", None),
+        ("mean", "n", None),
+        ("difference", "n", 2),
+    ]
+    assert found[0].value == pytest.approx(0.26 * axis)
+    assert found[0].limit == pytest.approx(0.25 * axis)
+    assert found[2].limit == pytest.approx(3 * axis)
+    assert asprs.remarks(d, 0.10) == found
+    assert asprs.remarks(d) == ()
+    (height,) = asprs.remarks([[math.nan, math.nan, 0.031], [0.0, 0.0, 0.03]], class_v=0.10)
+    assert (height.kind, height.component) == ("mean", "h")
+
+
+def test_nssda_has_the_golden_figures():
+    for row in golden("circles.json")["nssda"]:
+        x, y = row["rmse_x"], row["rmse_y"]
+        found = nssda(np.diag([x**2, y**2]), None, 20)
+        if row["accuracy_r"] is None:
+            assert found.accuracy_r is None
+        else:
+            assert found.accuracy_r == pytest.approx(row["accuracy_r"], rel=1e-9)
+        if "accuracy_r_from_radial" in row:
+            assert found.accuracy_r_equal == pytest.approx(row["accuracy_r_from_radial"], rel=1e-9)
+        else:
+            assert found.ratio == pytest.approx(row["ratio"], rel=1e-9)
+            assert found.ce95 == pytest.approx(row["exact_ce95_from_matrix"], rel=1e-8)
+        assert found.accuracy_z is None
+
+
+@pytest.mark.parametrize("which", ["statement_unity", "statement_free"])
+def test_nssda_of_the_golden_block_is_that_of_the_golden_statement(which):
+    d, expected = differences(), golden("statement.json")[which]["nssda"]
+    found = nssda(d[:, :2].T @ d[:, :2] / 30, root_mean_square(d[:, 2:]), 30)
+    assert found.ratio == pytest.approx(expected["ratio"], rel=1e-6)
+    assert found.accuracy_r_equal == pytest.approx(expected["accuracy_r_equal"], rel=1e-6)
+    assert found.accuracy_r == pytest.approx(expected["accuracy_r_unequal"], rel=1e-6)
+    assert found.accuracy_z == pytest.approx(expected["accuracy_z"], rel=1e-6)
+
+
+def test_nssda_asks_for_twenty_points_and_compiles_without():
+    assert nssda(None, 0.1, 19).enough is False
+    assert nssda(None, 0.1, 20).enough is True
+    assert nssda(None, 0.1, 20).wording == "tested"
+    assert nssda(None, None, 0).wording == "compiled"
+    assert nssda(np.zeros((2, 2)), 0.0, 3).accuracy_r == 0.0
+
+
+@pytest.fixture(scope="module")
+def bar():
+    """Return the golden lengths, measured and calibrated, in millimetres."""
+    return golden("circles.json")["lengths"]
+
+
+def of_bar(bar, **changed):
+    """Return the test of the golden lengths."""
+    rows = bar["lengths"]
+    limit = bar["limit"]
+    given_ = {
+        "covariance": np.diag([row["sd_measured_mm"] ** 2 for row in rows]),
+        "sd": [row["sd_calibrated_mm"] for row in rows],
+        "lines": [row["line"] for row in rows],
+        "limit": Limit(limit["A_mm"], limit["K"], limit["B_mm"]),
+    }
+    measured, calibrated = ([row[f"{name}_mm"] for row in rows] for name in ("measured", "calibrated"))
+    return length_test(measured, calibrated, **(given_ | changed))
+
+
+def test_golden_lengths_have_their_errors_and_limits(bar):
+    found, rows = of_bar(bar), bar["lengths"]
+    assert found.errors == pytest.approx([row["error_mm"] for row in rows], abs=1e-9)
+    assert found.limits == pytest.approx([row["limit_mm"] for row in rows], rel=1e-9)
+    assert found.normalised == pytest.approx([row["normalised"] for row in rows], rel=1e-6, abs=1e-9)
+    assert found.within.tolist() == [row["within"] for row in rows]
+    assert found.within.sum() == bar["within"]
+    assert found.met is bar["passed"] is False
+    assert found.largest == pytest.approx(bar["largest"], rel=1e-6)
+    assert found.rms == pytest.approx(bar["rms"], rel=1e-6)
+    assert (found.lines, found.least, found.enough) == (bar["lines"], bar["per_line"], True)
+    assert found.together.degrees_of_freedom == 35
+    omega = np.sum(np.square([row["normalised"] for row in rows]))
+    assert found.together.weighted_sum_of_squares == pytest.approx(omega, rel=1e-6)
+    assert found.together.rejected_high
+
+
+def test_too_few_lines_and_short_ones_are_said(bar):
+    assert of_bar(bar, lines=["one"] * 35).enough is False
+    assert of_bar(bar, lines=[*range(5)] * 7).enough is False
+    assert of_bar(bar, diagonal=4000.0).long_enough is True
+    assert of_bar(bar, diagonal=5000.0).long_enough is False
+    assert of_bar(bar).long_enough is True  # not known
+    assert of_bar(bar, limit=None).met is None
+    assert of_bar(bar, limit=None).within is None
+
+
+def test_errors_of_lengths_from_one_point_are_correlated():
+    rng = np.random.default_rng(5)
+    positions = rng.normal(size=(4, 3))
+    root = 1e-4 * rng.normal(size=(12, 12))
+    joint = root @ root.T
+    pairs = [[0, 1], [0, 2], [2, 3]]
+    lengths, covariance = measured_lengths(positions, joint, pairs)
+    drawn = positions.ravel() + rng.normal(size=(100_000, 12)) @ root.T
+    places = drawn.reshape(-1, 4, 3)
+    found = np.stack([np.linalg.norm(places[:, a] - places[:, b], axis=1) for a, b in pairs], axis=1)
+    assert lengths == pytest.approx(found.mean(axis=0), rel=1e-5)
+    scale = np.sqrt(np.diag(covariance))
+    assert np.cov(found.T) / np.outer(scale, scale) == pytest.approx(
+        covariance / np.outer(scale, scale), abs=0.02
+    )
+    known = lengths + rng.normal(size=3) @ np.linalg.cholesky(covariance).T
+    test = length_test(lengths, known, covariance=covariance, sd=np.zeros(3), lines=["a", "a", "b"])
+    e = lengths - known
+    assert test.together.weighted_sum_of_squares == pytest.approx(
+        e @ np.linalg.solve(covariance, e), rel=1e-6
+    )
+
+
+def test_lengths_without_any_error_have_no_normalised_ones():
+    found = length_test([1.0, 2.0], [1.0, 2.1], covariance=np.zeros((2, 2)), sd=[0.0, 0.1], lines=["a", "a"])
+    assert found.normalised == pytest.approx([math.nan, -1.0], nan_ok=True)
+    assert found.together.degrees_of_freedom == 1
+
+
+def test_a_warm_bar_is_longer_than_at_the_reference():
+    found = at_reference([1000.0115, 1000.0], [21.0, 20.0], 11.5e-6)
+    assert found == pytest.approx([1000.0, 1000.0], rel=1e-12)
+
+
+@given(st.floats(-40, 60), st.floats(0, 3e-5))
+def test_a_bar_without_expansion_or_at_the_reference_keeps_its_length(temperature, expansion):
+    assert at_reference([2.0], [temperature], 0.0)[0] == 2.0
+    assert at_reference([2.0], [20.0], expansion)[0] == 2.0
+
+
+def test_figures_have_the_numbers_of_the_measures_of_iso_19157():
+    values = {"bias": [0.01, -0.02, 0.03], "rmse": 0.04, "rmse_plan": 0.05, "ce90": None, "le95": 0.08}
+    found = iso_19157.measures(values, unit="m", date="2026-01-31", scope="30 check points")
+    assert [(each["measure_id"], each["value"]) for each in found] == [
+        (128, [0.01, -0.02, 0.03]),
+        (39, 0.04),
+        (47, 0.05),
+        (36, 0.08),
+    ]
+    assert set(found[0]) == {
+        "element", "measure", "measure_id", "value", "unit", "evaluation", "date", "scope",
+    }  # fmt: skip
+    assert found[0]["element"] == iso_19157.ABSOLUTE
+    assert {each["evaluation"] for each in found} == {"direct external"}
+    assert json.loads(json.dumps(found)) == found
+    numbers = {key: number for key, (number, _) in iso_19157.MEASURES.items()}
+    assert (numbers["le90"], numbers["ce90"], numbers["ce95"], numbers["ellipse"]) == (35, 44, 45, 50)
+
+
+BAR = {"covariance": np.eye(2), "sd": [0.1, 0.1], "lines": ["a", "b"]}
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: asprs.points_asked_for(-1.0), "the area of a project is not negative: -1 km2"),
+        (lambda: accuracy(0.1, -0.1, 30, 30), "the survey's root mean square error is not negative: -0.1"),
+        (lambda: verdict(accuracy(0.1, 0.1, 30, 30), 0.0), "an accuracy class is positive: 0"),
+        (lambda: asprs.remarks([[0.0, 0.0]]), r"differences has the shape \(1, 2\), not \(n, 3\)"),
+        (lambda: nssda(None, -1.0, 3), "a root mean square error is not negative: -1"),
+        (lambda: nssda([1.0], None, 3), r"moments has the shape \(1,\), not \(2, 2\)"),
+        (lambda: nssda(-np.eye(2), None, 3), "not symmetric and positive semidefinite"),
+        (lambda: length_test([], [], **BAR), r"measured has the shape \(0,\), not \(m,\) with one length"),
+        (lambda: length_test([1.0, 2.0], [1.0, -2.0], **BAR), r"calibrated\[1\] is not a length: -2"),
+        (
+            lambda: length_test([1.0, 2.0], [1.0, 2.0], **(BAR | {"covariance": -np.eye(2)})),
+            "covariance is not symmetric and positive semidefinite",
+        ),
+        (lambda: length_test([1.0, 2.0], [1.0, 2.0], **(BAR | {"lines": ["a"]})), "lines has 1 names, not 2"),
+        (lambda: measured_lengths(np.zeros((2, 3)), np.eye(6), [[0, 1]]), r"pairs\[0\]: its two points lie"),
+        (
+            lambda: measured_lengths(np.zeros((2, 3)), np.eye(6), [[0, 2]]),
+            r"pairs\[:, 1\]\[0\] is 2, outside 0",
+        ),
+        (
+            lambda: measured_lengths(np.zeros((2, 3)), np.eye(6), [0, 1]),
+            r"pairs has the shape \(2,\), not \(m, 2\)",
+        ),
+        (lambda: measured_lengths([1.0], np.eye(6), [[0, 1]]), r"positions has the shape \(1,\)"),
+        (lambda: at_reference([1.0], [20.0, 20.0], 1e-5), r"temperatures has the shape \(2,\), not \(1,\)"),
+        (lambda: at_reference([1.0], [-1e6], 1e-5), "expansion and temperatures make no length"),
+        (
+            lambda: iso_19157.measures({"ce50": 1.0}, unit="m", date="", scope=""),
+            "'ce50' is no measure of ISO 19157; there are bias, le90",
+        ),
+        (
+            lambda: iso_19157.measures({}, unit="m", date="", scope="", element="shape"),
+            "not 'shape'",
+        ),
+    ],
+)
+def test_what_is_no_figure_is_refused(call, said):
+    with pytest.raises(InputError, match=said):
+        call()
