@@ -32,8 +32,8 @@ from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.selection import Adjusted, Things, photo_components, point_components
 from photogram.results.suspects import network_trial
-from photogram.show.ways import statement_of
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
+from photogram.show.ways import statement_of
 from photogram.statistics.limits import GlobalTest, global_test
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """A page as a PDF document on A4; what makes it is the extra `photogram[pdf]`, and matplotlib for pictures.
 
-The first sections stand on the first page as far as they go; sections that are annexes begin on pages of their own.
-Equal pages give equal bytes.
+The first sections stand on the first page as far as they go; sections that are annexes begin on pages of
+their own. Equal pages give equal bytes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,20 @@ from typing import Any
 from xml.sax.saxutils import escape
 
 from photogram.errors import InputError
-from photogram.show.page import Cell, Column, Drawing, Facts, Judgement, Layers, Page, Part, Remarks, Section, Table, Text
+from photogram.show.page import (
+    Cell,
+    Column,
+    Drawing,
+    Facts,
+    Judgement,
+    Layers,
+    Page,
+    Part,
+    Remarks,
+    Section,
+    Table,
+    Text,
+)
 
 __all__ = ["page_pdf"]
 
@@ -103,7 +116,9 @@ def _numbered() -> Any:
                 self.__dict__.update(sheet)
                 self.setFont(FONT, 7)
                 self.setFillColor(SOFT)
-                self.drawRightString(self._pagesize[0] - MARGIN, MARGIN / 2, f"{self._pageNumber} / {len(self._sheets)}")
+                self.drawRightString(
+                    self._pagesize[0] - MARGIN, MARGIN / 2, f"{self._pageNumber} / {len(self._sheets)}"
+                )
                 super().showPage()
             super().save()
 
@@ -154,7 +169,8 @@ class _Flow:
             yield from self._section(section)
 
     def _judgement(self, judgement: Judgement) -> Iterator[Any]:
-        from reportlab.platypus import Paragraph, Table as Grid
+        from reportlab.platypus import Paragraph
+        from reportlab.platypus import Table as Grid
 
         lines = [
             Paragraph(escape(f"{judgement.mark} {judgement.on}".strip()), self._mark[judgement.tone]),
@@ -217,7 +233,8 @@ class _Flow:
             yield Paragraph(escape(drawing.caption), self._small)
 
     def _facts(self, facts: Facts) -> Any:
-        from reportlab.platypus import Paragraph, Table as Grid
+        from reportlab.platypus import Paragraph
+        from reportlab.platypus import Table as Grid
 
         rows = [
             [
@@ -246,7 +263,9 @@ class _Flow:
         ]
         rows = [[self._written(column, cell) for column, cell in row] for row in table.cells()]
         grid = LongTable([heads, *rows], colWidths=self._widths(table), repeatRows=1)
-        grid.setStyle([("LINEBELOW", (0, 0), (-1, 0), 0.8, INK), ("LINEBELOW", (0, 1), (-1, -1), 0.3, RULE), *_CLOSE])
+        grid.setStyle(
+            [("LINEBELOW", (0, 0), (-1, 0), 0.8, INK), ("LINEBELOW", (0, 1), (-1, -1), 0.3, RULE), *_CLOSE]
+        )
         yield grid
 
     def _written(self, column: Column, cell: Cell) -> Any:

@@ -66,9 +66,7 @@ class _Renderer(RendererBase):
         """Return points as dots of the canvas."""
         return points
 
-    def draw_path(
-        self, gc: GraphicsContextBase, path: Path, transform: Any, rgbFace: Any = None  # noqa: N803
-    ) -> None:
+    def draw_path(self, gc: GraphicsContextBase, path: Path, transform: Any, rgbFace: Any = None) -> None:
         """Draw a path, filled where it has a face."""
         canvas = self._canvas
         canvas.saveState()
@@ -81,9 +79,9 @@ class _Renderer(RendererBase):
             canvas.setStrokeAlpha(self._alpha(gc, gc.get_rgb()))
             canvas.setLineCap(CAPS[gc.get_capstyle()])
             canvas.setLineJoin(JOINS[gc.get_joinstyle()])
-            offset, dashes = gc.get_dashes()
-            if dashes is not None and len(dashes):
-                canvas.setDash([float(each) for each in dashes], float(offset))
+            offset, dashes = self._dashes(gc)
+            if dashes:
+                canvas.setDash(dashes, offset)
         if rgbFace is not None:
             canvas.setFillColorRGB(*rgbFace[:3])
             canvas.setFillAlpha(self._alpha(gc, rgbFace))
@@ -99,18 +97,25 @@ class _Renderer(RendererBase):
         Image.fromarray(im[::-1]).save(content, format="png")
         canvas.saveState()
         self._clip(gc)
-        matrix = (1, 0, 0, 1, x, y) if transform is None else (transform + Affine2D().translate(x, y)).to_values()
+        matrix = (
+            (1, 0, 0, 1, x, y) if transform is None else (transform + Affine2D().translate(x, y)).to_values()
+        )
         canvas.transform(*matrix)
         size = (width, height) if transform is None else (1, 1)
         canvas.drawImage(ImageReader(content), 0, 0, *size, mask="auto")
         canvas.restoreState()
 
     @staticmethod
+    def _dashes(gc: Any) -> tuple[float, list[float]]:
+        offset, dashes = gc.get_dashes()
+        return float(offset), [] if dashes is None else [float(each) for each in dashes]
+
+    @staticmethod
     def _alpha(gc: GraphicsContextBase, colour: Any) -> float:
         forced = gc.get_forced_alpha()
         return float(gc.get_alpha() if forced or len(colour) < 4 else colour[3])
 
-    def _clip(self, gc: GraphicsContextBase) -> None:
+    def _clip(self, gc: Any) -> None:
         box = gc.get_clip_rectangle()
         if box is not None:
             edge = self._canvas.beginPath()

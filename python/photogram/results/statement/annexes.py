@@ -169,7 +169,10 @@ def _budget(found: Statement, own: Budget) -> list[Part]:
         ]
         for each in own.largest
     ]
-    return [Table(title, columns, rows), Table(texts("table.single", quantity=own.quantity), single, observed)]
+    return [
+        Table(title, columns, rows),
+        Table(texts("table.single", quantity=own.quantity), single, observed),
+    ]
 
 
 def camera_annex(found: Statement) -> Section:
@@ -222,7 +225,10 @@ def _distortion(found: Statement, camera: AdjustedCamera) -> list[Part]:
     decimals = decimals_for(curve.sd[rows_at])
     columns = [cells.column("radius", unit), cells.column("correction", unit), cells.column("sd", unit)]
     rows: list[Row] = [
-        [cells.figures(float(curve.radii[k])), *cells.vector(np.array([curve.values[k], curve.sd[k]]), decimals)]
+        [
+            cells.figures(float(curve.radii[k])),
+            *cells.vector(np.array([curve.values[k], curve.sd[k]]), decimals),
+        ]
         for k in rows_at.tolist()
     ]
     return [Table(texts("table.distortion", camera=camera.name), columns, rows)]
@@ -285,26 +291,29 @@ def _markers(found: Statement) -> list[Part]:
 
 
 def survey_annex(found: Statement) -> Section:
-    """Return annex F: control and check points as they were given, in the client's system where one is asked for."""
-    texts, cells, block = found.texts, Written(found.texts), found.result.block
-    names, values, deviations, kinds = found.survey
-    if not len(names):
+    """Return annex F: control and check points as they were given."""
+    texts, cells, own = found.texts, Written(found.texts), found.survey
+    if own.system is None or not own.names:
         return Section("annex-f", texts("annex.f"), [], annex=True)
-    decimals = max(3, decimals_for(deviations))
-    axes = found.axes
-    unit = block.linear_unit
+    decimals = max(3, decimals_for(own.sd))
+    unit = found.result.block.linear_unit
     columns = [
         cells.column("point", text=True),
         cells.column("use", text=True),
-        *(Column(name, own) for name, own in axes),
+        *(Column(name, axis) for name, axis in own.system.axes),
         *cells.columns(("sd",), unit, ""),
     ]
-    degrees = [8 if own == "deg" else decimals for _, own in axes]
+    places = [8 if axis == "deg" else decimals for _, axis in own.system.axes]
     rows: list[Row] = [
-        [name, texts(f"use.{kinds[k]}"), *_mixed(cells, values[k], degrees), *cells.vector(deviations[k], decimals)]
-        for k, name in enumerate(names)
+        [
+            name,
+            texts(f"use.{own.kinds[k]}"),
+            *_mixed(cells, own.positions[k], places),
+            *cells.vector(own.sd[k], decimals),
+        ]
+        for k, name in enumerate(own.names)
     ]
-    note = texts("assume.crs", crs=found.crs) if found.crs else ""
+    note = texts("assume.crs", crs=own.system.crs) if own.system.crs else ""
     return Section("annex-f", texts("annex.f"), [Table(texts("annex.f"), columns, rows, note)], annex=True)
 
 
@@ -320,7 +329,11 @@ def files_annex(found: Statement) -> Section:
         facts.append(Fact(texts("page.command"), found.command))
     parts: list[Part] = [Facts(texts("page.program"), facts)]
     if found.inputs:
-        columns = [Column(texts("page.file"), text=True), cells.column("size", "bytes"), Column("SHA-256", text=True)]
+        columns = [
+            Column(texts("page.file"), text=True),
+            cells.column("size", "bytes"),
+            Column("SHA-256", text=True),
+        ]
         rows: list[Row] = [[each.path.name, each.size, each.sha256] for each in found.inputs]
         parts.append(Table(texts("table.files"), columns, rows))
     return Section("annex-g", texts("annex.g"), parts, annex=True)

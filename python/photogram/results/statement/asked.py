@@ -56,11 +56,11 @@ class Asked:
     components
         The :class:`photogram.VarianceComponents` whose result it is, where weights were estimated.
     lengths
-        Calibrated lengths: mappings of `line`, `from`, `to` (names of points), `length`, `sd`, `temperature` (deg
-        C, may be left out).
+        Calibrated lengths: mappings of `line`, `from`, `to` (names of points), `length`, `sd`, `temperature`
+        (deg C, may be left out).
     limit, expansion
-        (A, K, B) of the limit A + K L <= B of their errors, and what takes measured lengths to 20 deg C: of the
-        object, per kelvin.
+        (A, K, B) of the limit A + K L <= B of their errors, and what takes measured lengths to 20 deg C: of
+        the object, per kelvin.
     title, project, client, firm, surveyor, date
         What the head of the page says.
     """

@@ -51,9 +51,7 @@ def _said(texts: Texts, key: str, **fields: str | int | float) -> tuple[str, str
     return key, texts(key, **fields)
 
 
-def _weights(
-    result: Result, components: VarianceComponents | None, texts: Texts
-) -> list[tuple[str, str]]:
+def _weights(result: Result, components: VarianceComponents | None, texts: Texts) -> list[tuple[str, str]]:
     said = []
     test = result.global_test
     if components is not None:
@@ -65,7 +63,7 @@ def _weights(
         ]
         said.append(_said(texts, "weights.components", components=", ".join(parts)))
     elif test is not None:
-        key = "weights.rejected" if test.rejected_high or test.rejected_low else "weights.given"
+        key = f"weights.{'high' if test.rejected_high else 'low' if test.rejected_low else 'given'}"
         low, high = (texts.number(each, 3) for each in test.limits)
         said.append(_said(texts, key, s2=texts.number(test.variance, 3), low=low, high=high))
     if result.unit_variance == "unity" or result.variance_of_unit_weight is None:
@@ -78,7 +76,7 @@ def _adjustment(result: Result, texts: Texts, removed: Sequence[str]) -> list[tu
     total, out = int(result.used_images.sum()), len(removed) + len(result.set_aside)
     block = result.block
     held = held_names(result)
-    refraction = "–" if block.refraction is None else str(block.refraction)
+    refraction = texts("assume.no_refraction") if block.refraction is None else str(block.refraction)
     frame = f"{block.frame}, {block.linear_unit}"
     return [
         _said(texts, "assume.removed", n=out, all=total + out, percent=texts.percent(out / (total + out)))

@@ -235,7 +235,7 @@ def _budget(
 
 
 def written(texts: Texts, found: Budget) -> tuple[str, str, str]:
-    """Return value, standard deviation and U with their unit: two significant digits of the standard deviation."""
+    """Return value, standard deviation (two significant digits) and U with their unit."""
     factor, unit = (1.0, found.unit) if found.unit != "rad" else (math.degrees(1.0), "°")
     sd = found.sd * factor
     decimals = max(0, 1 - math.floor(math.log10(sd))) if 0 < sd < math.inf else 6

@@ -6,8 +6,7 @@ from typing import Any
 
 from photogram import _photocore
 from photogram.io import json
-from photogram.results.group_sums import sums_of
-from photogram.results.group_sums import observables
+from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.result import Result
 from photogram.results.statement.asked import lengths_in
@@ -17,6 +16,8 @@ from photogram.results.statement.statement import Statement
 from photogram.show.ways import document_of
 
 __all__ = ["kinds_of", "to_json"]
+
+_HEAD = ("client", "firm", "project", "surveyor", "date")
 
 
 @document_of.register(Statement)
@@ -28,7 +29,10 @@ def to_json(found: Statement) -> bytes:
         {
             "program": f"photogram {_photocore.__version__}",
             "title": asked.title or result.block.title,
-            **{name: getattr(asked, name) or None for name in ("client", "firm", "project", "surveyor", "date")},
+            **{
+                name: getattr(asked, name) or None
+                for name in ("client", "firm", "project", "surveyor", "date")
+            },
             "language": found.texts.language,
             "units": {"length": unit, "angle": "rad", "image": result.block.image_unit},
             "headline": found.headline,
@@ -84,7 +88,7 @@ def _layout(found: Statement) -> dict[str, Any] | None:
 
 
 def kinds_of(result: Result) -> dict[str, tuple[int, float, float]]:
-    """Return number, redundancy and weighted sum of squares of every kind of observation, cameras among them."""
+    """Return number, redundancy and weighted sum of squares of every kind, cameras among them."""
     grouping = grouped(observables(result), "kind")
     counts, squares, redundancy = sums_of(result, grouping)
     found = {

@@ -31,12 +31,12 @@ CELLS = 120
 
 
 def differences(found: Compared, control: Floats, labels: dict[str, str]) -> Figure | None:
-    """Draw control (k, 3), check points, their differences in plan with ellipses, and those in height as colours."""
+    """Draw (k, 3) control, check points, their differences in plan, and those in height as colours."""
     if not len(found) and not len(control):
         return None
     places = [each[:, :2] for each in (found.places, control) if len(each)]
     every = np.concatenate(places)
-    low, extent = every.min(axis=0), np.ptp(every, axis=0)
+    extent = np.ptp(every, axis=0)
     figure = new_figure(WIDTH, float(np.clip(WIDTH * (extent[1] + 1e-9) / (extent[0] + 1e-9), 2.6, WIDTH)))
     axes = figure.add_subplot()
     axes.set_aspect("equal", adjustable="datalim")
@@ -49,7 +49,6 @@ def differences(found: Compared, control: Floats, labels: dict[str, str]) -> Fig
     axes.ticklabel_format(useOffset=False, style="plain")
     axes.margins(0.12)
     axes.legend(loc="upper left", fontsize="small")
-    del low
     return figure
 
 
@@ -58,8 +57,18 @@ def _points(figure: Figure, axes: Axes, found: Compared, extent: float, labels: 
     heights = np.where(np.isfinite(d[:, 2]), d[:, 2], 0.0)
     most = max(float(np.abs(heights).max()), 1e-12)
     drawn = axes.scatter(
-        *plan.T, c=heights, cmap="RdBu_r", vmin=-most, vmax=most, marker="s", s=26, edgecolors=INK, linewidths=0.5,
-        label=labels["check"], zorder=3,
+        plan[:, 0],
+        plan[:, 1],
+        c=heights,
+        cmap="RdBu_r",
+        vmin=-most,
+        vmax=most,
+        marker="s",
+        s=26,
+        edgecolors=INK,
+        linewidths=0.5,
+        label=labels["check"],
+        zorder=3,
     )
     figure.colorbar(drawn, ax=axes, shrink=0.8, label=f"{labels['height']}, {labels['unit']}")
     both = np.isfinite(d[:, :2]).all(axis=1)
@@ -71,14 +80,19 @@ def _points(figure: Figure, axes: Axes, found: Compared, extent: float, labels: 
         own = found.blocks(found.covariance)[both, :2, :2]
         ellipses(axes, plan[both], own, NINETY_FIVE / scale, color=BLUE, linewidth=0.6, zorder=2)
         length = round_length(largest)
-        axes.plot([], [], color=VERMILION, label=f"{length:g} {labels['unit']} = {length / scale:.3g} {labels['unit']}")
+        axes.plot(
+            [],
+            [],
+            color=VERMILION,
+            label=f"{length:g} {labels['unit']} = {length / scale:.3g} {labels['unit']}",
+        )
     if len(found) <= NAMED:
         for name, place in zip(found.names, plan, strict=True):
             axes.annotate(name, place, (4, 4), textcoords="offset points", fontsize="x-small", color=SOFT)
 
 
 def overlap(result: Result, labels: dict[str, str]) -> Figure | None:
-    """Draw how many photos see each place of the ground, as the adjusted photos stand; None without footprints."""
+    """Draw how many adjusted photos see each place of the ground; None without footprints."""
     outlines = footprints(result).outlines[:, :, :2]
     outlines = outlines[np.isfinite(outlines).all(axis=(1, 2))]
     if not len(outlines):

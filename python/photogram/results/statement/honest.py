@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.results.statement.compared import PARTS, Compared
 from photogram.statistics.distributions import critical_normal
 from photogram.statistics.error_radii import circular_error
@@ -156,6 +156,16 @@ class PointTests:
     dimension: Floats
     ce90: Floats
     le90: Floats
+
+    @property
+    def least(self) -> Floats:
+        """(n,) the smaller of both probabilities."""
+        return np.fmin(self.p, self.p_others)
+
+    @property
+    def wrong(self) -> Bools:
+        """(n,) whether a point is wrong, or the block is where it lies."""
+        return np.asarray(self.least < self.limit)
 
     @property
     def limit(self) -> float:

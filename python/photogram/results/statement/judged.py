@@ -11,14 +11,17 @@ import numpy as np
 from photogram.messages import listed
 from photogram.results.result import Result
 from photogram.results.statement.asked import Asked
+from photogram.results.statement.asprs import wording
 from photogram.results.statement.assumed import assumptions
 from photogram.results.statement.budget import Budget, written
 from photogram.results.statement.compared import Compared
-from photogram.results.statement.figures import Figures
+from photogram.results.statement.figures import Figures, Sized
+from photogram.results.statement.honest import LEVEL, Bias, Prediction, Surface
 from photogram.results.statement.layout import Layout
 from photogram.results.statement.standards import Asprs, Lengths, Standards
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
+from photogram.statistics.distributions import critical_normal
 
 __all__ = ["Judged", "Said", "judged"]
 
@@ -27,7 +30,7 @@ NOT_USABLE = 4
 Said = list[tuple[str, str]]
 """Keys of the table of words, and texts."""
 HEIGHT_KINDS = 10.0
-"""Standard deviations of a mean difference of heights beyond which heights of two kinds may have been compared."""
+"""Standard deviations of a mean difference beyond which heights of two kinds may have been compared."""
 NAMED = 10
 
 
@@ -77,17 +80,18 @@ def judged(
     bad = spoilt or missed or high or (low and strict)
     remarks = _remarks(asked, texts, found, of_all, of_vegetated, standards, layout)
     key = _headline(spoilt, missed, high, low, of_all, standards)
-    headline = texts(key, verdict=verdict.headline) if spoilt else texts(key, n=0 if of_all is None else of_all.n)
+    headline = (
+        texts(key, verdict=verdict.headline) if spoilt else texts(key, n=0 if of_all is None else of_all.n)
+    )
     return Judged(
         exit=NOT_USABLE if bad else 0,
-        tone="bad" if bad else "look" if low or remarks or of_all is None else "good",
+        tone="bad" if bad else "look" if low or remarks or _doubtful(of_all) else "good",
         headline=headline,
         sentences=[
-            *_asprs(asked, texts, of_all, standards.asprs),
+            *_asprs(asked, texts, standards.asprs),
             *(_nssda(texts, standards) if "nssda" in asked.standards else []),
             *_lengths(texts, standards.lengths),
-            *_honest(texts, of_all),
-            *_points(asked, texts, found, of_all),
+            *_honest(asked, texts, found, of_all),
             *(("budget.line", _budget(texts, each)) for each in taken_apart),
         ],
         assumptions=assumptions(result, asked, texts, found, layout, removed),
@@ -95,10 +99,29 @@ def judged(
     )
 
 
+def _whole(of_all: Figures) -> Prediction | None:
+    """Return the test of as many components together as there are points with all of them."""
+    return of_all.prediction["all"] or of_all.prediction["h"] or of_all.prediction["plan"]
+
+
 def _rejected(of_all: Figures | None) -> tuple[bool, bool]:
     """Return whether the whole test finds differences larger, or smaller, than predicted."""
-    whole = None if of_all is None else of_all.prediction["all"] or of_all.prediction["h"] or of_all.prediction["plan"]
+    whole = None if of_all is None else _whole(of_all)
     return (False, False) if whole is None else (whole.rejected_high, whole.rejected_low)
+
+
+def _doubtful(of_all: Figures | None) -> bool:
+    """Return whether there are no check points, or some component, mean, surface or point does not agree."""
+    if of_all is None:
+        return True
+    parts = [each for each in of_all.prediction.values() if each is not None]
+    shifts = [each for each in of_all.bias.values() if each is not None]
+    return (
+        any(each.rejected_high or each.rejected_low for each in parts)
+        or any(each.rejected for each in shifts)
+        or (of_all.surface is not None and of_all.surface.rejected)
+        or bool(of_all.points.wrong.any())
+    )
 
 
 def _missed(standards: Standards) -> bool:
@@ -125,7 +148,7 @@ def _headline(
     return "headline.found"
 
 
-def _asprs(asked: Asked, texts: Texts, of_all: Figures | None, found: Asprs | None) -> Said:
+def _asprs(asked: Asked, texts: Texts, found: Asprs | None) -> Said:
     if found is None:
         return []
     said: Said = []
@@ -134,87 +157,116 @@ def _asprs(asked: Asked, texts: Texts, of_all: Figures | None, found: Asprs | No
         own = {f"rmse_{name}": texts.length(figure.rmse)} if figure is not None else {}
         if size is None:
             if figure is not None and name != "3d":
-                said.append((f"asprs.found.{name}", texts(f"asprs.found.{name}", n=figure.count, **own)))
+                said.append(_said(texts, f"asprs.found.{name}", n=figure.count, **own))
         elif figure is not None:
             case = "missed" if found.verdicts[name] == "missed" else found.words
-            key = f"asprs.{case}.{name}"
-            said.append((key, texts(key, n=figure.count, **{"class": texts.size(size)}, **own)))
+            said.append(
+                _said(texts, f"asprs.{case}.{name}", n=figure.count, **{"class": texts.size(size)}, **own)
+            )
         elif name != "3d":
-            key = f"asprs.none.{name}"
             left = {f"loo_{name}": texts.length(found.left_out[name])}
-            said.append((key, texts(key, **{"class": texts.size(size)}, **left)))
+            said.append(_said(texts, f"asprs.none.{name}", **{"class": texts.size(size)}, **left))
     vegetated = found.figures["vva"]
     if vegetated is not None:
-        text = texts("asprs.found.vva", n=vegetated.count, rmse_v=texts.length(vegetated.rmse))
-        said.append(("asprs.found.vva", text))
-    del of_all
+        key = f"asprs.{wording(vegetated.count)}.vva"
+        said.append(_said(texts, key, n=vegetated.count, rmse_v=texts.length(vegetated.rmse)))
     return said
+
+
+def _said(texts: Texts, key: str, **fields: str | int | float) -> tuple[str, str]:
+    return key, texts(key, **fields)
 
 
 def _nssda(texts: Texts, standards: Standards) -> Said:
     found = standards.nssda
     if found is None:
         return []
-    case = "tested" if found.enough else "compiled"
     said: Said = []
     if found.accuracy_r is not None:
-        key = f"nssda.{case}.h"
-        said.append((key, texts(key, accuracy=texts.length(found.accuracy_r), n=found.count)))
+        accuracy = texts.length(found.accuracy_r)
+        said.append(_said(texts, f"nssda.{found.wording}.h", accuracy_r=accuracy, n=found.count))
     elif found.ce95 is not None and found.ratio is not None:
-        text = texts("nssda.unequal", ratio=texts.number(found.ratio, 2), ce95=texts.length(found.ce95))
-        said.append(("nssda.unequal", text))
+        ratio = texts.number(found.ratio, 2)
+        said.append(_said(texts, "nssda.ce95", ratio=ratio, ce95=texts.length(found.ce95)))
     if found.accuracy_z is not None:
-        key = f"nssda.{case}.v"
-        said.append((key, texts(key, accuracy=texts.length(found.accuracy_z), n=found.count)))
-    return said
+        accuracy = texts.length(found.accuracy_z)
+        said.append(_said(texts, f"nssda.{found.wording}.v", accuracy_z=accuracy, n=found.count))
+    return said if found.enough else [*said, _said(texts, "nssda.few", n=found.count)]
 
 
 def _lengths(texts: Texts, found: Lengths | None) -> Said:
     if found is None:
         return []
     test = found.test
-    n, largest = len(test.errors), texts.length(test.largest)
-    if found.limit is None or test.within is None:
-        text = texts("lengths.found", n=n, largest=largest, rmse=texts.length(test.rms))
-        return [("lengths.found", text)]
-    limit = {
-        "a": texts.length(found.limit.constant),
-        "k": texts.significant(found.limit.slope, 2),
-        "b": texts.length(found.limit.most),
+    own: dict[str, str | int] = {
+        "n": len(test.errors),
+        "lines": test.lines,
+        "largest": texts.length(test.largest),
+        "rms": texts.length(test.rms),
     }
-    if test.met:
-        return [("lengths.met", texts("lengths.met", n=n, largest=largest, **limit))]
-    count = int((~test.within).sum())
-    return [("lengths.missed", texts("lengths.missed", n=n, count=count, largest=largest, **limit))]
+    if found.limit is None or test.within is None:
+        said = [_said(texts, "lengths.found", **own)]
+    else:
+        limit = f"{texts.length(found.limit.constant)} + {texts.significant(found.limit.slope, 2)} L"
+        if math.isfinite(found.limit.most):
+            limit += f" ≤ {texts.length(found.limit.most)}"
+        beyond = int((~test.within).sum())
+        key, more = ("lengths.missed", {"beyond": beyond}) if beyond else ("lengths.met", {})
+        said = [_said(texts, key, limit=limit, **own, **more)]
+    if test.together is not None:
+        whole = test.together
+        key = f"lengths.{'high' if whole.rejected_high else 'low' if whole.rejected_low else 'agree'}"
+        said.append(_said(texts, key, **_factor(texts, whole.factor, whole.interval)))
+    return said
 
 
-def _honest(texts: Texts, of_all: Figures | None) -> Said:
+def _honest(asked: Asked, texts: Texts, found: Compared, of_all: Figures | None) -> Said:
     if of_all is None:
-        return [("honest.none", texts("honest.none"))]
+        return [_said(texts, "honest.none")]
     said: Said = []
-    whole = of_all.prediction["all"] or of_all.prediction["h"] or of_all.prediction["plan"]
+    whole = _whole(of_all)
     high, low = _rejected(of_all)
     if whole is not None:
         key = f"honest.{'high' if high else 'low' if low else 'yes'}"
-        said.append((key, texts(key, n=whole.points, **_factor(texts, whole.factor, whole.factor_interval))))
+        said.append(_said(texts, key, n=whole.points, **_factor(texts, whole.factor, whole.factor_interval)))
     for part in ("e", "n", "h", "plan"):
         own = of_all.prediction[part]
         if own is not None and (own.rejected_high or own.rejected_low):
             fields = _factor(texts, own.factor, own.factor_interval)
-            text = texts("honest.part", component=texts(f"component.{part}"), **fields)
-            said.append(("honest.part", text))
-    for part in ("e", "n", "h"):
-        shift = of_all.bias[part]
-        if shift is not None and shift.rejected:
-            text = texts(
-                "bias.shift",
-                component=texts(f"component.{part}"),
-                mean=texts.length(shift.mean),
-                expanded=texts.length(shift.expanded),
-                p=texts.significant(shift.p, 2),
-            )
-            said.append(("bias.shift", text))
-    return [*said, *_surface(texts, of_all)]
+            said.append(_said(texts, "honest.part", component=texts(f"component.{part}"), **fields))
+    shifts = [(part, own) for part, own in of_all.bias.items() if own is not None]
+    for part, shift in shifts:
+        if shift.rejected:
+            fields = {
+                "component": texts(f"component.{part}"),
+                "mean": texts.length(shift.mean),
+                "expanded": texts.length(shift.expanded),
+                "k": texts.number(shift.expanded / shift.sd_of_mean, 2),
+                "p": texts.percent(asked.coverage),
+            }
+            said.append(_said(texts, "bias.found", **fields))
+    if shifts and not any(shift.rejected for _, shift in shifts):
+        said.append(_said(texts, "bias.none"))
+    return [*said, *_surface(texts, of_all.surface), *_points(asked, texts, found, of_all)]
+
+
+def _surface(texts: Texts, found: Surface | None) -> Said:
+    if found is None:
+        return [_said(texts, "surface.few")]
+    p = texts.significant(found.p, 2)
+    if not found.rejected:
+        return [_said(texts, "surface.none", p=p)]
+    said = [_said(texts, "surface.found", p=p)]
+    value, sd = found.estimate, found.sd
+    k = 1 if abs(found.t[1]) > abs(found.t[2]) else 2
+    limit = critical_normal(LEVEL)
+    if abs(found.t[k]) > limit:
+        rise, own = texts.length(float(value[k])), texts.length(float(sd[k]))
+        said.append(_said(texts, "surface.tilt", rise=rise, sd=own))
+    if abs(found.t[3]) > limit:
+        bend, own = texts.length(float(value[3])), texts.length(float(sd[3]))
+        said.append(_said(texts, "surface.dome", bend=bend, sd=own))
+    return said
 
 
 def _factor(texts: Texts, factor: float, interval: tuple[float, float]) -> dict[str, str]:
@@ -225,29 +277,14 @@ def _factor(texts: Texts, factor: float, interval: tuple[float, float]) -> dict[
     }
 
 
-def _surface(texts: Texts, of_all: Figures) -> Said:
-    found = of_all.surface
-    if found is None or not found.rejected:
-        return []
-    k = int(np.argmax(np.abs(found.t)))
-    name = ("shift", "x", "y", "dome")[k]
-    fields = {"value": texts.length(float(found.estimate[k])), "sd": texts.length(float(found.sd[k]))}
-    if name != "shift":
-        fields["length"] = texts.length(found.scale, 3)
-    text = texts(
-        "surface.bent", p=texts.significant(found.p, 2), largest=texts(f"surface.{name}", **fields)
-    )
-    return [("surface.bent", text)]
-
-
 def _points(asked: Asked, texts: Texts, found: Compared, of_all: Figures | None) -> Said:
     """Return which single points disagree, and which were set beside."""
     said: Said = []
     if of_all is not None:
         tests = of_all.points
-        least = np.fmin(tests.p, tests.p_others)
-        for row in np.flatnonzero(least < tests.limit).tolist()[:NAMED]:
-            text = texts("point.wrong", point=found.names[row], p=texts.significant(float(least[row]), 2))
+        for row in np.flatnonzero(tests.wrong).tolist()[:NAMED]:
+            p = texts.significant(float(tests.least[row]), 2)
+            text = texts("point.wrong", point=found.names[row], p=p)
             said.append(("point.wrong", text))
     if asked.without:
         reasons = "; ".join(f"{point}: {reason}" for point, reason in asked.without.items())
@@ -282,16 +319,28 @@ def _remarks(
     if standards.asprs is not None:
         said += _asprs_remarks(asked, texts, found, of_all, of_vegetated, standards.asprs)
     if standards.lengths is not None:
-        test = standards.lengths.test
-        if not (test.enough and test.long_enough):
-            lacking = f"{test.lines} x {test.least}, {texts.percent(test.longest)} %"
-            said.append(texts("lengths.arrangement", lacking=lacking))
-        if not standards.lengths.at_reference:
-            said.append(texts("lengths.temperature"))
+        said += _lengths_remarks(texts, standards.lengths)
     if layout is not None:
         said += _layout(texts, layout)
-    if _two_heights(of_all) and of_all is not None and of_all.bias["h"] is not None:
-        said.append(texts("assume.height_kinds", mean=texts.length(of_all.bias["h"].mean)))
+    shift = None if of_all is None else of_all.bias["h"]
+    heights = None if of_all is None else of_all.parts["h"]
+    if shift is not None and heights is not None and _two_heights(found, shift, heights):
+        said.append(texts("bias.heights", mean=texts.length(shift.mean), sd=texts.length(heights.sd)))
+    return said
+
+
+def _lengths_remarks(texts: Texts, found: Lengths) -> list[str]:
+    test, said = found.test, list[str]()
+    if not test.enough:
+        said.append(texts("lengths.few", lines=test.lines, least=test.least))
+    if not math.isfinite(test.longest):
+        said.append(texts("lengths.diagonal"))
+    elif not test.long_enough:
+        said.append(texts("lengths.short", share=texts.percent(test.longest)))
+    if found.expansion is None:
+        said.append(texts("lengths.warm"))
+    else:
+        said.append(texts("lengths.reference", expansion=texts.significant(found.expansion, 3)))
     return said
 
 
@@ -304,31 +353,33 @@ def _asprs_remarks(
     own: Asprs,
 ) -> list[str]:
     said = []
-    area = f"{texts.significant(own.area, 3)} km²"
     n = 0 if of_all is None else of_all.n
     if asked.classes and n < own.points_asked:
-        said.append(texts("asprs.number", asked=own.points_asked, area=area, n=n))
+        said.append(texts("asprs.points", asked=own.points_asked, n=n))
     if of_vegetated is not None and of_vegetated.n < own.points_asked:
-        said.append(texts("asprs.number.vva", asked=own.points_asked, area=area, n=of_vegetated.n))
+        said.append(texts("asprs.points", asked=own.points_asked, n=of_vegetated.n))
     for name, good in own.survey.items():
         figure = own.figures[name]
         if not good and figure is not None:
             size = {"class": texts.size(asked.classes[name])}
-            said.append(texts(f"asprs.survey.{name}", survey=texts.length(figure.survey), **size))
+            said.append(texts("asprs.survey", survey=texts.length(figure.survey), **size))
     for name, good in own.control.items():
         rmse = own.control_rmse["hv".index(name)]
         if not good and math.isfinite(rmse):
-            limit = asked.classes.get("v", asked.classes["h"]) if name == "v" else asked.classes["h"]
-            said.append(
-                texts(f"asprs.control.{name}", survey=texts.length(rmse), **{"class": texts.size(limit)})
-            )
+            plain = asked.classes["h"]
+            limit = asked.classes["v"] / 2 if name == "v" and "v" in asked.classes else plain
+            limit = plain / 2 if name == "h" else limit
+            said.append(texts(f"asprs.control.{name}", sd=texts.length(rmse), limit=texts.size(limit)))
     for each in own.remarks[:NAMED]:
-        component, value = texts(f"component.{each.component}"), texts.length(each.value)
+        fields = {
+            "component": texts(f"component.{each.component}"),
+            "value": texts.length(each.value),
+            "limit": texts.length(each.limit),
+        }
         if each.point is None:
-            said.append(texts("asprs.mean", component=component, mean=value))
+            said.append(texts("asprs.mean", **fields))
         else:
-            point = found.names[each.point]
-            said.append(texts("asprs.blunder", component=component, difference=value, point=point))
+            said.append(texts("asprs.difference", point=found.names[each.point], **fields))
     return said
 
 
@@ -345,11 +396,8 @@ def _layout(texts: Texts, found: Layout) -> list[str]:
     return said
 
 
-def _two_heights(of_all: Figures | None) -> bool:
+def _two_heights(found: Compared, shift: Bias, own: Sized) -> bool:
     """Return whether heights of two kinds may have been compared: all of one sign, far from 0, and alike."""
-    if of_all is None:
-        return False
-    shift, own = of_all.bias["h"], of_all.parts["h"]
-    if shift is None or own is None or own.n < 3 or not abs(shift.z) > HEIGHT_KINDS:
-        return False
-    return own.sd < abs(shift.mean) / 3
+    heights = found.differences[found.counted[:, 2], 2]
+    one_sign = bool((heights > 0).all() or (heights < 0).all())
+    return own.n > 2 and one_sign and abs(shift.z) > HEIGHT_KINDS and own.sd < abs(shift.mean) / 3

@@ -20,6 +20,7 @@ from photogram.results.statement.leave_one_out import leave_one_out
 from photogram.results.statement.quantities import chosen, wanted
 from photogram.results.statement.standards import standards
 from photogram.results.statement.statement import Statement
+from photogram.results.statement.surveyed import System, surveyed
 from photogram.results.statement.texts import Texts
 from photogram.show.run import InputFile
 from photogram.show.ways import statement_of
@@ -33,6 +34,7 @@ def statement(
     *,
     strict: bool = False,
     removed: Sequence[str] = (),
+    system: System | None = None,
     inputs: Sequence[InputFile] = (),
     command: str = "",
     **asked: Any,
@@ -47,11 +49,13 @@ def statement(
         Whether what is a remark otherwise has the exit code 4.
     removed
         Observations that were taken out before, by their names.
+    system
+        In which coordinates are shown; None: the axes of the block.
     inputs, command
         What it was made of, for annex G.
     asked
-        `standards`, `classes`, `area`, `sd`, `without`, `independent`, `language`, `text`, `budgets`, `coverage`,
-        `client` ...: see :class:`photogram.results.statement.asked.Asked`.
+        `standards`, `classes`, `area`, `sd`, `without`, `independent`, `language`, `text`, `budgets`,
+        `coverage`, `client` ...: see :class:`photogram.results.statement.asked.Asked`.
 
     Raises
     ------
@@ -67,9 +71,13 @@ def statement(
         raise InputError(f"a statement is of an adjusted block: {shown(result)}")
     options = Asked.checked(**asked)
     if not result.converged:
-        raise AdjustmentError(f"there is no statement of an adjustment that has not converged: {result.status}")
+        raise AdjustmentError(
+            f"there is no statement of an adjustment that has not converged: {result.status}"
+        )
     if not result.WHOLE or not np.isfinite(result.point_cofactors[result.used_points]).all():
-        raise AdjustmentError("there is no statement without covariances: adjust with covariance=True, not in parts")
+        raise AdjustmentError(
+            "there is no statement without covariances: adjust with covariance=True, not in parts"
+        )
     texts = Texts(options.language, options.text, result.block.linear_unit)
     found = compared(result, options)
     rest = found.without(list(options.without)) if options.without else None
@@ -110,6 +118,7 @@ def statement(
             strict=strict,
         ),
         removed=tuple(removed),
+        survey=surveyed(result, found, system),
         inputs=tuple(inputs),
         command=command,
     )

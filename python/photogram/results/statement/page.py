@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.results.features_report import through
 from photogram.results.features_report import written as feature_written
 from photogram.results.statement.annexes import (
@@ -25,6 +24,7 @@ from photogram.results.statement.drawings import differences, overlap
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.sheets import Written, decimals_for
 from photogram.results.statement.statement import Statement
+from photogram.results.statement.texts import Texts
 from photogram.show.page import Column, Drawing, Fact, Judgement, Page, Remarks, Row, Section, Table, Text
 from photogram.show.ways import page_of
 
@@ -54,8 +54,12 @@ def statement_page(found: Statement) -> Page:
         highlights=[],
         sections=[
             Section("figures", texts("page.figures"), [*_figures(found), *_notes(found)]),
-            Section("assumptions", texts("page.assumptions"), [Remarks([t for _, t in judged.assumptions], 40)]),
-            Section("remarks", texts("page.remarks"), [Remarks(judged.remarks, 40)] if judged.remarks else []),
+            Section(
+                "assumptions", texts("page.assumptions"), [Remarks([t for _, t in judged.assumptions], 40)]
+            ),
+            Section(
+                "remarks", texts("page.remarks"), [Remarks(judged.remarks, 40)] if judged.remarks else []
+            ),
             Section("map", texts("page.map"), [*_maps(found), Text(texts("page.signature"))]),
             checks_annex(found),
             left_out_annex(found),
@@ -70,6 +74,10 @@ def statement_page(found: Statement) -> Page:
         language=texts.language,
         first=texts("page.first"),
     )
+
+
+def _told(name: str, texts: Texts, sentences: Sequence[str]) -> Section:
+    return Section(name, texts(f"page.{name}"), [Remarks(sentences, 40)] if sentences else [])
 
 
 def _figures(found: Statement) -> list[Table]:
@@ -139,7 +147,7 @@ def _class(found: Statement, part: str, decimals: int, cells: Written) -> list[o
     if name not in asked or found.standards.asprs is None:
         return [None, ""]
     verdict = found.standards.asprs.verdicts.get(name, "")
-    return [cells.number(asked[name], decimals), found.texts(f"class.{verdict}") if verdict else ""]
+    return [cells.number(asked[name], decimals), found.texts(f"asprs.verdict.{verdict}") if verdict else ""]
 
 
 def _radii(found: Statement, own: Figures) -> Table:
@@ -171,7 +179,7 @@ def _notes(found: Statement) -> list[Text]:
         fields[f"product_{name}"] = texts.length(product) if math.isfinite(product) else below
         own = math.nan if predicted is None else predicted.predicted_rmse_of_product
         fields[f"predicted_{name}"] = texts.length(own)
-    return [Text(texts("asprs.footnote", **fields))]
+    return [Text(f"{texts('asprs.footnote')} {texts('asprs.product', **fields)}")]
 
 
 def _maps(found: Statement) -> Sequence[Drawing]:
@@ -194,7 +202,10 @@ def _maps(found: Statement) -> Sequence[Drawing]:
             lambda: differences(found.compared, control, labels),
         ),
         Drawing(
-            "map-overlap", texts("page.overlap"), texts("page.overlap.caption"), lambda: overlap(found.result, labels)
+            "map-overlap",
+            texts("page.overlap"),
+            texts("page.overlap.caption"),
+            lambda: overlap(found.result, labels),
         ),
     ]
 
@@ -248,6 +259,3 @@ def _metrology(found: Statement) -> list[Section]:
     if not tables:
         return []
     return [Section("metrology", texts("page.values"), tables, annex=True)]
-
-
-VERSION = _photocore.__version__

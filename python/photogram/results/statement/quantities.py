@@ -198,4 +198,3 @@ def _unit(result: Result, kind: str, name: str, component: int) -> str:
     if kind == "camera":
         return units(next(each.camera for each in result.cameras if each.name == name))[component]
     return next(each.units[component] for each in result.unknowns if each.name == name)
-

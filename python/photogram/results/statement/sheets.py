@@ -65,7 +65,9 @@ def left_out_file(found: Sequence[LeftOut], unit: str) -> bytes:
         "p": [each.p for each in found],
         "least_eigenvalue": [float(each.eigenvalues.min(initial=math.nan)) for each in found],
     }
-    return csv_text(columns, [f"lengths in {unit}; d: predicted by all others minus survey; no independent check"])
+    return csv_text(
+        columns, [f"lengths in {unit}; d: predicted by all others minus survey; no independent check"]
+    )
 
 
 def budget_file(found: Sequence[Budget]) -> bytes:
@@ -77,12 +79,14 @@ def budget_file(found: Sequence[Budget]) -> bytes:
         for own in each.sources:
             nu = each.freedom.of_kind.get(own.name, math.nan) if own.level == "kind" else math.nan
             named = basis if own.name in each.freedom.of_kind or basis == "given" else "given"
-            rows.append((*head, own.level, own.name, own.number, own.u, own.share, math.nan, math.nan, nu, named))
+            rows.append(
+                (*head, own.level, own.name, own.number, own.u, own.share, math.nan, math.nan, nu, named)
+            )
         for one in each.largest:
             source = " ".join(one.observation)
             u = math.sqrt(one.contribution)
-            last = (1, u, one.share, one.sensitivity, one.sd, math.nan, basis)
-            rows.append((*head, "observation", source, *last))
+            alone = (1, u, one.share, one.sensitivity, one.sd, math.nan, basis)
+            rows.append((*head, "observation", source, *alone))
     names = (
         *("quantity", "unit", "value", "u", "level", "source", "number", "u_k", "share"),
         *("sensitivity", "sd", "dof", "taken_from"),

@@ -67,7 +67,7 @@ class Asprs:
 
     def member(self, asked: Asked, metre: float) -> dict[str, Any]:
         """Return what the JSON document has; `metre` is the linear unit in metres."""
-        found: dict[str, Any] = {key: None for key in _METRES_OF.values()}
+        found: dict[str, Any] = dict.fromkeys(_METRES_OF.values())
         found |= {_METRES_OF[name]: size * metre for name, size in asked.classes.items()}
         for name, each in self.figures.items():
             found[f"upper_{name}"] = None if each is None else each.upper
@@ -94,7 +94,7 @@ class Lengths:
     calibrated: Floats
     limit: Limit | None
     test: LengthTest
-    at_reference: bool
+    expansion: float | None
 
     def member(self) -> dict[str, Any]:
         """Return what the JSON document has."""
@@ -120,7 +120,7 @@ class Lengths:
             "met": test.met,
             "lines": test.lines,
             "arrangement": test.enough and test.long_enough,
-            "at_reference_temperature": self.at_reference,
+            "at_reference_temperature": self.expansion is not None,
             "T": None if together is None else together.weighted_sum_of_squares,
             "rank": None if together is None else together.degrees_of_freedom,
             "p_high": None if together is None else together.probability_above,
@@ -307,7 +307,7 @@ def _lengths(result: Result, asked: Asked) -> Lengths:
         freedom=math.inf if known else result.degrees_of_freedom,
     )
     ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]
-    return Lengths(lines, ends, calibrated, limit, test, turned)
+    return Lengths(lines, ends, calibrated, limit, test, asked.expansion if turned else None)
 
 
 def _iso(result: Result, asked: Asked, of_all: Figures | None) -> list[dict[str, Any]]:

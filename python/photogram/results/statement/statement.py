@@ -1,4 +1,4 @@
-"""An accuracy statement of an adjusted block: figures, sentences, assumptions, and what they are written to."""
+"""An accuracy statement of an adjusted block: figures, sentences, assumptions, and their forms."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from photogram.results.statement.leave_one_out import LeftOut
 from photogram.results.statement.members import budget_member, figures_member, left_out_rows, point_rows
 from photogram.results.statement.quantities import wanted
 from photogram.results.statement.standards import Standards
+from photogram.results.statement.surveyed import NOTHING, Survey
 from photogram.results.statement.texts import Texts
 from photogram.show.brief import Brief, Rows
 from photogram.show.run import InputFile
@@ -42,8 +43,8 @@ class Statement(Brief):
     compared
         Check points with their joint covariance.
     of_all, of_rest, of_vegetated
-        Figures of all check points, of those that are left without some, and of heights in vegetation; None where
-        there are none.
+        Figures of all check points, of those that are left without some, and of heights in vegetation; None
+        where there are none.
     left_out
         Control points as the others predict them.
     taken_apart
@@ -56,6 +57,8 @@ class Statement(Brief):
         Headline, sentences, assumptions, remarks and exit code: one judgement for all that is written.
     removed
         Observations that were taken out before.
+    survey
+        Control and check points as they were given, in the system in which they are shown.
     inputs, command
         What it was made of, where a command has made it.
     """
@@ -73,14 +76,16 @@ class Statement(Brief):
     layout: Layout | None
     judged: Judged
     removed: tuple[str, ...] = ()
+    survey: Survey = NOTHING
     inputs: tuple[InputFile, ...] = ()
     command: str = ""
 
     @property
     def exit(self) -> int:
-        """0: nothing speaks against it; 4: a class is missed, differences are larger than predicted, or the verdict.
+        """0: nothing speaks against it; 4: it must not be handed over as it is.
 
-        Differences that are smaller than predicted are 4 with `strict`.
+        A class is missed, differences are larger than predicted, or the verdict of the adjustment says so;
+        with `strict` also where differences are smaller than predicted.
         """
         return self.judged.exit
 
@@ -120,8 +125,8 @@ class Statement(Brief):
         Parameters
         ----------
         quantity
-            `point C08 z`, `distance C01 C30`, `camera drone f`, `photo 101 z`, or a linear function by its gradient,
-            `{("point", "C08"): [0, 0, 1]}`.
+            `point C08 z`, `distance C01 C30`, `camera drone f`, `photo 101 z`, or a linear function by its
+            gradient, `{("point", "C08"): [0, 0, 1]}`.
 
         Raises
         ------
@@ -147,7 +152,10 @@ class Statement(Brief):
     def brief(self) -> tuple[str, Rows]:
         """Return the statement in a few lines."""
         rows = [("headline", self.headline), *((key, text) for key, text in self.judged.sentences)]
-        return "Accuracy statement", [*rows, ("see", ".figures, .check_points, .budget(..), .to_html(), .to_pdf()")]
+        return "Accuracy statement", [
+            *rows,
+            ("see", ".figures, .check_points, .budget(..), .to_html(), .to_pdf()"),
+        ]
 
     def to_html(self, path: str | PathLike[str] | None = None) -> bytes:
         """Return the page as one HTML file that needs nothing else, and write it where a path is given.
@@ -159,7 +167,7 @@ class Statement(Brief):
         return _written(page_html(page_of(self)), path)
 
     def to_pdf(self, path: str | PathLike[str] | None = None) -> bytes:
-        """Return the page as a PDF document, and write it where a path is given; equal statements, equal bytes.
+        """Return the page as a PDF document, and write it where a path is given.
 
         Needs reportlab and matplotlib (`pip install 'photogram[pdf]'`).
         """

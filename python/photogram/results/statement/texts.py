@@ -1,4 +1,4 @@
-"""The words of a statement: one table of sentences for each language, and those that a firm puts in their place."""
+"""The words of a statement: a table of sentences for each language, and a firm's own in their place."""
 
 from __future__ import annotations
 
@@ -111,7 +111,13 @@ class Texts:
         head = ""
         while len(whole) > 4 or (head and len(whole) > 3):
             whole, head = whole[:-3], group + whole[-3:] + head
-        return sign.replace("-", "−") + whole + head + (self._table["number.decimal"] if point else "") + decimals
+        return (
+            sign.replace("-", "−")
+            + whole
+            + head
+            + (self._table["number.decimal"] if point else "")
+            + decimals
+        )
 
     def length(self, value: float, figures: int = 2) -> str:
         """Return a length with its unit: centimetres where it is less than a metre, millimetres for less."""
@@ -133,14 +139,18 @@ class Texts:
 
     def percent(self, probability: float) -> str:
         """Return a probability in percent, without its sign."""
-        return self.significant(100 * probability, 2) if probability < 0.1 else f"{100 * probability:g}"
+        percent = 100 * probability
+        if not math.isfinite(percent):
+            return NOTHING
+        return self._local(f"{percent:.1f}".removesuffix(".0"))
 
     def day(self, given: str) -> str:
         """Return a date (ISO) as the language writes it; anything else as it is."""
         try:
-            return date.fromisoformat(given).strftime(self._table["date.format"])
+            day = date.fromisoformat(given)
         except ValueError:
             return given
+        return self._table["date"].format(year=day.year, month=f"{day.month:02}", day=f"{day.day:02}")
 
     def has(self, key: str) -> bool:
         """Return whether there is a sentence."""
