@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from photogram.results.model_tests import compare, score_test, terms_test
     from photogram.results.result import Result
     from photogram.results.snooped import Snooped
+    from photogram.results.statement.made import statement
+    from photogram.results.statement.statement import Statement
     from photogram.results.variance_function import VarianceFunction
     from photogram.stellar.cameras import camera_from
 
@@ -87,6 +89,7 @@ __all__ = [
     "Simulation",
     "Snooped",
     "Spheroid",
+    "Statement",
     "VarianceComponents",
     "VarianceFunction",
     "__version__",
@@ -109,6 +112,7 @@ __all__ = [
     "score_test",
     "simulate",
     "snoop",
+    "statement",
     "terms_test",
     "variance_components",
     "variance_function",
@@ -147,6 +151,8 @@ _HOMES = {
     "Result": "results.result",
     "Simulation": "network.simulation",
     "Snooped": "results.snooped",
+    "Statement": "results.statement.statement",
+    "statement": "results.statement.made",
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",

@@ -47,6 +47,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.",
         "features.features",
     ),
+    "statement": (
+        "State how accurate a block is, by whose standard, found how, assuming what: a page to hand over.",
+        "statement.statement",
+    ),
     "new": (
         "Write a small real project as tables, with comments that say what may stand there.",
         "new.new",

@@ -60,8 +60,8 @@ def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
     for each in given:
         name, equals, numbers = each.partition("=")
         name = name.strip()
-        if name not in ("images", "control", "gnss"):
-            raise InputError(f"--sd {each}: images=.., control=.. or gnss=..")
+        if name not in ("images", "control", "check", "gnss"):
+            raise InputError(f"--sd {each}: images=.., control=.., check=.. or gnss=..")
         try:
             values = tuple(float(number) for number in numbers.split(","))
         except ValueError:

@@ -7,15 +7,13 @@ their own. Equal pages give equal bytes.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cache
 from typing import Any
 from xml.sax.saxutils import escape
 
 from photogram.errors import InputError
 from photogram.show.page import (
-    Cell,
-    Column,
     Drawing,
     Facts,
     Judgement,
@@ -27,16 +25,14 @@ from photogram.show.page import (
     Table,
     Text,
 )
+from photogram.show.pdf_tables import BOLD, CLOSE, FONT, INK, RULE, SOFT, TONES, grid
 
 __all__ = ["page_pdf"]
 
-MARGIN = 48.0
+MARGIN = 44.0
 """Points at all sides of a sheet."""
-FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
-INK, SOFT, RULE = "#17212b", "#55626e", "#d6dce1"
-TONES = {"good": "#00694a", "look": "#8a5200", "bad": "#a3201a", "": INK}
-HIGHEST = 300.0
-"""Points of a picture."""
+HIGHEST, FRONT = 300.0, 215.0
+"""Points of a picture, and of one before the annexes."""
 
 
 def page_pdf(page: Page, *, author: str = "") -> bytes:
@@ -131,22 +127,22 @@ class _Flow:
     def __init__(self, page: Page, width: float) -> None:
         from reportlab.lib.styles import ParagraphStyle
 
-        self._page, self._width = page, width
+        self._page, self._width, self._front = page, width, True
 
         def style(size: float, **more: Any) -> Any:
-            given = {"fontName": FONT, "fontSize": size, "leading": 1.32 * size, "textColor": INK, **more}
+            given = {"fontName": FONT, "fontSize": size, "leading": 1.28 * size, "textColor": INK, **more}
             return ParagraphStyle(f"{size}{sorted(more.items())}", **given)
 
         self._title = style(15, fontName=BOLD, spaceAfter=4)
         self._what = style(9, textColor=SOFT)
         self._head = style(10.5, fontName=BOLD, spaceBefore=8, spaceAfter=3)
         self._caption = style(8, fontName=BOLD, spaceBefore=4, spaceAfter=2)
-        self._body = style(8.2, spaceAfter=2)
-        self._small = style(7, textColor=SOFT, spaceAfter=3)
+        self._body = style(8, spaceAfter=1)
+        self._small = style(6.8, textColor=SOFT, spaceAfter=2)
+        self._line = style(7)
         self._mark = {tone: style(9, fontName=BOLD, textColor=colour) for tone, colour in TONES.items()}
         self._headline = style(10.5, fontName=BOLD, spaceAfter=3)
-        self._cell, self._cell_right = style(6.9), style(6.9, alignment=2)
-        self._cell_head, self._head_right = style(6.9, fontName=BOLD), style(6.9, fontName=BOLD, alignment=2)
+        self._cell = style(6.9)
 
     def story(self) -> Iterator[Any]:
         """Return everything, one after the other."""
@@ -157,14 +153,16 @@ class _Flow:
             yield Paragraph(escape(page.what), self._what)
         yield Paragraph(escape(page.title or page.what), self._title)
         if page.head:
-            yield self._facts(Facts("", page.head))
+            told = " · ".join(f"{each.name}: {each.value}" for each in page.head)
+            yield Paragraph(escape(told), self._body)
         yield Spacer(1, 5)
         for each in page.judgements:
             yield from self._judgement(each)
         for sentence in page.advice:
             yield Paragraph(f"• {escape(sentence)}", self._body)
         for section in page.sections:
-            if section.annex:
+            self._front = self._front and not section.annex
+            if section.annex and section.parts:
                 yield PageBreak()
             yield from self._section(section)
 
@@ -193,11 +191,30 @@ class _Flow:
 
         if not section.parts:
             return
-        yield _Heading(escape(section.title), self._head, section.id)
+        if section.title:
+            yield _Heading(escape(section.title), self._head, section.id)
         if section.intro:
             yield Paragraph(escape(section.intro), self._small)
+        if self._front and [type(part) for part in section.parts] == [Remarks, Drawing]:
+            yield self._beside(*section.parts)
+            return
         for part in section.parts:
             yield from self._part(part, section.title)
+
+    def _beside(self, told: Any, drawing: Any) -> Any:
+        """Return sentences with a picture at their side: the first sheet is to hold both."""
+        from reportlab.platypus import Table as Grid
+
+        whole = self._width
+        columns = (0.52 * whole, 0.48 * whole)
+        cells = []
+        for part, self._width in zip((told, drawing), (columns[0] - 10, columns[1]), strict=True):
+            cells.append(list(self._part(part, "")))
+        self._width = whole
+        grid = Grid([cells], colWidths=columns)
+        nothing = [(f"{side}PADDING", (0, 0), (-1, -1), 0) for side in ("LEFT", "TOP", "BOTTOM")]
+        grid.setStyle([("VALIGN", (0, 0), (-1, -1), "TOP"), *nothing])
+        return grid
 
     def _part(self, part: Part, within: str) -> Iterator[Any]:
         from reportlab.platypus import Paragraph, Spacer
@@ -214,11 +231,11 @@ class _Flow:
             for each in part.parts:
                 yield from self._part(each, within)
         elif isinstance(part, Text):
-            yield Paragraph(escape(part.text), self._body)
+            yield Paragraph(escape(part.text), self._line)
         elif isinstance(part, Remarks):
             for sentence in part.sentences:
-                yield Paragraph(f"• {escape(sentence)}", self._body)
-        yield Spacer(1, 3)
+                yield Paragraph(f"• {escape(sentence)}", self._line)
+        yield Spacer(1, 2)
 
     def _drawing(self, drawing: Drawing) -> Iterator[Any]:
         from reportlab.platypus import Paragraph
@@ -229,7 +246,7 @@ class _Flow:
         with styled():
             figure = drawing.draw()
         if figure is not None:
-            yield FigureFlowable(figure, self._width, HIGHEST)
+            yield FigureFlowable(figure, self._width, FRONT if self._front else HIGHEST)
             yield Paragraph(escape(drawing.caption), self._small)
 
     def _facts(self, facts: Facts) -> Any:
@@ -244,60 +261,17 @@ class _Flow:
             for each in facts.facts
         ]
         grid = Grid(rows, colWidths=[0.25 * self._width, 0.75 * self._width])
-        grid.setStyle([("LINEABOVE", (0, 0), (-1, -1), 0.4, RULE), *_CLOSE])
+        grid.setStyle([("LINEABOVE", (0, 0), (-1, -1), 0.4, RULE), *CLOSE])
         return grid
 
     def _table(self, table: Table, within: str) -> Iterator[Any]:
-        from reportlab.platypus import LongTable, Paragraph
+        from reportlab.platypus import Paragraph
 
         if table.caption != within:
             yield Paragraph(escape(table.caption), self._caption)
         if table.note:
             yield Paragraph(escape(table.note), self._small)
-        heads = [
-            Paragraph(
-                escape(each.head) + (f"<br/>{escape(each.unit)}" if each.unit else ""),
-                self._cell_head if each.text else self._head_right,
-            )
-            for each in table.columns
-        ]
-        rows = [[self._written(column, cell) for column, cell in row] for row in table.cells()]
-        grid = LongTable([heads, *rows], colWidths=self._widths(table), repeatRows=1)
-        grid.setStyle(
-            [("LINEBELOW", (0, 0), (-1, 0), 0.8, INK), ("LINEBELOW", (0, 1), (-1, -1), 0.3, RULE), *_CLOSE]
-        )
-        yield grid
-
-    def _written(self, column: Column, cell: Cell) -> Any:
-        from reportlab.platypus import Paragraph
-
-        text = escape(column.written(cell.value))
-        coloured = f'<font color="{TONES[cell.tone]}">{text}</font>' if cell.tone else text
-        return Paragraph(coloured, self._cell if column.text else self._cell_right)
-
-    def _widths(self, table: Table) -> list[float]:
-        """Return widths of columns by what stands in them; together as wide as the sheet, at the most."""
-        from reportlab.pdfbase.pdfmetrics import stringWidth
-
-        size = self._cell.fontSize
-        wide = []
-        for k, column in enumerate(table.columns):
-            words = [word for text in (column.head, column.unit) for word in text.split()]
-            cells = [column.written(cell.value) for row in table.cells() for cell in [row[k][1]]]
-            longest = max((stringWidth(text, FONT, size) for text in cells), default=0.0)
-            head = max((stringWidth(word, BOLD, size) for word in words), default=0.0)
-            wide.append(max(min(longest, 0.5 * self._width), head) + 9.0)
-        total = sum(wide)
-        return [each * self._width / total for each in wide] if total > self._width else wide
-
-
-_CLOSE: Sequence[tuple[Any, ...]] = (
-    ("VALIGN", (0, 0), (-1, -1), "TOP"),
-    ("LEFTPADDING", (0, 0), (-1, -1), 2),
-    ("RIGHTPADDING", (0, 0), (-1, -1), 4),
-    ("TOPPADDING", (0, 0), (-1, -1), 1),
-    ("BOTTOMPADDING", (0, 0), (-1, -1), 1.5),
-)
+        yield grid(table, self._width)
 
 
 def _Heading(text: str, style: Any, key: str) -> Any:  # noqa: N802

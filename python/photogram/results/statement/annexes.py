@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -14,11 +15,13 @@ from photogram.results.distortion import distortion_curve
 from photogram.results.statement.budget import Budget, written
 from photogram.results.statement.compared import in_order
 from photogram.results.statement.document import kinds_of
+from photogram.results.statement.drawings import overlap
+from photogram.results.statement.figures import Figures
 from photogram.results.statement.sheets import Written, decimals_for
 from photogram.results.statement.sources import held_names
 from photogram.results.statement.statement import Statement
 from photogram.show.judgement import verdict_table
-from photogram.show.page import Cell, Column, Fact, Facts, Part, Remarks, Row, Section, Table
+from photogram.show.page import Cell, Column, Drawing, Fact, Facts, Part, Remarks, Row, Section, Table
 
 __all__ = [
     "adjustment_annex",
@@ -31,7 +34,7 @@ __all__ = [
 ]
 
 _AXES = ("e", "n", "h")
-SOURCES = 25
+SOURCES = 12
 """Sources of a budget at a finer level than kinds that the page lists, those that contribute most."""
 RADII = 11
 """Of the table of distortion."""
@@ -64,13 +67,31 @@ def checks_annex(found: Statement) -> Section:
             *cells.vector(tests.normalised[k], 1),
             cells.number(float(tests.T[k]), 1),
             cells.p(float(tests.p[k]), tests.limit),
-            cells.number(float(tests.others[k]), 1),
+            cells.looked(float(tests.others[k]), 1, bad=bool(tests.p_others[k] < tests.limit)),
             cells.number(float(tests.ce90[k]), decimals),
             cells.number(float(tests.le90[k]), decimals),
         ]
         for k, name in enumerate(own.names)
     ]
-    return Section("annex-a", texts("annex.a"), [Table(texts("annex.a"), columns, rows)], annex=True)
+    table = Table(texts("annex.a"), columns, rows)
+    return Section("annex-a", texts("annex.a"), [table, _radii(found, found.of_all)], annex=True)
+
+
+def _radii(found: Statement, own: Figures) -> Table:
+    texts, cells = found.texts, Written(found.texts)
+    unit = found.result.block.linear_unit
+    decimals = decimals_for(own.points.sd_adjusted)
+    columns = [
+        Column("", text=True),
+        *(cells.column(key, unit) for key in ("sample", "upper", "moments", "mixture")),
+    ]
+    rows: list[Row] = []
+    for name, radius in own.radii.items():
+        if radius is not None:
+            values = (radius.sample, radius.upper, own.of_moments[name], own.mixture.get(name, math.nan))
+            numbers = [cells.number(math.nan if each is None else each, decimals) for each in values]
+            rows.append([name.upper(), *numbers])
+    return Table(texts("table.radii"), columns, rows, texts("table.radii.note"))
 
 
 def left_out_annex(found: Statement) -> Section:
@@ -253,8 +274,15 @@ def adjustment_annex(found: Statement) -> Section:
         parts.append(verdict_table(result.verdict))
     if found.removed:
         parts += [Facts(texts("table.removed"), []), Remarks(list(found.removed), 60)]
-    parts += _markers(found)
+    parts += [*_markers(found), _overlap(found)]
     return Section("annex-e", texts("annex.e"), parts, result.verdict.headline, annex=True)
+
+
+def _overlap(found: Statement) -> Drawing:
+    texts, unit = found.texts, found.result.block.linear_unit
+    labels = {name: texts(f"column.{name}") for name in ("east", "north", "photos")} | {"unit": unit}
+    draw = partial(overlap, found.result, labels)
+    return Drawing("map-overlap", texts("page.overlap"), texts("page.overlap.caption"), draw)
 
 
 def _markers(found: Statement) -> list[Part]:

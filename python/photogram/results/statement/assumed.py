@@ -23,12 +23,17 @@ def assumptions(
     texts: Texts,
     found: Compared,
     layout: Layout | None,
+    assumed: Sequence[str],
     removed: Sequence[str],
 ) -> list[tuple[str, str]]:
     """Return keys and texts."""
-    said = [*_weights(result, asked.components, texts), *_adjustment(result, texts, removed)]
+    said = [*_weights(result, asked.components, texts)]
+    said += [_said(texts, "assume.read", said=each) for each in assumed]
+    said += [*_adjustment(result, texts, removed)]
     if len(found):
         said += _survey(asked, texts, found)
+        if found.step > 1:
+            said.append(_said(texts, "assume.taken", all=found.known, step=found.step))
         said.append(_said(texts, "assume.heights"))
         if "asprs-2023" in asked.standards:
             said.append(_said(texts, "assume.slopes"))

@@ -67,6 +67,8 @@ class Compared:
         (n, 3) standard deviations of the survey without what all points share.
     scale, second
         s2, and the degrees of freedom with which it was estimated: infinite where the unit weight is known.
+    known, step
+        Of how many check points every `step`th is taken: their joint covariance is dense.
     not_usable
         Names of known points that say nothing, with the reason.
     """
@@ -83,7 +85,8 @@ class Compared:
     scale: float
     second: float
     not_usable: tuple[tuple[str, str], ...] = ()
-    remarks: tuple[str, ...] = ()
+    known: int = 0
+    step: int = 1
 
     def __len__(self) -> int:
         return len(self.names)
@@ -163,13 +166,9 @@ def compared(result: Result, asked: Asked) -> Compared:
         As :meth:`Result.covariances`.
     """
     block, checks = result.block, result.check_points
-    rows, remarks = in_order(block, checks.rows), []
+    rows = in_order(block, checks.rows)
     step = -(-len(rows) // MOST)
-    if step > 1:
-        remarks.append(
-            f"of {len(rows)} check points every {step}th is taken: their joint covariance is dense"
-        )
-        rows = rows[::step]
+    rows = rows[::step]
     names = tuple(block.point_ids[row] for row in rows.tolist())
     _check_apart(block, rows)
     given = block.point_positions[rows]
@@ -196,7 +195,8 @@ def compared(result: Result, asked: Asked) -> Compared:
         scale=result.covariance_scale,
         second=math.inf if known else result.degrees_of_freedom,
         not_usable=tuple(_not_usable(result)),
-        remarks=tuple(remarks),
+        known=len(checks.rows),
+        step=step,
     )
 
 

@@ -69,6 +69,7 @@ def judged(
     standards: Standards,
     layout: Layout | None,
     *,
+    assumed: Sequence[str] = (),
     removed: Sequence[str] = (),
     strict: bool = False,
 ) -> Judged:
@@ -94,7 +95,7 @@ def judged(
             *_honest(asked, texts, found, of_all),
             *(("budget.line", _budget(texts, each)) for each in taken_apart),
         ],
-        assumptions=assumptions(result, asked, texts, found, layout, removed),
+        assumptions=assumptions(result, asked, texts, found, layout, assumed, removed),
         remarks=remarks,
     )
 

@@ -33,6 +33,7 @@ def statement(
     result: Result,
     *,
     strict: bool = False,
+    assumed: Sequence[str] = (),
     removed: Sequence[str] = (),
     system: System | None = None,
     inputs: Sequence[InputFile] = (),
@@ -47,6 +48,8 @@ def statement(
         The adjusted block, with covariances.
     strict
         Whether what is a remark otherwise has the exit code 4.
+    assumed
+        What was assumed when the files were read, in sentences.
     removed
         Observations that were taken out before, by their names.
     system
@@ -114,6 +117,7 @@ def statement(
             taken_apart,
             said,
             lie,
+            assumed=assumed,
             removed=removed,
             strict=strict,
         ),

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from photogram.messages import listed
 from photogram.results.features_report import through
 from photogram.results.features_report import written as feature_written
 from photogram.results.statement.annexes import (
@@ -20,17 +21,28 @@ from photogram.results.statement.annexes import (
     survey_annex,
 )
 from photogram.results.statement.compared import control_places
-from photogram.results.statement.drawings import differences, overlap
+from photogram.results.statement.drawings import differences
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.sheets import Written, decimals_for
 from photogram.results.statement.statement import Statement
 from photogram.results.statement.texts import Texts
-from photogram.show.page import Column, Drawing, Fact, Judgement, Page, Remarks, Row, Section, Table, Text
+from photogram.show.page import (
+    Cell,
+    Column,
+    Drawing,
+    Fact,
+    Judgement,
+    Page,
+    Remarks,
+    Row,
+    Section,
+    Table,
+    Text,
+)
 from photogram.show.ways import page_of
 
 __all__ = ["statement_page"]
 
-_PARTS = (("e", "e"), ("n", "n"), ("h", "h"), ("plan", "plan"), ("all", "all"))
 _CLASSES = {"h": "v", "plan": "h", "all": "3d"}
 """Parts of the components with classes."""
 
@@ -54,13 +66,9 @@ def statement_page(found: Statement) -> Page:
         highlights=[],
         sections=[
             Section("figures", texts("page.figures"), [*_figures(found), *_notes(found)]),
-            Section(
-                "assumptions", texts("page.assumptions"), [Remarks([t for _, t in judged.assumptions], 40)]
-            ),
-            Section(
-                "remarks", texts("page.remarks"), [Remarks(judged.remarks, 40)] if judged.remarks else []
-            ),
-            Section("map", texts("page.map"), [*_maps(found), Text(texts("page.signature"))]),
+            _assumptions(found),
+            _told("remarks", texts, judged.remarks),
+            Section("signature", "", [Text(texts("page.signature"))]),
             checks_annex(found),
             left_out_annex(found),
             budgets_annex(found),
@@ -76,59 +84,59 @@ def statement_page(found: Statement) -> Page:
     )
 
 
+def _assumptions(found: Statement) -> Section:
+    told = Remarks([text for _, text in found.judged.assumptions], 40)
+    return Section("assumptions", found.texts("page.assumptions"), [told, _map(found)])
+
+
 def _told(name: str, texts: Texts, sentences: Sequence[str]) -> Section:
     return Section(name, texts(f"page.{name}"), [Remarks(sentences, 40)] if sentences else [])
 
 
 def _figures(found: Statement) -> list[Table]:
-    if found.of_all is None:
+    """Return the table of the first sheet: with classes, and RMSE without points beside those of all."""
+    own = found.of_all
+    if own is None:
         return []
-    tables = [_figure_table(found, found.of_all, "")]
-    if found.of_rest is not None:
-        left = ", ".join(found.asked.without)
-        tables.append(_figure_table(found, found.of_rest, found.texts("table.without", points=left)))
-    return [*tables, _radii(found, found.of_all)]
-
-
-def _figure_table(found: Statement, own: Figures, caption: str) -> Table:
     texts, cells = found.texts, Written(found.texts)
-    unit = found.result.block.linear_unit
-    decimals = decimals_for(own.points.sd_adjusted)
     keys = ("mean", "sd", "rmse", "interval", "predicted", "survey", "combined", "largest")
     columns = [
         cells.column("component", text=True),
         cells.column("n"),
-        *(cells.column(key, unit) for key in keys),
+        *(cells.column(key) for key in keys),
         cells.column("point", text=True),
     ]
-    classes = bool(found.asked.classes) and not caption
+    rest = found.of_rest
+    if rest is not None:
+        columns.append(Column(texts("column.without", points=listed(list(found.asked.without), 3))))
+    classes = bool(found.asked.classes)
     if classes:
-        columns += [cells.column("class", unit), cells.column("verdict", text=True)]
+        columns += [cells.column("class"), cells.column("verdict", text=True)]
+    known = [each.predicted_rmse_of_product for each in own.prediction.values() if each is not None]
+    decimals = decimals_for(np.array(known))
     rows: list[Row] = []
-    for part, name in _PARTS:
-        sized, predicted = own.parts[part], own.prediction[part]
-        if sized is None or predicted is None:
+    for part in own.parts:
+        row = _row(found, own, part, decimals)
+        if not row:
             continue
-        survey, combined = _survey(own, part)
-        number = partial(cells.number, decimals=decimals)
-        low, high = (texts.number(each, decimals) for each in predicted.rmse_interval)
-        row: list[object] = [
-            texts(f"component.{name}"),
-            sized.n,
-            number(sized.mean),
-            number(sized.sd),
-            number(sized.rmse),
-            f"{low} – {high}",
-            number(predicted.predicted_rmse),
-            number(survey),
-            number(combined),
-            number(sized.largest),
-            sized.point,
-        ]
-        if classes:
-            row += _class(found, part, decimals, cells)
-        rows.append(row)  # type: ignore[arg-type]
-    return Table(caption or texts("page.figures"), columns, rows)
+        if rest is not None:
+            left = rest.parts[part]
+            row.append(cells.number(math.nan if left is None else left.rmse, decimals))
+        rows.append([*row, *(_class(found, part, decimals, cells) if classes else [])])
+    unit = found.result.block.linear_unit
+    return [Table(texts("table.figures", unit=unit), columns, rows)]
+
+
+def _row(found: Statement, own: Figures, part: str, decimals: int) -> list[Cell | str | float | None]:
+    texts, cells = found.texts, Written(found.texts)
+    sized, predicted = own.parts[part], own.prediction[part]
+    if sized is None or predicted is None:
+        return []
+    survey, combined = _survey(own, part)
+    low, high = (texts.number(each, decimals) for each in predicted.rmse_interval)
+    numbers = (sized.mean, sized.sd, sized.rmse), (predicted.predicted_rmse, survey, combined, sized.largest)
+    before, after = ([cells.number(each, decimals) for each in group] for group in numbers)
+    return [texts(f"component.{part}"), sized.n, *before, f"{low} – {high}", *after, sized.point]
 
 
 def _survey(own: Figures, part: str) -> tuple[float, float]:
@@ -142,29 +150,12 @@ def _survey(own: Figures, part: str) -> tuple[float, float]:
     return math.nan, math.nan
 
 
-def _class(found: Statement, part: str, decimals: int, cells: Written) -> list[object]:
+def _class(found: Statement, part: str, decimals: int, cells: Written) -> list[Cell | str | None]:
     asked, name = found.asked.classes, _CLASSES.get(part, "")
     if name not in asked or found.standards.asprs is None:
         return [None, ""]
     verdict = found.standards.asprs.verdicts.get(name, "")
     return [cells.number(asked[name], decimals), found.texts(f"asprs.verdict.{verdict}") if verdict else ""]
-
-
-def _radii(found: Statement, own: Figures) -> Table:
-    texts, cells = found.texts, Written(found.texts)
-    unit = found.result.block.linear_unit
-    decimals = decimals_for(own.points.sd_adjusted)
-    columns = [
-        Column("", text=True),
-        *(cells.column(key, unit) for key in ("sample", "upper", "moments", "predicted")),
-    ]
-    rows: list[Row] = []
-    for name, radius in own.radii.items():
-        if radius is not None:
-            values = (radius.sample, radius.upper, own.of_moments[name], own.mixture.get(name, math.nan))
-            numbers = [cells.number(math.nan if each is None else each, decimals) for each in values]
-            rows.append([name.upper(), *numbers])
-    return Table(texts("table.radii"), columns, rows, texts("table.radii.note"))
 
 
 def _notes(found: Statement) -> list[Text]:
@@ -182,32 +173,18 @@ def _notes(found: Statement) -> list[Text]:
     return [Text(f"{texts('asprs.footnote')} {texts('asprs.product', **fields)}")]
 
 
-def _maps(found: Statement) -> Sequence[Drawing]:
-    texts, unit = found.texts, found.result.block.linear_unit
+def _map(found: Statement) -> Drawing:
+    texts, control = found.texts, control_places(found.result.block)
     labels = {
         "control": texts("use.control"),
         "check": texts("use.check"),
         "east": texts("column.east"),
         "north": texts("column.north"),
         "height": texts("component.h"),
-        "photos": texts("column.photos"),
-        "unit": unit,
+        "unit": found.result.block.linear_unit,
     }
-    control = control_places(found.result.block)
-    return [
-        Drawing(
-            "map-differences",
-            texts("page.map"),
-            texts("page.map.caption"),
-            lambda: differences(found.compared, control, labels),
-        ),
-        Drawing(
-            "map-overlap",
-            texts("page.overlap"),
-            texts("page.overlap.caption"),
-            lambda: overlap(found.result, labels),
-        ),
-    ]
+    draw = partial(differences, found.compared, control, labels)
+    return Drawing("map-differences", texts("page.map"), texts("page.map.caption"), draw)
 
 
 def _metrology(found: Statement) -> list[Section]:
@@ -258,4 +235,4 @@ def _metrology(found: Statement) -> list[Section]:
         tables.append(Table(texts("table.iso"), columns, rows))
     if not tables:
         return []
-    return [Section("metrology", texts("page.values"), tables, annex=True)]
+    return [Section("annex-h", texts("annex.h"), tables, annex=True)]

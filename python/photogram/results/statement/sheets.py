@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,15 +15,30 @@ from photogram.results.statement.budget import Budget
 from photogram.results.statement.compared import Compared
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.leave_one_out import LeftOut
+from photogram.results.statement.statement import Statement
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Cell, Column, Row
 
-__all__ = ["Written", "budget_file", "check_file", "decimals_for", "left_out_file"]
+__all__ = ["Written", "decimals_for", "files_of_statement"]
 
 _AXES = ("e", "n", "h")
 
 
-def check_file(
+def files_of_statement(found: Statement) -> dict[str, bytes]:
+    """Return the tables of a statement as text of commas, by the names of files."""
+    unit = found.result.block.linear_unit
+    files = {
+        "check_points.csv": _check_file(
+            found.compared, found.of_all, found.survey.checks, dict(found.asked.without), unit
+        ),
+        "budget.csv": _budget_file(found.taken_apart),
+    }
+    if found.left_out:
+        files["leave_one_out.csv"] = _left_out_file(found.left_out, unit)
+    return files
+
+
+def _check_file(
     found: Compared, of_all: Figures | None, coordinates: Floats, without: dict[str, str], unit: str
 ) -> bytes:
     """Return `check_points.csv`: a row for each check point, and for known points that say nothing."""
@@ -53,7 +69,7 @@ def check_file(
     return csv_text(columns, [f"lengths in {unit}; d: adjusted minus given, to the east, north and up"])
 
 
-def left_out_file(found: Sequence[LeftOut], unit: str) -> bytes:
+def _left_out_file(found: Sequence[LeftOut], unit: str) -> bytes:
     """Return `leave_one_out.csv`: control points as the others predict them."""
     columns: dict[str, Any] = {"point": [each.point for each in found]}
     for name, values in (("d", [each.difference for each in found]), ("sd", [each.sd for each in found])):
@@ -70,7 +86,7 @@ def left_out_file(found: Sequence[LeftOut], unit: str) -> bytes:
     )
 
 
-def budget_file(found: Sequence[Budget]) -> bytes:
+def _budget_file(found: Sequence[Budget]) -> bytes:
     """Return `budget.csv`: a row for each source of each quantity at each level."""
     rows: list[tuple[Any, ...]] = []
     for each in found:
@@ -127,6 +143,10 @@ class Written:
             return Cell("")
         known = math.isfinite(value)
         return Cell(self._texts.number(value, decimals), sorts=value if known else None)
+
+    def looked(self, value: float, decimals: int, *, bad: bool) -> Cell:
+        """Return a number that is to be looked at where it is bad."""
+        return replace(self.number(value, decimals), tone="look" if bad else "")
 
     def figures(self, value: float | None, figures: int = 3) -> Cell:
         """Return a number with so many significant figures."""

@@ -1,0 +1,265 @@
+"""`photogram statement`: an accuracy statement that one may hand over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from photogram.cli.adjust import adjusted_block, started_block
+from photogram.cli.console import print_remark, print_sections
+from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.maps import Crs
+from photogram.cli.options import Quiet, Strict, Threads, default_out, out_option
+from photogram.cli.projects import (
+    NOTHING,
+    Additions,
+    Example,
+    ProjectPath,
+    project_path,
+    read_project,
+    with_additions,
+    with_options,
+)
+
+if TYPE_CHECKING:
+    from photogram import Result
+    from photogram.results.statement.statement import Statement
+
+__all__ = ["statement", "statement_files"]
+
+
+class LanguageName(StrEnum):
+    """Languages of the page."""
+
+    EN = "en"
+    DE = "de"
+
+
+class IndependentName(StrEnum):
+    """What may be declared of the survey of check points."""
+
+    YES = "yes"
+    SAME_BASE = "same-base"
+    NO = "no"
+
+
+def _text(name: str, what: str, metavar: str = "TEXT") -> Any:
+    return typer.Option(f"--{name}", metavar=metavar, help=what, show_default=False)
+
+
+Word = str | None
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is asked of a statement, with the options that say it; a project may say it too."""
+
+    standard: Annotated[
+        Word,
+        _text("standard", "plain, asprs-2023, nssda, vdi-2634, iso-19157.", "NAME,.."),
+    ] = None
+    class_h: Annotated[Word, _text("class-h", "Horizontal accuracy class: 5cm.", "LENGTH")] = None
+    class_v: Annotated[Word, _text("class-v", "Vertical accuracy class: 10cm.", "LENGTH")] = None
+    class_3d: Annotated[Word, _text("class-3d", "Three-dimensional accuracy class.", "LENGTH")] = None
+    area: Annotated[
+        Word, _text("area", "Area of the product: 12.5km2. Default: hull of the adjusted points.", "AREA")
+    ] = None
+    without: Annotated[
+        list[str] | None,
+        _text("without", "Give figures without a check point beside, with the reason.", "POINT=REASON"),
+    ] = None
+    independent: Annotated[
+        IndependentName | None,
+        typer.Option(help="Declare whether check points are independent of the block.", show_default=False),
+    ] = None
+    language: Annotated[
+        LanguageName | None, typer.Option(help="Of the page. Default: en.", show_default=False)
+    ] = None
+    text: Annotated[
+        Path | None,
+        Reads.FILE,
+        typer.Option(metavar="FILE", help="Sentences of a firm: TOML, by key.", show_default=False),
+    ] = None
+    budget: Annotated[
+        list[str] | None,
+        _text(
+            "budget",
+            "Take a quantity apart: 'point C08 z', 'distance C01 C30' ..",
+            "QUANTITY",
+        ),
+    ] = None
+    coverage: Annotated[
+        float | None,
+        typer.Option(
+            metavar="P",
+            min=0.01,
+            max=0.999999,
+            help="Probability of expanded uncertainties. Default: 0.95.",
+            show_default=False,
+        ),
+    ] = None
+    project: Annotated[Word, _text("project", "Project, for the head of the page.")] = None
+    client: Annotated[Word, _text("client", "Client.")] = None
+    firm: Annotated[Word, _text("firm", "Firm.")] = None
+    surveyor: Annotated[Word, _text("surveyor", "Who signs.")] = None
+    date: Annotated[Word, _text("date", "Date of the statement (2026-11-25). Default: today.")] = None
+
+    def options(self, unit: str) -> dict[str, Any]:
+        """Return what :meth:`photogram.Result.statement` takes of it; `unit` is that of the block."""
+        from photogram.formats.sentences import read_sentences
+        from photogram.results.statement.asked import length_of
+
+        sizes = {"h": self.class_h, "v": self.class_v, "3d": self.class_3d}
+        classes = {name: length_of(size, unit) for name, size in sizes.items() if size is not None}
+        found: dict[str, Any] = {
+            "standards": None if self.standard is None else _listed(self.standard),
+            "classes": classes or None,
+            "area": None if self.area is None else length_of(self.area, unit, area=True),
+            "without": dict(map(_reason, self.without)) if self.without else None,
+            "independent": None if self.independent is None else self.independent.value,
+            "language": None if self.language is None else self.language.value,
+            "text": None if self.text is None else read_sentences(self.text),
+            "budgets": tuple(self.budget) if self.budget else None,
+            "coverage": self.coverage,
+        }
+        found |= {name: getattr(self, name) for name in ("project", "client", "firm", "surveyor", "date")}
+        return {name: value for name, value in found.items() if value is not None}
+
+
+def _listed(given: str) -> tuple[str, ...]:
+    return tuple(each.strip() for each in given.split(",") if each.strip())
+
+
+def _reason(given: str) -> tuple[str, str]:
+    point, equals, reason = given.partition("=")
+    if not (equals and point.strip() and reason.strip()):
+        raise typer.BadParameter(f'{given!r} is not POINT="reason"', param_hint="--without")
+    return point.strip(), reason.strip()
+
+
+@with_job
+@with_options("wanted", Wanted)
+@with_additions()
+def statement(
+    job: Job,
+    path: ProjectPath = None,
+    example: Example = False,
+    out: Annotated[
+        Path | None,
+        Writes.DIRECTORY,
+        out_option("Directory for the page, PDF, JSON and tables. Default: PATH-statement."),
+    ] = None,
+    wanted: Wanted = Wanted(),  # frozen
+    crs: Crs = None,
+    added: Additions = NOTHING,
+    threads: Threads = None,
+    strict: Strict = False,
+    quiet: Quiet = False,
+) -> None:
+    """State how accurate a block is, by whose standard, found how, assuming what: a page to hand over.
+
+    PATH is a result that `photogram adjust --parquet` has written, or a project, which is adjusted first.
+    Check points need standard deviations of their survey: in the table of control, or --sd check=0.01.
+    """
+    source = project_path(job, path)
+    target = out or (Path("example-statement") if example else default_out(source, "-statement"))
+    with job:
+        from photogram.formats.additions import deviations
+
+        result, declared, assumed = _adjusted(job, source, added, threads)
+        asked = {**declared, **wanted.options(result.block.linear_unit)}
+        sd = deviations(added.sd or []).get("check")
+        if sd is not None:
+            asked["sd"] = sd
+        with job.status("stating"):
+            found = stated(job, result, asked, crs=crs, strict=strict, assumed=assumed)
+            files = statement_files(job, found, target)
+        job.finish(files, summary=lambda: print_sections(_summary(found), "statement.json"), code=found.exit)
+
+
+def _adjusted(
+    job: Job, path: Path, added: Additions, threads: int | None
+) -> tuple[Result, Mapping[str, Any], Sequence[str]]:
+    """Return what is stated, what its project asks for, and what was assumed when it was read."""
+    from photogram import Result, read_result
+    from photogram.formats.results import is_result
+
+    if is_result(path):
+        job.reads(path)
+        result = read_result(path)
+        if not isinstance(result, Result):
+            raise typer.BadParameter("points of a collection have no given coordinates", param_hint="PATH")
+        return result, {}, ()
+    project = read_project(job, path, added)
+    block, started = started_block(project, keep_all=False)
+    result = adjusted_block(job, project, started or block, threads=threads)
+    return result, project.statement, project.lacks
+
+
+def stated(
+    job: Job,
+    result: Result,
+    asked: Mapping[str, Any],
+    *,
+    crs: str | None = None,
+    strict: bool = False,
+    assumed: Sequence[str] = (),
+    removed: Sequence[str] = (),
+) -> Statement:
+    """Return the statement of a result, with the files it was made of; dated today where no date is given."""
+    from datetime import date
+
+    from photogram import statement as made
+    from photogram.formats.placing import placed
+    from photogram.results.statement.surveyed import System
+
+    run = job.run("statement")
+    system = None
+    if crs is not None:
+        place = placed(result, crs)
+        (x, y, z), (u, v, w) = place.names, place.units
+        system = System(crs, ((x, u), (y, v), (z, w)), place.carried)
+    given = " ".join(f"{name} {value}" for name, value in run.options.items())
+    return made(
+        result,
+        strict=strict,
+        assumed=assumed,
+        removed=removed,
+        system=system,
+        inputs=run.inputs,
+        command=f"{run.command} {given}".rstrip(),
+        **{"date": date.today().isoformat(), **asked},
+    )
+
+
+def statement_files(job: Job, found: Statement, folder: Path) -> dict[Path, bytes]:
+    """Return all files of a statement; where what makes page or PDF is absent, that is told."""
+    from photogram.results.statement.sheets import files_of_statement
+
+    files = {folder / name: content for name, content in files_of_statement(found).items()}
+    files[folder / "statement.json"] = found.to_json()
+    for name, needed, make in (
+        ("statement.html", ("jinja2", "matplotlib"), found.to_html),
+        ("statement.pdf", ("reportlab", "matplotlib"), found.to_pdf),
+    ):
+        if all(map(find_spec, needed)):
+            files[folder / name] = make()
+        elif not job.quiet:
+            extra = "pdf" if name.endswith(".pdf") else "report"
+            print_remark(f"no {name}: pip install 'photogram[{extra}]'")
+    return files
+
+
+def _summary(found: Statement) -> list[tuple[str, list[str]]]:
+    """Return what is told on the screen: what the page says first."""
+    return [
+        (found.texts("page.what"), [found.headline]),
+        (found.texts("page.figures"), [text for _, text in found.judged.sentences]),
+        *([(found.texts("page.remarks"), found.judged.remarks)] if found.judged.remarks else []),
+    ]
