@@ -45,3 +45,29 @@ def control():
         )
         for use in ("control", "check")
     }
+
+
+def block_path():
+    """Return where the golden block lies."""
+    path = SHARED / "statement" / "block"
+    if not path.exists():
+        pytest.skip(f"{path} is not here")
+    return path
+
+
+def compare(found, expected, path, tolerance):
+    """Compare all that a golden member has, names and numbers, with what was found; probabilities to 1e-6."""
+    if isinstance(expected, dict):
+        for key, value in expected.items():
+            compare(found[key], value, f"{path}.{key}", tolerance)
+    elif isinstance(expected, list):
+        assert len(found) == len(expected), path
+        for k, (one, other) in enumerate(zip(found, expected, strict=True)):
+            compare(one, other, f"{path}[{k}]", tolerance)
+    elif isinstance(expected, float):
+        if path.endswith((".p", ".p_high")):
+            assert abs(found - expected) < 1e-6, path
+        else:
+            assert abs(found - expected) <= tolerance * abs(expected), (path, found, expected)
+    else:
+        assert found == expected, path

@@ -167,7 +167,7 @@ def compared(result: Result, asked: Asked) -> Compared:
     """
     block, checks = result.block, result.check_points
     rows = in_order(block, checks.rows)
-    step = -(-len(rows) // MOST)
+    step = max(-(-len(rows) // MOST), 1)
     rows = rows[::step]
     names = tuple(block.point_ids[row] for row in rows.tolist())
     _check_apart(block, rows)
