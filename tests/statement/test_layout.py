@@ -103,3 +103,18 @@ def test_a_hull_has_the_area_of_that_of_another_program_and_holds_its_points(poi
 def test_positions_that_are_none_are_refused(call, said):
     with pytest.raises(InputError, match=said):
         call()
+
+
+def test_the_hull_of_many_points_is_that_of_all():
+    from photogram.network import hull as module
+
+    random = np.random.default_rng(3)
+    for points in (
+        random.uniform(-5, 9, (5000, 2)),
+        random.standard_normal((4000, 2)) * [3, 0.01],
+        np.column_stack([np.arange(2000.0), np.zeros(2000)]),
+        np.repeat(random.uniform(0, 1, (7, 2)), 400, axis=0),
+    ):
+        found = module.hull(points)
+        assert not module.outside(points, found).any()
+        assert {tuple(corner) for corner in found} <= {tuple(point) for point in points}

@@ -301,7 +301,7 @@ def test_one_check_point_has_no_standard_deviation_of_the_sample(result):
 
 def test_the_sample_intervals_hold_and_bias_tests_keep_their_level(result):
     """Linear draws with the joint covariance: 95 +- 1 percent, 5 +- 1 percent."""
-    found = compared(result, Asked())
+    found = compared(result, Asked(), result.covariances())
     random = np.random.default_rng(5)
     root = np.linalg.cholesky(found.covariance)
     draws = random.standard_normal((8000, len(root))) @ root.T

@@ -8,6 +8,7 @@ from photogram.arguments.types import Bools, Floats
 
 __all__ = ["area", "hull", "outside"]
 
+MANY, DIRECTIONS = 1000, 16
 ROUNDING = 1e-9
 """Of the extent of a hull: a point that is no farther outside lies on it."""
 
@@ -17,6 +18,7 @@ def hull(points: Floats) -> Floats:
 
     Andrew's monotone chain. Points on a line have two corners, equal points up to two equal ones.
     """
+    points = _outermost(points)
     order = points[np.lexsort((points[:, 1], points[:, 0]))].tolist()
 
     def chain(ordered: list[list[float]]) -> list[list[float]]:
@@ -31,6 +33,23 @@ def hull(points: Floats) -> Floats:
         return kept
 
     return np.array(chain(order)[:-1] + chain(order[::-1])[:-1] or order[:1])
+
+
+def _outermost(points: Floats) -> Floats:
+    """Return the points that are not well within the polygon of those farthest out in some directions.
+
+    Of thousands few are left for the chain (Akl and Toussaint 1978).
+    """
+    if len(points) < MANY:
+        return points
+    turns = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
+    farthest = [int(np.argmax(points @ (np.cos(turn), np.sin(turn)))) for turn in turns]
+    corners = points[list(dict.fromkeys(farthest))]
+    within = np.full(len(points), len(corners) > 2)
+    for first, last in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        x, y = last - first
+        within &= x * (points[:, 1] - first[1]) - y * (points[:, 0] - first[0]) > 0
+    return points[~within]
 
 
 def area(corners: Floats) -> float:

@@ -35,6 +35,30 @@ impl ObservationRows {
         all
     }
 
+    /// A x of every row for several x without keeping the rows: for each row, in their order, a number for each x.
+    pub fn products(
+        problem: &AnyProblem<'_>,
+        values: &[f64],
+        held: &[usize],
+        xs: &[Vec<f64>],
+        threads: &Threads,
+    ) -> Vec<f64> {
+        let equations = ObservationEquations::new(problem, None, values, held, threads);
+        let of_locals = problem.for_locals(threads, |buffers, local| {
+            let mut found = vec![];
+            equations.each_row(buffers, local, |row| multiply(row.taken(), xs, &mut found));
+            found
+        });
+        let mut all = of_locals.concat();
+        equations.each_row_of_ties(|_, row| multiply(row.taken(), xs, &mut all));
+        let (terms, fixed) = (problem.terms(values), problem.fixed(held));
+        for unknown in 0..values.len() {
+            let (row, _) = terms.row(unknown);
+            multiply(row.into_iter().filter(|&(column, _)| !fixed[column]), xs, &mut all);
+        }
+        all
+    }
+
     fn empty() -> Self {
         Self { starts: vec![0], unknowns: vec![], coefficients: vec![], constants: vec![] }
     }
@@ -81,5 +105,14 @@ impl ObservationRows {
         let mut right = vec![0.0; unknowns];
         self.row(row).for_each(|(unknown, value)| right[unknown] += value);
         right
+    }
+}
+
+/// Puts a row times each x behind what is there.
+fn multiply(row: impl Iterator<Item = (usize, f64)>, xs: &[Vec<f64>], found: &mut Vec<f64>) {
+    let start = found.len();
+    found.resize(start + xs.len(), 0.0);
+    for (unknown, value) in row {
+        found[start..].iter_mut().zip(xs).for_each(|(sum, x)| *sum += value * x[unknown]);
     }
 }

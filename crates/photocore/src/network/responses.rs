@@ -100,13 +100,13 @@ impl Trial {
         of: &[Of],
         threads: &Threads,
     ) -> Result<Vec<f64>, NetworkError> {
-        let problem = &self.assembled.problem;
-        let rows = ObservationRows::new(problem, covariances.linearized.values(), &self.held, threads);
+        let (problem, values) = (&self.assembled.problem, covariances.linearized.values());
+        let solutions = covariances.solutions(partials, of, threads)?;
         let all = self.rows_of(0..self.suspects.len());
-        let mut influences = Vec::new();
-        for solution in covariances.solutions(partials, of, threads)? {
-            influences.extend(rows.times(&all, &solution, threads));
-        }
+        let width = solutions.len();
+        let products = ObservationRows::products(problem, values, &self.held, &solutions, threads);
+        let of_function = |k: usize| all.iter().map(move |&row| (row, k));
+        let influences = (0..width).flat_map(of_function).map(|(row, k)| products[row * width + k]).collect();
         Ok(influences)
     }
 

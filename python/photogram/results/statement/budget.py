@@ -17,6 +17,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.network.core import block_network
 from photogram.results.components import VarianceComponents
+from photogram.results.covariance import Covariances
 from photogram.results.group_sums import Left, Probing, observables
 from photogram.results.grouping import grouped
 from photogram.results.result import Result
@@ -159,6 +160,7 @@ class Budget:
 def budgets(
     result: Result,
     wanted: Sequence[Wanted],
+    covariances: Covariances,
     *,
     coverage: float = 0.95,
     components: VarianceComponents | None = None,
@@ -187,7 +189,6 @@ def budgets(
         pairs = zip(wanted, places, strict=True)
         return np.array([each.function(*(arrays[place] for place in own)) for each, own in pairs])
 
-    covariances = result.covariances()
     values = covariances.propagate(together, items)
     _, effects = covariances.influences(core, items, together)
     freedom = _Freedoms(result, rows, components)

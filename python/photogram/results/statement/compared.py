@@ -23,6 +23,7 @@ from photogram.network.block import Block
 from photogram.network.geometry import Spheroid, geocentric_to_geographic, lengths_of_units, local_frames
 from photogram.network.observations import Control
 from photogram.network.rays import local_axes
+from photogram.results.covariance import Covariances
 from photogram.results.result import Result
 from photogram.results.statement.asked import Asked
 
@@ -154,8 +155,8 @@ class Compared:
         return replace(found, vegetated=np.zeros(len(found), dtype=bool))
 
 
-def compared(result: Result, asked: Asked) -> Compared:
-    """Return the check points of a result.
+def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared:
+    """Return the check points of a result, by its covariances.
 
     Raises
     ------
@@ -176,7 +177,7 @@ def compared(result: Result, asked: Asked) -> Compared:
     differences = _turned(turn, result.point_differences[rows])
     sd = _survey(block, rows, differences, names, asked.sd)
     n = len(names)
-    joint = result.covariance(("point", names)) if names else np.zeros((0, 0))
+    joint = covariances.covariance(("point", names)) if names else np.zeros((0, 0))
     blocks = np.einsum("iab,ibjc,jdc->iajd", turn, joint.reshape(n, 3, n, 3), turn, optimize=True)
     known = result.unit_variance == "unity" or result.variance_of_unit_weight is None
     for name in asked.vegetated:

@@ -25,6 +25,8 @@ __all__ = ["Bias", "PointTests", "Prediction", "Surface", "bias", "point_tests",
 LEVEL = 0.05
 SINGULAR = 1e-12
 """Variance, in those of the components, below which a direction has none."""
+BORDER = 2.0 / SINGULAR
+"""More than T can be where C is not singular, over the squares of scaled differences."""
 LEAST = 6
 """Points with heights that a surface takes."""
 FLAT = 1e-6
@@ -220,12 +222,41 @@ def _limit(freedom: int, upper: bool) -> float:
 
 def _quadratic(d: Floats, covariance: Floats) -> tuple[float, int]:
     """Return d' C^+ d and the rank of C."""
-    scale = np.sqrt(np.diag(covariance))
-    scale = np.where(scale > 0, scale, 1.0)
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    scale = _scale(covariance)
+    scaled = covariance / np.outer(scale, scale)
+    # The last row of the factor of C bordered by d is L^-1 d: no second elimination.
+    y = d / scale
+    bordered = np.block([[scaled, y[:, np.newaxis]], [y, np.array([[BORDER * (1.0 + y @ y)]])]])
+    root = _root(bordered)
+    if root is not None:
+        return float(root[-1, :-1] @ root[-1, :-1]), len(d)
+    values, vectors = np.linalg.eigh(scaled)
     free = values > SINGULAR
     along = vectors.T @ (d / scale)
     return float((along[free] ** 2 / values[free]).sum()), int(free.sum())
+
+
+def _inverse(covariance: Floats) -> Floats:
+    """Return C^+."""
+    scale = _scale(covariance)
+    scaled = covariance / np.outer(scale, scale)
+    if _root(scaled) is not None:
+        return np.asarray(np.linalg.inv(scaled) / np.outer(scale, scale))
+    return np.asarray(np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True) / np.outer(scale, scale))
+
+
+def _scale(covariance: Floats) -> Floats:
+    sd = np.sqrt(np.diag(covariance))
+    return np.where(sd > 0, sd, 1.0)
+
+
+def _root(scaled: Floats) -> Floats | None:
+    """Return the Cholesky factor of a matrix whose diagonal is ones, perhaps bordered; None if singular."""
+    try:
+        root = np.linalg.cholesky(scaled)
+    except np.linalg.LinAlgError:
+        return None
+    return root if float(np.diag(root).min(initial=1.0)) ** 2 > SINGULAR else None
 
 
 def bias(found: Compared, component: str, k: float) -> Bias | None:
@@ -279,18 +310,20 @@ def point_tests(found: Compared) -> PointTests:
     sd = np.sqrt(np.diag(found.covariance)).reshape(n, 3)
     adjusted = found.blocks(found.product)
     counted = np.isfinite(found.differences)
-    statistic, others, dimension = np.full(n, np.nan), np.full(n, np.nan), counted.sum(axis=1).astype(float)
+    dimension = counted.sum(axis=1).astype(float)
+    statistic, others = np.full(n, np.nan), np.full(n, np.nan)
     rows = np.flatnonzero(counted.ravel())
     whole = found.covariance[np.ix_(rows, rows)]
     d = found.differences.ravel()[rows]
-    inverse = np.linalg.pinv(whole, rcond=SINGULAR, hermitian=True) if len(rows) else whole
+    inverse = _inverse(whole) if len(rows) else whole
     y = inverse @ d
-    for point in range(n):
-        own = np.flatnonzero(rows // 3 == point)
-        if len(own):
-            grid = np.ix_(own, own)
-            statistic[point], _ = _quadratic(d[own], whole[grid])
-            others[point] = float(y[own] @ np.linalg.pinv(inverse[grid], hermitian=True) @ y[own])
+    firsts = np.searchsorted(rows // 3, np.arange(n))
+    for size in np.unique(dimension[dimension > 0]).astype(int).tolist():
+        points = np.flatnonzero(dimension == size)
+        own = firsts[points, np.newaxis] + np.arange(size)
+        grid = (own[:, :, np.newaxis], own[:, np.newaxis, :])
+        statistic[points] = _each(whole[grid], d[own])
+        others[points] = _each(inverse[grid], y[own])
     with np.errstate(divide="ignore", invalid="ignore"):
         normalised = np.where(counted, found.differences / sd, np.nan)
     sd_adjusted = np.sqrt(np.diagonal(adjusted, axis1=1, axis2=2))
@@ -306,6 +339,12 @@ def point_tests(found: Compared) -> PointTests:
         ce90=circular_error(adjusted[:, :2, :2], 0.9) if n else np.zeros(0),
         le90=sd_adjusted[:, 2] * critical_normal(0.1),
     )
+
+
+def _each(matrices: Floats, vectors: Floats) -> Floats:
+    """Return v' M^+ v of each of (n, k, k) matrices and (n, k) vectors."""
+    inverse = np.linalg.pinv(matrices, rcond=SINGULAR, hermitian=True)
+    return np.asarray(np.einsum("ni,nij,nj->n", vectors, inverse, vectors))
 
 
 def _above(values: Floats, freedom: Floats) -> Floats:

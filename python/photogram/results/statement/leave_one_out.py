@@ -60,10 +60,10 @@ def leave_one_out(result: Result) -> list[LeftOut]:
     """Return every control point that took part as the others predict it, in the order of their names."""
     block, found = result.block, []
     observed = {each.point: each for each in block.observations if isinstance(each, Control)}
-    held_by = np.isfinite(block.point_sd).any(axis=1) | np.isin(
-        np.array(block.point_ids, dtype=object), [*observed]
-    )
+    held_by = np.isfinite(block.point_sd).any(axis=1)
+    held_by[[row for row, name in enumerate(block.point_ids) if name in observed]] = True
     control = np.flatnonzero(result.used_points & held_by)
+    residuals = result.point_residuals
     for row in in_order(block, control).tolist():
         name = block.point_ids[row]
         q = result.point_cofactors[row]
@@ -79,7 +79,7 @@ def leave_one_out(result: Result) -> list[LeftOut]:
         held = np.flatnonzero(np.isfinite(block.point_sd[row]) & (block.point_sd[row] > 0))
         if len(held):
             # Held along the axes of the block; those of geocentric blocks are turned together.
-            sd, v = block.point_sd[row, held], result.point_residuals[row, held]
+            sd, v = block.point_sd[row, held], residuals[row, held]
             if len(held) == 3:
                 whole = turn @ np.diag(sd)
                 found.append(_predicted(name, held, turn @ v, whole, turn @ q @ turn.T, result))

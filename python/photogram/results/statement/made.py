@@ -82,7 +82,8 @@ def statement(
             "there is no statement without covariances: adjust with covariance=True, not in parts"
         )
     texts = Texts(options.language, options.text, result.block.linear_unit)
-    found = compared(result, options)
+    covariances = result.covariances()
+    found = compared(result, options, covariances)
     rest = found.without(list(options.without)) if options.without else None
     of_all = figures(found, options.coverage)
     of_vegetated = figures(found.in_vegetation(), options.coverage)
@@ -92,7 +93,9 @@ def statement(
         if options.budgets is None
         else [wanted(result, each) for each in options.budgets]
     )
-    taken_apart = budgets(result, quantities, coverage=options.coverage, components=options.components)
+    taken_apart = budgets(
+        result, quantities, covariances, coverage=options.coverage, components=options.components
+    )
     said = standards(result, options, found, of_all, of_vegetated, left_out)
     lie = _layout(result, found)
     return Statement(

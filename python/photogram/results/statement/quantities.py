@@ -96,7 +96,8 @@ def chosen(result: Result, checks: Sequence[str]) -> list[Wanted]:
     between these points; the principal distance where it was estimated.
     """
     block = result.block
-    rows = np.flatnonzero(np.isin(np.array(block.point_ids, dtype=object), list(checks)))
+    own = set(checks)
+    rows = np.flatnonzero([name in own for name in block.point_ids])
     if not len(rows):
         rows = np.flatnonzero(result.used_points & (result.point_kinds == "pass"))
     found = []

@@ -138,7 +138,12 @@ class Statement(Brief):
         for each in self.taken_apart:
             if each.quantity == quantity:
                 return budget_member(each)
-        made = budgets(self.result, [wanted(self.result, quantity)], coverage=self.asked.coverage)
+        made = budgets(
+            self.result,
+            [wanted(self.result, quantity)],
+            self.result.covariances(),
+            coverage=self.asked.coverage,
+        )
         return budget_member(made[0])
 
     def __getitem__(self, name: str) -> dict[str, Any]:
