@@ -17,8 +17,7 @@ PhotosFolder = Annotated[
     typer.Option(
         "--photos-dir",
         metavar="DIR",
-        help="Folder of the photographs: positions in their files (EXIF, XMP, .MRK, geo.txt ...) are"
-        " observations.",
+        help="Photographs: positions in their files (EXIF, XMP, .MRK, geo.txt) are observations.",
         show_default=False,
     ),
 ]
@@ -27,14 +26,13 @@ PhotosCrs = Annotated[
     typer.Option(
         "--photos-crs",
         metavar="CRS",
-        help="System of positions in files of photographs that do not say it, or not what heights are above:"
-        " EPSG:4979, EPSG:4326+geoid=46.5.",
+        help="System of these, also of heights, where it is not said: EPSG:4326+geoid=46.5.",
         show_default=False,
     ),
 ]
 MrkAntenna = Annotated[
     bool,
     typer.Option(
-        "--mrk-antenna", help="Positions in .MRK files are those of the antenna, not of the camera."
+        "--mrk-antenna", help="Positions in .MRK are those of antennas."
     ),
 ]

@@ -164,7 +164,7 @@ def _tables(directory: Path, files: Sequence[Path], found: Found) -> dict[str, S
             if given.setdefault(key, said) is not said:
                 again[path] = again.get(path, 0) + 1
     for path, count in again.items():
-        text = f"{counted(count, 'photo')} stand in another table before it: what is said here does not count"
+        text = f"positions of {counted(count, 'photo')} are those of another table, not of this one"
         found.messages.append(Message(text, path))
     return given
 
