@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from example_scripts import load
 from formats.photographs import EXAMPLE, ORIGIN, block_with_pictures, dji, packet, picture, tags
 from photogram import InputError, formats
 from photogram.formats import PhotoFiles, Wishes, read_metadata
@@ -15,7 +16,6 @@ from photogram.network.observations import Position
 
 MRK = "{}\t384233.385421\t[2264]\t -40,N\t 0,E\t 86,V\t{},Lat\t{},Lon\t{},Ellh\t0.021, 0.022, 0.043\t50,Q\n"
 PLACE = (8.5, 47.3, 500.0)
-FILES = "photo files"
 
 
 @pytest.fixture(autouse=True)
@@ -382,3 +382,25 @@ def test_the_command_spares_pictures_and_refuses_words_about_nothing(run, flown)
         refused = run("info", folder, *words)
         assert refused.exit_code == 2
         assert "says something of --photos-dir" in refused.stderr
+
+
+def test_the_example_reads_five_pictures_and_a_table(capsys):
+    result = load("photo_positions").main()
+    assert result.converged
+    assert "{'XMP': 5, 'geo.txt': 1}" in capsys.readouterr().out
+    assert [each.shift is None for each in result.block.observations].count(True) == 1
+
+
+def test_positions_that_are_not_used_are_of_no_kind(tmp_path):
+    def write(path, *place):
+        if path.stem == "DJI_0101":
+            picture(path, gps=tags(*place))
+        else:
+            picture(path, xmp=packet(dji(*place)))
+
+    block_with_pictures(tmp_path, write=write)
+    project = adjusted(tmp_path)
+    assert len(positions(project)) == 5
+    assert "no standard deviations of 1 position of photos (--sd gnss=...)" in project.lacks
+    with pytest.raises(InputError, match="heights of two kinds"):
+        adjusted(tmp_path, sd={"gnss": (5.0,)})

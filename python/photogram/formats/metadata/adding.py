@@ -66,13 +66,14 @@ def with_photo_files(project: Project, files: PhotoFiles, sd: Mapping[str, tuple
         in axes of its own.
     """
     metadata = read_metadata(files.directory, mrk_antenna=files.mrk_antenna)
-    keys = _keys(project, metadata)
-    names = {key: name for name, key in keys.items()}
-    every = located([metadata.photos[key] for key in keys.values()], files.crs, sd.get("gnss"))
-    rows = np.flatnonzero(np.isfinite(every.sd).all(axis=1)).tolist()
-    lacking = len(every.records) - len(rows)
-    known = every.of(rows)
-    messages = [*metadata.messages, *remarks_on(known.records), *_told(metadata, known)]
+    records = {name: metadata.photos[key] for name, key in _keys(project, metadata).items()}
+    there = [name for name, each in records.items() if each.position is not None]
+    photos = [name for name in there if records[name].deviations is not None or "gnss" in sd]
+    lacking = len(there) - len(photos)
+    known = located([records[name] for name in photos], files.crs, sd.get("gnss"))
+    messages = [*metadata.messages, *remarks_on(known.records)]
+    if photos:
+        messages += _told(metadata, known)
     lacks = list(project.lacks)
     if lacking:
         lacks.append(f"no standard deviations of {counted(lacking, 'position')} of photos (--sd gnss=...)")
@@ -80,9 +81,8 @@ def with_photo_files(project: Project, files: PhotoFiles, sd: Mapping[str, tuple
     project = project.replace(
         messages=(*project.messages, *messages), lacks=tuple(lacks), details={**project.details, **read}
     )
-    if not rows:
+    if not photos:
         return project
-    photos = [names[each.photo] for each in known.records]
     project, xyz, covariances = _in_frame(project, known, photos)
     observed = _observations(project, known, photos, xyz, covariances)
     return project.replace(block=project.block.replace(observations=[*project.block.observations, *observed]))

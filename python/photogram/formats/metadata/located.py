@@ -55,15 +55,6 @@ class Located:
         """The flight of each position that has a shift and a lever arm in common with others; else empty."""
         return [each.flight if each.rtk else "" for each in self.records]
 
-    def of(self, rows: Sequence[int]) -> Located:
-        """Return some of the positions."""
-        return Located(
-            tuple(self.records[row] for row in rows),
-            tuple(self.systems[row] for row in rows),
-            self.xyz[rows],
-            self.sd[rows],
-        )
-
     def in_frame(self, frame: Frame) -> tuple[Floats, Floats, list[str]]:
         """Return (n, 3) positions and (n, 3, 3) covariances in a frame, and what is to be said of it.
 
@@ -97,7 +88,7 @@ class Located:
         known = np.nan_to_num(self.sd)
         xyz, turned, _ = Located(self.records, self.systems, self.xyz, known).in_frame(frame)
         xyz[:, :2] = np.degrees(xyz[:, :2])
-        sd = np.sqrt(np.diagonal(turned, axis1=1, axis2=2))
+        sd = np.sqrt(np.maximum(np.diagonal(turned, axis1=1, axis2=2), 0.0))
         return xyz, np.where(np.isnan(self.sd), np.nan, sd)
 
 

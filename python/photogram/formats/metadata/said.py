@@ -33,7 +33,9 @@ UNSAID, OTHER_REFERENCE = "unsaid", "unsaid, altitude reference 2 or 3"
 
 FIXED = "fixed"
 HIGHEST = 1e5
-"""Metres that a height may be at most."""
+"""Metres that a height, or a standard deviation, may be at most."""
+LEAST = 1e-6
+"""Metres that a standard deviation is at least."""
 
 
 @dataclass(frozen=True)
@@ -100,10 +102,10 @@ def fix_of(flag: int | None) -> str:
 def usable_deviations(east: float, north: float, height: float) -> Triple | None:
     """Return standard deviations; None where one of them is not positive or not there (NaN).
 
-    A receiver without a solution writes 0: that is no accuracy.
+    A receiver without a solution writes 0: that is no accuracy, nor is what no receiver has.
     """
     found = (east, north, height)
-    return found if all(0 < each < math.inf for each in found) else None
+    return found if all(LEAST <= each <= HIGHEST for each in found) else None
 
 
 def geographic_position(place: Place, values: Sequence[float]) -> Triple | None:
