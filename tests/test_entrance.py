@@ -47,6 +47,9 @@ def with_inputs(run, name, where):
         run("absolute-orientation", "--example", "--json", "former.json", "--quiet")
         where["points.csv"] = Path(PACKAGE) / "absolute_orientation" / "points.csv"
         return ["out.csv"]
+    if name == "metadata":
+        Path("flight").mkdir()
+        Path("flight/geo.txt").write_text("EPSG:4979\nDJI_0001.JPG 8.5 47.3 500\n")
     if name == "comparator correct":
         run("comparator", "--example", "--no-plots", "--quiet")
         where["former.json"] = Path("comparator-calibrated", "correction.json")

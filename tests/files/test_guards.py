@@ -61,6 +61,7 @@ RUNS = {
     "check": (["check", "project"], ["project/images.csv"]),
     "features": (["features", "project", "--distance", "d=south-1,t01"], ["project/images.csv"]),
     "info": (["info", "project"], ["project/images.csv"]),
+    "metadata": (["metadata", "flight"], ["flight/geo.txt"]),
     "convert": (["convert", "project"], ["project/images.csv"]),
     "new": (["new"], []),
     "plan": (["plan", "galveston", "second"], ["galveston/FRAMES", "second/GROUND"]),
@@ -113,6 +114,8 @@ def place(tmp_path, request):
     for project in ("galveston", "second"):
         shutil.copytree(EXAMPLES / "galveston", tmp_path / project)
     shutil.copytree(EXAMPLES / "project", tmp_path / "project")
+    (tmp_path / "flight").mkdir()
+    (tmp_path / "flight" / "geo.txt").write_text("EPSG:4979\nDJI_0001.JPG 8.5 47.3 500\n")
     (tmp_path / "former.json").write_text("{}")
     (tmp_path / "later.json").write_text("{}")
     (tmp_path / "grid.csv").write_text("point,x_um,y_um\n1,0,0\n")

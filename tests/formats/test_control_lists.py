@@ -344,3 +344,14 @@ def test_results_are_a_workbook_whose_text_is_never_a_formula(run, tmp_path):
     named = next(row[0] for row in rows if row[0].value == "=1+1")
     assert named.data_type != "f"
     assert any("unit" in str(row[1].value) for row in book["notes"].iter_rows())
+
+
+def test_photos_of_a_table_gnss_may_stand_under_label(tmp_path):
+    from photogram.formats.plain.settings import Settings
+    from photogram.formats.plain.tables import Tables
+
+    path = tmp_path / "gnss.csv"
+    path.write_text("Label,X/Easting,Y/Northing,Z/Altitude,Accuracy_X/Y/Z_(m)\na.jpg,1,2,3,0.5\n")
+    table = Tables(Settings(path, tables={"gnss": path}), []).read("gnss")
+    assert table.texts("photo") == ["a.jpg"]
+    assert table.numbers("sd").tolist() == [0.5]

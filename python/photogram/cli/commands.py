@@ -43,6 +43,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "Write a project in another format, and say what that has no place for.",
         "convert.convert",
     ),
+    "metadata": (
+        "Say where photos were taken by their files: EXIF, XMP, .MRK, geo.txt ...; write a table.",
+        "metadata.metadata",
+    ),
     "features": (
         "Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.",
         "features.features",

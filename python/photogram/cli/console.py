@@ -41,6 +41,7 @@ ON_TOP = 2
 EXTRAS = {
     "jinja2": "report",
     "matplotlib": "plots",
+    "PIL": "photos",
     "geopandas": "gis",
     "pyogrio": "gis",
     "pyproj": "gis",

@@ -85,6 +85,7 @@ class Job:
         self._options = dict(options or {})
         self._files, self._projects = list(files), list(projects)
         self._outputs, self._directories = list(outputs), list(directories)
+        self._spared: list[Path] = []
         self._failures = failures()
         self._resources = ExitStack()
         self._examples: list[Path] = []
@@ -134,6 +135,17 @@ class Job:
         """
         for path in paths:
             (self._projects if path.is_dir() else self._files).append(path)
+        self._check()
+
+    def spares(self, *paths: Path) -> None:
+        """Name further files of which little is read: no result goes over them, and reports do not list them.
+
+        Raises
+        ------
+        InputError
+            A result was to do so.
+        """
+        self._spared += paths
         self._check()
 
     def writes(self, *files: Path) -> None:
@@ -210,7 +222,7 @@ class Job:
         """Return a set of files, for results that are written piece by piece."""
         from photogram.io.writing import OutputSet
 
-        return OutputSet(self._inputs())
+        return OutputSet([*self._inputs(), *self._spared])
 
     def _inputs(self) -> list[Path]:
         inputs = list(self._files)
@@ -237,7 +249,7 @@ class Job:
             if path.exists() and any(path.samefile(each) for each in sources):
                 raise InputError("the results would be written over the input", file=path)
         inputs = self._inputs()
-        check_outputs(self._outputs, inputs, self._directories)
+        check_outputs(self._outputs, [*inputs, *self._spared], self._directories)
         for path in self._outputs:
             self._check_projects(path)
 

@@ -10,9 +10,9 @@ __all__ = ["Command"]
 
 PANELS = {
     "Input": "example packaged file_format control control_crs columns roles images names camera sd"
-    " pixel_origin model angles grid hand against against_spacing against_position_sd catalogue utc epoch"
-    " faintest points point_sd decimals format zero_missing ground_unit model_unit restart"
-    " start reject photos kind",
+    " photos_dir photos_crs mrk_antenna pixel_origin model angles grid hand against"
+    " against_spacing against_position_sd catalogue utc epoch faintest points point_sd decimals"
+    " format zero_missing ground_unit model_unit restart start reject photos kind",
     "Results": "out overwrite json xlsx html no_html plots plot_format parquet crs map ply ply_origin listing"
     " pdf to trace points_out part_two restart_out ident date",
     "Adjustment": "datum datum_points hold loss scale tolerance max_iterations covariance unit_variance"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from photogram.cli.job import Job, Reads
+from photogram.cli.photographs import MrkAntenna, PhotosCrs, PhotosFolder
 from photogram.messages import counted, listed
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ __all__ = [
     "EXAMPLE",
     "NOTHING",
     "Additions",
+    "Deviations",
     "Example",
     "ProjectPath",
     "described",
@@ -177,6 +179,9 @@ class Additions:
     names: NamesFile = None
     camera: CamerasFile = None
     sd: Deviations = None
+    photos_dir: PhotosFolder = None
+    photos_crs: PhotosCrs = None
+    mrk_antenna: MrkAntenna = False
     pixel_origin: PixelOrigin = None
     model: Model = None
     angles: Angles = None
@@ -223,11 +228,13 @@ def project_path(job: Job, path: Path | None) -> Path:
 
 def read_project(job: Job, path: Path, added: Additions) -> Project:
     """Read what lies at a path, with what a user adds; its files are inputs of the job from now on."""
-    from photogram.formats import Wishes, read
+    from photogram.formats import PhotoFiles, Wishes, read
     from photogram.formats.additions import deviations, with_control, with_images, with_repeated, with_sd
     from photogram.formats.columns import columns_given
     from photogram.formats.names import with_names
 
+    if added.photos_dir is None and (added.photos_crs or added.mrk_antenna):
+        raise typer.BadParameter("says something of --photos-dir", param_hint="--photos-crs, --mrk-antenna")
     if path.is_dir():
         job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))
     sd = deviations(added.sd or [])
@@ -240,8 +247,13 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
         angles=None if added.angles is None else added.angles.value,
         sd=sd,
         columns=columns,
+        photos=None
+        if added.photos_dir is None
+        else PhotoFiles(added.photos_dir, added.photos_crs, added.mrk_antenna),
     )
     project = with_sd(read(path, added.file_format, wishes), sd)
+    job.reads(*project.details.get("photo tables", ()))
+    job.spares(*project.details.get("photo pictures", ()))
     if added.keep_repeated:
         project = with_repeated(project)
     if added.images is not None:

@@ -6,7 +6,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from photogram.formats.format import Format, Wishes
+    from photogram.formats.format import Format, PhotoFiles, Wishes
+    from photogram.formats.metadata.merged import Metadata, PhotoRecord, read_metadata
+    from photogram.formats.metadata.said import Said
     from photogram.formats.placing import Placed, placed
     from photogram.formats.project import Frame, Options, Project
     from photogram.formats.registry import FORMATS, cannot_hold, read, recognised, target, to_files
@@ -15,13 +17,18 @@ __all__ = [
     "FORMATS",
     "Format",
     "Frame",
+    "Metadata",
     "Options",
+    "PhotoFiles",
+    "PhotoRecord",
     "Placed",
     "Project",
+    "Said",
     "Wishes",
     "cannot_hold",
     "placed",
     "read",
+    "read_metadata",
     "recognised",
     "target",
     "to_files",
@@ -29,7 +36,12 @@ __all__ = [
 
 _HOMES = {
     "Format": "format",
+    "PhotoFiles": "format",
     "Wishes": "format",
+    "Metadata": "metadata.merged",
+    "PhotoRecord": "metadata.merged",
+    "Said": "metadata.said",
+    "read_metadata": "metadata.merged",
     "Placed": "placing",
     "placed": "placing",
     "Frame": "project",

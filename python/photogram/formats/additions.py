@@ -11,6 +11,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.carrying import carried, is_free
 from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.images import from_corner, to_corner
 from photogram.formats.intersection import intersected
@@ -19,12 +20,10 @@ from photogram.formats.plain.reading import read_control
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
-from photogram.formats.plain.writing import attitude_matrices
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
 from photogram.io.delimited import ColumnTable, Names
 from photogram.messages import Message, listed
-from photogram.network.attitudes import Attitudes
 from photogram.network.similarity import similarity
 from photogram.results.result import Result
 
@@ -401,15 +400,15 @@ def with_control(
         messages.append(Message(f"control without images is left out: {listed(missing)}", path))
     targets = np.array([places[given.names[row]] for row in rows])
     raw = table.vectors("xyz")
-    messages += check_systems(project, settings, table, targets, raw[rows], free=_is_free(project))
+    messages += check_systems(project, settings, table, targets, raw[rows], free=is_free(project))
     held = [row for row in rows if np.isfinite(given.positions[row]).all()]
-    carried = _carried(
+    moved = _carried(
         project,
         np.array([places[given.names[row]] for row in held], dtype=np.int64),
         given.positions[held],
         transform.frame,
     )
-    block = carried.block
+    block = moved.block
     positions, deviation = block.point_positions.copy(), block.point_sd.copy()
     positions[targets], deviation[targets] = given.positions[rows], given.sd[rows]
     before = block.point_check_sd
@@ -418,28 +417,23 @@ def with_control(
     full = [each for each in given.observed if each.points[0] in places]
     for each in full:
         positions[places[each.points[0]]] = np.nan
-    found = carried.replace(
+    found = moved.replace(
         block=block.replace(
             point_positions=positions,
             point_sd=deviation,
             point_check_sd=check_sd,
             observations=[*block.observations, *full],
         ),
-        messages=(*messages, *carried.messages[len(project.messages) :]),
+        messages=(*messages, *moved.messages[len(project.messages) :]),
         # What is given now is no longer lacking.
         lacks=tuple(
-            each for each in carried.lacks if not ("--control FILE" in each and np.isfinite(deviation).any())
+            each for each in moved.lacks if not ("--control FILE" in each and np.isfinite(deviation).any())
         ),
     )
     planes = [
         each for each in plane_remarks(found.block, found.path, found.starts) if each not in found.messages
     ]
     return found.replace(messages=(*found.messages, *planes))
-
-
-def _is_free(project: Project) -> bool:
-    """Whether nothing but its first values says where the model of a project is."""
-    return not (project.block.observations or np.isfinite(project.block.photo_position_sd).any())
 
 
 def _carried(
@@ -452,27 +446,14 @@ def _carried(
     model[unknown] = intersected(project, points[unknown])
     known = np.isfinite(model).all(axis=1)
     same = replace(project, frame=frame) if frame != project.frame else project
-    if np.count_nonzero(known) < 3 or not _is_free(project):
+    if np.count_nonzero(known) < 3 or not is_free(project):
         return same
     scale, turn, shift, misfit = similarity(model[known], targets[known])
     before = float(np.sqrt(np.mean((model[known] - targets[known]) ** 2)))
     if not (np.isfinite(misfit) and SIMILAR * misfit < before):
         return same
-    matrices = attitude_matrices(block)
-    posed = np.isfinite(matrices).all(axis=(1, 2))
-    angles = block.photo_attitudes.copy()
-    angles[posed] = Attitudes(turn @ matrices[posed]).values("omega_phi_kappa")
     message = Message(
         f"the model is carried onto {np.count_nonzero(known)} control points by a similarity: scale"
         f" {scale:.6g}, {misfit:.3g} {block.linear_unit} rms left, {before:.3g} before"
     )
-    return project.replace(
-        block=block.replace(
-            photo_positions=scale * block.photo_positions @ turn.T + shift,
-            photo_attitudes=angles,
-            photo_to_ground=False,
-        ),
-        starts=scale * project.starts @ turn.T + shift,
-        frame=frame,
-        messages=(*project.messages, message),
-    )
+    return carried(project, (scale, turn, shift), frame, message)

@@ -244,7 +244,8 @@ def settled(
         raise table.head.error(
             f"--columns: there is no column {quoted(missing[0])}, but {listed(list(table.own))}"
         )
-    table = _with_points(table, names, messages)
+    if "point" in required:
+        table = _with_points(table, names, messages)
     if lacking := [each for each in required if each not in table]:
         raise table.head.error(
             f"the column {lacking[0]} is missing; there are {listed(list(table.own))}: {guess(table, known)}"

@@ -14,7 +14,7 @@ from photogram.io.numbers import finite_number
 from photogram.io.places import Place
 from photogram.messages import Message
 
-__all__ = ["ControlList", "read_control_list"]
+__all__ = ["ControlList", "read_control_list", "system_of"]
 
 WGS84 = "EPSG:4979"
 _UTM = re.compile(r"WGS84\s+UTM\s+(\d{1,2})\s*([NS])", re.IGNORECASE)
@@ -59,7 +59,14 @@ def read_control_list(path: Path, project: Project) -> ControlList | None:
     return None
 
 
-def _crs(line: str, place: Place) -> str:
+def system_of(line: str, place: Place) -> str:
+    """Return the system that the first line of a list names: `WGS84`, `WGS84 UTM 32N`, `EPSG:n`, `+proj=...`.
+
+    Raises
+    ------
+    InputError
+        It names none.
+    """
     if line.upper() == "WGS84":
         return WGS84
     if line.upper().startswith(("EPSG:", "+PROJ=")):
@@ -77,7 +84,7 @@ def _of_text(path: Path) -> ControlList:
         if line.strip() and not line.lstrip().startswith("#")
     ]
     head, *rest = lines
-    crs = _crs((head.text or "").strip(), head)
+    crs = system_of((head.text or "").strip(), head)
     points: dict[str, tuple[str, str, str]] = {}
     places: dict[str, int] = {}
     by_position: dict[tuple[str, str, str], str] = {}

@@ -28,6 +28,7 @@ __all__ = [
     "enu_origin",
     "from_frame",
     "geocentric",
+    "has_geoid_heights",
     "has_place",
     "is_on",
     "is_projected",
@@ -124,6 +125,19 @@ def _geoid(crs: str) -> Floats:
     """Return (3,) what carries heights above the geoid, whose height is written behind a system, up."""
     match = _GEOID.search(crs)
     return np.array([0.0, 0.0, 0.0 if match is None else float(match[1])])
+
+
+def has_geoid_heights(crs: str) -> bool:
+    """Whether the heights of a system are above the geoid (or sea level), and not above the ellipsoid.
+
+    Raises
+    ------
+    InputError
+        A system that PROJ does not know.
+    """
+    if enu_origin(crs) is not None:
+        return False
+    return _GEOID.search(crs) is not None or bool(_system(crs).is_compound)
 
 
 def without_geoid(crs: str) -> str:

@@ -10,7 +10,26 @@ from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.project import Project
 from photogram.results.result import Result
 
-__all__ = ["Format", "Wishes"]
+__all__ = ["Format", "PhotoFiles", "Wishes"]
+
+
+@dataclass(frozen=True)
+class PhotoFiles:
+    """A folder of photographs, and what a user says of the positions that its files carry.
+
+    Attributes
+    ----------
+    directory
+        The folder.
+    crs
+        The system of positions whose source does not say it, or not what heights are above (EXIF).
+    mrk_antenna
+        Whether positions of .MRK files are those of the antenna.
+    """
+
+    directory: Path
+    crs: str | None = None
+    mrk_antenna: bool = False
 
 
 @dataclass(frozen=True)
@@ -31,6 +50,8 @@ class Wishes:
         Standard deviations by table where files have none: one number or three.
     columns
         What the columns of the control of a plain project are.
+    photos
+        Where its photographs lie, whose files carry positions; None: as the project says.
     """
 
     cameras: Path | None = None
@@ -39,6 +60,7 @@ class Wishes:
     angles: str | None = None
     sd: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     columns: Columns = PLAIN
+    photos: PhotoFiles | None = None
 
 
 @dataclass(frozen=True)

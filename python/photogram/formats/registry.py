@@ -9,6 +9,7 @@ from pathlib import Path
 
 from photogram.errors import InputError, PhotogramError
 from photogram.formats.format import Format, Wishes
+from photogram.formats.metadata.adding import with_wished_photos
 from photogram.formats.millimetres import in_pixels, nominal_pixels
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
@@ -112,7 +113,9 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
     chosen, path = _located(path, file_format)
     with turned(f"reading {path}"):
         try:
-            project = chosen.read(path, wishes or Wishes())
+            wishes = wishes or Wishes()
+            project = chosen.read(path, wishes)
+            project = with_wished_photos(project, wishes)
             return project.replace(
                 messages=(*project.messages, *plane_remarks(project.block, path, project.starts))
             )

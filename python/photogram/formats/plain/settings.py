@@ -12,6 +12,7 @@ from typing import Any, NoReturn, cast
 
 from photogram.errors import InputError
 from photogram.formats.columns import Columns, columns_given
+from photogram.formats.format import PhotoFiles
 from photogram.formats.plain.schema import TABLES
 from photogram.formats.project import DatumName, Frame, Options
 from photogram.io.toml import TomlFile
@@ -58,6 +59,7 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
     "tables": tuple(TABLES),
     "adjust": ("datum", "loss", "unit_variance"),
     **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
+    "photos": ("crs", "columns", "roles", "directory", "directory_crs", "mrk_antenna"),
     "features": (),
 }
 
@@ -88,6 +90,8 @@ class Settings:
         What is said of the columns of tables of points, as `--columns` and `--roles` say it.
     features
         By their names, as :func:`photogram.features` takes them.
+    photo_files
+        Where photographs lie whose files carry positions; None without.
     """
 
     path: Path
@@ -107,6 +111,7 @@ class Settings:
     crs: Mapping[str, str] = field(default_factory=dict)
     columns: Mapping[str, Columns] = field(default_factory=dict)
     features: Mapping[str, Definition] = field(default_factory=dict)
+    photo_files: PhotoFiles | None = None
 
     def __post_init__(self) -> None:
         if not self.image_y:
@@ -151,6 +156,7 @@ def read_settings(path: Path) -> Settings:
         crs={name: file.text(name, "crs") for name in WITH_CRS if file.has(name, "crs")},
         columns={name: file.columns(name) for name in WITH_CRS if name in file.content},
         features={name: file.feature(name) for name in file.content.get("features", {})},
+        photo_files=file.photo_files(),
     )
 
 
@@ -210,6 +216,18 @@ class _File(TomlFile):
             return columns_given(self.text(table, "columns"), self.text(table, "roles"))
         except InputError as error:
             self.fail("columns" if "--columns" in error.message else "roles", error.message.replace("--", ""))
+
+    def photo_files(self) -> PhotoFiles | None:
+        """Return where photographs lie, and what is said of the positions of their files."""
+        antenna = self.value("photos", "mrk_antenna", False)
+        if not isinstance(antenna, bool):
+            self.fail("mrk_antenna", f"mrk_antenna is true or false, not {antenna!r}")
+        directory, crs = self.text("photos", "directory"), self.text("photos", "directory_crs")
+        if not directory:
+            return None
+        if not (self.path.parent / directory).is_dir():
+            self.fail("directory", f"there is no folder {directory}")
+        return PhotoFiles(self.path.parent / directory, crs or None, antenna)
 
     def feature(self, name: str) -> Definition:
         """Return the kind of a feature, and the points that it goes through."""

@@ -60,9 +60,11 @@ def streamable(path: Path) -> bool:
     place = path / SETTINGS if path.is_dir() else path
     if place.suffix != ".toml" or not place.is_file():
         return False
-    tables = read_settings(place).tables
+    settings = read_settings(place)
+    tables = settings.tables
     return (
-        "images" in tables
+        settings.photo_files is None
+        and "images" in tables
         and tables["images"].suffix == ".parquet"
         and set(tables) <= {"images", "points", *HELD}
     )

@@ -1,0 +1,1 @@
+"""Positions of photos, and how good they are, from what files of photographs already carry."""
