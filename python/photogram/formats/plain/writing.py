@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -19,6 +18,7 @@ from photogram.formats.plain.settings import VERSION
 from photogram.formats.plain.tables import correlations
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
+from photogram.io.toml import quoted_text
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -145,8 +145,7 @@ def _settings(project: Project, image_y: str) -> str:
 
 def _feature(name: str, definition: Definition) -> str:
     kind, points = definition
-    # Strings of JSON are strings of TOML.
-    texts = [json.dumps(each, ensure_ascii=False) for each in (name, *points)]
+    texts = [quoted_text(each) for each in (name, *points)]
     return f"{texts[0]} = {{ {kind} = [{', '.join(texts[1:])}] }}"
 
 
