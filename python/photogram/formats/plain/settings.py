@@ -15,6 +15,7 @@ from photogram.errors import InputError
 from photogram.formats.columns import Columns, columns_given
 from photogram.formats.plain.schema import TABLES
 from photogram.formats.plain.sections import Sections
+from photogram.formats.plain.statement_settings import KEYS, read_asked
 from photogram.formats.project import DatumName, Frame, Options
 from photogram.messages import Message, listed, nearest
 from photogram.results.features import KINDS, Definition
@@ -60,6 +61,7 @@ _KEYS: Mapping[str, tuple[str, ...] | None] = {
     "adjust": ("datum", "loss", "unit_variance"),
     **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
     "features": None,
+    **KEYS,
 }
 
 
@@ -89,6 +91,8 @@ class Settings:
         What is said of the columns of tables of points, as `--columns` and `--roles` say it.
     features
         By their names, as :func:`photogram.features` takes them.
+    statement
+        What `[check]` and `[statement]` say, as :meth:`photogram.Result.statement` takes it.
     """
 
     path: Path
@@ -108,6 +112,7 @@ class Settings:
     crs: Mapping[str, str] = field(default_factory=dict)
     columns: Mapping[str, Columns] = field(default_factory=dict)
     features: Mapping[str, Definition] = field(default_factory=dict)
+    statement: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.image_y:
@@ -153,6 +158,7 @@ def read_settings(path: Path) -> Settings:
         crs={name: file.text(name, "crs") for name in WITH_CRS if file.has(name, "crs")},
         columns={name: file.columns(name) for name in WITH_CRS if name in file.content},
         features={name: file.feature(name) for name in file.content.get("features", {})},
+        statement=read_asked(file, file.word("units", "length")),
     )
 
 
@@ -238,7 +244,7 @@ def _tables(file: _File) -> dict[str, Path]:
     for name in TABLES:
         if file.has("tables", name):
             found[name] = folder / file.text("tables", name)
-            if not found[name].is_file():
+            if not os.path.isfile(found[name]):  # nor where the name is too long for the system
                 file.fail("tables", name, f"the table {name} is not there: {found[name]}")
             continue
         present = [path for ending in ENDINGS if (path := folder / f"{name}{ending}").is_file()]

@@ -15,6 +15,8 @@ from photogram.formats.plain.observed import observed_tables
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import AXES
 from photogram.formats.plain.settings import VERSION
+from photogram.formats.plain.statement_settings import asked_files, asked_lines
+from photogram.formats.plain.statement_tables import COVERS, lengths_table
 from photogram.formats.plain.tables import correlations
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
@@ -108,9 +110,11 @@ def write(project: Project) -> Mapping[str, bytes]:
         "points": _points(project),
         "control": control_table(project),
         **observed_tables(block, cameras, photo_cameras),
+        "lengths": lengths_table(project.statement.get("lengths", ())),
     }
     files = {f"{name}.csv": csv_text(columns) for name, columns in tables.items() if columns}
-    return {"project.toml": _settings(project, image_y).encode(), **files}
+    settings = _settings(project, image_y).encode()
+    return {"project.toml": settings, **files, **asked_files(project.statement)}
 
 
 def _settings(project: Project, image_y: str) -> str:
@@ -140,6 +144,7 @@ def _settings(project: Project, image_y: str) -> str:
     lines += [f'loss = "{options.loss or "none"}"', f'unit_variance = "{options.unit_variance}"', ""]
     if project.features:
         lines += ["[features]", *(_feature(*each) for each in project.features.items()), ""]
+    lines += asked_lines(project.statement, unit)
     return "\n".join(lines)
 
 
@@ -266,6 +271,9 @@ def control_table(project: Project) -> dict[str, Any]:
         unheld = np.isinf(sd[:, k]) & np.isfinite(positions[:, k])
         columns[f"sd_{axis}"] = np.where(unheld, np.inf, columns[f"sd_{axis}"])
     columns["use"] = [rows.get(row, "control") for row in order]
+    if vegetated := project.statement.get("vegetated"):
+        there = [block.point_ids[row] in vegetated and rows.get(row) == "check" for row in order]
+        columns["cover"] = [COVERS[1] if each else None for each in there]
     return columns
 
 
