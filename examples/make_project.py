@@ -72,6 +72,14 @@ distances = 0.005
 # datum = "control"                 # control | minimum | inner
 # loss = "none"                     # none | huber | cauchy
 # unit_variance = "constrained"     # constrained | unity | redundancy
+
+# [check]                           # the survey of check points, for an accuracy statement
+# independent = "yes"               # yes | same-base | no: of the block; a declaration
+
+# [statement]                       # what a client is told of the accuracy; docs/formats.md has all keys
+# standards = ["asprs-2023", "plain"]
+# class_h = "5cm"                   # classes to be met, with their unit; also class_v, class_3d
+# client = "..."                    # also title, project, firm, surveyor, date
 """
 
 COMMENTS = {

@@ -40,12 +40,14 @@ from photogram.cli.projects import (
     with_additions,
     with_options,
 )
+from photogram.cli.stating import stated, statement_files
 
 if TYPE_CHECKING:
     from photogram import Block, FirstValues, Result
     from photogram.cli.pictures import Pictures
     from photogram.formats import Project
     from photogram.results.snooped import Snooped
+    from photogram.results.statement.statement import Statement
 
 __all__ = ["adjust", "adjusted_block", "started_block"]
 
@@ -149,6 +151,10 @@ def adjust(
             help="Begin with all images, those too that first values would set aside.",
         ),
     ] = False,
+    statement: Annotated[
+        bool,
+        typer.Option("--statement", help="Also write an accuracy statement, as the project asks for one."),
+    ] = False,
     divided: Parts = WHOLE,
     ordering: Ordering = OrderingName.AUTO,
     threads: Threads = None,
@@ -194,7 +200,8 @@ def adjust(
             result = cast("Result", removed.judged)
         else:
             removed, result = None, run(started or block)
-        _finish(job, project, result, removed, target, documents, pictures, sections, strict=strict)
+        own = _statement(job, project, result, removed, documents.crs, strict) if statement else None
+        _finish(job, project, result, removed, target, documents, pictures, sections, own, strict=strict)
 
 
 def _planned(project: Project, block: Block, divided: Parts) -> None:
@@ -215,6 +222,7 @@ def _finish(
     documents: Documents,
     pictures: Pictures,
     sections: list[tuple[str, list[str]]],
+    stated: Statement | None,
     *,
     strict: bool,
 ) -> None:
@@ -229,14 +237,40 @@ def _finish(
     taken = [] if removed is None else removed.sections()[ON_TOP:]
     sheets = {} if documents.xlsx is None else {documents.xlsx: excel_file(result)}
     page = documents.page(job, "adjust", target, lambda: page_of(told))
+    beside = {} if stated is None else statement_files(job, stated, target / "statement")
+    code = result.verdict.exit_code(strict=strict)
     job.finish(
-        {target / name: content for name, content in files.items()} | pictures.of(result) | page | sheets,
+        {target / name: content for name, content in files.items()}
+        | pictures.of(result)
+        | page
+        | sheets
+        | beside,
         documents.as_json(told),
         documents.data(result),
         documents.charts(result, _sizes(project), quiet=job.quiet),
         summary=lambda: print_sections(_summary(result, taken), "report.txt"),
-        code=result.verdict.exit_code(strict=strict),
+        code=code or (0 if stated is None else stated.exit),
     )
+
+
+def _statement(
+    job: Job, project: Project, result: Result, removed: Snooped | None, crs: str | None, strict: bool
+) -> Statement | None:
+    """Return the accuracy statement of a result; None where the adjustment has not converged."""
+    if not result.converged:
+        return None
+    out = () if removed is None else tuple(each.name for each in removed.removed)
+    with job.status("stating"):
+        return stated(
+            job,
+            result,
+            project.statement,
+            command="adjust",
+            crs=crs,
+            strict=strict,
+            assumed=project.lacks,
+            removed=out,
+        )
 
 
 def _in_system(result: Result, crs: str | None) -> dict[str, bytes]:

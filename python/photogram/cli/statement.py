@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from photogram.cli.adjust import adjusted_block, started_block
-from photogram.cli.console import print_remark, print_sections
+from photogram.cli.console import print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.maps import Crs
 from photogram.cli.options import Quiet, Strict, Threads, default_out, out_option
@@ -26,12 +25,13 @@ from photogram.cli.projects import (
     with_additions,
     with_options,
 )
+from photogram.cli.stating import stated, statement_files
 
 if TYPE_CHECKING:
     from photogram import Result
     from photogram.results.statement.statement import Statement
 
-__all__ = ["statement", "statement_files"]
+__all__ = ["statement"]
 
 
 class LanguageName(StrEnum):
@@ -200,60 +200,6 @@ def _adjusted(
     block, started = started_block(project, keep_all=False)
     result = adjusted_block(job, project, started or block, threads=threads)
     return result, project.statement, project.lacks
-
-
-def stated(
-    job: Job,
-    result: Result,
-    asked: Mapping[str, Any],
-    *,
-    crs: str | None = None,
-    strict: bool = False,
-    assumed: Sequence[str] = (),
-    removed: Sequence[str] = (),
-) -> Statement:
-    """Return the statement of a result, with the files it was made of; dated today where no date is given."""
-    from datetime import date
-
-    from photogram import statement as made
-    from photogram.formats.placing import placed
-    from photogram.results.statement.surveyed import System
-
-    run = job.run("statement")
-    system = None
-    if crs is not None:
-        place = placed(result, crs)
-        (x, y, z), (u, v, w) = place.names, place.units
-        system = System(crs, ((x, u), (y, v), (z, w)), place.carried)
-    given = " ".join(f"{name} {value}" for name, value in run.options.items())
-    return made(
-        result,
-        strict=strict,
-        assumed=assumed,
-        removed=removed,
-        system=system,
-        inputs=run.inputs,
-        command=f"{run.command} {given}".rstrip(),
-        **{"date": date.today().isoformat(), **asked},
-    )
-
-
-def statement_files(job: Job, found: Statement, folder: Path) -> dict[Path, bytes]:
-    """Return all files of a statement; where what makes page or PDF is absent, that is told."""
-    from photogram.results.statement.sheets import files_of_statement
-
-    files = {folder / name: content for name, content in files_of_statement(found).items()}
-    files[folder / "statement.json"] = found.to_json()
-    for name, needed, make in (
-        ("statement.html", ("jinja2", "matplotlib"), found.to_html),
-        ("statement.pdf", ("reportlab", "matplotlib"), found.to_pdf),
-    ):
-        if all(map(find_spec, needed)):
-            files[folder / name] = make()
-        elif not job.quiet:
-            extra = "pdf" if name.endswith(".pdf") else "report"
-            print_remark(f"no {name}: pip install 'photogram[{extra}]'")
-    return files
 
 
 def _summary(found: Statement) -> list[tuple[str, list[str]]]:

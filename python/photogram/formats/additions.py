@@ -22,6 +22,7 @@ from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
+from photogram.formats.stated import with_cover
 from photogram.io.delimited import ColumnTable, Names
 from photogram.messages import Message, listed
 from photogram.network.similarity import similarity
@@ -424,6 +425,7 @@ def with_control(
             point_check_sd=check_sd,
             observations=[*block.observations, *full],
         ),
+        statement=with_cover(project.statement, given.names, given.vegetated.intersection(places)),
         messages=(*messages, *moved.messages[len(project.messages) :]),
         # What is given now is no longer lacking.
         lacks=tuple(

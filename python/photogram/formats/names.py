@@ -7,6 +7,7 @@ from pathlib import Path
 
 from photogram.formats.plain.tables import indices_of
 from photogram.formats.project import Project
+from photogram.formats.stated import asked_by_other_names
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns
 from photogram.messages import Message
@@ -54,6 +55,7 @@ def with_names(project: Project, path: Path) -> Project:
             each: (kind, [new.get(point, point) for point in points])
             for each, (kind, points) in project.features.items()
         },
+        statement=asked_by_other_names(project.statement, new),
     )
 
 

@@ -103,6 +103,8 @@ class Project(Brief):
         Second images of points on photos, which were left out.
     features
         What is to be fitted to adjusted points, as :func:`photogram.features` takes it.
+    statement
+        What is asked of its accuracy statement, as :meth:`photogram.Result.statement` takes it.
     """
 
     block: Block
@@ -119,6 +121,7 @@ class Project(Brief):
     sd_taken: bool = False
     repeated: Repeated = field(default_factory=Repeated)
     features: Mapping[str, Definition] = field(default_factory=dict)
+    statement: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         given = self.block.in_frame(self.frame)

@@ -13,6 +13,7 @@ from photogram.formats.metadata.adding import with_wished_photos
 from photogram.formats.millimetres import in_pixels, nominal_pixels
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
+from photogram.formats.stated import parts_of_asked
 from photogram.formats.topocentric import in_topocentric, topocentric_remarks
 from photogram.io.files import reading
 from photogram.memory import turned
@@ -234,10 +235,12 @@ def target(path: Path, file_format: str | None = None) -> Target:
 def cannot_hold(project: Project, file_format: str) -> list[str]:
     """Return what of a project a format has no place for, in sentences."""
     chosen = _named(file_format)
+    beside = [counted(len(project.features), "feature")] if project.features else []
+    beside += parts_of_asked(project.statement)
     return [
         *([] if chosen.geographic else topocentric_remarks(project)),
         *chosen.cannot_hold(_fitting(project, chosen)),
-        *([counted(len(project.features), "feature")] if project.features and chosen.name != "plain" else []),
+        *([] if chosen.name == "plain" else beside),
         *(nominal_pixels(project) if chosen.pixels else []),
     ]
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
 
-__all__ = ["TomlFile"]
+__all__ = ["TomlFile", "quoted_text"]
 
 MOST_DIGITS = 1000
 _ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")
@@ -62,8 +63,30 @@ class TomlFile:
         known = record is not None and record <= len(self.lines)
         return Place(self.path, record, self.lines[record - 1] if record and known else None)
 
-    def error(self, key: str, message: str) -> InputError:
-        """Return an error at the first line that has a key or a table of this name."""
-        pattern = re.compile(rf"^\s*\[?\[?\s*[\"']?{re.escape(key)}[\"']?\s*[\]=.]")
-        found = (record for record, line in enumerate(self.lines, 1) if pattern.match(line))
-        return self._place(next(found, None)).error(message)
+    def error(self, key: str, message: str, section: str = "") -> InputError:
+        """Return an error at the first line that has a key or table: of the section, if there."""
+        word = rf"[\"']?{re.escape(key)}[\"']?\s*[\]=.]"
+        own, every = list(self._lines_of(section)), list(enumerate(self.lines, 1))
+        first = rf"^\s*\[?\[?\s*{word}"
+        # Inline tables and names with points have their keys amid a line.
+        for lines, pattern in ((own, first), (own, rf"^[^#]*[\[{{,.\s]{word}"), (every, first)):
+            for record, line in lines:
+                if re.match(pattern, line):
+                    return self._place(record).error(message)
+        return self._place(None).error(message)
+
+    def _lines_of(self, section: str) -> Iterator[tuple[int, str]]:
+        """Yield the lines of a section with their numbers: below its header, or with its name before keys."""
+        word = rf"\s*[\"']?{re.escape(section)}[\"']?\s*"
+        below, inside = False, False
+        for record, line in enumerate(self.lines, 1):
+            if line.lstrip().startswith("["):
+                below, inside = True, re.match(rf"\s*\[+{word}[\].]", line) is not None
+            if inside or (not below and re.match(rf"{word}[=.]", line)):
+                yield record, line
+
+
+def quoted_text(text: str) -> str:
+    """Return a text as files of TOML have it, between quotation marks."""
+    # Strings of JSON are strings of TOML, but for the one control character that JSON leaves as it is.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -141,17 +141,23 @@ class Adjusted:
         together = [np.concatenate(part) if part else np.empty(0) for part in (values, deviations)]
         return Selected(rows, labels, together[0], together[1], shapes)
 
+    def _places(self, kind: str) -> dict[str, int]:
+        """Return where each name of a kind stands: large networks are asked more than once."""
+        known: dict[str, dict[str, int]] = self.__dict__.setdefault("_known_places", {})
+        if kind not in known:
+            known[kind] = {name: i for i, name in enumerate(self.things[kind].ids)}
+        return known[kind]
+
     def _is_one(self, wanted: Wanted) -> bool:
         return isinstance(wanted, str) or (
             self.numbered and isinstance(wanted, Integral) and not isinstance(wanted, bool)
         )
 
     def _indices(self, kind: str, wanted: Wanted) -> list[int]:
-        ids = self.things[kind].ids
         if wanted is None:
             used = ~np.isnan([each[0] if len(each) else 0.0 for each in self.things[kind].values])
             return np.flatnonzero(used).tolist()
-        index = {name: i for i, name in enumerate(ids)}
+        index = self._places(kind)
         several: Any = [wanted] if self._is_one(wanted) else wanted
         asked = names(f"names of the kind {kind}", several)
         if missing := [name for name in asked if name not in index]:

@@ -20,6 +20,7 @@ from photogram.formats.plain.observed import read_observations
 from photogram.formats.plain.rigs import read_frames, read_rigs
 from photogram.formats.plain.schema import ANGLES, AXES
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
+from photogram.formats.plain.statement_tables import asked_of, read_cover
 from photogram.formats.plain.tables import Tables, covariances_of, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project, assembled
@@ -138,7 +139,15 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         spheroid=Spheroid(*transform.frame.ellipsoid) if transform.frame.kind == "geographic" else None,
         photo_to_ground=settings.attitude == "omega_phi_kappa" and settings.rotation == "photo_to_object",
         details={"settings": settings},
-    ).replace(sd_taken=True, features=settings.features)
+    ).replace(
+        sd_taken=True,
+        features=settings.features,
+        statement=asked_of(
+            tables,
+            {name: row for row, name in enumerate(points.names)},
+            frozenset() if given is None else given.vegetated,
+        ),
+    )
     for name, (_, wanted) in settings.features.items():
         try:
             named_points(wanted, points.names)
@@ -382,6 +391,7 @@ class _Given:
     sd: Floats
     check_sd: Floats
     observed: list[Observation]
+    vegetated: frozenset[str]
 
 
 def _control_table(tables: Tables) -> ColumnTable | None:
@@ -441,7 +451,8 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
             held[row] = np.inf
     off = {row for row, use in enumerate(uses) if use == "off"}
     values = np.where(np.array([row in off for row in range(len(uses))])[:, np.newaxis], np.nan, values)
-    return _Given(table, names, values, held, check_sd, observed)
+    vegetated = read_cover(table, names, uses)
+    return _Given(table, names, values, held, check_sd, observed, vegetated)
 
 
 def _isotropic(covariance: Floats) -> bool:

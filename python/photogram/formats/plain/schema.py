@@ -130,11 +130,12 @@ TABLES: Mapping[str, Schema] = {
     ),
     "control": Schema(
         ("point",),
-        ("point", "use"),
+        ("point", "use", "cover"),
         (*AXES, "sd", *_SD_AXES, *covariance_columns(AXES)),
         "`point`, one of `x`, `y`, `z`; `sd_x` .., `cov_xy`, `cov_xz`, `cov_yz`, `use` (`control`, `check`,"
         " `off`): of a check point `sd_x` .. say how good its coordinates are"
-        " ([tests](tests.md#check-points)); `[sd]` has `check` for these",
+        " ([tests](tests.md#check-points)); `[sd]` has `check` for these; `cover` (`open`, `vegetated`) of"
+        " check points: heights in vegetation are stated apart",
         deviations=(1, 3),
         has_system=True,
     ),
@@ -143,6 +144,14 @@ TABLES: Mapping[str, Schema] = {
         (*_ENDS, "instrument"),
         ("distance", "sd"),
         "`from`, `to`, `distance`; `sd`, `instrument`",
+        deviations=(1,),
+    ),
+    "lengths": Schema(
+        ("line", *_ENDS, "length"),
+        ("line", *_ENDS),
+        ("length", "sd", "temperature"),
+        "`line`, `from`, `to`, `length`; `sd`, `temperature` (degrees Celsius): calibrated lengths, on the"
+        " lines of VDI/VDE 2634; no observations: the statement holds adjusted ones against them",
         deviations=(1,),
     ),
     "instruments": Schema(

@@ -8,14 +8,16 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn, cast
+from typing import Any, cast
 
+from photogram.arguments.arrays import shown
 from photogram.errors import InputError
 from photogram.formats.columns import Columns, columns_given
 from photogram.formats.format import PhotoFiles
 from photogram.formats.plain.schema import TABLES
+from photogram.formats.plain.sections import Sections
+from photogram.formats.plain.statement_settings import KEYS, read_asked
 from photogram.formats.project import DatumName, Frame, Options
-from photogram.io.toml import TomlFile
 from photogram.messages import Message, listed, nearest
 from photogram.results.features import KINDS, Definition
 
@@ -50,7 +52,7 @@ _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("adjust", "unit_variance"): ("constrained", "unity", "redundancy", "free"),
 }
 """Words that a key may have; the first is the default."""
-_KEYS: Mapping[str, tuple[str, ...]] = {
+_KEYS: Mapping[str, tuple[str, ...] | None] = {
     "project": ("format", "name"),
     "frame": ("kind", "crs", "origin", "ellipsoid"),
     "units": ("length", "angle", "image"),
@@ -60,7 +62,8 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
     "adjust": ("datum", "loss", "unit_variance"),
     **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
     "photos": ("crs", "columns", "roles", "directory", "directory_crs", "mrk_antenna"),
-    "features": (),
+    "features": None,
+    **KEYS,
 }
 
 
@@ -92,6 +95,8 @@ class Settings:
         By their names, as :func:`photogram.features` takes them.
     photo_files
         Where photographs lie whose files carry positions; None without.
+    statement
+        What `[check]` and `[statement]` say, as :meth:`photogram.Result.statement` takes it.
     """
 
     path: Path
@@ -112,6 +117,7 @@ class Settings:
     columns: Mapping[str, Columns] = field(default_factory=dict)
     features: Mapping[str, Definition] = field(default_factory=dict)
     photo_files: PhotoFiles | None = None
+    statement: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.image_y:
@@ -128,11 +134,12 @@ def read_settings(path: Path) -> Settings:
         value that cannot be; two files of one table.
     """
     file = _File(path)
-    file.check_keys()
-    version = file.value("project", "format", None)
+    file.check_keys(_KEYS)
+    version = file.value("project", "format")
     if isinstance(version, bool) or version != VERSION:
-        message = "[project] format is missing" if version is None else f"has format {version!r}"
-        file.fail("format", f"{message}: this is version {VERSION} of the schema, `format = {VERSION}`")
+        message = "[project] format is missing" if version is None else f"has format {shown(version)}"
+        form = f"this is version {VERSION} of the schema, `format = {VERSION}`"
+        file.fail("project", "format", f"{message}: {form}")
     return Settings(
         path=path,
         name=file.text("project", "name"),
@@ -157,88 +164,51 @@ def read_settings(path: Path) -> Settings:
         columns={name: file.columns(name) for name in WITH_CRS if name in file.content},
         features={name: file.feature(name) for name in file.content.get("features", {})},
         photo_files=file.photo_files(),
+        statement=read_asked(file, file.word("units", "length")),
     )
 
 
-class _File(TomlFile):
+class _File(Sections):
     """A file of settings."""
-
-    def fail(self, key: str, message: str) -> NoReturn:
-        """Raise an error at the first line that has the key."""
-        raise self.error(key, message)
-
-    def check_keys(self) -> None:
-        """Refuse sections and keys that there are not."""
-        for section, values in self.content.items():
-            if section not in _KEYS:
-                self.fail(section, f"there is no section [{section}]{nearest(section, _KEYS)}")
-            if not isinstance(values, dict):
-                self.fail(section, f"{section} is no section")
-            for key in values:
-                if section != "features" and key not in _KEYS[section]:
-                    self.fail(key, f"[{section}] has no key {key}{nearest(key, _KEYS[section])}")
-
-    def has(self, section: str, key: str) -> bool:
-        """Whether a key is there."""
-        return key in self.content.get(section, {})
-
-    def value(self, section: str, key: str, default: Any) -> Any:
-        """Return what a key has."""
-        return self.content.get(section, {}).get(key, default)
-
-    def text(self, section: str, key: str) -> str:
-        """Return a text; empty where the key is not there."""
-        value = self.value(section, key, "")
-        if not isinstance(value, str):
-            self.fail(key, f"{key} is no text: {value!r}")
-        return value
 
     def word(self, section: str, key: str) -> str:
         """Return one of the words of a key."""
         words = _CHOICES[section, key]
         value = self.value(section, key, words[0])
         if value not in words:
-            self.fail(key, f"{key} is one of {', '.join(words)}, not {value!r}")
+            self.fail(section, key, f"{key} is one of {', '.join(words)}, not {shown(value)}")
         return str(value)
-
-    def numbers(self, section: str, key: str, counts: tuple[int, ...]) -> tuple[float, ...]:
-        """Return a number, or some of them."""
-        value = self.value(section, key, None)
-        listed = value if isinstance(value, list) else [value]
-        good = all(isinstance(each, int | float) and not isinstance(each, bool) for each in listed)
-        if not good or len(listed) not in counts:
-            self.fail(key, f"{key} is {' or '.join(map(str, counts))} numbers, not {value!r}")
-        return tuple(float(each) if abs(each) < 2**1023 else math.inf for each in listed)
 
     def columns(self, table: str) -> Columns:
         """Return what is said of the columns of a table."""
         try:
             return columns_given(self.text(table, "columns"), self.text(table, "roles"))
         except InputError as error:
-            self.fail("columns" if "--columns" in error.message else "roles", error.message.replace("--", ""))
+            key = "columns" if "--columns" in error.message else "roles"
+            self.fail(table, key, error.message.replace("--", ""))
 
     def photo_files(self) -> PhotoFiles | None:
         """Return where photographs lie, and what is said of the positions of their files."""
-        antenna = self.value("photos", "mrk_antenna", False)
-        if not isinstance(antenna, bool):
-            self.fail("mrk_antenna", f"mrk_antenna is true or false, not {antenna!r}")
+        antenna = self.has("photos", "mrk_antenna") and self.flag("photos", "mrk_antenna")
         directory, crs = self.text("photos", "directory"), self.text("photos", "directory_crs")
         if not directory:
             return None
         if not (self.path.parent / directory).is_dir():
-            self.fail("directory", f"there is no folder {directory}")
+            self.fail("photos", "directory", f"there is no folder {directory}")
         return PhotoFiles(self.path.parent / directory, crs or None, antenna)
 
     def feature(self, name: str) -> Definition:
         """Return the kind of a feature, and the points that it goes through."""
-        value = self.value("features", name, None)
+        value = self.value("features", name)
         if not isinstance(value, dict) or len(value) != 1:
-            self.fail(name, f'the feature {name} is {{ circle = ["point", "point", ...] }}, not {value!r}')
+            form = f'the feature {name} is {{ circle = ["point", "point", ...] }}'
+            self.fail("features", name, f"{form}, not {shown(value)}")
         (kind, points), *_ = value.items()
         if kind not in KINDS:
-            self.fail(name, f"the feature {name}: there is no {kind}{nearest(kind, KINDS)}")
+            self.fail("features", name, f"the feature {name}: there is no {kind}{nearest(kind, KINDS)}")
         if not isinstance(points, list) or not all(isinstance(each, str) for each in points):
-            self.fail(name, f"the feature {name} goes through a list of names, not {points!r}")
+            form = f"the feature {name} goes through a list of names"
+            self.fail("features", name, f"{form}, not {shown(points)}")
         return kind, tuple(points)
 
     def origin(self) -> tuple[float, float, float] | None:
@@ -247,7 +217,8 @@ class _File(TomlFile):
             return None
         latitude, longitude, height = self.numbers("frame", "origin", (3,))
         if not (abs(latitude) <= 90 and abs(longitude) <= 360 and math.isfinite(height)):
-            self.fail("origin", "origin is latitude and longitude in degrees, and the ellipsoidal height")
+            form = "origin is latitude and longitude in degrees, and the ellipsoidal height"
+            self.fail("frame", "origin", form)
         return latitude, longitude, height
 
     def ellipsoid(self) -> tuple[float, float]:
@@ -256,14 +227,14 @@ class _File(TomlFile):
             return Frame().ellipsoid
         a, b = self.numbers("frame", "ellipsoid", (2,))
         if not (0 < b <= a < math.inf):
-            self.fail("ellipsoid", "ellipsoid is the semi-major and the semi-minor axis")
+            self.fail("frame", "ellipsoid", "ellipsoid is the semi-major and the semi-minor axis")
         return a, b
 
     def deviations(self, table: str) -> tuple[float, ...]:
         """Return standard deviations of a table."""
         found = self.numbers("sd", table, WITH_SD[table])
         if not all(each >= 0 for each in found):
-            self.fail(table, f"{list(found)} is no standard deviation")
+            self.fail("sd", table, f"{list(found)} is no standard deviation")
         return found
 
 
@@ -289,8 +260,8 @@ def _tables(file: _File) -> dict[str, Path]:
     for name in TABLES:
         if file.has("tables", name):
             found[name] = folder / file.text("tables", name)
-            if not found[name].is_file():
-                file.fail(name, f"the table {name} is not there: {found[name]}")
+            if not os.path.isfile(found[name]):  # nor where the name is too long for the system
+                file.fail("tables", name, f"the table {name} is not there: {found[name]}")
             continue
         present = [path for ending in ENDINGS if (path := folder / f"{name}{ending}").is_file()]
         if len(present) > 1:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,9 +15,12 @@ from photogram.formats.plain.observed import observed_tables
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import AXES
 from photogram.formats.plain.settings import VERSION
+from photogram.formats.plain.statement_settings import asked_files, asked_lines
+from photogram.formats.plain.statement_tables import COVERS, lengths_table
 from photogram.formats.plain.tables import correlations
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
+from photogram.io.toml import quoted_text
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -108,9 +110,11 @@ def write(project: Project) -> Mapping[str, bytes]:
         "points": _points(project),
         "control": control_table(project),
         **observed_tables(block, cameras, photo_cameras),
+        "lengths": lengths_table(project.statement.get("lengths", ())),
     }
     files = {f"{name}.csv": csv_text(columns) for name, columns in tables.items() if columns}
-    return {"project.toml": _settings(project, image_y).encode(), **files}
+    settings = _settings(project, image_y).encode()
+    return {"project.toml": settings, **files, **asked_files(project.statement)}
 
 
 def _settings(project: Project, image_y: str) -> str:
@@ -140,13 +144,13 @@ def _settings(project: Project, image_y: str) -> str:
     lines += [f'loss = "{options.loss or "none"}"', f'unit_variance = "{options.unit_variance}"', ""]
     if project.features:
         lines += ["[features]", *(_feature(*each) for each in project.features.items()), ""]
+    lines += asked_lines(project.statement, unit)
     return "\n".join(lines)
 
 
 def _feature(name: str, definition: Definition) -> str:
     kind, points = definition
-    # Strings of JSON are strings of TOML.
-    texts = [json.dumps(each, ensure_ascii=False) for each in (name, *points)]
+    texts = [quoted_text(each) for each in (name, *points)]
     return f"{texts[0]} = {{ {kind} = [{', '.join(texts[1:])}] }}"
 
 
@@ -267,6 +271,9 @@ def control_table(project: Project) -> dict[str, Any]:
         unheld = np.isinf(sd[:, k]) & np.isfinite(positions[:, k])
         columns[f"sd_{axis}"] = np.where(unheld, np.inf, columns[f"sd_{axis}"])
     columns["use"] = [rows.get(row, "control") for row in order]
+    if vegetated := project.statement.get("vegetated"):
+        there = [block.point_ids[row] in vegetated and rows.get(row) == "check" for row in order]
+        columns["cover"] = [COVERS[1] if each else None for each in there]
     return columns
 
 

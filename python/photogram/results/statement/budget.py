@@ -24,7 +24,6 @@ from photogram.results.result import Result
 from photogram.results.statement.quantities import Wanted
 from photogram.results.statement.sources import Rows, kind_of
 from photogram.results.statement.texts import Texts
-from photogram.results.suspects import network_trial
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 
 __all__ = ["Budget", "Freedom", "Single", "Source", "budgets", "written"]
@@ -181,7 +180,7 @@ def budgets(
         return []
     network = block_network(result.block, result.options)
     core = network.trial(result.state, threads=0)
-    rows = Rows(result, network_trial(result.block, core))
+    rows = Rows(result, core)
     items = list(dict.fromkeys(item for each in wanted for item in each.items))
     places = [[items.index(item) for item in each.items] for each in wanted]
 
@@ -214,7 +213,8 @@ def _budget(
         Source(level, name, number, contribution, contribution * share)
         for level, name, number, contribution in rows.sources(squares)
     ]
-    order = np.argsort(-squares, kind="stable")[:LARGEST].tolist()
+    most = np.sort(np.argpartition(-squares, min(LARGEST, len(squares)) - 1)[:LARGEST])
+    order = most[np.argsort(-squares[most], kind="stable")].tolist()
     largest = [
         Single(rows.named(row), float(rows.sd[row]), float(t[row] / rows.sd[row]), own, own * share)
         for row in order

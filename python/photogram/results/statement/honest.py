@@ -253,7 +253,7 @@ def _scale(covariance: Floats) -> Floats:
 def _root(scaled: Floats) -> Floats | None:
     """Return the Cholesky factor of a matrix whose diagonal is ones, perhaps bordered; None if singular."""
     try:
-        root = np.linalg.cholesky(scaled)
+        root = np.asarray(np.linalg.cholesky(scaled), dtype=np.float64)
     except np.linalg.LinAlgError:
         return None
     return root if float(np.diag(root).min(initial=1.0)) ** 2 > SINGULAR else None

@@ -60,7 +60,7 @@ def leave_one_out(result: Result) -> list[LeftOut]:
     """Return every control point that took part as the others predict it, in the order of their names."""
     block, found = result.block, []
     observed = {each.point: each for each in block.observations if isinstance(each, Control)}
-    held_by = np.isfinite(block.point_sd).any(axis=1)
+    held_by = np.asarray(np.isfinite(block.point_sd).any(axis=1))
     held_by[[row for row, name in enumerate(block.point_ids) if name in observed]] = True
     control = np.flatnonzero(result.used_points & held_by)
     residuals = result.point_residuals

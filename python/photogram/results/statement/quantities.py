@@ -108,9 +108,9 @@ def chosen(result: Result, checks: Sequence[str]) -> list[Wanted]:
         first, second = _farthest(result, rows)
         found.append(_distance(result, f"distance {first} {second}", (first, second)))
     for camera in result.cameras:
-        own = [name for name, sd in zip(camera.names, camera.sd.tolist(), strict=True) if sd > 0]
+        free = [name for name, sd in zip(camera.names, camera.sd.tolist(), strict=True) if sd > 0]
         for name in PRINCIPAL:
-            if name in own:
+            if name in free:
                 return [*found, wanted(result, f"camera {camera.name} {name}")]
     return found
 
@@ -185,9 +185,9 @@ def _linear(result: Result, gradients: Mapping[Any, Any]) -> Wanted:
 def _check(result: Result, kind: str, names: Sequence[str]) -> None:
     if kind != "point":
         return
-    places = {name: row for row, name in enumerate(result.block.point_ids)}
+    ids = result.block.point_ids
     for name in names:
-        if name in places and not result.used_points[places[name]]:
+        if name in ids and not result.used_points[ids.index(name)]:
             raise InputError(f"the point {name} took no part in the adjustment")
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import listed
 from photogram.results.group_sums import observables
@@ -18,10 +19,9 @@ from photogram.results.network_trial import (
     KINDS,
     OBSERVATION,
     POSITION,
-    NetworkTrial,
 )
 from photogram.results.result import Result
-from photogram.results.suspects import observations_of_core
+from photogram.results.suspects import block_suspects, observations_of_core
 
 __all__ = ["Rows", "held_names", "kind_of"]
 
@@ -35,15 +35,17 @@ _PLURALS = {IMAGE: "images", CONTROL: "control", POSITION: "photo positions", AT
 class Rows:
     """All M observations: which groups they are in, and what they are called."""
 
-    def __init__(self, result: Result, trial: NetworkTrial) -> None:
-        self.block, self.core = result.block, trial.core
-        self.suspects, self.sd = trial.suspects, trial.deviations
+    def __init__(self, result: Result, core: _photocore.NetworkTrial) -> None:
+        self.block = result.block
+        self.suspects, self.sd = block_suspects(result.block, core), core.deviations
         self.group = np.repeat(np.arange(len(self.suspects)), np.diff(self.suspects.row_starts))
         self.kind: Indices = self.suspects.kinds[self.group]
         self.subject: Indices = self.suspects.subjects[self.group]
-        self.component: Indices = trial.core.components.astype(np.int64)
+        self.component: Indices = core.components.astype(np.int64)
         self._observed = observations_of_core(self.block)
         self._kinds, self._of_kind = self._labels()
+        self._images = self.kind == IMAGE
+        self._photo: Indices = self.suspects.photos[self.group[self._images]]
         seen = observables(result)
         self._cameras, self._camera_of_photo = list(seen.camera_names), seen.photo_cameras
         self._strips = np.full(len(self.block.photo_ids), -1)
@@ -75,13 +77,12 @@ class Rows:
     def sources(self, squares: Floats) -> Iterable[tuple[str, str, int, float]]:
         """Return level, name, number of rows and contribution of every group."""
         yield from _sums("kind", self._kinds, self._of_kind, squares)
-        image = self.kind == IMAGE
-        photo = self.suspects.photos[self.group[image]]
-        own = squares[image]
+        own = squares[self._images]
+        photo = self._photo
         strips = [str(number + 1) for number in range(int(self._strips.max(initial=-1)) + 1)]
         yield from _sums("strip", strips, self._strips[photo], own)
         yield from _sums("camera", self._cameras, self._camera_of_photo[photo], own)
-        yield from _most(list(_sums("photo", self.block.photo_ids, photo, own)))
+        yield from _sums("photo", self.block.photo_ids, photo, own, PHOTOS)
         control = self.kind == CONTROL
         points = self.suspects.points[self.group[control]]
         yield from _sums("point", self.block.point_ids, points, squares[control])
@@ -144,24 +145,24 @@ def kind_of(label: str) -> str:
 
 
 def _sums(
-    level: str, names: Sequence[str], of: Indices, squares: Floats
+    level: str, names: Sequence[str], of: Indices, squares: Floats, most: int | None = None
 ) -> Iterable[tuple[str, str, int, float]]:
-    """Return the sums over groups that have rows, in their order."""
-    inside = of >= 0
+    """Return the sums over groups that have rows, in their order; or the largest, and all others as one."""
+    inside = slice(None) if of.min(initial=0) >= 0 else of >= 0
     numbers = np.bincount(of[inside], minlength=len(names))
     sums = np.bincount(of[inside], weights=squares[inside], minlength=len(names))
-    for k in np.flatnonzero(numbers).tolist():
-        yield level, names[k], int(numbers[k]), float(sums[k])
-
-
-def _most(found: list[tuple[str, str, int, float]]) -> list[tuple[str, str, int, float]]:
-    """Return all photos, or those that contribute most with all others as one."""
-    if len(found) <= PHOTOS:
-        return found
-    order = sorted(found, key=lambda each: -each[3])
-    rest = order[PHOTOS:]
-    others = ("photo", "others", sum(each[2] for each in rest), math.fsum(each[3] for each in rest))
-    return [*order[:PHOTOS], others]
+    there = np.flatnonzero(numbers)
+    if most is not None and len(there) > most:
+        order = there[np.argsort(-sums[there], kind="stable")]
+        rest = order[most:]
+        others = ("others", int(numbers[rest].sum()), math.fsum(sums[rest].tolist()))
+        there = order[:most]
+    else:
+        others = None
+    values = zip(there.tolist(), numbers[there].tolist(), sums[there].tolist(), strict=True)
+    yield from ((level, names[k], number, total) for k, number, total in values)
+    if others is not None:
+        yield level, *others
 
 
 def held_names(result: Result) -> str:

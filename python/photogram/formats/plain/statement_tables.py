@@ -1,0 +1,117 @@
+"""Tables of a plain project that its accuracy statement needs: calibrated lengths, cover of check points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+from photogram.errors import InputError
+from photogram.formats.plain.tables import Tables, indices_of
+from photogram.io.delimited import ColumnTable
+from photogram.io.toml import TomlFile
+from photogram.messages import quoted
+from photogram.results.statement.asked import Asked
+
+__all__ = ["COVERS", "asked_of", "lengths_table", "read_cover"]
+
+COVERS = ("open", "vegetated")
+"""What check points lie in; the first is the default (ASPRS, Edition 2: NVA and VVA)."""
+_ENDS = ("from", "to")
+
+
+def read_cover(table: ColumnTable, names: Sequence[str], uses: Sequence[str]) -> frozenset[str]:
+    """Return the check points of a table of control that lie in vegetation.
+
+    Parameters
+    ----------
+    table
+        The table.
+    names, uses
+        Its points, and what each is: `control`, `check`, `off`.
+
+    Raises
+    ------
+    InputError
+        Another word; a control point in vegetation.
+    """
+    found = []
+    for row, word in enumerate(table.texts("cover", COVERS[0])):
+        if word.lower() not in COVERS:
+            raise table.error(row, f"column cover: {quoted(word)} is none of {', '.join(COVERS)}")
+        if word.lower() == COVERS[0]:
+            continue
+        if uses[row] == "control":
+            raise table.error(row, f"column cover: {names[row]} is control; only check points have a cover")
+        if uses[row] == "check":
+            found.append(names[row])
+    return frozenset(found)
+
+
+def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str]) -> dict[str, Any]:
+    """Return what a project asks of its statement, as :meth:`photogram.Result.statement` takes it.
+
+    Parameters
+    ----------
+    tables
+        Of the project; its settings have what `[check]` and `[statement]` say.
+    points
+        Rows of all points by their names.
+    vegetated
+        Check points in vegetation.
+
+    Raises
+    ------
+    InputError
+        Points that are not there, lengths at fault, or none where a standard is about them.
+    """
+    found, path = dict(tables.settings.statement), tables.settings.path
+    for name in found.get("without", ()):
+        if name not in points:
+            message = f"without: there is no point {quoted(name)}"
+            raise TomlFile(path).error(name, message, "statement")
+    if lengths := _lengths(tables, points):
+        found["lengths"] = lengths
+    if vegetated:
+        found["vegetated"] = vegetated
+    try:
+        Asked.checked(**found)
+    except InputError as error:
+        # Each by itself was checked with its line: together they are refused for want of lengths only.
+        raise TomlFile(path).error("standards", error.message, "statement") from None
+    return found
+
+
+def _lengths(tables: Tables, points: Mapping[str, int]) -> tuple[Mapping[str, Any], ...]:
+    """Return the rows of the table of calibrated lengths."""
+    table = tables.read("lengths")
+    if table is None:
+        return ()
+    table.names("line")
+    for end in _ENDS:
+        indices_of(table, end, points, "point")
+    lines, first, second = (table.texts(column) for column in ("line", *_ENDS))
+    sizes, warmth = table.numbers("length").tolist(), table.numbers("temperature").tolist()
+    deviations = tables.deviations(table, "lengths", ("sd",))[:, 0].tolist()
+    found = []
+    for row, (length, sd, temperature) in enumerate(zip(sizes, deviations, warmth, strict=True)):
+        if not length > 0:
+            why = "is empty" if math.isnan(length) else f"{length:g} is no length"
+            raise table.error(row, f"column length: {why}")
+        if first[row] == second[row]:
+            raise table.error(row, f"a length is between two points, not of {quoted(first[row])} from itself")
+        if not sd < math.inf:
+            raise table.error(row, "column sd: is empty or infinite: give it, or lengths under [sd]")
+        own = {"line": lines[row], "from": first[row], "to": second[row], "length": length, "sd": sd}
+        found.append(own if math.isnan(temperature) else {**own, "temperature": temperature})
+    return tuple(found)
+
+
+def lengths_table(lengths: Collection[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the columns of the table of lengths; none without any."""
+    if not lengths:
+        return {}
+    columns = {name: [each[name] for each in lengths] for name in ("line", *_ENDS, "length", "sd")}
+    if any("temperature" in each for each in lengths):
+        columns["temperature"] = [each.get("temperature") for each in lengths]
+    return columns
