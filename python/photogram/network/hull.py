@@ -49,7 +49,7 @@ def _outermost(points: Floats) -> Floats:
     for first, last in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         x, y = last - first
         within &= x * (points[:, 1] - first[1]) - y * (points[:, 0] - first[0]) > 0
-    return points[~within]
+    return np.asarray(points[~within])
 
 
 def area(corners: Floats) -> float:
