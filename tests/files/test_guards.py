@@ -66,6 +66,7 @@ RUNS = {
     "new": (["new"], []),
     "plan": (["plan", "galveston", "second"], ["galveston/FRAMES", "second/GROUND"]),
     "simulate": (["simulate"], []),
+    "statement": (["statement", "project", "--sd", "check=0.02"], ["project/images.csv"]),
 }
 FOLDERS = {"stellar-camera plate": "stellar", "stellar-camera exposures": "exposures"}
 

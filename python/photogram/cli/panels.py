@@ -22,6 +22,8 @@ PANELS = {
     " together calibrate",
     "Gross errors": "snoop level fdr unit_weight",
     "Features": "distance line plane circle sphere cylinder k coverage",
+    "Statement": "standard class_h class_v class_3d area without independent language text budget project"
+    " client firm surveyor statement",
     "In parts": "cluster workers parts memory run plan",
     "Simulated block": "strips photos_per_strip forward_overlap side_overlap principal_distance frame_size"
     " flying_height relief points_per_photo crab tilt control_spacing control_sd image_sd"
