@@ -136,6 +136,7 @@ def test_the_command_writes_tables_in_the_system(run, quarry):
         np.testing.assert_allclose(values, xyz, rtol=0, atol=1e-6)
         assert {"sd_east", "sd_north", "sd_up", "c_up_east"} <= set(header)
     control = Path("out/in_crs/control.csv").read_text()
+    assert f"Control and check points in {UTM}" in Path("out/report.html").read_text()
     assert "metres along east, north and up of this system" in control
     assert "d_east" in control
 

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from photogram.formats import Project
     from photogram.results.snooped import Snooped
     from photogram.results.statement.statement import Statement
+    from photogram.show.page import Section
 
 __all__ = ["adjust", "adjusted_block", "started_block"]
 
@@ -231,12 +232,13 @@ def _finish(
     from photogram.show.ways import page_of
 
     told = removed or result
-    files = _files(project, result, told.report(), sections) | _in_system(result, documents.crs)
+    in_crs, more = _in_system(result, documents.crs)
+    files = _files(project, result, told.report(), sections) | in_crs
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
     taken = [] if removed is None else removed.sections()[ON_TOP:]
     sheets = {} if documents.xlsx is None else {documents.xlsx: excel_file(result)}
-    page = documents.page(job, "adjust", target, lambda: page_of(told))
+    page = documents.page(job, "adjust", target, lambda: page_of(told).with_sections(*more))
     beside = {} if stated is None else statement_files(job, stated, target / "statement")
     code = result.verdict.exit_code(strict=strict)
     job.finish(
@@ -273,13 +275,15 @@ def _statement(
         )
 
 
-def _in_system(result: Result, crs: str | None) -> dict[str, bytes]:
-    """Return the tables of a result in another system of coordinates, where one is asked for."""
+def _in_system(result: Result, crs: str | None) -> tuple[dict[str, bytes], list[Section]]:
+    """Return the tables of a result in another system, and a section of the page, where one is asked for."""
     if crs is None:
-        return {}
+        return {}, []
+    from photogram.formats.placed_page import placed_section
     from photogram.formats.placing import placed, placed_files
 
-    return {f"in_crs/{name}": content for name, content in placed_files(placed(result, crs)).items()}
+    found = placed(result, crs)
+    return {f"in_crs/{name}": each for name, each in placed_files(found).items()}, [placed_section(found)]
 
 
 def _on_disk(job: Job, path: Path, target: Path, divided: Parts, threads: int | None) -> bool:

@@ -173,7 +173,9 @@ def statement(
         from photogram.formats.additions import deviations
 
         result, declared, assumed = _adjusted(job, source, added, threads)
-        asked = {**declared, **wanted.options(result.block.linear_unit)}
+        own = wanted.options(result.block.linear_unit)
+        classes = {**declared.get("classes", {}), **own.get("classes", {})}
+        asked = {**declared, **own, "classes": classes}
         sd = deviations(added.sd or []).get("check")
         if sd is not None:
             asked["sd"] = sd

@@ -39,7 +39,7 @@ DISTANCES = ("c", "f", "fx")
 INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy", "beta"})
 """Principal distance and point, and the beta of `eucm`, which is never 0; others are terms of the lens."""
 
-RADIAL = re.compile(r"[KkA]\d")
+RADIAL = re.compile(r"[KkA]\d|k")
 """Names of radial terms."""
 
 BALANCED_AT = 2.0 / 3.0

@@ -129,7 +129,12 @@ class Asked:
             raise InputError(f"independent is one of {', '.join(INDEPENDENT)}, not {self.independent!r}")
         if not 0 < self.coverage < 1:
             raise InputError(f"coverage is a probability between 0 and 1, not {self.coverage}")
-        if self.limit is not None and (len(self.limit) != 3 or not all(each >= 0 for each in self.limit)):
+        if self.expansion is not None and not math.isfinite(self.expansion):
+            raise InputError(f"the thermal expansion is a number, not {self.expansion}")
+        limit = self.limit
+        if limit is not None and (
+            len(limit) != 3 or not all(each >= 0 for each in limit) or limit[0] == math.inf
+        ):
             raise InputError(f"the limit of lengths is A, K and B of A + K L <= B, not {self.limit}")
         if "vdi-2634" in self.standards and not self.lengths:
             raise InputError("vdi-2634 is about calibrated lengths: a table of lengths lacks")

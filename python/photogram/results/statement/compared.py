@@ -18,7 +18,7 @@ import numpy as np
 from photogram.arguments.naming import natural_order
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
-from photogram.messages import listed, nearest
+from photogram.messages import listed
 from photogram.network.block import Block
 from photogram.network.geometry import Spheroid, geocentric_to_geographic, lengths_of_units, local_frames
 from photogram.network.observations import Control
@@ -146,7 +146,7 @@ class Compared:
         """
         for name in names:
             if name not in self.names:
-                raise InputError(f"{name} is no check point{nearest(name, self.names)}")
+                raise InputError(f"{name} is no check point")
         return self.some(~np.isin(np.array(self.names, dtype=object), list(names)))
 
     def in_vegetation(self) -> Compared:

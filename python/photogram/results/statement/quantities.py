@@ -17,12 +17,14 @@ from photogram.results.cameras import units
 from photogram.results.result import Result, adjusted
 from photogram.results.selection import Item
 
-__all__ = ["Wanted", "chosen", "wanted"]
+__all__ = ["Wanted", "chosen", "hint", "wanted"]
 
 _AXES = {"x": 0, "y": 1, "z": 2, "e": 0, "n": 1, "h": 2, "east": 0, "north": 1, "height": 2}
 """What coordinates may be called, beside the names that they have in the block."""
 PRINCIPAL = ("f", "fx", "c")
 """Parameters that are principal distances."""
+MANY = 10_000
+"""Names among which no near one is sought: it takes long."""
 TOGETHER = 256
 """Points whose distances to all others are computed at a time."""
 
@@ -77,7 +79,7 @@ def wanted(result: Result, asked: Any) -> Wanted:
     name, component = " ".join(words[1:-1]), words[-1]
     things = kinds[kind]
     if name not in things.ids:
-        raise InputError(f"there is no {kind} {name!r}{nearest(name, things.ids)}")
+        raise InputError(f"there is no {kind} {name!r}{hint(name, things.ids)}")
     names = things.components[list(things.ids).index(name)]
     lower = [each.lower() for each in names]
     own = _AXES.get(component.lower()) if kind in ("point", "photo") and component not in names else None
@@ -135,7 +137,13 @@ def _two(block: Block, words: Sequence[str]) -> tuple[str, str]:
         if known.issuperset(names):
             return names
     lacking = next((word for word in words if word not in known), words[0])
-    raise InputError(f"there is no point {lacking!r}{nearest(lacking, block.point_ids)}")
+    raise InputError(f"there is no point {lacking!r}{hint(lacking, block.point_ids)}")
+
+
+def hint(name: str, names: Sequence[str]) -> str:
+    """Return the nearest of many names as a question; nothing where none is near."""
+    there = nearest(name, names) if len(names) < MANY else ""
+    return there if "mean" in there else ""
 
 
 def _distance(result: Result, name: str, ends: tuple[str, str]) -> Wanted:

@@ -11,7 +11,6 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.messages import nearest
 from photogram.network.observations import Control
 from photogram.results.result import Result
 from photogram.results.statement import asprs
@@ -23,6 +22,7 @@ from photogram.results.statement.layout import area_in_plan
 from photogram.results.statement.leave_one_out import LeftOut
 from photogram.results.statement.lengths import LengthTest, Limit, at_reference, length_test, measured_lengths
 from photogram.results.statement.nssda import Nssda, nssda
+from photogram.results.statement.quantities import hint
 
 __all__ = ["Asprs", "Lengths", "Standards", "standards"]
 
@@ -275,7 +275,7 @@ def _lengths(result: Result, asked: Asked) -> Lengths:
     places = {name: row for row, name in enumerate(block.point_ids)}
     for name in names:
         if name not in places:
-            raise InputError(f"a length ends in {name!r}, which is no point{nearest(name, block.point_ids)}")
+            raise InputError(f"a length ends in {name!r}, which is no point{hint(name, block.point_ids)}")
         if not result.used_points[places[name]]:
             raise InputError(f"a length ends in {name}, which took no part in the adjustment")
     rows = np.array([places[name] for name in names], dtype=np.int64)

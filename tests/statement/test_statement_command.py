@@ -1,0 +1,136 @@
+"""The command that states: files, exit codes, what a project asks for."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from golden_statement import block_path
+
+FILES = (
+    *("budget.csv", "check_points.csv", "leave_one_out.csv"),
+    *("statement.html", "statement.json", "statement.pdf"),
+)
+
+
+@pytest.fixture
+def site(tmp_path, monkeypatch):
+    """Copy the golden block to where commands run."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(block_path(), "site")
+    for path in Path("site").iterdir():
+        path.chmod(0o644)
+    return Path("site")
+
+
+def test_a_project_is_stated_with_all_files(run, site):
+    done = run(
+        "statement", site, "--class-h", "5cm", "--class-v", "5cm", "--client", "Town", "--date", "2026-11-25"
+    )
+    assert done.exit_code == 0, done.output
+    assert sorted(path.name for path in Path("site-statement").iterdir()) == sorted(FILES)
+    document = json.loads(Path("site-statement/statement.json").read_text())
+    assert (document["exit"], document["client"], document["date"]) == (0, "Town", "2026-11-25")
+    assert {each["name"] for each in document["files"]} >= {"control.csv", "images.csv", "project.toml"}
+    assert document["command"].startswith("photogram statement")
+    assert document["headline"] in Path("site-statement/statement.html").read_text()
+    assert document["headline"] in done.output
+    assert len(document["budgets"]) == 3
+
+
+def test_a_result_as_data_is_stated_alike(run, site):
+    run("adjust", site, "--out", "out", "--parquet", "data", "--no-html")
+    run("statement", site, "--out", "one")
+    done = run("statement", "data", "--out", "two")
+    assert done.exit_code == 0, done.output
+    one, two = (json.loads(Path(each, "statement.json").read_text()) for each in ("one", "two"))
+    assert one["figures"]["rmse_h"] == pytest.approx(two["figures"]["rmse_h"], rel=1e-9)
+    assert [each["key"] for each in one["sentences"]] == [each["key"] for each in two["sentences"]]
+
+
+def test_a_missed_class_ends_with_4_and_writes_all(run, site):
+    done = run("statement", site, "--class-v", "40mm", "--out", "out")
+    assert done.exit_code == 4
+    assert "not met" in done.output
+    assert sorted(path.name for path in Path("out").iterdir()) == sorted(FILES)
+
+
+def test_what_the_project_asks_for_holds_unless_an_option_says_else(run, site):
+    text = (site / "project.toml").read_text()
+    (site / "firm.toml").write_text('"honest.yes" = "Unser Faktor: {factor}."\n')
+    (site / "project.toml").write_text(
+        text + '\n[check]\nindependent = "yes"\n'
+        '[statement]\nclass_h = "5cm"\nlanguage = "de"\nfirm = "Büro"\ntext = "firm.toml"\n'
+        'budgets = ["point C08 z"]\n'
+    )
+    run("statement", site, "--out", "out", "--firm", "Another", "--class-v", "6cm")
+    document = json.loads(Path("out/statement.json").read_text())
+    assert (document["language"], document["firm"]) == ("de", "Another")
+    assert document["asprs"]["class_v_m"] == 0.06
+    said = {each["key"]: each["text"] for each in document["sentences"]}
+    assert said["honest.yes"].startswith("Unser Faktor: 1,06")
+    assert said["asprs.tested.h"].startswith("Mit 30 Kontrollpunkten")
+    assert list(document["budgets"]) == ["point C08 z"]
+    assert "assume.independent.yes" in {each["key"] for each in document["assumptions"]}
+
+
+def test_adjust_states_beside_its_report_with_one_exit_code(run, site):
+    text = (site / "project.toml").read_text()
+    (site / "project.toml").write_text(text + '\n[statement]\nclass_v = "40mm"\n')
+    done = run("adjust", site, "--statement", "--out", "out")
+    assert done.exit_code == 4
+    assert sorted(path.name for path in Path("out/statement").iterdir()) == sorted(FILES)
+    assert run("adjust", site, "--out", "other").exit_code == 0
+
+
+def test_tables_have_a_row_for_each_point_and_source(run, site):
+    run("statement", site, "--out", "out", "--without", "C07=target moved", "--budget", "point C08 z")
+    lines = [line for line in Path("out/check_points.csv").read_text().splitlines() if line[0] != "#"]
+    assert lines[0].startswith("point,cover,east,north,up,d_e,d_n,d_h,sd_e,sd_n,sd_h,sd_adjusted_e")
+    assert lines[0].endswith("T,p,T_from_the_others,ce90_predicted,le90_predicted,used,reason")
+    assert len(lines) == 31
+    assert lines[7].startswith("C07,open,")
+    assert lines[7].endswith(",no,target moved")
+    budget = Path("out/budget.csv").read_text().splitlines()
+    assert budget[0] == ("quantity,unit,value,u,level,source,number,u_k,share,sensitivity,sd,dof,taken_from")
+    levels = {line.split(",")[4] for line in budget[1:]}
+    assert levels == {"kind", "strip", "camera", "photo", "point", "parameter", "observation"}
+    left = Path("out/leave_one_out.csv").read_text().splitlines()
+    assert len(left) == 10
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--class-h", "5"], "a length with its unit"),
+        (["--class-h", "5 parsec"], "no unit of length"),
+        (["--area", "5m"], "an area with its unit"),
+        (["--without", "C07"], "POINT="),
+        (["--standard", "din"], "no standard"),
+        (["--budget", "point C99 z"], "no point"),
+        (["--text", "missing.toml"], "missing.toml"),
+        (["--sd", "checks=1"], "check="),
+    ],
+)
+def test_what_cannot_be_is_refused_and_nothing_is_written(run, site, options, said):
+    done = run("statement", site, "--out", "out", *options)
+    assert done.exit_code in (1, 2)
+    assert said in " ".join(done.output.split())
+    assert not Path("out").exists()
+
+
+def test_coordinates_stand_in_the_system_of_the_client(run, site):
+    crs = pytest.importorskip("pyproj")
+    assert crs
+    text = (site / "project.toml").read_text()
+    frame = '\n[frame]\nkind = "topocentric"\norigin = [48.0, 9.0, 500.0]\n'
+    (site / "project.toml").write_text(text + frame)
+    done = run("statement", site, "--out", "out", "--crs", "EPSG:32632")
+    assert done.exit_code == 0, done.output
+    row = next(
+        line for line in Path("out/check_points.csv").read_text().splitlines() if line.startswith("C01")
+    )
+    east, north = (float(each) for each in row.split(",")[2:4])
+    assert abs(east - 500000) < 200
+    assert 5.3e6 < north < 5.4e6
+    assert "EPSG:32632" in Path("out/statement.html").read_text()
