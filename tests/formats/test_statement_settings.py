@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import InputError, formats
+from photogram import InputError, adjust, formats
 from photogram.formats.additions import with_control
 from photogram.formats.names import with_names
 from photogram.formats.sentences import read_sentences
 from photogram.results.statement.asked import Asked
+from shared_data import SHARED
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
@@ -390,8 +391,6 @@ def test_other_names_of_points_are_names_in_what_is_asked(project, tmp_path):
 
 
 def test_a_statement_takes_what_a_project_asks(project):
-    from photogram import adjust
-
     change(project / "project.toml", "gnss = 0.03", "gnss = 0.03\ncheck = 0.01")
     change(project / "project.toml", 'without = { middle = "target moved" }\n', "")
     whole = formats.read(project)
@@ -401,6 +400,22 @@ def test_a_statement_takes_what_a_project_asks(project):
     assert [each["cover"] for each in document["check_points"]] == ["vegetated"]
     assert list(document["budgets"]) == ["point middle z", "distance north-1 t01"]
     assert len(document["lengths"]["lengths"]) == 2
+
+
+def test_classes_of_a_project_are_judged_as_the_golden_data_have_it(tmp_path):
+    source = SHARED / "statement"
+    if not source.exists():
+        pytest.skip(f"{source} is not here")
+    place = Path(shutil.copytree(source / "block", tmp_path / "block"))
+    with (place / "project.toml").open("a") as file:
+        file.write('\n[statement]\nclass_h = "5cm"\nclass_v = "50 mm"\n')
+    whole = formats.read(place)
+    result = adjust(whole.block, unit_variance=whole.options.unit_variance)
+    found = json.loads(result.statement(**whole.statement).to_json())["asprs"]
+    golden = json.loads((source / "statement.json").read_text())["asprs"]
+    for key in ("class_h_m", "class_v_m", "upper_h", "upper_v"):
+        assert found[key] == pytest.approx(golden[key], rel=1e-6)
+    assert [found[key] for key in ("horizontal", "vertical")] == ["met with confidence", "met"]
 
 
 def test_the_documentation_shows_sections_that_can_be_read(tmp_path):

@@ -36,6 +36,29 @@ SMALL_DISK = 0.03
 """Part of the inputs whose run may write files of a few kB only."""
 COMMAND = 0.2
 """Part of the inputs that the whole command runs; the others are read, adjusted and reported."""
+ASKED: dict[str, Any] = {
+    "survey_common_sd": (0.003, 0.003, 0.005),
+    "survey_common_in_control": True,
+    "independent": "same-base",
+    "standards": ("asprs-2023", "plain", "nssda", "vdi-2634", "iso-19157"),
+    "classes": {"h": 0.05, "v": 0.1, "3d": 0.12},
+    "area": 12.5e6,
+    "without": {"middle": "target moved"},
+    "language": "de",
+    "text": {"asprs.points": "{n} of {asked} points."},
+    "budgets": ("point middle z", "distance north-1 south-1", "camera drone f"),
+    "coverage": 0.9,
+    "limit": (1e-5, 5e-6, np.inf),
+    "expansion": 11.5e-6,
+    "client": "Müller & Söhne",
+    "date": "2026-05-01",
+    "vegetated": frozenset({"middle"}),
+    "lengths": (
+        {"line": "1", "from": "north-1", "to": "south-1", "length": 70.765, "sd": 0.005, "temperature": 21.5},
+        {"line": "2", "from": "north-1", "to": "north-2", "length": 50.1, "sd": 0.005},
+    ),
+}
+"""What the example asks of its statement, so that damage comes to these sections and tables, too."""
 SYSTEMS = (
     *(
         "EPSG:25832",
@@ -201,7 +224,7 @@ def _bases() -> list[formats.Project]:
     made = photogram.simulate(
         strips=1, photos_per_strip=3, points_per_photo=8, check_points=1, position_sd=0.1, seed=11
     )
-    return [formats.read(EXAMPLE), _as_project(made.block)]
+    return [formats.read(EXAMPLE).replace(statement=ASKED), _as_project(made.block)]
 
 
 def _as_project(block: Block, **options: Any) -> formats.Project:
