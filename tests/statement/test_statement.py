@@ -404,3 +404,24 @@ def test_files_are_written_whole(stated, tmp_path):
     for name, write in (("a.json", stated.to_json), ("a.pdf", stated.to_pdf), ("a.html", stated.to_html)):
         assert write(tmp_path / name) == (tmp_path / name).read_bytes()
     assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_an_error_that_cancels_still_counts_against_the_datum(result):
+    """RMSE of the survey has it, the covariance of differences has not (2.2)."""
+    found = result.statement(budgets=(), survey_common_sd=0.02, survey_common_in_control=True).figures
+    alone = result.statement(budgets=()).figures
+    assert found["rmse_v2"] == pytest.approx(math.hypot(alone["rmse_v2"], 0.02), rel=1e-9)
+    assert found["prediction"]["h"]["T"] == alone["prediction"]["h"]["T"]
+
+
+def test_nothing_is_compared_in_a_datum_that_was_chosen(result):
+    block = result.block
+    held = np.isfinite(block.point_sd).any(axis=1)
+    bare = block.replace(
+        point_sd=np.full_like(block.point_sd, np.inf),
+        observations=[],
+        point_positions=np.where(held[:, np.newaxis], np.nan, block.point_positions),
+    )
+    free = photogram.adjust(bare, unit_variance="unity", datum=photogram.InnerConstraints())
+    with pytest.raises(photogram.InputError, match="datum of the network is chosen"):
+        free.statement(budgets=())

@@ -64,8 +64,8 @@ class Compared:
     product, survey
         (3 n, 3 n) s2 Q of the adjusted points, and S of their survey; rows of what is not given are zero in
         S.
-    survey_sd
-        (n, 3) standard deviations of the survey without what all points share.
+    survey_sd, common_sd
+        (n, 3) standard deviations of the survey without what all points share, and (3,) of that.
     scale, second
         s2, and the degrees of freedom with which it was estimated: infinite where the unit weight is known.
     known, step
@@ -83,6 +83,7 @@ class Compared:
     product: Floats
     survey: Floats
     survey_sd: Floats
+    common_sd: Floats
     scale: float
     second: float
     not_usable: tuple[tuple[str, str], ...] = ()
@@ -96,6 +97,11 @@ class Compared:
     def covariance(self) -> Floats:
         """(3 n, 3 n) C, of the differences."""
         return np.asarray(self.product + self.survey)
+
+    @property
+    def survey_variances(self) -> Floats:
+        """(n, 3) of the survey against the datum, which counts what cancels in the differences, too."""
+        return np.asarray(self.survey_sd**2 + self.common_sd**2)
 
     @property
     def counted(self) -> Bools:
@@ -161,8 +167,8 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
     Raises
     ------
     InputError
-        A point without standard deviations of its survey, with that of one axis in plan only, or that is
-        control.
+        A datum that was chosen, in which nothing can be compared; a point without standard deviations of its
+        survey, with that of one axis in plan only, or that is control.
     AdjustmentError, OutOfMemoryError, KeyboardInterrupt
         As :meth:`Result.covariances`.
     """
@@ -171,6 +177,11 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
     step = max(-(-len(rows) // MOST), 1)
     rows = rows[::step]
     names = tuple(block.point_ids[row] for row in rows.tolist())
+    if len(rows) and result.datum.is_chosen:
+        raise InputError(
+            f"check points cannot be compared: the datum of the network is chosen ({result.datum}),"
+            " and theirs is another"
+        )
     _check_apart(block, rows)
     given = block.point_positions[rows]
     turn = turned_to_east(block, given)
@@ -193,6 +204,7 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
         product=blocks.reshape(3 * n, 3 * n),
         survey=_survey_covariance(sd, asked),
         survey_sd=sd,
+        common_sd=np.array(asked.survey_common_sd),
         scale=result.covariance_scale,
         second=math.inf if known else result.degrees_of_freedom,
         not_usable=tuple(_not_usable(result)),

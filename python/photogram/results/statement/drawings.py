@@ -10,6 +10,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.results.footprints import footprints
 from photogram.results.result import Result
 from photogram.results.statement.compared import Compared
+from photogram.results.statement.standards import Lengths
 from photogram.show.pictures import arrows, ellipses, new_figure, round_length
 from photogram.show.style import BLUE, INK, SOFT, VERMILION
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["differences", "overlap", "photos_per_place"]
+__all__ = ["differences", "lengths", "overlap", "photos_per_place"]
 
 WIDTH = 6.3
 """Inches of a picture."""
@@ -89,6 +90,24 @@ def _points(figure: Figure, axes: Axes, found: Compared, extent: float, labels: 
     if len(found) <= NAMED:
         for name, place in zip(found.names, plan, strict=True):
             axes.annotate(name, place, (4, 4), textcoords="offset points", fontsize="x-small", color=SOFT)
+
+
+def lengths(found: Lengths, labels: dict[str, str]) -> Figure:
+    """Draw errors of calibrated lengths over these, with one standard deviation, and their limits."""
+    figure = new_figure(WIDTH, 3.0)
+    axes = figure.add_subplot()
+    order = np.argsort(found.calibrated, kind="stable")
+    test = found.test
+    axes.errorbar(found.calibrated, test.errors, test.sd, fmt="o", color=BLUE, markersize=3, elinewidth=0.7)
+    if test.limits is not None:
+        for sign in (1.0, -1.0):
+            axes.plot(
+                found.calibrated[order], sign * test.limits[order], "--", color=VERMILION, linewidth=0.9
+            )
+    axes.axhline(0.0, color=SOFT, linewidth=0.6)
+    axes.set_xlabel(f"{labels['length']}, {labels['unit']}")
+    axes.set_ylabel(f"{labels['error']}, {labels['unit']}")
+    return figure
 
 
 def overlap(result: Result, labels: dict[str, str]) -> Figure | None:

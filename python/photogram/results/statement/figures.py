@@ -164,7 +164,7 @@ def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
     d = np.where(found.counted, found.differences, np.nan)
     plan, heights = np.hypot(d[:, 0], d[:, 1]), d[:, 2]
     in_plan, in_height = np.isfinite(plan), np.isfinite(heights)
-    survey = found.survey.diagonal().reshape(-1, 3)
+    survey = found.survey_variances
     tests = point_tests(found)
     return Figures(
         n=len(found),

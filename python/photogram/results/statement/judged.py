@@ -79,7 +79,9 @@ def judged(
     verdict = result.verdict
     spoilt = verdict.exit_code(strict=strict) == NOT_USABLE
     bad = spoilt or missed or high or (low and strict)
-    remarks = _remarks(asked, texts, found, of_all, of_vegetated, standards, layout)
+    block = result.block
+    held = not block.photo_position_sd.any() and not block.photo_attitude_sd.any()
+    remarks = _remarks(asked, texts, found, of_all, of_vegetated, standards, layout, held)
     key = _headline(spoilt, missed, high, low, of_all, standards)
     headline = (
         texts(key, verdict=verdict.headline) if spoilt else texts(key, n=0 if of_all is None else of_all.n)
@@ -314,9 +316,12 @@ def _remarks(
     of_vegetated: Figures | None,
     standards: Standards,
     layout: Layout | None,
+    held: bool,
 ) -> list[str]:
     said = [texts("unusable", point=name, reason=reason) for name, reason in found.not_usable[:NAMED]]
-    said += [f"{key}: en" for key in texts.missing]
+    said += [texts("language.missing", sentence=key) for key in texts.missing]
+    if held:
+        said.append(texts("assume.fixed"))
     if standards.asprs is not None:
         said += _asprs_remarks(asked, texts, found, of_all, of_vegetated, standards.asprs)
     if standards.lengths is not None:

@@ -22,6 +22,7 @@ from photogram.results.statement.annexes import (
 )
 from photogram.results.statement.compared import control_places
 from photogram.results.statement.drawings import differences
+from photogram.results.statement.drawings import lengths as drawn_lengths
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.sheets import Written, decimals_for
 from photogram.results.statement.statement import Statement
@@ -33,6 +34,7 @@ from photogram.show.page import (
     Fact,
     Judgement,
     Page,
+    Part,
     Remarks,
     Row,
     Section,
@@ -190,7 +192,7 @@ def _map(found: Statement) -> Drawing:
 def _metrology(found: Statement) -> list[Section]:
     """Return features, and calibrated lengths: results of metrology."""
     texts, cells = found.texts, Written(found.texts)
-    tables: list[Table] = []
+    tables: list[Part] = []
     features, lengths = found.result.features, found.standards.lengths
     unit = found.result.block.linear_unit
     if features is not None and len(features):
@@ -225,6 +227,10 @@ def _metrology(found: Statement) -> list[Section]:
             for k, (line, (first, last)) in enumerate(zip(lengths.lines, lengths.ends, strict=True))
         ]
         tables.append(Table(texts("table.lengths"), columns, rows))
+        labels = {name: texts(f"column.{name}") for name in ("length", "error")} | {"unit": unit}
+        draw = partial(drawn_lengths, lengths, labels)
+        title, caption = texts("picture.lengths"), texts("picture.lengths.caption")
+        tables.append(Drawing("lengths", title, caption, draw))
     if found.standards.iso_19157:
         columns = [cells.column("measure", text=True), cells.column("id"), cells.column("value"), Column("")]
         rows = []

@@ -17,7 +17,7 @@ from photogram.results.statement import asprs
 from photogram.results.statement.asked import Asked, lengths_in
 from photogram.results.statement.compared import Compared, plan_positions, turned_to_east
 from photogram.results.statement.figures import Figures
-from photogram.results.statement.iso_19157 import measures
+from photogram.results.statement.iso_19157 import RELATIVE, measures
 from photogram.results.statement.layout import area_in_plan
 from photogram.results.statement.leave_one_out import LeftOut
 from photogram.results.statement.lengths import LengthTest, Limit, at_reference, length_test, measured_lengths
@@ -166,13 +166,14 @@ def standards(
     InputError
         Lengths between points that there are not; classes that cannot be.
     """
+    lengths = _lengths(result, asked) if asked.lengths else None
     return Standards(
         asprs=_asprs(result, asked, found, of_all, of_vegetated, left_out)
         if "asprs-2023" in asked.standards
         else None,
         nssda=_nssda(of_all),
-        lengths=_lengths(result, asked) if asked.lengths else None,
-        iso_19157=_iso(result, asked, of_all) if "iso-19157" in asked.standards else [],
+        lengths=lengths,
+        iso_19157=_iso(result, asked, of_all, lengths) if "iso-19157" in asked.standards else [],
     )
 
 
@@ -310,23 +311,25 @@ def _lengths(result: Result, asked: Asked) -> Lengths:
     return Lengths(lines, ends, calibrated, limit, test, asked.expansion if turned else None)
 
 
-def _iso(result: Result, asked: Asked, of_all: Figures | None) -> list[dict[str, Any]]:
-    if of_all is None:
-        return []
-    bias = [None if each is None else each.mean for each in (of_all.parts[part] for part in "enh")]
-    whole = of_all.parts["all"]
-    values: dict[str, Any] = {
-        "bias": bias,
-        "rmse": None if whole is None else whole.rmse,
-        "rmse_plan": of_all.rmse_h1,
-        "ce90": of_all.of_moments["ce90"],
-        "ce95": of_all.of_moments["ce95"],
-        "le90": of_all.of_moments["le90"],
-        "le95": of_all.of_moments["le95"],
-        "ellipse": _ellipse(of_all.moments),
-    }
-    scope = f"{of_all.n} check points"
-    return measures(values, unit=result.block.linear_unit, date=asked.date, scope=scope)
+def _iso(
+    result: Result, asked: Asked, of_all: Figures | None, lengths: Lengths | None
+) -> list[dict[str, Any]]:
+    more = {"unit": result.block.linear_unit, "date": asked.date}
+    found: list[dict[str, Any]] = []
+    if of_all is not None:
+        whole = of_all.parts["all"]
+        values: dict[str, Any] = {
+            "bias": [None if each is None else each.mean for each in (of_all.parts[part] for part in "enh")],
+            "rmse": None if whole is None else whole.rmse,
+            "rmse_plan": of_all.rmse_h1,
+            **{name: of_all.of_moments[name] for name in ("ce90", "ce95", "le90", "le95")},
+            "ellipse": _ellipse(of_all.moments),
+        }
+        found += measures(values, scope=f"{of_all.n} check points", **more)
+    if lengths is not None:
+        scope = f"{len(lengths.lines)} lengths"
+        found += measures({"rmse": lengths.test.rms}, scope=scope, element=RELATIVE, **more)
+    return found
 
 
 def _ellipse(moments: Floats) -> list[float] | None:
