@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.adjust import adjusted_block, started_block
 from photogram.cli.console import print_sections
 from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.options import JsonFile, Quiet, Strict, Threads, out_option
@@ -17,14 +16,12 @@ from photogram.cli.projects import (
     Additions,
     Example,
     ProjectPath,
-    read_project,
     with_additions,
     with_options,
 )
+from photogram.cli.results import result_at
 
 if TYPE_CHECKING:
-    from photogram import Result
-    from photogram.formats import Project
     from photogram.results.features import Definition
 
 __all__ = ["features"]
@@ -99,25 +96,18 @@ def features(
     """
     path = job.packaged("flange") if path is None else path
     with job:
-        from photogram import Result, read_result
         from photogram import features as fitted
         from photogram.formats.adjusted import feature_files
-        from photogram.formats.results import is_result
         from photogram.io.json import to_json
         from photogram.results.features_report import features_document, features_sections
         from photogram.show.sections import verdict_sections
 
         definitions = wanted.definitions()
-        if is_result(path):
-            job.reads(path)
-            result = read_result(path)
-            if not isinstance(result, Result):
-                raise typer.BadParameter("points of a collection have no names", param_hint="PATH")
-            declared = {} if result.features is None else result.features.definitions
-        else:
-            project = read_project(job, path, added)
+        result, project = result_at(job, path, added, threads, fitted=False)
+        if project is not None:
             declared = dict(project.features)
-            result = _adjusted(job, project.replace(features={}), threads)
+        else:
+            declared = {} if result.features is None else result.features.definitions
         if not (definitions or declared):
             raise typer.BadParameter("name what to fit: --circle bore=p1,p2,p3 ...", param_hint="PATH")
         found = fitted(result, definitions or declared, k=k, coverage=coverage)
@@ -130,8 +120,3 @@ def features(
             ),
             code=verdict.exit_code(strict=strict),
         )
-
-
-def _adjusted(job: Job, project: Project, threads: int | None) -> Result:
-    block, started = started_block(project, keep_all=False)
-    return adjusted_block(job, project, started or block, threads=threads)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -10,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.adjust import adjusted_block, started_block
 from photogram.cli.console import print_sections
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.maps import Crs
@@ -21,14 +19,13 @@ from photogram.cli.projects import (
     Example,
     ProjectPath,
     project_path,
-    read_project,
     with_additions,
     with_options,
 )
+from photogram.cli.results import result_at
 from photogram.cli.stating import stated, statement_files
 
 if TYPE_CHECKING:
-    from photogram import Result
     from photogram.results.statement.statement import Statement
 
 __all__ = ["statement"]
@@ -172,7 +169,9 @@ def statement(
     with job:
         from photogram.formats.additions import deviations
 
-        result, declared, assumed = _adjusted(job, source, added, threads)
+        result, project = result_at(job, source, added, threads)
+        declared = {} if project is None else project.statement
+        assumed = () if project is None else project.lacks
         own = wanted.options(result.block.linear_unit)
         classes = {**declared.get("classes", {}), **own.get("classes", {})}
         asked = {**declared, **own, "classes": classes}
@@ -183,25 +182,6 @@ def statement(
             found = stated(job, result, asked, crs=crs, strict=strict, assumed=assumed)
             files = statement_files(job, found, target)
         job.finish(files, summary=lambda: print_sections(_summary(found), "statement.json"), code=found.exit)
-
-
-def _adjusted(
-    job: Job, path: Path, added: Additions, threads: int | None
-) -> tuple[Result, Mapping[str, Any], Sequence[str]]:
-    """Return what is stated, what its project asks for, and what was assumed when it was read."""
-    from photogram import Result, read_result
-    from photogram.formats.results import is_result
-
-    if is_result(path):
-        job.reads(path)
-        result = read_result(path)
-        if not isinstance(result, Result):
-            raise typer.BadParameter("points of a collection have no given coordinates", param_hint="PATH")
-        return result, {}, ()
-    project = read_project(job, path, added)
-    block, started = started_block(project, keep_all=False)
-    result = adjusted_block(job, project, started or block, threads=threads)
-    return result, project.statement, project.lacks
 
 
 def _summary(found: Statement) -> list[tuple[str, list[str]]]:

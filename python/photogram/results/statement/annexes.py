@@ -12,7 +12,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.results.cameras import AdjustedCamera, units
 from photogram.results.distortion import distortion_curve
-from photogram.results.statement.budget import Budget, written
+from photogram.results.statement.budget import Budget, budget_line
 from photogram.results.statement.compared import in_order
 from photogram.results.statement.document import kinds_of
 from photogram.results.statement.drawings import overlap
@@ -133,7 +133,6 @@ def budgets_annex(found: Statement) -> Section:
 
 def _budget(found: Statement, own: Budget) -> list[Part]:
     texts, cells = found.texts, Written(found.texts)
-    value, u, expanded = written(texts, own)
     columns = [
         cells.column("source", text=True),
         cells.column("number"),
@@ -164,15 +163,7 @@ def _budget(found: Statement, own: Budget) -> list[Part]:
         name = texts(f"level.{each.level}", name=each.name)
         share = cells.number(100 * each.share, 1)
         rows.append([f"– {name}", each.number, cells.figures(each.u, 2), share, None, ""])
-    title = texts(
-        "budget.line",
-        quantity=own.quantity,
-        value=value,
-        u=u,
-        expanded=expanded,
-        k=texts.number(own.k, 2),
-        p=texts.percent(own.coverage),
-    )
+    title = budget_line(texts, own)
     single = [
         cells.column("observation", text=True),
         cells.column("sd"),

@@ -26,7 +26,7 @@ from photogram.results.statement.sources import Rows, kind_of
 from photogram.results.statement.texts import Texts
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 
-__all__ = ["Budget", "Freedom", "Single", "Source", "budgets", "written"]
+__all__ = ["Budget", "Freedom", "Single", "Source", "budget_line", "budgets"]
 
 LARGEST = 5
 """Single observations that are listed."""
@@ -235,14 +235,15 @@ def _budget(
     )
 
 
-def written(texts: Texts, found: Budget) -> tuple[str, str, str]:
-    """Return value, standard deviation (two significant digits) and U with their unit."""
+def budget_line(texts: Texts, found: Budget) -> str:
+    """Return value, standard deviation (two significant digits) and expanded uncertainty in a sentence."""
     factor, unit = (1.0, found.unit) if found.unit != "rad" else (math.degrees(1.0), "°")
     sd = found.sd * factor
     decimals = max(0, 1 - math.floor(math.log10(sd))) if 0 < sd < math.inf else 6
     numbers = (texts.number(each * factor, decimals) for each in (found.value, found.sd, found.expanded))
     value, u, expanded = (f"{each} {unit}".rstrip() for each in numbers)
-    return value, u, expanded
+    k, p = texts.number(found.k, 2), texts.percent(found.coverage)
+    return texts("budget.line", quantity=found.quantity, value=value, u=u, expanded=expanded, k=k, p=p)
 
 
 class _Freedoms:

@@ -13,7 +13,7 @@ from photogram.results.result import Result
 from photogram.results.statement.asked import Asked
 from photogram.results.statement.asprs import wording
 from photogram.results.statement.assumed import assumptions
-from photogram.results.statement.budget import Budget, written
+from photogram.results.statement.budget import Budget, budget_line
 from photogram.results.statement.compared import Compared
 from photogram.results.statement.figures import Figures, Sized
 from photogram.results.statement.honest import LEVEL, Bias, Prediction, Surface
@@ -95,7 +95,7 @@ def judged(
             *(_nssda(texts, standards) if "nssda" in asked.standards else []),
             *_lengths(texts, standards.lengths),
             *_honest(asked, texts, found, of_all),
-            *(("budget.line", _budget(texts, each)) for each in taken_apart),
+            *(("budget.line", budget_line(texts, each)) for each in taken_apart),
         ],
         assumptions=assumptions(result, asked, texts, found, layout, assumed, removed),
         remarks=remarks,
@@ -293,19 +293,6 @@ def _points(asked: Asked, texts: Texts, found: Compared, of_all: Figures | None)
         reasons = "; ".join(f"{point}: {reason}" for point, reason in asked.without.items())
         said.append(("point.left", texts("point.left", points=listed(list(asked.without)), reasons=reasons)))
     return said
-
-
-def _budget(texts: Texts, found: Budget) -> str:
-    value, u, expanded = written(texts, found)
-    return texts(
-        "budget.line",
-        quantity=found.quantity,
-        value=value,
-        u=u,
-        expanded=expanded,
-        k=texts.number(found.k, 2),
-        p=texts.percent(found.coverage),
-    )
 
 
 def _remarks(
