@@ -7,6 +7,10 @@ from pathlib import Path
 import pytest
 from golden_statement import block_path
 
+import photogram
+from photogram.formats import read
+from photogram.formats.topocentric import in_topocentric
+
 FILES = (
     *("budget.csv", "check_points.csv", "leave_one_out.csv"),
     *("statement.html", "statement.json", "statement.pdf"),
@@ -134,3 +138,24 @@ def test_coordinates_stand_in_the_system_of_the_client(run, site):
     assert abs(east - 500000) < 200
     assert 5.3e6 < north < 5.4e6
     assert "EPSG:32632" in Path("out/statement.html").read_text()
+
+
+def test_longitudes_and_latitudes_are_stated_as_a_local_frame_is(run, tmp_path, monkeypatch):
+    """D and C are turned to east, north, up at each point: the same figures in both kinds of space."""
+    monkeypatch.chdir(tmp_path)
+    shape = ("--strips", "3", "--photos-per-strip", "5", "--check-points", "25", "--seed", "2")
+    assert run("simulate", "flight", *shape, "--spheroid", "wgs84").exit_code == 0
+    earth = read("flight")
+    found = []
+    for project in (earth, in_topocentric(earth)):
+        result = photogram.adjust(project.block, unit_variance="unity")
+        found.append(result.statement(sd=(0.05, 0.06, 0.08), budgets=()))
+    assert found[0].result.geographic
+    assert not found[1].result.geographic
+    one, other = (each.figures for each in found)
+    assert one["prediction"]["all"]["T"] == pytest.approx(other["prediction"]["all"]["T"], rel=1e-4)
+    assert one["rmse"] == pytest.approx(other["rmse"], rel=2e-3)
+    for first, second in zip(found[0].leave_one_out, found[1].leave_one_out, strict=True):
+        assert first["point"] == second["point"]
+        assert first["T"] == pytest.approx(second["T"], rel=1e-3)
+        assert first["rank"] == second["rank"]

@@ -33,7 +33,7 @@ class LeftOut:
     point
         Its name.
     difference
-        (3,) predicted minus survey, east, north, up; NaN for what is not held or not predictable. Linear
+        (3,) predicted minus survey, east, north, up; NaN for what is not held or hardly predictable. Linear
         unit.
     sd
         (3,) its standard deviations.
@@ -99,8 +99,8 @@ def _predicted(name: str, held: np.ndarray, v: Floats, factor: Floats, q: Floats
     pseudo = (vectors[:, shown] / values[shown]) @ vectors[:, shown].T
     statistic = float(residual @ pseudo @ residual) / result.covariance_scale
     rank = int(shown.sum())
-    # Components with a notable part in a direction that the rest does not predict.
-    blind = (np.abs(factor @ vectors[:, ~shown]) > 1e-6 * np.abs(factor).max()).any(axis=1)
+    # Components that lie mostly along directions that the rest does not predict.
+    blind = (vectors[:, ~shown] ** 2).sum(axis=1) > 0.5
     difference, sd, covariance = np.full(3, np.nan), np.full(3, np.nan), np.zeros((3, 3))
     own = factor @ pseudo @ factor.T * result.covariance_scale
     difference[held] = np.where(blind, np.nan, -(factor @ pseudo @ residual))
