@@ -33,19 +33,18 @@ _PLURALS = {IMAGE: "images", CONTROL: "control", POSITION: "photo positions", AT
 
 
 class Rows:
-    """All M observations: which groups they are in, and what they are called."""
+    """All M observations in G groups, an image or a control point each: what they are of, and are called."""
 
     def __init__(self, result: Result, core: _photocore.NetworkTrial) -> None:
         self.block = result.block
         self.suspects, self.sd = block_suspects(result.block, core), core.deviations
-        self.group = np.repeat(np.arange(len(self.suspects)), np.diff(self.suspects.row_starts))
-        self.kind: Indices = self.suspects.kinds[self.group]
-        self.subject: Indices = self.suspects.subjects[self.group]
-        self.component: Indices = core.components.astype(np.int64)
+        self._starts: Indices = self.suspects.row_starts
+        self._sizes: Indices = np.diff(self._starts)
+        self._component = core.components
         self._observed = observations_of_core(self.block)
         self._kinds, self._of_kind = self._labels()
-        self._images = self.kind == IMAGE
-        self._photo: Indices = self.suspects.photos[self.group[self._images]]
+        # Images are the first groups.
+        self._images = slice(0, int(np.count_nonzero(self.suspects.kinds == IMAGE)))
         seen = observables(result)
         self._cameras, self._camera_of_photo = list(seen.camera_names), seen.photo_cameras
         self._strips = np.full(len(self.block.photo_ids), -1)
@@ -53,52 +52,53 @@ class Rows:
             self._strips[photos] = number
 
     def __len__(self) -> int:
-        return len(self.group)
+        return int(self._starts[-1])
 
     def _labels(self) -> tuple[list[str], Indices]:
-        """Return the names of kinds, and (M,) which each row is of."""
-        names = _PLURALS
+        """Return the names of kinds, and (G,) which each group is of."""
         of_observation = [kind_of(each.label) for each in self._observed]
         of_unknown = [each.KIND for each in self.block.unknowns]
         found: dict[str, int] = {}
-        number = np.zeros(len(self.group), dtype=np.int64)
-        for kind in range(len(KINDS)):
-            own = np.flatnonzero(self.kind == kind)
-            if not len(own):
-                continue
-            if kind in names or KINDS[kind] == "camera":
-                number[own] = found.setdefault(names.get(kind, "camera"), len(found))
+        number = np.zeros(len(self.suspects), dtype=np.int64)
+        for kind in np.unique(self.suspects.kinds).tolist():
+            own = np.flatnonzero(self.suspects.kinds == kind)
+            if kind in _PLURALS or KINDS[kind] == "camera":
+                number[own] = found.setdefault(_PLURALS.get(kind, "camera"), len(found))
                 continue
             labels = of_observation if kind == OBSERVATION else of_unknown
             each = np.array([found.setdefault(label, len(found)) for label in labels], dtype=np.int64)
-            number[own] = each[self.subject[own]]
+            number[own] = each[self.suspects.subjects[own]]
         return list(found), number
 
     def sources(self, squares: Floats) -> Iterable[tuple[str, str, int, float]]:
-        """Return level, name, number of rows and contribution of every group."""
-        yield from _sums("kind", self._kinds, self._of_kind, squares)
-        own = squares[self._images]
-        photo = self._photo
+        """Return level, name, number of rows and contribution of every source, of (M,) squares."""
+        sums, sizes = np.add.reduceat(squares, self._starts[:-1]), self._sizes
+        yield from _sums("kind", self._kinds, self._of_kind, sums, sizes)
+        own, rows, photo = sums[self._images], sizes[self._images], self.suspects.photos[self._images]
         strips = [str(number + 1) for number in range(int(self._strips.max(initial=-1)) + 1)]
-        yield from _sums("strip", strips, self._strips[photo], own)
-        yield from _sums("camera", self._cameras, self._camera_of_photo[photo], own)
-        yield from _sums("photo", self.block.photo_ids, photo, own, PHOTOS)
-        control = self.kind == CONTROL
-        points = self.suspects.points[self.group[control]]
-        yield from _sums("point", self.block.point_ids, points, squares[control])
+        if len(strips) > 1:
+            yield from _sums("strip", strips, self._strips[photo], own, rows)
+        yield from _sums("camera", self._cameras, self._camera_of_photo[photo], own, rows)
+        yield from _sums("photo", self.block.photo_ids, photo, own, rows, PHOTOS)
+        control = self.suspects.kinds == CONTROL
+        points = self.suspects.points[control]
+        yield from _sums("point", self.block.point_ids, points, sums[control], sizes[control])
         yield from self._parameters(squares)
 
     def _parameters(self, squares: Floats) -> Iterable[tuple[str, str, int, float]]:
         """Return weighted parameters of cameras and components of common unknowns."""
         several = len(self.block.camera_names) > 1
-        for row in np.flatnonzero(self.kind > OBSERVATION).tolist():
-            kind, *of, component = self.named(row)
-            name = component if kind == "camera" and not several else " ".join([*of, component])
-            yield "parameter", name, 1, float(squares[row])
+        for group in np.flatnonzero(self.suspects.kinds > OBSERVATION).tolist():
+            for row in self.suspects.rows(group).tolist():
+                kind, *of, component = self.named(row)
+                name = component if kind == "camera" and not several else " ".join([*of, component])
+                yield "parameter", name, 1, float(squares[row])
 
     def named(self, row: int) -> tuple[str, ...]:
         """Return the kind of a row, of what it is, and its component."""
-        kind, subject, component = int(self.kind[row]), int(self.subject[row]), int(self.component[row])
+        group = int(np.searchsorted(self._starts, row, "right")) - 1
+        kind, subject = int(self.suspects.kinds[group]), int(self.suspects.subjects[group])
+        component = int(self._component[row])
         block = self.block
         if kind == IMAGE:
             axes = ("column", "row") if block.image_unit == "px" else ("x", "y")
@@ -121,21 +121,22 @@ class Rows:
 
     def groups(self, grouping: Grouping) -> Indices:
         """Return (M,) the group of each row in a grouping; -1 for none."""
-        found = np.full(len(self.group), -1)
-        for kind, table in (
-            (IMAGE, grouping.images),
-            (CONTROL, grouping.points),
-            (POSITION, grouping.photos),
-        ):
-            own = self.kind == kind
-            found[own] = table[self.subject[own], self.component[own]]
-        own = self.kind == ATTITUDE
-        found[own] = grouping.photos[self.subject[own], 3 + self.component[own]]
-        own = self.kind == OBSERVATION
+        kind, subject = (
+            np.repeat(each, self._sizes) for each in (self.suspects.kinds, self.suspects.subjects)
+        )
+        component = self._component.astype(np.int64)
+        found = np.full(len(self), -1)
+        tables = {IMAGE: grouping.images, CONTROL: grouping.points, POSITION: grouping.photos}
+        for own_kind, table in tables.items():
+            own = kind == own_kind
+            found[own] = table[subject[own], component[own]]
+        own = kind == ATTITUDE
+        found[own] = grouping.photos[subject[own], 3 + component[own]]
+        own = kind == OBSERVATION
         if own.any():
             numbers = {id(each): row for row, each in enumerate(self.block.observations)}
             of = np.array([numbers[id(each)] for each in self._observed], dtype=np.int64)
-            found[own] = grouping.observations[of[self.subject[own]]]
+            found[own] = grouping.observations[of[subject[own]]]
         return found
 
 
@@ -145,21 +146,23 @@ def kind_of(label: str) -> str:
 
 
 def _sums(
-    level: str, names: Sequence[str], of: Indices, squares: Floats, most: int | None = None
+    level: str, names: Sequence[str], of: Indices, sums: Floats, sizes: Indices, most: int | None = None
 ) -> Iterable[tuple[str, str, int, float]]:
     """Return the sums over groups that have rows, in their order; or the largest, and all others as one."""
-    inside = slice(None) if of.min(initial=0) >= 0 else of >= 0
-    numbers = np.bincount(of[inside], minlength=len(names))
-    sums = np.bincount(of[inside], weights=squares[inside], minlength=len(names))
+    if of.min(initial=0) < 0:
+        inside = of >= 0
+        of, sums, sizes = of[inside], sums[inside], sizes[inside]
+    numbers = np.bincount(of, weights=sizes, minlength=len(names)).astype(np.int64)
+    totals = np.bincount(of, weights=sums, minlength=len(names))
     there = np.flatnonzero(numbers)
     if most is not None and len(there) > most:
-        order = there[np.argsort(-sums[there], kind="stable")]
+        order = there[np.argsort(-totals[there], kind="stable")]
         rest = order[most:]
-        others = ("others", int(numbers[rest].sum()), math.fsum(sums[rest].tolist()))
+        others = ("others", int(numbers[rest].sum()), math.fsum(totals[rest].tolist()))
         there = order[:most]
     else:
         others = None
-    values = zip(there.tolist(), numbers[there].tolist(), sums[there].tolist(), strict=True)
+    values = zip(there.tolist(), numbers[there].tolist(), totals[there].tolist(), strict=True)
     yield from ((level, names[k], number, total) for k, number, total in values)
     if others is not None:
         yield level, *others
