@@ -21,11 +21,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("shapes", nargs="*", default=["20x50"], help="strips x photos in a strip")
     parser.add_argument("--check-points", type=int, default=1000)
-    parser.add_argument("--control-spacing", type=int, default=12, help="bases between control points")
+    parser.add_argument("--control-spacing", type=int, default=12, help="bases between control")
     given = parser.parse_args()
-    print(
-        f"{platform.machine()}, {os.cpu_count()} processors, {given.check_points} check points, {BUDGETS} budgets"
-    )
+    machine = f"{platform.machine()}, {os.cpu_count()} processors"
+    print(f"{machine}, {given.check_points} check points, {BUDGETS} budgets")
     print(f"{'photos':>8}{'points':>10}{'adjustment s':>14}{'statement s':>14}{'ratio':>8}")
     for shape in given.shapes:
         print(line(shape, given.check_points, given.control_spacing), flush=True)
