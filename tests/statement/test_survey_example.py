@@ -3,9 +3,11 @@
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
 from golden_statement import block_path
 
+from example_scripts import load
 from photogram import adjust, formats
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "survey"))
@@ -33,3 +35,20 @@ def test_its_statement_is_what_its_page_says():
     assert found.figures["rmse_v"] == pytest.approx(0.04495903524, rel=1e-6)
     verdicts = found.standards.asprs.verdicts
     assert verdicts == {"h": "met with confidence", "v": "met with confidence"}
+
+
+def test_the_script_states_in_own_words_and_takes_an_area_apart(tmp_path, capsys):
+    script = load("accuracy_statement")
+    found = script.main(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "statement.html",
+        "statement.pdf",
+        "statement.json",
+    }
+    printed = capsys.readouterr().out
+    assert "We stand by our standard deviations: 30 check points agree (factor 1.06)." in printed
+    square_metres, gradient = script.area(script.corners(found.result))
+    joint = found.result.covariance(("point", list(script.CORNERS)))
+    whole = np.column_stack([gradient, np.zeros(4)]).ravel()
+    expanded = 1.959964 * np.sqrt(whole @ joint @ whole)
+    assert f"area of the lot: {square_metres:.1f} m2, U = {expanded:.1f} m2 (k = 1.96)" in printed
