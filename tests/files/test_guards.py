@@ -66,7 +66,7 @@ RUNS = {
     "new": (["new"], []),
     "plan": (["plan", "galveston", "second"], ["galveston/FRAMES", "second/GROUND"]),
     "simulate": (["simulate"], []),
-    "statement": (["statement", "survey"], ["survey/images.csv", "survey/control.csv"]),
+    "statement": (["statement", "project", "--sd", "check=0.02"], ["project/images.csv"]),
 }
 FOLDERS = {"stellar-camera plate": "stellar", "stellar-camera exposures": "exposures"}
 
@@ -114,8 +114,7 @@ def place(tmp_path, request):
                 shutil.copy(file, tmp_path)
     for project in ("galveston", "second"):
         shutil.copytree(EXAMPLES / "galveston", tmp_path / project)
-    for project in ("project", "survey"):
-        shutil.copytree(EXAMPLES / project, tmp_path / project)
+    shutil.copytree(EXAMPLES / "project", tmp_path / "project")
     (tmp_path / "flight").mkdir()
     (tmp_path / "flight" / "geo.txt").write_text("EPSG:4979\nDJI_0001.JPG 8.5 47.3 500\n")
     (tmp_path / "former.json").write_text("{}")
