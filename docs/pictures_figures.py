@@ -1,10 +1,10 @@
-"""Draw the pictures of docs/pictures.md: docs/pictures/*.svg.
+"""Draw the pictures of docs/pictures.md and docs/statement.md: docs/pictures/*.svg.
 
     python docs/pictures_figures.py
 
 The network is the packaged example of GIANT, the camera that of examples/self_calibration.py; the field of
 residuals is a simulated block whose camera bends a little more than the adjustment knows, the features are
-those of the example of metrology.
+those of the example of metrology, the map of the statement is that of the example of a survey.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from walk import rounded
 
 from photogram import (
@@ -29,7 +30,9 @@ from photogram import (
 from photogram.giant import read_project
 from photogram.plots import figures
 from photogram.results.fitting import with_features
+from photogram.show.page import Drawing
 from photogram.show.pictures import drawn
+from photogram.show.ways import page_of
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 from self_calibration import measured
@@ -53,6 +56,16 @@ def part() -> Result:
     return with_features(result, project.features)
 
 
+def stated() -> Figure:
+    """Return the map on the first sheet of the statement of the packaged survey."""
+    project = formats.read(str(files("photogram") / "examples" / "survey"))
+    page = page_of(adjust(project.block, unit_variance="unity").statement(**project.statement))
+    drawings = [part for section in page.sections for part in section.parts if isinstance(part, Drawing)]
+    figure = next(each for each in drawings if each.name == "map-differences").draw()
+    assert figure is not None
+    return figure
+
+
 def results() -> dict[str, tuple[Result, tuple[str, ...]]]:
     """Return adjustments, and which pictures are taken of each."""
     galveston = adjust(read_project(files("photogram") / "examples" / "galveston").to_block())
@@ -66,11 +79,13 @@ def results() -> dict[str, tuple[Result, tuple[str, ...]]]:
 
 def pictures() -> dict[str, str]:
     """Return the drawings by their names."""
-    return {
-        name: rounded(drawn(figure, FOLDER / f"{name}.svg").decode())
+    every = {
+        name: figure
         for result, names in results().values()
         for name, figure in figures(result, names).items()
     }
+    every["statement"] = stated()
+    return {name: rounded(drawn(figure, FOLDER / f"{name}.svg").decode()) for name, figure in every.items()}
 
 
 def main() -> None:

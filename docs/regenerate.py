@@ -32,6 +32,7 @@ from pathlib import Path
 import calibration_numbers
 import comparator_numbers
 import redundancy_figure
+import statement_numbers
 import stellar_numbers
 import tests_numbers
 
@@ -40,6 +41,7 @@ BLOCKS: dict[str, Mapping[str, Callable[[], list[str] | None]]] = {
     "comparator.md": comparator_numbers.BLOCKS,
     "redundancy.md": redundancy_figure.BLOCKS,
     "self-calibration.md": calibration_numbers.BLOCKS,
+    "statement.md": statement_numbers.BLOCKS,
     "stellar-camera.md": stellar_numbers.BLOCKS,
     "tests.md": tests_numbers.BLOCKS,
 }

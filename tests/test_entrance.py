@@ -109,8 +109,8 @@ def test_wrong_usage_ends_with_2_on_standard_error(run, name, where):
 def test_commands_with_a_directory_of_results_have_a_report():
     made = {name for name, command in COMMANDS.items() if roles(command).get("out") is Writes.DIRECTORY}
     assert set(PAGED) <= made
-    # The report of `features` is that of `adjust`: these are its tables.
-    assert made - set(PAGED) <= {"convert", "features", "new", "simulate"}
+    # The report of `features` is that of `adjust`; the page of `statement` is its result.
+    assert made - set(PAGED) <= {"convert", "features", "new", "simulate", "statement"}
 
 
 def test_help_of_parents_names_their_commands(run):

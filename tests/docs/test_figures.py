@@ -105,6 +105,7 @@ SENTENCES = {
     "tutorials/aerial-block.md": 4,
     "tutorials/drone.md": 3,
     "tutorials/metrology.md": 5,
+    "tutorials/statement.md": 3,
     "tutorials/vision.md": 3,
 }
 """At the least so many figures of the sentences of a page say from which of its blocks they come."""

@@ -13,8 +13,8 @@ from photogram import adjust, formats
 from photogram.stellar.night_file import inputs
 
 
-@pytest.mark.parametrize("kind", ["metrology", "night"])
-def test_new_begins_a_metrology_job_or_a_night(run, tmp_path, kind):
+@pytest.mark.parametrize("kind", ["metrology", "survey", "night"])
+def test_new_begins_a_metrology_job_a_survey_or_a_night(run, tmp_path, kind):
     assert run("new", "own", "--kind", kind).exit_code == 0
     refused = run("new", "own")
     assert refused.exit_code == 1
@@ -23,6 +23,10 @@ def test_new_begins_a_metrology_job_or_a_night(run, tmp_path, kind):
         done = run("adjust", "own", "--no-html")
         assert done.exit_code == 0, done.output
         assert "976 images of 61 points" in done.output
+    elif kind == "survey":
+        done = run("statement", "own")
+        assert done.exit_code == 0, done.output
+        assert "The accuracy asked for is met" in done.output
     else:
         night = tmp_path / "own" / "night.toml"
         assert inputs(night) == [night, night.with_name("images.csv")]

@@ -20,10 +20,16 @@ class Kind(StrEnum):
 
     BLOCK = "block"
     METROLOGY = "metrology"
+    SURVEY = "survey"
     NIGHT = "night"
 
 
-SOURCES = {Kind.BLOCK: EXAMPLE, Kind.METROLOGY: ("flange",), Kind.NIGHT: ("exposures",)}
+SOURCES = {
+    Kind.BLOCK: EXAMPLE,
+    Kind.METROLOGY: ("flange",),
+    Kind.SURVEY: ("survey",),
+    Kind.NIGHT: ("exposures",),
+}
 """Packaged examples, directories of photogram.examples."""
 
 
@@ -39,7 +45,7 @@ def new(
         Kind,
         typer.Option(
             help="block: photos of a drone with control. metrology: targets and scale bars, no control."
-            " night: exposures of stars."
+            " survey: check points enough to state an accuracy. night: exposures of stars."
         ),
     ] = Kind.BLOCK,
     overwrite: Annotated[

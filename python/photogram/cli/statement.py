@@ -18,7 +18,6 @@ from photogram.cli.projects import (
     Additions,
     Example,
     ProjectPath,
-    project_path,
     with_additions,
     with_options,
 )
@@ -163,8 +162,9 @@ def statement(
 
     PATH is a result that `photogram adjust --parquet` has written, or a project, which is adjusted first.
     Check points need standard deviations of their survey: in the table of control, or --sd check=0.01.
+    --example is that of `photogram new --kind survey`.
     """
-    source = project_path(job, path)
+    source = job.packaged("survey") if path is None else path
     target = out or (Path("example-statement") if example else default_out(source, "-statement"))
     with job:
         from photogram.formats.additions import deviations

@@ -41,7 +41,7 @@ def stated(
         place = placed(result, crs)
         (x, y, z), (u, v, w) = place.names, place.units
         system = System(crs, ((x, u), (y, v), (z, w)), place.carried)
-    given = " ".join(f"{name} {value}" for name, value in run.options.items())
+    given = " ".join(name if value == "True" else f"{name} {value}" for name, value in run.options.items())
     return made(
         result,
         strict=strict,

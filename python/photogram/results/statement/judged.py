@@ -143,7 +143,8 @@ def _headline(
         (high, "high"),
         (low, "low"),
         (of_all is None and not met, "none"),
-        ("produced to meet" in verdicts or "not decided" in verdicts, "produced"),
+        ("not decided" in verdicts, "found"),
+        ("produced to meet" in verdicts, "produced"),
         (bool(verdicts) or bool(met), "met"),
     ):
         if holds:
@@ -261,6 +262,9 @@ def _surface(texts: Texts, found: Surface | None) -> Said:
         return [_said(texts, "surface.none", p=p)]
     said = [_said(texts, "surface.found", p=p)]
     value, sd = found.estimate, found.sd
+    if abs(found.t[0]) > critical_normal(LEVEL):
+        shift, own = texts.length(float(value[0])), texts.length(float(sd[0]))
+        said.append(_said(texts, "surface.shift", shift=shift, sd=own))
     k = 1 if abs(found.t[1]) > abs(found.t[2]) else 2
     limit = critical_normal(LEVEL)
     if abs(found.t[k]) > limit:
