@@ -1,5 +1,6 @@
 """Public functions and input classes with hostile values for every parameter: errors of our own."""
 
+import dataclasses
 import importlib
 import inspect
 import math
@@ -11,6 +12,7 @@ import pytest
 import photogram
 from photogram import InputError, PhotogramError
 from photogram.giant import Project, read_project
+from photogram.results.statement.asked import Asked
 
 SMALL = {"strips": 1, "photos_per_strip": 3, "points_per_photo": 6, "check_points": 1, "control_spacing": 1}
 PACKAGES = (
@@ -27,7 +29,7 @@ PACKAGES = (
 )
 MADE_BY_THE_LIBRARY = {
     "photogram": "Cleaned Differences Feature Features FirstValues GroupSums Iteration Message Orientation"
-    " Plan Pose Progress Resection Result Simulation Snooped VarianceComponents VarianceFunction",
+    " Plan Pose Progress Resection Result Simulation Snooped Statement VarianceComponents VarianceFunction",
     "photogram.absolute_orientation": "Model Orientation Strip",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Comparison Decomposition Identity Place PlateResult"
@@ -163,6 +165,7 @@ def good(tmp_path_factory):
             "eliminate_terms": {"block": calibrated.block},
             "score_test": {"result": calibrated, "names": ["K3"]},
             "terms_test": {"result": calibrated, "names": ["K1"]},
+            "statement": {"result": photogram.adjust(block), "sd": 0.1, "budgets": ()},
             "group_sums": {"result": photogram.adjust(block)},
             "orient": {"stations": stations},
             "variance_components": {"network": block, "max_steps": 3},
@@ -348,6 +351,21 @@ def test_hostile_arguments_are_refused_by_errors_of_our_own(package, name, good,
                 pass
             except BaseException as error:  # panics of the extension are no Exceptions
                 failed.append(f"{parameter} = {what}: {type(error).__name__}: {error}"[:200])
+    assert not failed, "\n".join(failed)
+
+
+def test_hostile_options_of_a_statement_are_refused(good):
+    arguments = good["photogram"]["statement"]
+    failed = []
+    for option in [each.name for each in dataclasses.fields(Asked)]:
+        for what, make in HOSTILE.items():
+            try:
+                with np.errstate(all="ignore"):
+                    photogram.statement(**{**arguments, option: make()})
+            except (PhotogramError, OSError):
+                pass
+            except BaseException as error:
+                failed.append(f"{option} = {what}: {type(error).__name__}: {error}"[:200])
     assert not failed, "\n".join(failed)
 
 

@@ -333,7 +333,7 @@ def test_a_statement_of_what_has_not_converged_is_refused(result):
     stopped = photogram.adjust(result.block, unit_variance="unity", max_iterations=1)
     with pytest.raises(photogram.AdjustmentError, match="has not converged"):
         stopped.statement()
-    with pytest.raises(photogram.InputError, match="a statement is of an adjusted block"):
+    with pytest.raises(photogram.InputError, match="not a Result"):
         photogram.statement("block")
 
 

@@ -32,6 +32,8 @@ _NAMES = {"length_limit": "limit"}
 SENTENCES = "sentences.toml"
 """The file that sentences are written to."""
 
+SOME_LENGTH = {"line": "1", "from": "A", "to": "B", "length": 1.0, "sd": 0.0}
+
 
 def read_asked(file: Sections, unit: str) -> dict[str, Any]:
     """Return what the sections ask, as :meth:`photogram.Result.statement` takes it.
@@ -67,7 +69,7 @@ def _checked(file: Sections, section: str, key: str, asked: Mapping[str, Any]) -
         if key == "language":
             Texts(asked[key])
         # Whether there are lengths is not known before the tables are read.
-        checked = Asked.checked(lengths=({},), **asked)
+        checked = Asked.checked(lengths=(SOME_LENGTH,), **asked)
     except InputError as error:
         file.fail(section, key, error.message)
     return {name: getattr(checked, name) for name in asked}

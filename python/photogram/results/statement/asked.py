@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any
 
+import numpy as np
+
+from photogram.arguments.arrays import names, number, numbers, shown, truth_value
 from photogram.errors import InputError
 from photogram.messages import nearest
+from photogram.results.components import VarianceComponents
 
 __all__ = ["INDEPENDENT", "STANDARDS", "Asked", "length_of", "lengths_in"]
 
@@ -18,6 +22,7 @@ INDEPENDENT = ("yes", "same-base", "no")
 """What may be declared of the survey of check points."""
 _METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
 _METRES["us-ft"] = 1200 / 3937
+_UNPAIRED = re.compile("[\ud800-\udfff]")
 _LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([A-Za-z-]*?)(2?)\s*")
 
 
@@ -78,7 +83,7 @@ class Asked:
     text: Mapping[str, str] = field(default_factory=dict)
     budgets: tuple[Any, ...] | None = None
     coverage: float = 0.95
-    components: Any = None
+    components: VarianceComponents | None = None
     lengths: tuple[Mapping[str, Any], ...] = ()
     limit: tuple[float, float, float] | None = None
     expansion: float | None = None
@@ -102,17 +107,8 @@ class Asked:
         for name in given:
             if name not in known:
                 raise InputError(f"a statement has no {name}{nearest(name, known)}")
-        asked = cls(**{name: value for name, value in given.items() if value is not None})
-        asked = replace(
-            asked,
-            standards=tuple(asked.standards),
-            without=dict(asked.without),
-            vegetated=frozenset(asked.vegetated),
-            sd=None if asked.sd is None else _three("sd", asked.sd),
-            survey_common_sd=_three("survey_common_sd", asked.survey_common_sd),
-            lengths=tuple(asked.lengths),
-            budgets=None if asked.budgets is None else tuple(asked.budgets),
-        )
+        own = {name: value for name, value in given.items() if value is not None}
+        asked = cls(**{name: _CHECKS.get(name, _text)(name, value) for name, value in own.items()})
         asked._check()
         return asked
 
@@ -131,11 +127,6 @@ class Asked:
             raise InputError(f"coverage is a probability between 0 and 1, not {self.coverage}")
         if self.expansion is not None and not math.isfinite(self.expansion):
             raise InputError(f"the thermal expansion is a number, not {self.expansion}")
-        limit = self.limit
-        if limit is not None and (
-            len(limit) != 3 or not all(each >= 0 for each in limit) or limit[0] == math.inf
-        ):
-            raise InputError(f"the limit of lengths is A, K and B of A + K L <= B, not {self.limit}")
         if "vdi-2634" in self.standards and not self.lengths:
             raise InputError("vdi-2634 is about calibrated lengths: a table of lengths lacks")
         if self.area is not None and not 0 < self.area < math.inf:
@@ -145,13 +136,97 @@ class Asked:
                 raise InputError(f'{point} is left out for a reason: --without {point}="target moved"')
 
 
-def _three(name: str, given: float | Sequence[float]) -> tuple[float, ...]:
+def _text(name: str, value: object) -> str:
+    if not isinstance(value, str) or "\0" in value or (not value.isascii() and _UNPAIRED.search(value)):
+        raise InputError(f"{name} is no text: {shown(value)}")
+    return value
+
+
+def _several(name: str, value: Any) -> tuple[str, ...]:
+    return tuple(names(name, [value] if isinstance(value, str) else value))
+
+
+def _mapping(name: str, value: object) -> Mapping[Any, Any]:
+    if not isinstance(value, Mapping):
+        raise InputError(f"{name} is no mapping: {shown(value)}")
+    return value
+
+
+def _sizes(name: str, value: object) -> dict[str, float]:
+    return {_text(name, own): number(f"{name} {own}", each) for own, each in _mapping(name, value).items()}
+
+
+def _sentences(name: str, value: object) -> dict[str, str]:
+    return {_text(name, own): _text(f"{name} {own}", each) for own, each in _mapping(name, value).items()}
+
+
+def _three(name: str, given: Any) -> tuple[float, ...]:
     """Return one number, or three, for east, north and up."""
-    values = (given,) * 3 if isinstance(given, int | float) else tuple(given)
+    values = tuple(np.atleast_1d(numbers(name, given)).ravel().tolist())
     values = values * 3 if len(values) == 1 else values
-    if len(values) != 3 or not all(isinstance(each, int | float) and 0 <= each < math.inf for each in values):
-        raise InputError(f"{name} is one standard deviation, or three (east, north, up), not {given}")
-    return tuple(float(each) for each in values)
+    if len(values) != 3 or not all(0 <= each < math.inf for each in values):
+        raise InputError(f"{name} is one standard deviation, or three (east, north, up), not {shown(given)}")
+    return values
+
+
+def _limit(name: str, given: Any) -> tuple[float, float, float]:
+    values = np.atleast_1d(numbers(name, given)).ravel().tolist()
+    if len(values) != 3 or not all(each >= 0 for each in values) or not math.isfinite(values[0] + values[1]):
+        raise InputError(f"the limit of lengths is A, K and B of A + K L <= B, not {shown(given)}")
+    return values[0], values[1], values[2]
+
+
+def _lengths(name: str, given: Any) -> tuple[Mapping[str, Any], ...]:
+    if isinstance(given, str) or not isinstance(given, Sequence):
+        raise InputError(f"{name} is no list of lengths: {shown(given)}")
+    return tuple(
+        _length(f"{name}[{row}]", _mapping(f"{name}[{row}]", each)) for row, each in enumerate(given)
+    )
+
+
+def _length(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    lacking = [key for key in ("line", "from", "to", "length", "sd") if key not in given]
+    if lacking:
+        raise InputError(f"{name} has no {lacking[0]}")
+    line, first, last = names(name, [given[key] for key in ("line", "from", "to")])
+    values = {key: number(f"{name} {key}", given[key]) for key in ("length", "sd")}
+    if given.get("temperature") is not None:
+        values["temperature"] = number(f"{name} temperature", given["temperature"])
+    return {"line": line, "from": first, "to": last, **values}
+
+
+def _quantities(name: str, given: Any) -> tuple[Any, ...]:
+    if isinstance(given, str | Mapping):
+        return (given,)
+    if not isinstance(given, Sequence):
+        raise InputError(f"{name} is no list of quantities: {shown(given)}")
+    return tuple(given)
+
+
+def _components(name: str, given: object) -> object:
+    if not isinstance(given, VarianceComponents):
+        raise InputError(f"{name} are no variance components: {shown(given)}")
+    return given
+
+
+_CHECKS: Mapping[str, Callable[[str, Any], Any]] = {
+    "standards": _several,
+    "classes": _sizes,
+    "area": number,
+    "sd": _three,
+    "without": _sentences,
+    "vegetated": lambda name, value: frozenset(_several(name, value)),
+    "survey_common_sd": _three,
+    "survey_common_in_control": truth_value,
+    "text": _sentences,
+    "budgets": _quantities,
+    "coverage": number,
+    "components": _components,
+    "lengths": _lengths,
+    "limit": _limit,
+    "expansion": number,
+}
+"""What checks and converts options; the others are text."""
 
 
 def lengths_in(unit: str) -> float:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.arrays import shown
-from photogram.errors import AdjustmentError, InputError
+from photogram.arguments.annotations import check_arguments
+from photogram.errors import AdjustmentError
 from photogram.results.result import Result
 from photogram.results.statement.asked import Asked
 from photogram.results.statement.budget import budgets
@@ -70,8 +70,6 @@ def statement(
     OutOfMemoryError, KeyboardInterrupt
         As :meth:`photogram.Result.covariances`.
     """
-    if not isinstance(result, Result):
-        raise InputError(f"a statement is of an adjusted block: {shown(result)}")
     options = Asked.checked(**asked)
     if not result.converged:
         raise AdjustmentError(
@@ -141,3 +139,6 @@ def _layout(result: Result, found: Compared) -> Layout | None:
     if not np.ptp(every[:, :2], axis=0).any():
         return None
     return layout(checks, every, control)
+
+
+check_arguments(globals(), ["statement"])

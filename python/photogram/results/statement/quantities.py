@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.arrays import shown
 from photogram.arguments.types import Indices
 from photogram.errors import InputError
 from photogram.messages import nearest
@@ -67,12 +68,14 @@ def wanted(result: Result, asked: Any) -> Wanted:
     """
     if isinstance(asked, Mapping):
         return _linear(result, asked)
-    words = str(asked).split()
+    words = asked.split() if isinstance(asked, str) else []
     if len(words) < 3:
-        raise InputError(f"{asked!r} is no quantity: 'point C08 z', 'distance C01 C30', 'camera drone f'")
+        raise InputError(
+            f"{shown(asked)} is no quantity: 'point C08 z', 'distance C01 C30', 'camera drone f'"
+        )
     kind = words[0]
     if kind == "distance":
-        return _distance(result, str(asked), _two(result.block, words[1:]))
+        return _distance(result, asked, _two(result.block, words[1:]))
     kinds = adjusted(result).things
     if kind not in kinds or kind == "step":
         raise InputError(f"there are no quantities of the kind {kind!r}{nearest(kind, kinds)}")
@@ -88,7 +91,7 @@ def wanted(result: Result, asked: Any) -> Wanted:
             raise InputError(f"{kind} {name} has no {component!r}: it has {', '.join(names)}")
         own = names.index(component) if component in names else lower.index(component.lower())
     _check(result, kind, [name])
-    return Wanted(str(asked), ((kind, name),), lambda x: x[own], _unit(result, kind, name, own))
+    return Wanted(asked, ((kind, name),), lambda x: x[own], _unit(result, kind, name, own))
 
 
 def chosen(result: Result, checks: Sequence[str]) -> list[Wanted]:
