@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -74,9 +75,17 @@ class _Named(NamedSuspects):
             lengths=(plan, plan, block.linear_unit),
         )
         self.block = block
-        self.point_row = {name: row for row, name in enumerate(block.point_ids)}
-        self.photo_row = {name: row for row, name in enumerate(block.photo_ids)}
         self.observations = observations_of_core(block)
+
+    @cached_property
+    def point_row(self) -> dict[str, int]:
+        """The row of each point: of large blocks it is made only where it is asked for."""
+        return {name: row for row, name in enumerate(self.block.point_ids)}
+
+    @cached_property
+    def photo_row(self) -> dict[str, int]:
+        """The row of each photo, likewise."""
+        return {name: row for row, name in enumerate(self.block.photo_ids)}
 
     def parts(self, group: int) -> Sequence[Sequence[int]] | None:
         """Return what may go alone: plan, height or all of control, single components of stations."""

@@ -69,11 +69,10 @@ def surveyed(result: Result, found: Compared, system: System | None) -> Survey:
     observed = {each.point: each for each in block.observations if isinstance(each, Control)}
     kinds = result.point_kinds.copy()
     positions, sd = block.point_positions.copy(), block.point_sd.copy()
-    for row, name in enumerate(block.point_ids):
-        if name in observed:
-            kinds[row] = "control"
-            positions[row] = np.asarray(observed[name].position, dtype=float)
-            sd[row] = np.sqrt(np.diag(observed[name].precision))
+    for name, each in observed.items():
+        row = block.point_ids.index(name)
+        kinds[row], positions[row] = "control", np.asarray(each.position, dtype=float)
+        sd[row] = np.sqrt(np.diag(each.precision))
     survey = dict(zip(found.names, found.survey_sd, strict=True))
     rows = in_order(block, np.flatnonzero(kinds != "pass"))
     for row in rows.tolist():
