@@ -44,11 +44,12 @@ def page_pdf(page: Page, *, author: str = "") -> bytes:
         reportlab, or matplotlib, which has the fonts, is missing: `pip install 'photogram[pdf]'`.
     """
     try:
+        import matplotlib as mpl
         from reportlab.lib.pagesizes import A4
         from reportlab.platypus import BaseDocTemplate, Frame, PageTemplate
     except ModuleNotFoundError:
-        raise InputError("a PDF needs reportlab: pip install 'photogram[pdf]'") from None
-    _fonts()
+        raise InputError("a PDF needs reportlab and matplotlib: pip install 'photogram[pdf]'") from None
+    _fonts(mpl.get_data_path())
     content = io.BytesIO()
     document = BaseDocTemplate(
         content,
@@ -69,15 +70,14 @@ def page_pdf(page: Page, *, author: str = "") -> bytes:
 
 
 @cache
-def _fonts() -> None:
+def _fonts(data: str) -> None:
     """Make the fonts known that matplotlib brings along: they have all letters of the languages."""
     from pathlib import Path
 
-    import matplotlib as mpl
     from reportlab.pdfbase.pdfmetrics import registerFont, registerFontFamily
     from reportlab.pdfbase.ttfonts import TTFont
 
-    folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
+    folder = Path(data) / "fonts" / "ttf"
     for name in (FONT, BOLD):
         registerFont(TTFont(name, folder / f"{name}.ttf"))
     registerFontFamily(FONT, normal=FONT, bold=BOLD, italic=FONT, boldItalic=BOLD)

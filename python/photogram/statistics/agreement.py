@@ -18,10 +18,12 @@ from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Agreement, Tested
 from photogram.statistics.limits import global_test
 
-__all__ = ["agreement"]
+__all__ = ["SINGULAR", "agreement", "quadratic", "root_of", "scale_of"]
 
 SINGULAR = 1e-12
 """Variance, in those of the components, below which a direction has none: known without error, and held."""
+BORDER = 2.0 / SINGULAR
+"""More than T can be where C is not singular, over the squares of scaled differences."""
 
 
 def agreement(
@@ -62,7 +64,7 @@ def agreement(
     for point in np.flatnonzero(rows.any(axis=1)).tolist():
         chosen = rows[point]
         covariance = (scale * own[point] + given[point])[np.ix_(chosen, chosen)]
-        found[point], dimension[point] = _quadratic(differences[point, chosen], covariance)
+        found[point], dimension[point] = quadratic(differences[point, chosen], covariance)
     together = None
     if not alone and rows.any():
         whole = scale * cofactors
@@ -70,7 +72,7 @@ def agreement(
             place = slice(point * width, (point + 1) * width)
             whole[place, place] += given[point]
         flat = rows.ravel()
-        omega, rank = _quadratic(differences.ravel()[flat], whole[np.ix_(flat, flat)])
+        omega, rank = quadratic(differences.ravel()[flat], whole[np.ix_(flat, flat)])
         together = global_test(omega, rank, level, second)
     if math.isinf(second):
         points = Tested("check points", found, name, "T", dimension)
@@ -85,15 +87,43 @@ def _blocks(matrix: Floats, width: int) -> Floats:
     return np.asarray(matrix.reshape(count, width, count, width)[range(count), :, range(count), :])
 
 
-def _quadratic(d: Floats, covariance: Floats) -> tuple[float, float]:
-    """Return d' C^+ d and the rank of C: (NaN, NaN) where C is not known, (NaN, 0) where all are exact."""
-    scale = np.sqrt(np.diag(covariance))
+def quadratic(d: Floats, covariance: Floats) -> tuple[float, float]:
+    """Return d' C^+ d and the rank of C: (NaN, NaN) where C is not known, (NaN, 0) where all are exact.
+
+    Parameters
+    ----------
+    d
+        (m,) differences.
+    covariance
+        (m, m), C.
+    """
     if not np.isfinite(covariance).all():
         return math.nan, math.nan
-    scale = np.where(scale > 0, scale, 1.0)
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    scale = scale_of(covariance)
+    scaled, y = covariance / np.outer(scale, scale), d / scale
+    # The last row of the factor of C bordered by d is L^-1 d: no second elimination.
+    bordered = np.block([[scaled, y[:, np.newaxis]], [y, np.array([[BORDER * (1.0 + y @ y)]])]])
+    root = root_of(bordered)
+    if root is not None:
+        return float(root[-1, :-1] @ root[-1, :-1]), float(len(d))
+    values, vectors = np.linalg.eigh(scaled)
     free = values > SINGULAR
-    along = vectors.T @ (d / scale)
+    along = vectors.T @ y
     return (
         (float((along[free] ** 2 / values[free]).sum()), float(free.sum())) if free.any() else (math.nan, 0.0)
     )
+
+
+def scale_of(covariance: Floats) -> Floats:
+    """Return (m,) standard deviations; 1 for what has none."""
+    sd = np.sqrt(np.diag(covariance))
+    return np.where(sd > 0, sd, 1.0)
+
+
+def root_of(scaled: Floats) -> Floats | None:
+    """Return the Cholesky factor of a matrix whose diagonal is ones, perhaps bordered; None if singular."""
+    try:
+        root = np.asarray(np.linalg.cholesky(scaled), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return None
+    return root if float(np.diag(root).min(initial=1.0)) ** 2 > SINGULAR else None

@@ -16,6 +16,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.results.statement.compared import PARTS, Compared
+from photogram.statistics.agreement import SINGULAR, quadratic, root_of, scale_of
 from photogram.statistics.distributions import critical_normal
 from photogram.statistics.error_radii import circular_error
 from photogram.statistics.freedom import effective_freedom, rmse_interval
@@ -23,10 +24,7 @@ from photogram.statistics.freedom import effective_freedom, rmse_interval
 __all__ = ["Bias", "PointTests", "Prediction", "Surface", "bias", "point_tests", "prediction", "surface"]
 
 LEVEL = 0.05
-SINGULAR = 1e-12
-"""Variance, in those of the components, below which a direction has none."""
-BORDER = 2.0 / SINGULAR
-"""More than T can be where C is not singular, over the squares of scaled differences."""
+_NONE = (math.nan, math.nan)
 LEAST = 6
 """Points with heights that a surface takes."""
 FLAT = 1e-6
@@ -183,7 +181,8 @@ def prediction(found: Compared, part: str) -> Prediction | None:
     rows = found.rows(part)
     product = found.product[np.ix_(rows, rows)]
     points = len(d) // len(PARTS[part])
-    statistic, rank = _quadratic(d, covariance)
+    statistic, found_rank = quadratic(d, covariance)
+    rank = int(found_rank)
     rmse = math.sqrt(float(d @ d) / points)
     freedom = effective_freedom(covariance)
     low, high = (_limit(rank, upper) for upper in (False, True))
@@ -220,43 +219,13 @@ def _limit(freedom: int, upper: bool) -> float:
     return _photocore.chi_square_quantile(LEVEL / 2, freedom, upper=upper) if freedom else math.nan
 
 
-def _quadratic(d: Floats, covariance: Floats) -> tuple[float, int]:
-    """Return d' C^+ d and the rank of C."""
-    scale = _scale(covariance)
-    scaled = covariance / np.outer(scale, scale)
-    # The last row of the factor of C bordered by d is L^-1 d: no second elimination.
-    y = d / scale
-    bordered = np.block([[scaled, y[:, np.newaxis]], [y, np.array([[BORDER * (1.0 + y @ y)]])]])
-    root = _root(bordered)
-    if root is not None:
-        return float(root[-1, :-1] @ root[-1, :-1]), len(d)
-    values, vectors = np.linalg.eigh(scaled)
-    free = values > SINGULAR
-    along = vectors.T @ (d / scale)
-    return float((along[free] ** 2 / values[free]).sum()), int(free.sum())
-
-
 def _inverse(covariance: Floats) -> Floats:
     """Return C^+."""
-    scale = _scale(covariance)
+    scale = scale_of(covariance)
     scaled = covariance / np.outer(scale, scale)
-    if _root(scaled) is not None:
+    if root_of(scaled) is not None:
         return np.asarray(np.linalg.inv(scaled) / np.outer(scale, scale))
     return np.asarray(np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True) / np.outer(scale, scale))
-
-
-def _scale(covariance: Floats) -> Floats:
-    sd = np.sqrt(np.diag(covariance))
-    return np.where(sd > 0, sd, 1.0)
-
-
-def _root(scaled: Floats) -> Floats | None:
-    """Return the Cholesky factor of a matrix whose diagonal is ones, perhaps bordered; None if singular."""
-    try:
-        root = np.asarray(np.linalg.cholesky(scaled), dtype=np.float64)
-    except np.linalg.LinAlgError:
-        return None
-    return root if float(np.diag(root).min(initial=1.0)) ** 2 > SINGULAR else None
 
 
 def bias(found: Compared, component: str, k: float) -> Bias | None:
