@@ -164,7 +164,7 @@ def _three(name: str, given: Any) -> tuple[float, ...]:
     """Return one number, or three, for east, north and up."""
     values = tuple(np.atleast_1d(numbers(name, given)).ravel().tolist())
     values = values * 3 if len(values) == 1 else values
-    if len(values) != 3 or not all(0 <= each < math.inf for each in values):
+    if len(values) != 3 or not all(each >= 0 and math.isfinite(each * each) for each in values):
         raise InputError(f"{name} is one standard deviation, or three (east, north, up), not {shown(given)}")
     return values
 

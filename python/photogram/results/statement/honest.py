@@ -182,7 +182,7 @@ def prediction(found: Compared, part: str) -> Prediction | None:
     product = found.product[np.ix_(rows, rows)]
     points = len(d) // len(PARTS[part])
     statistic, found_rank = quadratic(d, covariance)
-    rank = int(found_rank)
+    rank = int(found_rank) if math.isfinite(found_rank) else 0
     rmse = math.sqrt(float(d @ d) / points)
     freedom = effective_freedom(covariance)
     low, high = (_limit(rank, upper) for upper in (False, True))
