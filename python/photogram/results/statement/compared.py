@@ -189,7 +189,9 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
     sd = _survey(block, rows, differences, names, asked.sd)
     n = len(names)
     joint = covariances.covariance(("point", names)) if names else np.zeros((0, 0))
-    blocks = np.einsum("iab,ibjc,jdc->iajd", turn, joint.reshape(n, 3, n, 3), turn, optimize=True)
+    if block.geographic or block.frame.kind == "geocentric":
+        blocks = np.einsum("iab,ibjc,jdc->iajd", turn, joint.reshape(n, 3, n, 3), turn, optimize=True)
+        joint = np.asarray(blocks.reshape(3 * n, 3 * n))
     known = result.unit_variance == "unity" or result.variance_of_unit_weight is None
     for name in asked.vegetated:
         if name not in block.point_ids:
@@ -201,7 +203,7 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
         given_places=plan_positions(block, given),
         places=plan_positions(block, result.point_positions[rows]),
         differences=differences,
-        product=blocks.reshape(3 * n, 3 * n),
+        product=joint,
         survey=_survey_covariance(sd, asked),
         survey_sd=sd,
         common_sd=np.array(asked.survey_common_sd),

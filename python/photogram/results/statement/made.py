@@ -75,7 +75,10 @@ def statement(
         raise AdjustmentError(
             f"there is no statement of an adjustment that has not converged: {result.status}"
         )
-    if not result.WHOLE or not np.isfinite(result.point_cofactors[result.used_points]).all():
+    if (
+        not result.WHOLE
+        or not np.isfinite(result.point_cofactors[np.flatnonzero(result.used_points)[:1]]).all()
+    ):
         raise AdjustmentError(
             "there is no statement without covariances: adjust with covariance=True, not in parts"
         )

@@ -60,7 +60,7 @@ class Rows:
         of_unknown = [each.KIND for each in self.block.unknowns]
         found: dict[str, int] = {}
         number = np.zeros(len(self.suspects), dtype=np.int64)
-        for kind in np.unique(self.suspects.kinds).tolist():
+        for kind in np.flatnonzero(np.bincount(self.suspects.kinds)).tolist():
             own = np.flatnonzero(self.suspects.kinds == kind)
             if kind in _PLURALS or KINDS[kind] == "camera":
                 number[own] = found.setdefault(_PLURALS.get(kind, "camera"), len(found))
