@@ -92,8 +92,7 @@ def _fitting(
     """Return what fits a feature, and all that features have in common."""
     if result.geographic:
         raise InputError("features have rectangular coordinates: these are longitudes and latitudes")
-    known = result.unit_variance == "unity" or result.variance_of_unit_weight is None
-    freedom = math.inf if known else result.degrees_of_freedom
+    freedom = result.freedom_of_scale
     if coverage is not None:
         if not 0 < coverage < 1:
             raise InputError(f"coverage is a probability between 0 and 1, not {coverage}")

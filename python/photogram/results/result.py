@@ -206,6 +206,12 @@ class Result(AdjustedNetwork):
         """The weighted sum of squares of all observations, and the degrees of freedom of the unit weight."""
         return self.sums_of_squares.total, self.degrees_of_freedom
 
+    @property
+    def freedom_of_scale(self) -> float:
+        """The degrees of freedom with which `covariance_scale` is known; infinite where it is given."""
+        known = self.unit_variance == "unity" or self.variance_of_unit_weight is None
+        return math.inf if known else self.degrees_of_freedom
+
     def _adjusted(self) -> Adjusted:
         return adjusted(self)
 
@@ -360,7 +366,6 @@ class Result(AdjustedNetwork):
     @cached_property
     def check_points(self) -> CheckPoints:
         """Check points with their differences and standard deviations, tested one by one and together."""
-        known = self.unit_variance == "unity" or self.variance_of_unit_weight is None
         untested = "" if self.converged else "the adjustment has not converged"
         if not self.block.photo_position_sd.any() and not self.block.photo_attitude_sd.any():
             untested = "all photos are fixed, and no standard deviation has their errors"
@@ -371,7 +376,7 @@ class Result(AdjustedNetwork):
             self.block,
             self.point_differences,
             self.point_kinds,
-            second=math.inf if known else self.degrees_of_freedom,
+            second=self.freedom_of_scale,
             untested=untested,
             whole=self.WHOLE,
         )

@@ -50,8 +50,8 @@ def checks_annex(found: Statement) -> Section:
     columns = [
         cells.column("point", text=True),
         cells.column("cover", text=True),
-        *cells.columns(("difference", "sd"), unit, ""),
-        *cells.columns(("normalised",), "", ""),
+        *cells.columns(("difference", "sd"), unit),
+        *cells.columns(("normalised",), ""),
         cells.column("T"),
         cells.column("p"),
         cells.column("others"),
@@ -103,7 +103,7 @@ def left_out_annex(found: Statement) -> Section:
     decimals = decimals_for(np.array([each.sd for each in found.left_out]))
     columns = [
         cells.column("point", text=True),
-        *cells.columns(("difference", "sd"), unit, ""),
+        *cells.columns(("difference", "sd"), unit),
         cells.column("T"),
         cells.column("p"),
     ]
@@ -320,7 +320,7 @@ def survey_annex(found: Statement) -> Section:
         cells.column("point", text=True),
         cells.column("use", text=True),
         *(Column(name, axis) for name, axis in own.system.axes),
-        *cells.columns(("sd",), unit, ""),
+        *cells.columns(("sd",), unit),
     ]
     places = [8 if axis == "deg" else decimals for _, axis in own.system.axes]
     rows: list[Row] = [

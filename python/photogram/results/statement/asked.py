@@ -15,13 +15,14 @@ from photogram.errors import InputError
 from photogram.messages import nearest
 from photogram.results.components import VarianceComponents
 
-__all__ = ["INDEPENDENT", "STANDARDS", "Asked", "length_of", "lengths_in"]
+__all__ = ["INDEPENDENT", "METRES", "STANDARDS", "Asked", "length_of", "lengths_in"]
 
 STANDARDS = ("plain", "asprs-2023", "nssda", "vdi-2634", "iso-19157")
 INDEPENDENT = ("yes", "same-base", "no")
 """What may be declared of the survey of check points."""
-_METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
-_METRES["us-ft"] = 1200 / 3937
+METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
+METRES["us-ft"] = 1200 / 3937
+"""Metres of the units of length."""
 _UNPAIRED = re.compile("[\ud800-\udfff]")
 _LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([A-Za-z-]*?)(2?)\s*")
 
@@ -238,9 +239,9 @@ def lengths_in(unit: str) -> float:
         A unit that nobody knows.
     """
     try:
-        return _METRES[unit]
+        return METRES[unit]
     except KeyError:
-        raise InputError(f"there is no unit of length {unit!r}{nearest(unit, _METRES)}") from None
+        raise InputError(f"there is no unit of length {unit!r}{nearest(unit, METRES)}") from None
 
 
 def length_of(given: str, unit: str, *, area: bool = False) -> float:

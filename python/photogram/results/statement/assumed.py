@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -71,9 +72,9 @@ def _weights(result: Result, components: VarianceComponents | None, texts: Texts
         key = f"weights.{'high' if test.rejected_high else 'low' if test.rejected_low else 'given'}"
         low, high = (texts.number(each, 3) for each in test.limits)
         said.append(_said(texts, key, s2=texts.number(test.variance, 3), low=low, high=high))
-    if result.unit_variance == "unity" or result.variance_of_unit_weight is None:
+    if math.isinf(result.freedom_of_scale):
         return [*said, _said(texts, "weights.known")]
-    s2, f = texts.number(result.variance_of_unit_weight, 3), texts.number(result.degrees_of_freedom, 0)
+    s2, f = texts.number(result.covariance_scale, 3), texts.number(result.degrees_of_freedom, 0)
     return [*said, _said(texts, "weights.posterior", s2=s2, f=f), _said(texts, "honest.approximate")]
 
 

@@ -251,7 +251,7 @@ class _Freedoms:
 
     def __init__(self, result: Result, rows: Rows, components: VarianceComponents | None) -> None:
         self._common = result.degrees_of_freedom
-        known = result.unit_variance == "unity" or result.variance_of_unit_weight is None
+        known = math.isinf(result.freedom_of_scale)
         self._basis = "components" if components is not None else "given" if known else "unit variance"
         self._names: list[str] = []
         self._of: Indices = np.full(len(rows), -1)

@@ -8,7 +8,6 @@ d_i -> J_i d_i, C_ij -> J_i C_ij J_j'.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -25,7 +24,7 @@ from photogram.network.observations import Control
 from photogram.network.rays import local_axes
 from photogram.results.covariance import Covariances
 from photogram.results.result import Result
-from photogram.results.statement.asked import Asked
+from photogram.results.statement.asked import METRES, Asked
 
 __all__ = [
     "PARTS",
@@ -34,6 +33,7 @@ __all__ = [
     "control_places",
     "in_order",
     "plan_positions",
+    "turned_jointly",
     "turned_to_east",
 ]
 
@@ -187,12 +187,9 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
     turn = turned_to_east(block, given)
     differences = _turned(turn, result.point_differences[rows])
     sd = _survey(block, rows, differences, names, asked.sd)
-    n = len(names)
     joint = covariances.covariance(("point", names)) if names else np.zeros((0, 0))
     if block.geographic or block.frame.kind == "geocentric":
-        blocks = np.einsum("iab,ibjc,jdc->iajd", turn, joint.reshape(n, 3, n, 3), turn, optimize=True)
-        joint = np.asarray(blocks.reshape(3 * n, 3 * n))
-    known = result.unit_variance == "unity" or result.variance_of_unit_weight is None
+        joint = turned_jointly(turn, joint)
     for name in asked.vegetated:
         if name not in block.point_ids:
             raise InputError(f"there is no point {name!r} in vegetation")
@@ -208,7 +205,7 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
         survey_sd=sd,
         common_sd=np.array(asked.survey_common_sd),
         scale=result.covariance_scale,
-        second=math.inf if known else result.degrees_of_freedom,
+        second=result.freedom_of_scale,
         not_usable=tuple(_not_usable(result)),
         known=len(checks.rows),
         step=step,
@@ -230,6 +227,13 @@ def turned_to_east(block: Block, positions: Floats) -> Floats:
         a, b = block.frame.ellipsoid
         return local_frames(geocentric_to_geographic(_finite(positions), Spheroid(a, b)))
     return np.broadcast_to(np.eye(3), (len(positions), 3, 3))
+
+
+def turned_jointly(turn: Floats, joint: Floats) -> Floats:
+    """Return J C J' of the (3 n, 3 n) joint covariance of points, J as of :func:`turned_to_east`."""
+    n = len(turn)
+    blocks = np.einsum("iab,ibjc,jdc->iajd", turn, joint.reshape(n, 3, n, 3), turn, optimize=True)
+    return np.asarray(blocks.reshape(3 * n, 3 * n))
 
 
 def _finite(positions: Floats) -> Floats:
@@ -314,7 +318,7 @@ def control_places(block: Block) -> Floats:
 
 def _check_apart(block: Block, rows: Indices) -> None:
     """Refuse check points that are control points of other names."""
-    metre = {"m": 1.0, "mm": 1e3, "ft": 1 / 0.3048, "us-ft": 3937 / 1200}.get(block.linear_unit, 1.0)
+    apart = SAME_PLACE / METRES.get(block.linear_unit, 1.0)
     control = _control_positions(block)
     if not control or not len(rows):
         return
@@ -322,7 +326,7 @@ def _check_apart(block: Block, rows: Indices) -> None:
     held = plan_positions(block, np.array([control[name] for name in others]))
     checks = plan_positions(block, block.point_positions[rows])
     for place, row in zip(checks, rows.tolist(), strict=True):
-        near = np.linalg.norm(held - place, axis=1) < SAME_PLACE * metre  # what is not given is near nothing
+        near = np.linalg.norm(held - place, axis=1) < apart  # what is not given is near nothing
         if near.any():
             raise InputError(
                 f"check point {block.point_ids[row]} is control: it lies where {others[near.argmax()]} does"

@@ -29,10 +29,7 @@ def to_json(found: Statement) -> bytes:
         {
             "program": f"photogram {_photocore.__version__}",
             "title": asked.title or result.block.title,
-            **{
-                name: getattr(asked, name) or None
-                for name in ("client", "firm", "project", "surveyor", "date")
-            },
+            **{name: getattr(asked, name) or None for name in _HEAD},
             "language": found.texts.language,
             "units": {"length": unit, "angle": "rad", "image": result.block.image_unit},
             "headline": found.headline,

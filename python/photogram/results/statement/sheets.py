@@ -128,9 +128,8 @@ class Written:
         """Return a column by the key of its head."""
         return Column(self._texts(f"column.{key}"), unit, text=text)
 
-    def columns(self, keys: Sequence[str], unit: str, component: str) -> list[Column]:
-        """Return columns for east, north and height of several things, `component` before each."""
-        del component
+    def columns(self, keys: Sequence[str], unit: str) -> list[Column]:
+        """Return columns for east, north and height of several things."""
         return [
             Column(f"{self._texts(f'column.{key}')} {self._texts(f'component.{axis}')}", unit)
             for key in keys

@@ -15,7 +15,7 @@ from photogram.network.observations import Control
 from photogram.results.result import Result
 from photogram.results.statement import asprs
 from photogram.results.statement.asked import Asked, lengths_in
-from photogram.results.statement.compared import Compared, plan_positions, turned_to_east
+from photogram.results.statement.compared import Compared, plan_positions, turned_jointly, turned_to_east
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.iso_19157 import RELATIVE, measures
 from photogram.results.statement.layout import area_in_plan
@@ -282,9 +282,7 @@ def _lengths(result: Result, asked: Asked) -> Lengths:
     rows = np.array([places[name] for name in names], dtype=np.int64)
     positions, joint = result.point_positions[rows], result.covariance(("point", names))
     if block.geographic:
-        turn = turned_to_east(block, positions)
-        n = len(names)
-        joint = np.einsum("iab,ibjc,jdc->iajd", turn, joint.reshape(n, 3, n, 3), turn).reshape(3 * n, 3 * n)
+        joint = turned_jointly(turned_to_east(block, positions), joint)
         positions = plan_positions(block, positions)
     pairs = np.array([[names.index(each["from"]), names.index(each["to"])] for each in asked.lengths])
     measured, covariance = measured_lengths(positions, joint, pairs)
@@ -294,7 +292,6 @@ def _lengths(result: Result, asked: Asked) -> Lengths:
         measured = at_reference(measured, temperatures, asked.expansion)
     limit = None if asked.limit is None else Limit(*asked.limit)
     every = plan_positions(block, result.point_positions[result.used_points])
-    known = result.unit_variance == "unity" or result.variance_of_unit_weight is None
     lines = [str(each["line"]) for each in asked.lengths]
     calibrated = np.array([each["length"] for each in asked.lengths], dtype=float)
     test = length_test(
@@ -305,7 +302,7 @@ def _lengths(result: Result, asked: Asked) -> Lengths:
         lines=lines,
         limit=limit,
         diagonal=float(np.linalg.norm(np.ptp(every, axis=0))),
-        freedom=math.inf if known else result.degrees_of_freedom,
+        freedom=result.freedom_of_scale,
     )
     ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]
     return Lengths(lines, ends, calibrated, limit, test, asked.expansion if turned else None)
