@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from photogram.formats import read
 from photogram.results.statement.asked import Asked
 from photogram.results.statement.compared import compared
 from photogram.results.statement.honest import bias, prediction
+from photogram.results.statement.judged import judged
 from photogram.statistics.freedom import rmse_interval
 
 KINDS = ("point C08 z", "distance C01 C30", "camera drone f")
@@ -266,6 +268,23 @@ def test_figures_without_a_point_stand_beside_with_its_reason(result):
         result.statement(without={"C07": " "})
     with pytest.raises(photogram.InputError, match="C99 is no check point"):
         result.statement(without={"C99": "lost"})
+
+
+def test_no_green_mark_above_a_control_point_that_disagrees_or_a_warning_of_the_adjustment(monkeypatch):
+    found = _with_checks(0.9).statement(budgets=(), standards=("plain",))
+    result = found.result
+
+    def tone(left_out):
+        given = (result, found.asked, found.texts, found.compared, found.of_all, found.of_vegetated)
+        return judged(*given, left_out, (), found.standards, None).tone
+
+    first, *others = found.left_out
+    limit = 0.05 / len(found.left_out)
+    assert tone(found.left_out) == "good"
+    assert tone([replace(first, p=1.01 * limit), *others]) == "good"
+    assert tone([replace(first, p=0.99 * limit), *others]) == "look"
+    monkeypatch.setitem(vars(result), "verdict", replace(result.verdict, warning=True))
+    assert tone(found.left_out) == "look"
 
 
 def test_a_common_error_of_the_survey_widens_the_bias(result):

@@ -17,6 +17,7 @@ from photogram.results.statement.compared import in_order
 from photogram.results.statement.document import kinds_of
 from photogram.results.statement.drawings import overlap
 from photogram.results.statement.figures import Figures
+from photogram.results.statement.leave_one_out import limit_of
 from photogram.results.statement.sheets import Written, decimals_for
 from photogram.results.statement.sources import held_names
 from photogram.results.statement.statement import Statement
@@ -113,7 +114,7 @@ def left_out_annex(found: Statement) -> Section:
             *cells.vector(each.difference, decimals),
             *cells.vector(each.sd, decimals),
             cells.number(each.T, 1),
-            cells.p(each.p, 0.05 / len(found.left_out)),
+            cells.p(each.p, limit_of(found.left_out)),
         ]
         for each in found.left_out
     ]

@@ -18,6 +18,7 @@ from photogram.results.statement.compared import Compared
 from photogram.results.statement.figures import Figures, Sized
 from photogram.results.statement.honest import LEVEL, Bias, Prediction, Surface
 from photogram.results.statement.layout import Layout
+from photogram.results.statement.leave_one_out import LeftOut, limit_of
 from photogram.results.statement.standards import Asprs, Lengths, Standards
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
@@ -65,6 +66,7 @@ def judged(
     found: Compared,
     of_all: Figures | None,
     of_vegetated: Figures | None,
+    left_out: Sequence[LeftOut],
     taken_apart: Sequence[Budget],
     standards: Standards,
     layout: Layout | None,
@@ -79,6 +81,7 @@ def judged(
     verdict = result.verdict
     spoilt = verdict.exit_code(strict=strict) == NOT_USABLE
     bad = spoilt or missed or high or (low and strict)
+    doubtful = low or verdict.warning or _doubtful(of_all) or _contradicted(left_out, standards.lengths)
     block = result.block
     held = not block.photo_position_sd.any() and not block.photo_attitude_sd.any()
     remarks = _remarks(asked, texts, found, of_all, of_vegetated, standards, layout, held)
@@ -88,7 +91,7 @@ def judged(
     )
     return Judged(
         exit=NOT_USABLE if bad else 0,
-        tone="bad" if bad else "look" if low or remarks or _doubtful(of_all) else "good",
+        tone="bad" if bad else "look" if remarks or doubtful else "good",
         headline=headline,
         sentences=[
             *_asprs(asked, texts, standards.asprs),
@@ -124,6 +127,14 @@ def _doubtful(of_all: Figures | None) -> bool:
         or any(each.rejected for each in shifts)
         or (of_all.surface is not None and of_all.surface.rejected)
         or bool(of_all.points.wrong.any())
+    )
+
+
+def _contradicted(left_out: Sequence[LeftOut], lengths: Lengths | None) -> bool:
+    """Return whether a control point disagrees with the others, or lengths do with what is predicted."""
+    together = None if lengths is None else lengths.test.together
+    return any(each.p < limit_of(left_out) for each in left_out) or (
+        together is not None and (together.rejected_high or together.rejected_low)
     )
 
 

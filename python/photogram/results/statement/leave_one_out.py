@@ -8,6 +8,7 @@ has in common stays hidden.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +18,9 @@ from photogram.arguments.types import Floats
 from photogram.network.observations import Control
 from photogram.results.result import Result
 from photogram.results.statement.compared import in_order, turned_to_east
+from photogram.results.statement.honest import LEVEL
 
-__all__ = ["LeftOut", "leave_one_out"]
+__all__ = ["LeftOut", "leave_one_out", "limit_of"]
 
 PREDICTABLE = 0.01
 """Eigenvalue of R_g below which the rest does not predict a direction: the point holds the datum along it."""
@@ -88,6 +90,11 @@ def leave_one_out(result: Result) -> list[LeftOut]:
                 inside = np.outer(units, units) * q[np.ix_(held, held)]
                 found.append(_predicted(name, held, units * v, np.diag(units * sd), inside, result))
     return found
+
+
+def limit_of(found: Sequence[LeftOut]) -> float:
+    """Return the probability below which a control point disagrees with the others (Bonferroni)."""
+    return LEVEL / max(len(found), 1)
 
 
 def _predicted(name: str, held: np.ndarray, v: Floats, factor: Floats, q: Floats, result: Result) -> LeftOut:

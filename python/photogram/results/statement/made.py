@@ -118,6 +118,7 @@ def statement(
             found,
             of_all,
             of_vegetated,
+            left_out,
             taken_apart,
             said,
             lie,
