@@ -957,16 +957,12 @@ class FormedNode:
         """
 
 @final
-class NetworkTrial:
-    """A network tried without some of its observations; the symbolic analysis is done once.
+class NetworkSuspects:
+    """The G groups of observations that may hold a gross error together, in the order of all tests.
 
-    Its *suspects* are the G groups of observations that may hold a gross error together: images in their
-    order, then the control of points, positions and attitudes of photos, observations beside images, and what
-    was observed of cameras and common unknowns. Each has rows, M in all, which stand one suspect after the
-    other; so do square blocks. What is out has weight zero.
-
-    Of all methods, errors are those of the adjustment: BlockError or CollectionError, of the kind
-    `undetermined points` or `undetermined photos` where what is out takes their last support.
+    Images in their order, then the control of points, positions and attitudes of photos, observations beside
+    images, and what was observed of cameras and common unknowns. Each has rows, M in all, which stand one
+    group after the other.
     """
 
     @property
@@ -987,6 +983,20 @@ class NetworkTrial:
     @property
     def deviations(self) -> _Floats:
         """(M,) standard deviations a priori, in the units of the observations."""
+
+@final
+class NetworkTrial:
+    """A network tried without some of its observations; the symbolic analysis is done once.
+
+    Rows and square blocks of its suspects stand one suspect after the other. What is out has weight zero.
+
+    Of all methods, errors are those of the adjustment: BlockError or CollectionError, of the kind
+    `undetermined points` or `undetermined photos` where what is out takes their last support.
+    """
+
+    @property
+    def suspects(self) -> NetworkSuspects:
+        """What may be out."""
 
     @property
     def photos(self) -> list[list[float]]:
@@ -1093,23 +1103,6 @@ class NetworkTrial:
         of one standard deviation moves it, in its unit and in its standard deviations (a priori unit weight).
         """
 
-    def influences(
-        self, covariances: BlockCovariances, partials: _Floats, of: list[tuple[str, int]]
-    ) -> _Floats:
-        """Return what errors of one standard deviation in every row do to functions of the unknowns.
-
-        Parameters
-        ----------
-        covariances
-            Of the same network at the same values, in the datum of what was held.
-        partials, of
-            As for `BlockCovariances.propagate`: (k, u).
-
-        Returns
-        -------
-        (k, M).
-        """
-
     def inseparable(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
         """Return pairs of suspects of one point whose tests are correlated by more than `limit`."""
 
@@ -1180,6 +1173,16 @@ class BlockCovariances:
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
     ) -> _Floats:
         """Return J Q J^T, for (m, k) partials J of m functions of the k unknowns of what is named."""
+
+    def suspects(self) -> NetworkSuspects:
+        """Return the groups of observations of the network."""
+
+    def influences(self, partials: _Floats, of: list[tuple[str, int]]) -> _Floats:
+        """Return what errors of one standard deviation in every row do to functions of the unknowns: (m, M).
+
+        Rows are those of all suspects; `partials`, `of` are those of :meth:`propagate`; the datum is that of
+        what was held.
+        """
 
     def group_squares(
         self,

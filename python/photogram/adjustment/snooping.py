@@ -266,10 +266,10 @@ def _exchanged(block: Block, trial: NetworkTrial, outcome: Outcome, result: Resu
 
 def gone(trial: NetworkTrial, out: Out, kind: int) -> tuple[Indices, Indices]:
     """Return what of a kind is out, row by row: the numbers of the subjects, and their components."""
-    kinds, subjects = trial.core.subjects
-    group = np.repeat(np.arange(len(kinds)), np.diff(trial.core.row_starts))
+    kinds, subjects = trial.core.suspects.subjects
+    group = np.repeat(np.arange(len(kinds)), np.diff(trial.core.suspects.row_starts))
     rows = out.rows & (kinds[group] == kind)
-    return subjects[group[rows]], trial.core.components[rows]
+    return subjects[group[rows]], trial.core.suspects.components[rows]
 
 
 def used_images(trial: NetworkTrial, out: Out, count: int) -> Bools:

@@ -65,7 +65,7 @@ def _snoop_collection(
             state, images = found
             core = collection_network(collection, own).trial(state, threads=core_threads(threads))
             trial.restart(core)
-            kinds, subjects = core.subjects
+            kinds, subjects = core.suspects.subjects
             groups = np.flatnonzero((kinds == IMAGE) & np.isin(subjects, images))
             return Aside(tuple(groups.tolist()), {}, BY_LOSSES)
 

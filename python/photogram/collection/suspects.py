@@ -23,7 +23,7 @@ def collection_trial(
     """Return a collection as tests ask it."""
     return NetworkTrial(
         core=core,
-        suspects=_Named(collection, core, parts).suspects(),
+        suspects=_Named(collection, core.suspects, parts).suspects(),
         supported=np.asarray(np.isfinite(collection.photo_sd).all(axis=1)),
         rough=ROUGH,
         exact=EXACT,
@@ -31,7 +31,7 @@ def collection_trial(
 
 
 class _Named(NamedSuspects):
-    def __init__(self, collection: Collection, core: _photocore.NetworkTrial, parts: bool) -> None:
+    def __init__(self, collection: Collection, core: _photocore.NetworkSuspects, parts: bool) -> None:
         components = ("XYZ", POSE[3:], POSE[:3])
         super().__init__(collection, core, apart=parts, components=components, lengths=("",) * 3)
         self.parameters = collection.parameters[len(POSE) :]

@@ -185,15 +185,17 @@ class Covariances:
             return Propagated(float(value), float(sd), covariance, partials, scalar)
         return Propagated(value, sd, covariance, partials, found)
 
+    def suspects(self) -> _photocore.NetworkSuspects:
+        """Return the groups of observations, whose rows :meth:`influences` counts."""
+        return self._core.suspects()
+
     def influences(
-        self, trial: _photocore.NetworkTrial, selection: Selection, function: Callable[..., Any] | None
+        self, selection: Selection, function: Callable[..., Any] | None
     ) -> tuple[list[tuple[str, str, str]], Floats]:
         """Return what errors of one standard deviation in every observation do to unknowns or a function.
 
         Parameters
         ----------
-        trial
-            The same network, as it stands.
         selection, function
             Unknowns, and what they go into; None for themselves.
 
@@ -206,7 +208,7 @@ class Covariances:
             partials = np.eye(len(selected.values))
         else:
             partials = _partials(function, selected, _evaluated(function, selected, selected.values))
-        return selected.labels, self._asked(lambda: trial.influences(self._core, partials, selected.rows))
+        return selected.labels, self._asked(lambda: self._core.influences(partials, selected.rows))
 
     def _asked(self, ask: Callable[[], T]) -> T:
         try:

@@ -74,9 +74,9 @@ class NetworkTrial:
         exact: float,
     ) -> None:
         self.core, self.suspects, self.rough, self.exact = core, suspects, rough, exact
-        self.deviations: Floats = core.deviations
+        self.deviations: Floats = core.suspects.deviations
         self._supported = supported
-        self._is_image = np.asarray(core.subjects[0] == IMAGE)
+        self._is_image = np.asarray(core.suspects.subjects[0] == IMAGE)
         starts = suspects.row_starts
         sizes = np.diff(starts)
         self._block_starts = np.concatenate([[0], np.cumsum(sizes**2)])
@@ -287,7 +287,7 @@ class NamedSuspects(ABC):
     def __init__(
         self,
         given: Given,
-        core: _photocore.NetworkTrial,
+        core: _photocore.NetworkSuspects,
         *,
         apart: bool,
         components: tuple[Sequence[str], Sequence[str], Sequence[str]],

@@ -245,7 +245,7 @@ class Reliability:
         InputError
             A selection that is not there.
         """
-        labels, found = self._covariances().influences(self._trial.core, selection, None)
+        labels, found = self._covariances().influences(selection, None)
         return labels, np.asarray(found * (self.detectable / self.sd))
 
     def influence_of(self, function: Callable[..., Any], unknowns: Selection) -> Floats:
@@ -253,7 +253,7 @@ class Reliability:
 
         `function` and `unknowns` are those of :meth:`photogram.Result.propagate`.
         """
-        _, found = self._covariances().influences(self._trial.core, unknowns, function)
+        _, found = self._covariances().influences(unknowns, function)
         return np.asarray(found * (self.detectable / self.sd))
 
     def most_moved(self, count: int = SEARCHED) -> list[Moved]:

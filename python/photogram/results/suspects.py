@@ -27,7 +27,7 @@ __all__ = ["block_suspects", "network_trial", "observations_of_core"]
 ANGLES = ("omega", "phi", "kappa")
 
 
-def block_suspects(block: Block, core: _photocore.NetworkTrial, *, parts: bool = True) -> Suspects:
+def block_suspects(block: Block, core: _photocore.NetworkSuspects, *, parts: bool = True) -> Suspects:
     """Return the groups of observations of a block as the core has them.
 
     Parameters
@@ -50,7 +50,7 @@ def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = 
     deviations = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
     return NetworkTrial(
         core=core,
-        suspects=block_suspects(block, core, parts=parts),
+        suspects=block_suspects(block, core.suspects, parts=parts),
         supported=np.asarray(np.isfinite(deviations).all(axis=1)),
         rough=ROUGH,
         exact=EXACT,
@@ -64,7 +64,7 @@ def observations_of_core(block: Block) -> list[Observation]:
 
 
 class _Named(NamedSuspects):
-    def __init__(self, block: Block, core: _photocore.NetworkTrial, parts: bool) -> None:
+    def __init__(self, block: Block, core: _photocore.NetworkSuspects, parts: bool) -> None:
         axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
         plan = "rad" if block.geographic else block.linear_unit
         super().__init__(

@@ -121,6 +121,11 @@ impl Linearized {
         &self.values
     }
 
+    /// The unknowns that were held there.
+    pub fn held(&self) -> &[usize] {
+        &self.held
+    }
+
     /// Weighted sum of squares of the observations at these values, weighted unknowns among them; not finite where some cannot be computed.
     pub fn sum_of_squares(&self) -> f64 {
         self.sum_of_squares

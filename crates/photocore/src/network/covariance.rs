@@ -1,12 +1,14 @@
 //! Covariances of anything in an adjusted network with anything else, and the network in other datums, without adjusting again.
 
 use std::ops::ControlFlow;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, Matrix6};
 
 use super::model::Owner;
 use super::mounts::Composed;
 use super::problem::Assembled;
+use super::suspects::Suspects;
 use super::state::{InnerConstraints, NetworkDatum, State};
 use super::{Network, NetworkError, Options, Solution};
 use crate::Threads;
@@ -47,6 +49,7 @@ pub struct Covariances {
     pub(super) photo_of_camera: Vec<Option<usize>>,
     /// The camera of each photo.
     pub(super) camera_of_photo: Vec<usize>,
+    pub(super) suspects: OnceLock<Arc<Suspects>>,
     memory: Option<usize>,
 }
 
@@ -108,6 +111,7 @@ impl Network {
             point,
             photo_of_camera,
             camera_of_photo: self.photos.iter().map(|photo| photo.camera).collect(),
+            suspects: OnceLock::new(),
             memory: options.memory,
         })
     }

@@ -26,7 +26,7 @@ impl Trial {
         let terms = self.terms(&problem.sd, &found.values);
         let mut all = Vec::new();
         for &index in suspects {
-            let suspect = &self.suspects[index];
+            let suspect = &self.suspects.all[index];
             let rows = suspect.rows.len();
             match suspect.home {
                 Home::Group { group, point } => {
@@ -86,7 +86,7 @@ impl Trial {
         let model = &self.assembled.problem.model;
         let mut rest = effects;
         for &index in suspects {
-            let suspect = &self.suspects[index];
+            let suspect = &self.suspects.all[index];
             let (own, others) = rest.split_at_mut(suspect.rows.len());
             rest = others;
             let photo = match suspect.home {
@@ -129,7 +129,7 @@ impl Trial {
         let count = own.residual.len();
         let mut starts = vec![0];
         own.suspects.iter().for_each(|&index| {
-            starts.push(starts[starts.len() - 1] + self.suspects[index].rows.len());
+            starts.push(starts[starts.len() - 1] + self.suspects.all[index].rows.len());
         });
         let block = |i: usize, j: usize| -> Vec<f64> {
             let rows = starts[i]..starts[i + 1];
@@ -138,7 +138,7 @@ impl Trial {
         let mut found = vec![];
         for j in 0..own.suspects.len() {
             for i in 0..j {
-                let out = |k: usize| !self.suspects[own.suspects[k]].rows.iter().any(|row| self.is_in(row.0));
+                let out = |k: usize| !self.suspects.all[own.suspects[k]].rows.iter().any(|row| self.is_in(row.0));
                 if out(i) || out(j) {
                     continue;
                 }

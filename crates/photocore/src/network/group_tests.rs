@@ -127,15 +127,15 @@ impl Trial {
         let found = self.found()?;
         let groups = found.cofactors.groups.as_ref().ok_or(NetworkError::State)?;
         let terms = self.terms(&self.assembled.problem.sd, &found.values);
-        let mut all = Tests::unknown(self.suspects.len(), &self.row_starts, &self.block_starts);
-        let parts = all.parts(&self.row_starts, &self.block_starts);
+        let mut all = Tests::unknown(self.suspects.all.len(), self.suspects.row_starts(), &self.block_starts);
+        let parts = all.parts(self.suspects.row_starts(), &self.block_starts);
         let fill = |_, (suspects, mut part): (&[Suspect], Part<'_>)| {
             for suspect in suspects {
                 let size = suspect.rows.len();
                 part.put(size, self.test(suspect, found, groups, &terms));
             }
         };
-        let parts = self.suspects.chunks(TOGETHER).zip(parts).collect();
+        let parts = self.suspects.all.chunks(TOGETHER).zip(parts).collect();
         threads.install(|| parallel::each_of(parts, &fill));
         Ok(all)
     }

@@ -109,7 +109,7 @@ pub use selection::{Dropped, Reason};
 pub use solution::{DatumInForce, Redundancies, Solution, SumsOfSquares, Unseen, Weak};
 pub use state::{InnerConstraints, NetworkDatum, State};
 pub use surroundings::{BlockOf, Surroundings};
-pub use suspects::Subject;
+pub use suspects::{Subject, Suspects};
 pub use trial::{Converged, Out, Outcome, Trial};
 pub use weak_points::WeakPoint;
 

@@ -58,7 +58,7 @@ impl Trial {
         let around = self.around(suspects, &self.observation_sd, found, threads);
         let terms = self.terms(&self.sd, &found.values);
         let predict = |&index: &usize| {
-            let suspect = &self.suspects[index];
+            let suspect = &self.suspects.all[index];
             let out: Vec<usize> =
                 (0..suspect.rows.len()).filter(|&k| !self.is_in(suspect.rows[k].0)).collect();
             if out.is_empty() || self.is_gone(suspect) {
@@ -94,7 +94,7 @@ impl Trial {
         let problem = &self.assembled.problem;
         let (mut places, mut ties) = (vec![], vec![]);
         for &index in suspects {
-            match self.suspects[index].home {
+            match self.suspects.all[index].home {
                 Home::Group { point, .. } => places.push(point),
                 Home::Tie(tie) => ties.push(tie),
                 Home::Point(_) | Home::Block(_) => {}
@@ -207,7 +207,7 @@ impl Trial {
 
     /// The equations of the coordinates of a local point that are observations themselves.
     fn further(&self, place: usize, terms: &Terms<'_>) -> Vec<f64> {
-        let mut own = self.on_place[place].iter().map(|&index| &self.suspects[index]);
+        let mut own = self.on_place[place].iter().map(|&index| &self.suspects.all[index]);
         let Some(suspect) = own.find(|suspect| matches!(suspect.home, Home::Point(_))) else { return vec![] };
         let all: Vec<usize> = (0..suspect.rows.len()).collect();
         self.term_rows(suspect, &all, terms).transpose().as_slice().to_vec()
@@ -225,7 +225,7 @@ impl Trial {
         let groups = problem.layout().groups_of(place);
         let (mut rows, mut off) = (vec![], vec![]);
         for &index in &self.on_place[place] {
-            let suspect = &self.suspects[index];
+            let suspect = &self.suspects.all[index];
             let first = match suspect.home {
                 Home::Group { group, .. } => 2 * (group - groups.start),
                 _ => 2 * groups.len(),

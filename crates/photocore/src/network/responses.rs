@@ -1,14 +1,15 @@
 //! What single observations have to do with everything else: columns of R, effects on chosen unknowns, the unknown that an error moves most.
 //! Each takes a solution of the normal equations.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, Vector3};
 
 use super::NetworkError;
 use super::covariance::{Covariances, Of};
 use super::model::Owner;
-use super::suspects::{Home, Row};
+use super::suspects::{Home, Suspects};
 use super::trial::Trial;
 use crate::Threads;
 use crate::adjustment::{AdjustError, Linearized, ObservationRows};
@@ -43,6 +44,36 @@ pub struct Moved {
     pub in_sd: f64,
 }
 
+impl Covariances {
+    /// The groups of observations of the network, in the order of all tests.
+    pub fn suspects(&self) -> &Arc<Suspects> {
+        let new = || Suspects::new(&self.assembled, self.images, &|photo| self.camera_of_photo[photo]);
+        self.suspects.get_or_init(|| Arc::new(new()))
+    }
+
+    /// What errors of one standard deviation in every row of [`Covariances::suspects`] do to functions of the unknowns: for each function
+    /// a number for each row.
+    ///
+    /// `partials`: of each function by the unknowns of what `of` names, as in [`Covariances::propagate`].
+    ///
+    /// # Errors
+    /// Those of [`Covariances::propagate`].
+    pub fn influences(
+        &self,
+        partials: &[f64],
+        of: &[Of],
+        threads: &Threads,
+    ) -> Result<Vec<f64>, NetworkError> {
+        let (problem, values) = (&self.assembled.problem, self.linearized.values());
+        let solutions = self.solutions(partials, of, threads)?;
+        let products =
+            ObservationRows::products(problem, values, self.linearized.held(), &solutions, threads);
+        let (width, suspects) = (solutions.len(), self.suspects());
+        let rows = || suspects.rows_of(0..suspects.all.len(), problem.layout().equations());
+        Ok((0..width).flat_map(|k| rows().map(move |row| (row, k))).map(|(row, k)| products[row * width + k]).collect())
+    }
+}
+
 impl Trial {
     /// The columns of R that belong to the rows of some suspects: for each of these rows the cofactors of its residual with those of all
     /// rows of all suspects, one after the other.
@@ -50,9 +81,10 @@ impl Trial {
     /// # Errors
     /// Nothing was adjusted before; an interruption, no memory.
     pub fn responses(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<f64>, NetworkError> {
-        let all = self.rows_of(0..self.suspects.len());
+        let all = self.rows_of(0..self.suspects.all.len());
+        let starts = self.suspects.row_starts();
         let asked: Vec<usize> =
-            suspects.iter().flat_map(|&index| self.row_starts[index]..self.row_starts[index + 1]).collect();
+            suspects.iter().flat_map(|&index| starts[index]..starts[index + 1]).collect();
         let mut columns = Vec::with_capacity(all.len() * asked.len());
         let rows: Vec<usize> = asked.iter().map(|&row| all[row]).collect();
         self.solutions(&rows, threads, |index, solution, equations| {
@@ -86,30 +118,6 @@ impl Trial {
         Ok(found)
     }
 
-    /// What errors of one standard deviation in every row of all suspects do to functions of the unknowns: for each function a number for
-    /// each row.
-    ///
-    /// `partials`: of each function by the unknowns of what `of` names, as in [`Covariances::propagate`].
-    ///
-    /// # Errors
-    /// Those of [`Covariances::propagate`].
-    pub fn influences(
-        &self,
-        covariances: &Covariances,
-        partials: &[f64],
-        of: &[Of],
-        threads: &Threads,
-    ) -> Result<Vec<f64>, NetworkError> {
-        let (problem, values) = (&self.assembled.problem, covariances.linearized.values());
-        let solutions = covariances.solutions(partials, of, threads)?;
-        let all = self.rows_of(0..self.suspects.len());
-        let width = solutions.len();
-        let products = ObservationRows::products(problem, values, &self.held, &solutions, threads);
-        let of_function = |k: usize| all.iter().map(move |&row| (row, k));
-        let influences = (0..width).flat_map(of_function).map(|(row, k)| products[row * width + k]).collect();
-        Ok(influences)
-    }
-
     /// Hands out Q a^T of some rows a, one after the other, with all rows.
     fn solutions(
         &self,
@@ -135,13 +143,8 @@ impl Trial {
     }
 
     /// The rows of some suspects among those of [`ObservationRows`].
-    fn rows_of(&self, suspects: std::ops::Range<usize>) -> Vec<usize> {
-        let equations = self.assembled.problem.layout().equations();
-        let number = |&(row, _): &(Row, usize)| match row {
-            Row::Equation(equation) => equation,
-            Row::Unknown(unknown) => equations + unknown,
-        };
-        self.suspects[suspects].iter().flat_map(|suspect| suspect.rows.iter().map(number)).collect()
+    fn rows_of(&self, suspects: Range<usize>) -> Vec<usize> {
+        self.suspects.rows_of(suspects, self.assembled.problem.layout().equations()).collect()
     }
 
     /// For each photo that steps by a rotation vector where its angles stand, and what makes steps of these of it.

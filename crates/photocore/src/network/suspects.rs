@@ -3,8 +3,9 @@
 
 use smallvec::SmallVec;
 
-use super::Network;
-use super::model::Owner;
+use std::ops::Range;
+
+use super::model::{Bundle, Owner};
 use super::problem::Assembled;
 use crate::geometry::PoseNumbers;
 
@@ -58,53 +59,117 @@ pub(super) struct Suspect {
     pub rows: SmallVec<[(Row, usize); 3]>,
 }
 
-impl Network {
-    /// The groups of observations that take part: images in their order, then control, positions, attitudes, observations beside images,
-    /// cameras, common unknowns.
-    pub(super) fn suspects(&self, assembled: &Assembled) -> Vec<Suspect> {
-        let mut all = images(assembled, self.images.len());
+/// The groups of observations that take part: images in their order, then control, positions, attitudes, observations beside images,
+/// cameras, common unknowns. Their rows are counted one after the other.
+#[derive(Debug)]
+pub struct Suspects {
+    pub(super) all: Vec<Suspect>,
+    row_starts: Vec<usize>,
+    deviations: Vec<f64>,
+}
+
+impl Suspects {
+    /// Those of a network of so many images, and of these cameras of its photos.
+    pub(super) fn new(assembled: &Assembled, count: usize, camera_of_photo: &dyn Fn(usize) -> usize) -> Self {
+        let mut all = images(assembled, count);
         all.extend(of_points(assembled));
-        all.extend(self.of_photos(assembled));
+        all.extend(of_photos(assembled));
         all.extend(observations(assembled));
-        all.extend(self.of_blocks(assembled));
-        all
+        all.extend(of_blocks(assembled, camera_of_photo));
+        let mut row_starts = vec![0];
+        row_starts.extend(all.iter().scan(0, |rows, suspect| {
+            *rows += suspect.rows.len();
+            Some(*rows)
+        }));
+        let problem = &assembled.problem;
+        let own = |suspect: &Suspect, row| {
+            deviation(&problem.model, suspect, row, (&problem.observation_sd, &problem.sd))
+        };
+        let deviations =
+            all.iter().flat_map(|suspect| suspect.rows.iter().map(|&row| own(suspect, row))).collect();
+        Self { all, row_starts, deviations }
     }
 
-    fn of_photos(&self, assembled: &Assembled) -> Vec<Suspect> {
-        let model = &assembled.problem.model;
-        let halves = match self.poses {
-            PoseNumbers::Angles(_) => [0..3, 3..6],
-            PoseNumbers::Vectors => [3..6, 0..3],
-        };
-        let subjects: [fn(usize) -> Subject; 2] = [Subject::Position, Subject::Attitude];
-        let half = |(subject, half): (fn(usize) -> Subject, std::ops::Range<usize>)| {
-            (0..self.photos.len()).filter_map(move |photo| {
-                let first = model.of_block(photo).start + half.start;
-                weighted(assembled, subject(photo), Home::Block(photo), first..first + 3)
-            })
-        };
-        subjects.into_iter().zip(halves).flat_map(half).collect()
+    /// What each group is of.
+    pub fn subjects(&self) -> impl Iterator<Item = Subject> {
+        self.all.iter().map(|suspect| suspect.subject)
     }
 
-    /// The weighted parameters of cameras and components of common unknowns.
-    fn of_blocks(&self, assembled: &Assembled) -> Vec<Suspect> {
-        let model = &assembled.problem.model;
-        let with_camera = (0..model.cameras.len()).filter(|&photo| model.has_own_camera(photo));
-        let own = with_camera.filter_map(|photo| {
-            let block = model.of_block(photo);
-            let subject = Subject::Camera(self.photos[photo].camera);
-            weighted(assembled, subject, Home::Block(photo), block.start + 6..block.end)
-        });
-        let shared = (model.cameras.len()..model.stations()).filter_map(|block| {
-            let subject = match model.owner(block) {
-                Owner::Camera(camera) => Subject::Camera(camera),
-                Owner::Common(common) => Subject::Common(common),
-                Owner::Photo(_) => return None,
-            };
-            weighted(assembled, subject, Home::Block(block), model.of_block(block))
-        });
-        own.chain(shared).collect()
+    /// Where the rows of each start among all rows; one more at the end.
+    pub fn row_starts(&self) -> &[usize] {
+        &self.row_starts
     }
+
+    /// The component that each row is.
+    pub fn components(&self) -> impl Iterator<Item = usize> {
+        self.all.iter().flat_map(|suspect| suspect.rows.iter().map(|&(_, component)| component))
+    }
+
+    /// Standard deviation of each row as it is given, in its unit; of unit weight where the components of an observation are correlated.
+    pub fn deviations(&self) -> &[f64] {
+        &self.deviations
+    }
+
+    /// The rows of some of them, as [`crate::adjustment::ObservationRows`] counts: equations, then unknowns.
+    pub(super) fn rows_of(&self, some: Range<usize>, equations: usize) -> impl Iterator<Item = usize> {
+        let number = move |&(row, _): &(Row, usize)| match row {
+            Row::Equation(equation) => equation,
+            Row::Unknown(unknown) => equations + unknown,
+        };
+        self.all[some].iter().flat_map(move |suspect| suspect.rows.iter().map(number))
+    }
+}
+
+/// Standard deviation of a row of a suspect, from those of equations and of unknowns.
+pub(super) fn deviation(
+    model: &Bundle,
+    suspect: &Suspect,
+    (row, component): (Row, usize),
+    (of_equations, of_unknowns): (&[f64], &[f64]),
+) -> f64 {
+    match (row, suspect.subject, suspect.home) {
+        (_, Subject::Observation(_), Home::Tie(tie)) => {
+            model.observations[tie - model.tied_images()].root.row(component).norm()
+        }
+        (Row::Equation(equation), ..) => of_equations[equation],
+        (Row::Unknown(unknown), ..) => of_unknowns[unknown],
+    }
+}
+
+fn of_photos(assembled: &Assembled) -> Vec<Suspect> {
+    let model = &assembled.problem.model;
+    let halves = match model.poses {
+        PoseNumbers::Angles(_) => [0..3, 3..6],
+        PoseNumbers::Vectors => [3..6, 0..3],
+    };
+    let subjects: [fn(usize) -> Subject; 2] = [Subject::Position, Subject::Attitude];
+    let half = |(subject, half): (fn(usize) -> Subject, Range<usize>)| {
+        (0..model.cameras.len()).filter_map(move |photo| {
+            let first = model.of_block(photo).start + half.start;
+            weighted(assembled, subject(photo), Home::Block(photo), first..first + 3)
+        })
+    };
+    subjects.into_iter().zip(halves).flat_map(half).collect()
+}
+
+/// The weighted parameters of cameras and components of common unknowns.
+fn of_blocks(assembled: &Assembled, camera_of_photo: &dyn Fn(usize) -> usize) -> Vec<Suspect> {
+    let model = &assembled.problem.model;
+    let with_camera = (0..model.cameras.len()).filter(|&photo| model.has_own_camera(photo));
+    let own = with_camera.filter_map(|photo| {
+        let block = model.of_block(photo);
+        let subject = Subject::Camera(camera_of_photo(photo));
+        weighted(assembled, subject, Home::Block(photo), block.start + 6..block.end)
+    });
+    let shared = (model.cameras.len()..model.stations()).filter_map(|block| {
+        let subject = match model.owner(block) {
+            Owner::Camera(camera) => Subject::Camera(camera),
+            Owner::Common(common) => Subject::Common(common),
+            Owner::Photo(_) => return None,
+        };
+        weighted(assembled, subject, Home::Block(block), model.of_block(block))
+    });
+    own.chain(shared).collect()
 }
 
 /// Those of so many images that take part, in their order.
@@ -155,7 +220,7 @@ fn weighted(
     assembled: &Assembled,
     subject: Subject,
     home: Home,
-    unknowns: std::ops::Range<usize>,
+    unknowns: Range<usize>,
 ) -> Option<Suspect> {
     let of = |(k, unknown): (usize, usize)| {
         assembled.problem.is_weighted(unknown).then_some((Row::Unknown(unknown), k))

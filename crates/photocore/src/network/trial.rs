@@ -1,10 +1,12 @@
 //! A network tried without some of its observations: adjusted again and again, the symbolic analysis done once.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::problem::Assembled;
 use super::state::State;
-use super::suspects::{Home, Row, Subject, Suspect};
+use super::suspects::{self, Home, Row, Subject, Suspect, Suspects};
 use super::{Network, NetworkError, Options};
 use crate::Threads;
 use crate::adjustment::{self, AdjustError, Leverages, Loss, Method, Status, Stop, Terms, Watch};
@@ -15,9 +17,8 @@ use crate::geometry::PoseNumbers;
 pub struct Trial {
     pub(super) assembled: Assembled,
     options: adjustment::Options,
-    pub(super) suspects: Vec<Suspect>,
-    /// Where the rows of each suspect start, and its square block; one more at the end.
-    pub(super) row_starts: Vec<usize>,
+    pub(super) suspects: Arc<Suspects>,
+    /// Where the square block of each suspect starts; one more at the end.
     pub(super) block_starts: Vec<usize>,
     /// Standard deviations as given: of the equations, of the unknowns.
     pub(super) observation_sd: Vec<f64>,
@@ -123,17 +124,17 @@ impl Trial {
         held: Vec<usize>,
         found: Option<Leverages>,
     ) -> Self {
-        let suspects = network.suspects(&assembled);
-        let (mut row_starts, mut block_starts) = (vec![0], vec![0]);
-        for suspect in &suspects {
-            row_starts.push(row_starts[row_starts.len() - 1] + suspect.rows.len());
+        let camera = |photo: usize| network.photos[photo].camera;
+        let suspects = Suspects::new(&assembled, network.images.len(), &camera);
+        let mut block_starts = vec![0];
+        for suspect in &suspects.all {
             block_starts.push(block_starts[block_starts.len() - 1] + suspect.rows.len().pow(2));
         }
         let mut place = vec![None; network.points.len()];
         assembled.points.iter().enumerate().for_each(|(index, &point)| place[point] = Some(index));
         let locals = assembled.problem.model.locals;
         let mut on_place: Vec<Vec<usize>> = vec![vec![]; locals];
-        for (index, suspect) in suspects.iter().enumerate() {
+        for (index, suspect) in suspects.all.iter().enumerate() {
             match suspect.home {
                 Home::Group { point, .. } => on_place[point].push(index),
                 Home::Point(place) if place < locals => on_place[place].push(index),
@@ -149,8 +150,7 @@ impl Trial {
             sd: assembled.problem.sd.clone(),
             options: own,
             assembled,
-            suspects,
-            row_starts,
+            suspects: Arc::new(suspects),
             block_starts,
             place,
             on_place,
@@ -161,23 +161,8 @@ impl Trial {
     }
 
     /// The groups of observations, in the order of all tests.
-    pub fn subjects(&self) -> impl Iterator<Item = Subject> {
-        self.suspects.iter().map(|suspect| suspect.subject)
-    }
-
-    /// Where the rows of each start among all rows; one more at the end.
-    pub fn row_starts(&self) -> &[usize] {
-        &self.row_starts
-    }
-
-    /// The component that each row is.
-    pub fn components(&self) -> impl Iterator<Item = usize> {
-        self.suspects.iter().flat_map(|suspect| suspect.rows.iter().map(|&(_, component)| component))
-    }
-
-    /// Standard deviation of each row, in its unit; of unit weight where the components of an observation are correlated.
-    pub fn deviations(&self) -> impl Iterator<Item = f64> {
-        self.suspects.iter().flat_map(|suspect| suspect.rows.iter().map(|&row| self.deviation(suspect, row)))
+    pub fn suspects(&self) -> &Arc<Suspects> {
+        &self.suspects
     }
 
     /// Takes the network as it stands where its adjustment has ended, with everything in it.
@@ -256,7 +241,7 @@ impl Trial {
             Home::Tie(tie) => all.get(groups + tie).copied(),
             Home::Point(_) | Home::Block(_) => None,
         };
-        let weights = self.suspects.iter().map(|suspect| weight(suspect).unwrap_or(1.0)).collect();
+        let weights = self.suspects.all.iter().map(|suspect| weight(suspect).unwrap_or(1.0)).collect();
         self.assembled.problem.initial = found.unknowns;
         Ok(Some(weights))
     }
@@ -318,7 +303,7 @@ impl Trial {
         let Assembled { problem, .. } = &mut self.assembled;
         problem.observation_sd.clone_from(&self.observation_sd);
         problem.sd.clone_from(&self.sd);
-        let rows = self.suspects.iter().flat_map(|suspect| suspect.rows.iter());
+        let rows = self.suspects.all.iter().flat_map(|suspect| suspect.rows.iter());
         for (&(row, _), _) in rows.zip(out.rows).filter(|(_, out)| **out) {
             match row {
                 Row::Equation(equation) => problem.observation_sd[equation] = f64::INFINITY,
@@ -358,15 +343,8 @@ impl Trial {
         }
     }
 
-    pub(super) fn deviation(&self, suspect: &Suspect, (row, component): (Row, usize)) -> f64 {
-        let model = &self.assembled.problem.model;
-        match (row, suspect.subject, suspect.home) {
-            (_, Subject::Observation(_), Home::Tie(tie)) => {
-                model.observations[tie - model.tied_images()].root.row(component).norm()
-            }
-            (Row::Equation(equation), ..) => self.observation_sd[equation],
-            (Row::Unknown(unknown), ..) => self.sd[unknown],
-        }
+    pub(super) fn deviation(&self, suspect: &Suspect, row: (Row, usize)) -> f64 {
+        suspects::deviation(&self.assembled.problem.model, suspect, row, (&self.observation_sd, &self.sd))
     }
 
     /// What leads from errors of unit weight of some rows of a suspect to their units.

@@ -1,12 +1,13 @@
 //! Covariances of an adjusted network.
 
 use nalgebra::DMatrix;
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn};
 use photocore::adjustment::{GroupSquares, Probing};
 use photocore::network::{Covariances, Groups, Network, NetworkError as Failure, Of, Options};
 use pyo3::prelude::*;
 
 use super::state::BlockState;
+use super::suspects::NetworkSuspects;
 use super::{BlockError, failure};
 use crate::arrays::group_rows;
 use crate::options::unknown;
@@ -70,6 +71,27 @@ fn matrix(py: Python<'_>, found: DMatrix<f64>, symmetric: bool) -> PyResult<Boun
 
 #[pymethods]
 impl BlockCovariances {
+    fn suspects(&self, py: Python<'_>) -> NetworkSuspects {
+        py.detach(|| NetworkSuspects(self.covariances.suspects().clone()))
+    }
+
+    fn influences<'py>(
+        &self,
+        py: Python<'py>,
+        partials: PyReadonlyArray2<'_, f64>,
+        of: Vec<OfRow>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let count = partials.as_array().nrows();
+        let partials: Vec<f64> = partials.as_array().iter().copied().collect();
+        let of = of_rows(of)?;
+        let found = watched(py, Workers::of(0, self.images), None, |pool, _| {
+            self.covariances.influences(&partials, &of, pool)
+        })?;
+        let influences = found.map_err(|error| (self.refused)(&error))?;
+        let rows = influences.len() / count.max(1);
+        PyArray1::from_vec(py, influences).reshape([count, rows])
+    }
+
     #[pyo3(signature = (rows, columns, *, threads, progress))]
     fn cofactors<'py>(
         &self,

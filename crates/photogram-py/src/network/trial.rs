@@ -1,13 +1,14 @@
 //! A network tried without some of its observations.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use photocore::adjustment::Loss;
-use photocore::network::{Moved, Network, Options, Out, Outcome, Subject, Trial, UnknownOf};
+use photocore::network::{Moved, Network, Options, Out, Outcome, Trial, UnknownOf};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::covariances::{BlockCovariances, OfRow, Refused, of_rows};
+use super::covariances::Refused;
 use super::state::BlockState;
+use super::suspects::NetworkSuspects;
 use crate::arrays::table;
 use crate::options::named_loss;
 use crate::solution::status_name;
@@ -44,19 +45,6 @@ impl NetworkTrial {
     }
 }
 
-fn subject(subject: Subject) -> (u8, i64) {
-    let (kind, index) = match subject {
-        Subject::Image(index) => (0, index),
-        Subject::Control(index) => (1, index),
-        Subject::Position(index) => (2, index),
-        Subject::Attitude(index) => (3, index),
-        Subject::Observation(index) => (4, index),
-        Subject::Camera(index) => (5, index),
-        Subject::Common(index) => (6, index),
-    };
-    (kind, index as i64)
-}
-
 /// The unknown that is moved most: its kind, index and component, by how much, and that in its standard deviation.
 type MovedRow = (&'static str, usize, usize, f64, f64);
 
@@ -87,25 +75,8 @@ pub fn tried(
 #[pymethods]
 impl NetworkTrial {
     #[getter]
-    fn subjects<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<i64>>) {
-        let (kinds, indices): (Vec<u8>, Vec<i64>) = self.trial.subjects().map(subject).unzip();
-        (PyArray1::from_vec(py, kinds), PyArray1::from_vec(py, indices))
-    }
-
-    #[getter]
-    fn row_starts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        let starts = self.trial.row_starts().iter().map(|&start| start as i64);
-        PyArray1::from_vec(py, starts.collect())
-    }
-
-    #[getter]
-    fn components<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        PyArray1::from_vec(py, self.trial.components().map(|component| component as i64).collect())
-    }
-
-    #[getter]
-    fn deviations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.trial.deviations().collect())
+    fn suspects(&self) -> NetworkSuspects {
+        NetworkSuspects(self.trial.suspects().clone())
     }
 
     #[getter]
@@ -220,7 +191,7 @@ impl NetworkTrial {
     fn responses<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let found = watched(py, self.workers(), None, |pool, _| self.trial.responses(&suspects, pool))?;
         let columns = found.map_err(|error| (self.refused)(&error))?;
-        let rows = self.trial.row_starts().last().copied().unwrap_or_default();
+        let rows = self.trial.suspects().row_starts().last().copied().unwrap_or_default();
         let count = columns.len() / rows.max(1);
         PyArray1::from_vec(py, columns).reshape([count, rows])
     }
@@ -237,24 +208,6 @@ impl NetworkTrial {
             (kind, index, moved.component, moved.effect, moved.in_sd)
         };
         Ok(found.map_err(|error| (self.refused)(&error))?.into_iter().map(row).collect())
-    }
-
-    fn influences<'py>(
-        &self,
-        py: Python<'py>,
-        covariances: &BlockCovariances,
-        partials: PyReadonlyArray2<'_, f64>,
-        of: Vec<OfRow>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let count = partials.as_array().nrows();
-        let partials: Vec<f64> = partials.as_array().iter().copied().collect();
-        let of = of_rows(of)?;
-        let found = watched(py, self.workers(), None, |pool, _| {
-            self.trial.influences(&covariances.covariances, &partials, &of, pool)
-        })?;
-        let influences = found.map_err(|error| (self.refused)(&error))?;
-        let rows = influences.len() / count.max(1);
-        PyArray1::from_vec(py, influences).reshape([count, rows])
     }
 
     fn inseparable(

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.network.core import block_network
 from photogram.results.components import VarianceComponents
 from photogram.results.covariance import Covariances
 from photogram.results.group_sums import Left, Probing, observables
@@ -178,9 +177,7 @@ def budgets(
     """
     if not wanted:
         return []
-    network = block_network(result.block, result.options)
-    core = network.trial(result.state, threads=0)
-    rows = Rows(result, core)
+    rows = Rows(result, covariances.suspects())
     items = list(dict.fromkeys(item for each in wanted for item in each.items))
     places = [[items.index(item) for item in each.items] for each in wanted]
 
@@ -189,7 +186,7 @@ def budgets(
         return np.array([each.function(*(arrays[place] for place in own)) for each, own in pairs])
 
     values = covariances.propagate(together, items)
-    _, effects = covariances.influences(core, items, together)
+    _, effects = covariances.influences(items, together)
     freedom = _Freedoms(result, rows, components)
     return [
         _budget(result, each, float(values.value[k]), t, rows, freedom, coverage)

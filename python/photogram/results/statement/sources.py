@@ -35,7 +35,7 @@ _PLURALS = {IMAGE: "images", CONTROL: "control", POSITION: "photo positions", AT
 class Rows:
     """All M observations in G groups, an image or a control point each: what they are of, and are called."""
 
-    def __init__(self, result: Result, core: _photocore.NetworkTrial) -> None:
+    def __init__(self, result: Result, core: _photocore.NetworkSuspects) -> None:
         self.block = result.block
         self.suspects, self.sd = block_suspects(result.block, core), core.deviations
         self._starts: Indices = self.suspects.row_starts

@@ -1,0 +1,54 @@
+//! The groups of observations of a network.
+
+use std::sync::Arc;
+
+use numpy::PyArray1;
+use photocore::network::{Subject, Suspects};
+use pyo3::prelude::*;
+
+/// Adds the class to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<NetworkSuspects>()
+}
+
+/// The groups of observations that are tested together.
+#[pyclass(module = "photogram._photocore", frozen)]
+pub struct NetworkSuspects(pub(super) Arc<Suspects>);
+
+fn subject(subject: Subject) -> (u8, i64) {
+    let (kind, index) = match subject {
+        Subject::Image(index) => (0, index),
+        Subject::Control(index) => (1, index),
+        Subject::Position(index) => (2, index),
+        Subject::Attitude(index) => (3, index),
+        Subject::Observation(index) => (4, index),
+        Subject::Camera(index) => (5, index),
+        Subject::Common(index) => (6, index),
+    };
+    (kind, index as i64)
+}
+
+#[pymethods]
+impl NetworkSuspects {
+    #[getter]
+    fn subjects<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<i64>>) {
+        let (kinds, indices): (Vec<u8>, Vec<i64>) = self.0.subjects().map(subject).unzip();
+        (PyArray1::from_vec(py, kinds), PyArray1::from_vec(py, indices))
+    }
+
+    #[getter]
+    fn row_starts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        let starts = self.0.row_starts().iter().map(|&start| start as i64);
+        PyArray1::from_vec(py, starts.collect())
+    }
+
+    #[getter]
+    fn components<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_vec(py, self.0.components().map(|component| component as i64).collect())
+    }
+
+    #[getter]
+    fn deviations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, self.0.deviations())
+    }
+}
