@@ -90,7 +90,8 @@ def spherical_error(covariances: ArrayLike, probability: float) -> Floats:
 
     Returns
     -------
-    (n,) as those of :func:`circular_error`.
+    (n,)
+        As those of :func:`circular_error`.
 
     Raises
     ------
