@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 __all__ = ["page_html"]
 
+LONG = 16
+"""Characters of a word that a table may break; shorter ones give the least width of their column."""
+
 
 def page_html(page: Page) -> bytes:
     """Return a page as an HTML file (UTF-8) that needs no network and no other file.
@@ -94,7 +97,8 @@ def _coded(text: str) -> Markup:
 def _attributes(column: Column, cell: Cell) -> Markup:
     from markupsafe import Markup
 
-    classes = " ".join(filter(None, ("text" if column.text else "", cell.tone)))
+    long = column.text and any(len(word) > LONG for word in str(cell.value).split())
+    classes = " ".join(filter(None, ("text" if column.text else "", "long" if long else "", cell.tone)))
     found = Markup(' class="{}"').format(classes) if classes else Markup()
     if cell.id:
         found += Markup(' id="{}"').format(cell.id)
