@@ -3,10 +3,12 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import photogram.results.statement as package
 from photogram.results.statement.texts import LANGUAGES, Texts, fields_of, table_of
+from photogram.show.page import decimals_of
 
 SOURCES = Path(package.__file__).parent
 
@@ -48,3 +50,11 @@ def test_numbers_are_those_of_the_language():
 def test_a_firm_puts_its_own_sentence_in_the_place_of_one():
     own = Texts("de", {"honest.yes": "Faktor {factor}."})
     assert own("honest.yes", n=3, factor="1,1", low="1", high="2") == "Faktor 1,1."
+
+
+def test_tables_keep_two_figures_of_the_smallest_deviation_or_of_the_median():
+    deviations = np.array([0.0012, 0.034, 5.6, np.nan, 0.0])
+    assert decimals_of(deviations) == 3
+    assert decimals_of(deviations, smallest=True) == 4
+    assert decimals_of(1e-9 * deviations, smallest=True, most=6) == 6
+    assert decimals_of(np.array([np.nan, 0.0]), unknown=3) == 3

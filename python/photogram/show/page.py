@@ -312,13 +312,23 @@ def significant(value: float, figures: int = 4) -> str:
     return f"{value:.{figures - 1}e}"
 
 
-def decimals_of(deviations: Floats) -> int:
+def decimals_of(
+    deviations: Floats, *, smallest: bool = False, unknown: int = 4, most: int = MOST_DECIMALS
+) -> int:
     """Return with how many decimals values are written whose standard deviations are these.
 
-    The median standard deviation keeps two significant figures; 4 decimals where none is known.
+    Parameters
+    ----------
+    deviations
+        In the unit in which values are written.
+    smallest
+        Whether the smallest of them keeps two significant figures; otherwise the median does.
+    unknown, most
+        Decimals where none is known, and at the most.
     """
     known = np.asarray(deviations, dtype=float)
     known = known[np.isfinite(known) & (known > 0)]
     if not known.size:
-        return 4
-    return int(np.clip(1 - math.floor(math.log10(float(np.median(known)))), 0, MOST_DECIMALS))
+        return unknown
+    decisive = float(known.min() if smallest else np.median(known))
+    return int(np.clip(1 - math.floor(math.log10(decisive)), 0, most))

@@ -22,7 +22,19 @@ from photogram.results.statement.sheets import Written, decimals_for
 from photogram.results.statement.sources import held_names
 from photogram.results.statement.statement import Statement
 from photogram.show.judgement import verdict_table
-from photogram.show.page import Cell, Column, Drawing, Fact, Facts, Part, Remarks, Row, Section, Table
+from photogram.show.page import (
+    Cell,
+    Column,
+    Drawing,
+    Fact,
+    Facts,
+    Part,
+    Remarks,
+    Row,
+    Section,
+    Table,
+    decimals_of,
+)
 
 __all__ = [
     "adjustment_annex",
@@ -209,7 +221,7 @@ def _camera(found: Statement, camera: AdjustedCamera) -> list[Part]:
     rows: list[Row] = []
     for k, (name, unit) in enumerate(zip(camera.names, units(camera.camera), strict=True)):
         sd = float(camera.sd[k])
-        decimals = max(0, 1 - math.floor(math.log10(sd))) if 0 < sd < math.inf else 6
+        decimals = decimals_of(np.array([sd]), unknown=6)
         own = "from.estimated" if k in estimated else "from.given"
         rows.append(
             [name, unit, cells.number(float(camera.values[k]), decimals), cells.figures(sd, 2), texts(own)]

@@ -23,6 +23,7 @@ from photogram.results.result import Result
 from photogram.results.statement.quantities import Wanted
 from photogram.results.statement.sources import Rows, kind_of
 from photogram.results.statement.texts import Texts
+from photogram.show.page import decimals_of
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 
 __all__ = ["Budget", "Freedom", "Single", "Source", "budget_line", "budgets"]
@@ -236,7 +237,7 @@ def budget_line(texts: Texts, found: Budget) -> str:
     """Return value, standard deviation (two significant digits) and expanded uncertainty in a sentence."""
     factor, unit = (1.0, found.unit) if found.unit != "rad" else (math.degrees(1.0), "°")
     sd = found.sd * factor
-    decimals = max(0, 1 - math.floor(math.log10(sd))) if 0 < sd < math.inf else 6
+    decimals = decimals_of(np.array([sd]), unknown=6)
     numbers = (texts.number(each * factor, decimals) for each in (found.value, found.sd, found.expanded))
     value, u, expanded = (f"{each} {unit}".rstrip() for each in numbers)
     k, p = texts.number(found.k, 2), texts.percent(found.coverage)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,13 @@ from photogram.results.statement.figures import Figures
 from photogram.results.statement.leave_one_out import LeftOut
 from photogram.results.statement.statement import Statement
 from photogram.results.statement.texts import Texts
-from photogram.show.page import Cell, Column, Row
+from photogram.show.page import Cell, Column, Row, decimals_of
 
 __all__ = ["Written", "decimals_for", "files_of_statement"]
 
 _AXES = ("e", "n", "h")
+decimals_for = partial(decimals_of, smallest=True, unknown=3, most=6)
+"""With how many decimals a table is written: no value in it loses the digits of its standard deviation."""
 
 
 def files_of_statement(found: Statement) -> dict[str, bytes]:
@@ -108,14 +111,6 @@ def _budget_file(found: Sequence[Budget]) -> bytes:
         *("sensitivity", "sd", "dof", "taken_from"),
     )
     return csv_text({name: [row[k] for row in rows] for k, name in enumerate(names)}, [])
-
-
-def decimals_for(deviations: Floats) -> int:
-    """Return with how many decimals a table is written: two significant digits of the smallest deviation."""
-    known = deviations[np.isfinite(deviations) & (deviations > 0)]
-    if not known.size:
-        return 3
-    return int(np.clip(1 - math.floor(math.log10(float(known.min()))), 0, 6))
 
 
 class Written:
