@@ -22,11 +22,6 @@ STANDARDS = ("asprs-2023", "plain", "nssda", "iso-19157")
 
 
 @pytest.fixture(scope="module")
-def result():
-    return photogram.adjust(read(block_path()).block, unit_variance="unity")
-
-
-@pytest.fixture(scope="module")
 def stated(result):
     return result.statement(
         standards=STANDARDS, classes={"h": 0.05, "v": 0.05}, budgets=KINDS, date="2026-11-25", client="A & B"

@@ -11,6 +11,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.messages import counted
 from photogram.network.observations import Control
 from photogram.results.result import Result
 from photogram.results.statement import asprs
@@ -322,9 +323,9 @@ def _iso(
             **{name: of_all.of_moments[name] for name in ("ce90", "ce95", "le90", "le95")},
             "ellipse": _ellipse(of_all.moments),
         }
-        found += measures(values, scope=f"{of_all.n} check points", **more)
+        found += measures(values, scope=counted(of_all.n, "check point"), **more)
     if lengths is not None:
-        scope = f"{len(lengths.lines)} lengths"
+        scope = counted(len(lengths.lines), "length")
         found += measures({"rmse": lengths.test.rms}, scope=scope, element=RELATIVE, **more)
     return found
 

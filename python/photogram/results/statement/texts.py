@@ -79,11 +79,23 @@ class Texts:
         local = table_of(language)
         self.missing = sorted(set(english) - set(local))
         """Keys that are said in English for want of a sentence in the language."""
-        self._table = {**english, **local, **(own or {})}
+        self._table, self._own = {**english, **local, **(own or {})}, own or {}
 
     def __call__(self, key: str, **values: Any) -> str:
-        """Return a sentence with its fields."""
-        return self._table[key].format(**{name: self._field(value) for name, value in values.items()})
+        """Return a sentence with its fields, in the singular where one of them is a count of one."""
+        sentence = self._table[self._form(key, values)]
+        return sentence.format(**{name: self._field(value) for name, value in values.items()})
+
+    def _form(self, key: str, values: Mapping[str, Any]) -> str:
+        """Return the key of the sentence in the form that its counts take."""
+        ones = [name for name, value in values.items() if isinstance(value, int) and value == 1]
+        # One of what a sentence counts first leaves no other count in it.
+        for name in sorted(ones, key=lambda name: name != "n"):
+            form = f"{key}.one" if name == "n" else f"{key}.one.{name}"
+            # A firm that has put a sentence of its own means it for every count.
+            if form in self._own or (form in self._table and key not in self._own):
+                return form
+        return key
 
     def _field(self, value: Any) -> str:
         if isinstance(value, str):
