@@ -1,0 +1,12 @@
+"""The adjusted golden block, once for all tests of the statement."""
+
+import pytest
+from golden_statement import block_path
+
+import photogram
+from photogram.formats import read
+
+
+@pytest.fixture(scope="session")
+def result():
+    return photogram.adjust(read(block_path()).block, unit_variance="unity")
