@@ -13,6 +13,7 @@ from photogram.results.statement.asked import Asked
 from photogram.results.statement.compared import Compared
 from photogram.results.statement.layout import Layout
 from photogram.results.statement.sources import held_names
+from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
 
 __all__ = ["assumptions"]
@@ -26,6 +27,8 @@ def assumptions(
     layout: Layout | None,
     assumed: Sequence[str],
     removed: Sequence[str],
+    *,
+    lengths: Lengths | None = None,
 ) -> list[tuple[str, str]]:
     """Return keys and texts."""
     said = [*_weights(result, asked.components, texts)]
@@ -50,6 +53,8 @@ def assumptions(
                 diagonal=texts.length(layout.diagonal, 3),
             )
         )
+    if lengths is not None and lengths.expansion is not None:
+        said.append(_said(texts, "lengths.reference", expansion=texts.significant(lengths.expansion, 3)))
     return [*said, _said(texts, "assume.not_covered")]
 
 

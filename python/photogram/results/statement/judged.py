@@ -59,6 +59,38 @@ class Judged:
     remarks: list[str]
 
 
+@dataclass(frozen=True)
+class _Against:
+    """What speaks against handing a statement over.
+
+    Attributes
+    ----------
+    spoilt, missed, high
+        The adjustment cannot be used, an accuracy asked for is missed, differences are larger than predicted.
+    warning, low, control, lengths
+        The verdict of the adjustment is a warning, differences are smaller than predicted, control points
+        disagree with the others, calibrated lengths with their standard deviations.
+    """
+
+    spoilt: bool
+    missed: bool
+    high: bool
+    warning: bool
+    low: bool
+    control: Sequence[LeftOut]
+    lengths: bool
+
+    @property
+    def always(self) -> bool:
+        """Whether it must not be handed over as it is."""
+        return self.spoilt or self.missed or self.high
+
+    @property
+    def strictly(self) -> bool:
+        """Whether `strict` says so, too."""
+        return self.warning or self.low or bool(self.control) or self.lengths
+
+
 def judged(
     result: Result,
     asked: Asked,
@@ -76,23 +108,25 @@ def judged(
     strict: bool = False,
 ) -> Judged:
     """Return what the statement says of all that was found."""
-    high, low = _rejected(of_all)
-    missed = _missed(standards)
-    verdict = result.verdict
-    spoilt = verdict.exit_code(strict=strict) == NOT_USABLE
-    bad = spoilt or missed or high or (low and strict)
-    doubtful = low or verdict.warning or _doubtful(of_all) or _contradicted(left_out, standards.lengths)
+    against = _against(result, of_all, left_out, standards)
+    bad = against.always or (strict and against.strictly)
+    doubtful = against.strictly or _doubtful(of_all)
     block = result.block
     held = not block.photo_position_sd.any() and not block.photo_attitude_sd.any()
     remarks = _remarks(asked, texts, found, of_all, of_vegetated, standards, layout, held)
-    key = _headline(spoilt, missed, high, low, of_all, standards)
-    headline = (
-        texts(key, verdict=verdict.headline) if spoilt else texts(key, n=0 if of_all is None else of_all.n)
-    )
+    remarks += [
+        texts("control.wrong", point=each.point, p=texts.significant(each.p, 2))
+        for each in against.control[:NAMED]
+    ]
+    fields: dict[str, str | int] = {
+        "verdict": result.verdict.headline,
+        "points": listed([each.point for each in against.control], NAMED),
+        "n": 0 if of_all is None else of_all.n,
+    }
     return Judged(
         exit=NOT_USABLE if bad else 0,
         tone="bad" if bad else "look" if remarks or doubtful else "good",
-        headline=headline,
+        headline=texts(_headline(against, of_all, standards, strict=strict), **fields),
         sentences=[
             *_asprs(asked, texts, standards.asprs),
             *(_nssda(texts, standards) if "nssda" in asked.standards else []),
@@ -100,8 +134,26 @@ def judged(
             *_honest(asked, texts, found, of_all),
             *(("budget.line", budget_line(texts, each)) for each in taken_apart),
         ],
-        assumptions=assumptions(result, asked, texts, found, layout, assumed, removed),
+        assumptions=assumptions(
+            result, asked, texts, found, layout, assumed, removed, lengths=standards.lengths
+        ),
         remarks=remarks,
+    )
+
+
+def _against(
+    result: Result, of_all: Figures | None, left_out: Sequence[LeftOut], standards: Standards
+) -> _Against:
+    high, low = _rejected(of_all)
+    lengths = None if standards.lengths is None else standards.lengths.test.together
+    return _Against(
+        spoilt=not result.verdict.usable,
+        missed=_missed(standards),
+        high=high,
+        warning=result.verdict.warning,
+        low=low,
+        control=[each for each in left_out if each.p < limit_of(left_out)],
+        lengths=lengths is not None and (lengths.rejected_high or lengths.rejected_low),
     )
 
 
@@ -130,29 +182,22 @@ def _doubtful(of_all: Figures | None) -> bool:
     )
 
 
-def _contradicted(left_out: Sequence[LeftOut], lengths: Lengths | None) -> bool:
-    """Return whether a control point disagrees with the others, or lengths do with what is predicted."""
-    together = None if lengths is None else lengths.test.together
-    return any(each.p < limit_of(left_out) for each in left_out) or (
-        together is not None and (together.rejected_high or together.rejected_low)
-    )
-
-
 def _missed(standards: Standards) -> bool:
     classes = () if standards.asprs is None else standards.asprs.verdicts.values()
     return "missed" in classes or (standards.lengths is not None and standards.lengths.test.met is False)
 
 
-def _headline(
-    spoilt: bool, missed: bool, high: bool, low: bool, of_all: Figures | None, standards: Standards
-) -> str:
+def _headline(against: _Against, of_all: Figures | None, standards: Standards, *, strict: bool) -> str:
     verdicts = [] if standards.asprs is None else list(standards.asprs.verdicts.values())
     met = standards.lengths is not None and standards.lengths.test.met
     for holds, name in (
-        (spoilt, "verdict"),
-        (missed, "missed"),
-        (high, "high"),
-        (low, "low"),
+        (against.spoilt, "verdict"),
+        (against.missed, "missed"),
+        (against.high, "high"),
+        (strict and against.warning, "warning"),
+        (strict and against.control, "control"),
+        (strict and against.lengths, "lengths"),
+        (against.low, "low"),
         (of_all is None and not met, "none"),
         ("not decided" in verdicts, "found"),
         ("produced to meet" in verdicts, "produced"),
@@ -347,8 +392,6 @@ def _lengths_remarks(texts: Texts, found: Lengths) -> list[str]:
         said.append(texts("lengths.short", share=texts.percent(test.longest)))
     if found.expansion is None:
         said.append(texts("lengths.warm"))
-    else:
-        said.append(texts("lengths.reference", expansion=texts.significant(found.expansion, 3)))
     return said
 
 

@@ -85,7 +85,8 @@ class Statement(Brief):
         """0: nothing speaks against it; 4: it must not be handed over as it is.
 
         A class is missed, differences are larger than predicted, or the verdict of the adjustment says so;
-        with `strict` also where differences are smaller than predicted.
+        with `strict` also where that verdict is a warning, differences are smaller than predicted, a control
+        point disagrees with the others, or calibrated lengths disagree with their standard deviations.
         """
         return self.judged.exit
 
