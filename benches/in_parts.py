@@ -21,12 +21,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from peak import peak_memory
-from photogram import adjust, simulate
-from photogram.adjustment.elsewhere import Division
+from photogram import adjust, adjust_in_parts, simulate
+from photogram.distributed import Division, plan_in_parts
 from photogram.distributed.counts import FORMATION, Counts, counted_work
 from photogram.distributed.cut import Incidence, Tree
-from photogram.distributed.entrance import plan_in_parts
-from photogram.distributed.running import bytes_of
+from photogram.distributed.division import bytes_of
 from photogram.distributed.schedule import Times, scheduled
 from photogram.distributed.workers import connected
 
@@ -148,7 +147,7 @@ def carried_out(size: str, workers: int, parts: int, memory: str, *, alone: bool
         print("\n".join(plan.lines()), flush=True)
         before = client.run(peak_memory)
         start = time.perf_counter()
-        found = adjust(block, cluster=client, memory=memory, folder=folder)
+        found = adjust_in_parts(block, division)
         seconds = time.perf_counter() - start
         after = client.run(peak_memory)
     print(f"{found.status} after {len(found.iterations)} iterations, {seconds:.1f} s, results merged")

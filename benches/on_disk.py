@@ -23,8 +23,8 @@ from pyarrow import parquet
 from peak import peak_memory
 from photogram import simulate
 from photogram.adjustment.adjustment import Progress
-from photogram.adjustment.elsewhere import Division
-from photogram.distributed.running import bytes_of
+from photogram.distributed import Division
+from photogram.distributed.division import bytes_of
 from photogram.distributed.workers import connected
 from photogram.formats import Wishes, to_files
 from photogram.formats.in_parts import adjusted_on_disk, planned_on_disk

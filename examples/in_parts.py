@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram import Block, Result, adjust, simulate
-from photogram.adjustment.elsewhere import Division
-from photogram.distributed.entrance import plan_in_parts
+from photogram import Block, Result, adjust, adjust_in_parts, simulate
+from photogram.distributed import Division, plan_in_parts
 
 PARTS = 4
 
@@ -31,8 +30,9 @@ def apart(found: Result, whole: Result) -> tuple[float, float]:
 def main() -> None:
     """Plan, adjust in parts and in one process, and compare."""
     block = flown()
-    print("\n".join(plan_in_parts(block, Division(parts=PARTS)).lines()))
-    found, whole = adjust(block, parts=PARTS), adjust(block)
+    division = Division(parts=PARTS)
+    print("\n".join(plan_in_parts(block, division).lines()))
+    found, whole = adjust_in_parts(block, division), adjust(block)
     values, redundancy = apart(found, whole)
     print(f"photos differ by {values:.0e} standard deviations, redundancy numbers by {redundancy:.0e}")
 

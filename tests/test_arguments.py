@@ -11,6 +11,7 @@ import pytest
 
 import photogram
 from photogram import InputError, PhotogramError
+from photogram.distributed import Division
 from photogram.giant import Project, read_project
 from photogram.results.statement.asked import Asked
 
@@ -20,6 +21,7 @@ PACKAGES = (
     "photogram.absolute_orientation",
     "photogram.collection",
     "photogram.comparator",
+    "photogram.distributed",
     "photogram.network.geometry",
     "photogram.giant",
     "photogram.perspective_center",
@@ -34,6 +36,7 @@ MADE_BY_THE_LIBRARY = {
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Comparison Decomposition Identity Place PlateResult"
     " Pointing Reading RecordedCalibration RecordedCase Session Simulation collect_cases",
+    "photogram.distributed": "PartsPlan",
     "photogram.giant": "ErrorWarning ImageFrame Project",
     "photogram.perspective_center": "Cycle PerspectiveCenter Run Stop",
     "photogram.stellar": "Result",
@@ -156,6 +159,7 @@ def good(tmp_path_factory):
             "snoop": {"block": block},
             "features": {"result": calibrated, "definitions": {"d": ("distance", block.point_ids[:2])}},
             "first_values": {"block": block},
+            "adjust_in_parts": {"block": block, "division": Division(parts=2)},
             "adjust_started": {"started": photogram.first_values(block)},
             "camera_from": {"path": star_camera, "name": "stars", "weighted": True},
             "clean": {"network": block},
@@ -253,6 +257,11 @@ def good(tmp_path_factory):
             "rotation_matrix": {"angles": np.zeros((1, 3))},
             "viewing_directions": {"positions": places, "attitudes": np.zeros((1, 3))},
         },
+        "photogram.distributed": {
+            "Division": {"parts": 2},
+            "adjust_in_parts": {"block": block, "division": Division(parts=2)},
+            "plan_in_parts": {"block": block, "division": Division(parts=2)},
+        },
         "photogram.giant": {
             "Camera": {"name": "A", "principal_distance": -152.0},
             "Common": {},
@@ -342,7 +351,7 @@ def test_hostile_arguments_are_refused_by_errors_of_our_own(package, name, good,
         for what, make in HOSTILE.items():
             if (package, name) in OF_THE_SIZE and what in BIG:
                 continue
-            if parameter == "progress" and what == "a class":
+            if parameter in ("progress", "by") and what == "a class":
                 continue  # it can be called: what comes of that is the caller's
             try:
                 with np.errstate(all="ignore"):

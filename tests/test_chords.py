@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram import Camera, adjust
+from photogram import Camera, adjust, adjust_in_parts
+from photogram.distributed import Division
 
 TRUE = {"fx": 152.7, "fy": 152.7, "cx": 0.02, "cy": -0.01, "k1": -6e-4, "k2": 2e-4, "p1": 2e-5, "p2": -3e-5}
 FREE = dict.fromkeys(TRUE, np.inf)
@@ -28,7 +29,7 @@ def apart(one, other):
 
 def test_a_chord_takes_the_place_of_a_formation(block):
     """Networks in parts take plain steps: one more, to the same end and the same covariances."""
-    found, plain = adjust(block), adjust(block, parts=2)
+    found, plain = adjust(block), adjust_in_parts(block, Division(parts=2))
     assert found.converged
     assert found.formations == len(found.iterations) == len(plain.iterations) - 1
     # Chords fall by about as much as full steps: the last of both is about as long.
@@ -43,6 +44,6 @@ def test_a_chord_takes_the_place_of_a_formation(block):
 
 def test_known_cameras_take_plain_steps(block):
     known = block.replace(cameras=[Camera("opencv", TRUE, unit="mm", name=name) for name in ("A", "B")])
-    found, plain = adjust(known), adjust(known, parts=2)
+    found, plain = adjust(known), adjust_in_parts(known, Division(parts=2))
     assert len(found.iterations) == len(plain.iterations)
     assert apart(found, plain) < 1e-9

@@ -20,6 +20,7 @@ import photogram
         ("from photogram.statistics import global_test", "global_test"),
         ("from photogram.adjustment import adjust, Progress", "adjust"),
         ("import photogram.adjustment", "photogram.adjust"),
+        ("from photogram.distributed import adjust_in_parts", "adjust_in_parts"),
         ("import photogram.io.writing.guard", "photogram.io.writing.guard.check_outputs"),
     ],
 )
@@ -51,10 +52,11 @@ def test_the_top_has_no_more_names_than_can_be_read():
 
 
 PARTS = """
-from photogram.adjustment import adjust
+from photogram.distributed import Division, adjust_in_parts
 from photogram.network.simulation import simulate
 
-print(adjust(simulate(strips=2, photos_per_strip=4, seed=1).block, parts=2).report().splitlines()[0])
+block = simulate(strips=2, photos_per_strip=4, seed=1).block
+print(adjust_in_parts(block, Division(parts=2)).report().splitlines()[0])
 """
 COLLECTED = """
 from photogram.adjustment.snooping import snoop

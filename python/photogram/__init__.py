@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from photogram import collection as collection
     from photogram import comparator as comparator
     from photogram import diagnosis as diagnosis
+    from photogram import distributed as distributed
     from photogram import formats as formats
     from photogram import giant as giant
     from photogram import perspective_center as perspective_center
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.snooping import snoop
     from photogram.adjustment.variance_function import variance_function
     from photogram.diagnosis.diagnose import diagnose
+    from photogram.distributed.adjust import adjust_in_parts
     from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.formats.results import read_result
     from photogram.messages import Message
@@ -94,6 +96,7 @@ __all__ = [
     "VarianceFunction",
     "__version__",
     "adjust",
+    "adjust_in_parts",
     "adjust_started",
     "camera_from",
     "clean",
@@ -156,6 +159,7 @@ _HOMES = {
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
+    "adjust_in_parts": "distributed.adjust",
     "adjust_started": "adjustment.again",
     "camera_from": "stellar.cameras",
     "Cleaned": "adjustment.cleaning",
@@ -190,6 +194,7 @@ MODULES = (
     "collection",
     "comparator",
     "diagnosis",
+    "distributed",
     "formats",
     "giant",
     "perspective_center",

@@ -1,19 +1,15 @@
 """Blocks in parts by the core: what one process gives."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from test_parts import tied_block
 
 import photogram
 from example_scripts import load
-from photogram import adjust
-from photogram.adjustment.elsewhere import Division
-from photogram.distributed import running
+from photogram import adjust, adjust_in_parts, adjust_started
+from photogram.distributed import Division, plan_in_parts
+from photogram.distributed import adjust as of_blocks
 from photogram.distributed.core import CoreEngine
-from photogram.distributed.entrance import plan_in_parts
 from photogram.distributed.run import read_manifest
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.network.observations import Distance, Relative
@@ -29,14 +25,6 @@ def block():
 @pytest.fixture(scope="module")
 def whole(block):
     return adjust(block)
-
-
-@pytest.mark.parametrize("home", ["photogram.adjustment", "photogram.adjustment.adjustment"])
-def test_whoever_imports_adjust_by_another_name_has_parts_too(home):
-    code = f"from {home} import adjust; from photogram.network.simulation import simulate;"
-    code += "print(adjust(simulate(strips=2, photos_per_strip=4).block, parts=2).status)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert (done.stdout, done.stderr) == ("converged\n", "")
 
 
 def agrees(found, whole, least=1e-9, *, tied=False):
@@ -74,7 +62,7 @@ def agrees(found, whole, least=1e-9, *, tied=False):
 
 @pytest.mark.parametrize("parts", [2, 4, 16])
 def test_parts_give_what_one_process_gives(block, whole, parts):
-    found = adjust(block, parts=parts)
+    found = adjust_in_parts(block, Division(parts=parts))
     agrees(found, whole)
     assert found.messages == whole.messages
     assert found.sums_of_squares.total == pytest.approx(whole.sums_of_squares.total, rel=1e-11)
@@ -86,7 +74,7 @@ def test_cameras_ties_and_common_unknowns_cross_cuts():
     block = block.replace(
         observations=[each for each in block.observations if not isinstance(each, Relative)]
     )
-    whole, found = adjust(block), adjust(block, parts=4)
+    whole, found = adjust(block), adjust_in_parts(block, Division(parts=4))
     agrees(found, whole, tied=True)
     for one, other in zip(found.cameras, whole.cameras, strict=True):
         np.testing.assert_allclose(one.values, other.values, rtol=1e-12)
@@ -111,7 +99,7 @@ def freed(block):
 @pytest.mark.parametrize("parts", [2, 6])
 def test_a_free_block_is_held_as_in_one_process(block, parts):
     """Its datum is that of the same photos, in whichever nodes they are."""
-    found, whole = adjust(freed(block), parts=parts), adjust(freed(block))
+    found, whole = adjust_in_parts(freed(block), Division(parts=parts)), adjust(freed(block))
     assert len(whole.datum.held) == 7
     assert found.datum == whole.datum
     assert found.messages == whole.messages
@@ -126,14 +114,14 @@ def test_what_observations_leave_open_of_a_free_block_is_held():
         block.point_ids[0], block.point_ids[-1], float(np.linalg.norm(ends[1] - ends[0])), sd=0.01
     )
     block = block.replace(observations=[distance])
-    found, whole = adjust(block, parts=3), adjust(block)
+    found, whole = adjust_in_parts(block, Division(parts=3)), adjust(block)
     assert len(whole.datum.held) == 6
     assert found.datum == whole.datum
     agrees(found, whole, 1e-6, tied=True)
 
 
 def test_a_held_photo_is_held_in_the_results_of_its_nodes(block, tmp_path):
-    found = adjust(freed(block), parts=4, folder=tmp_path / "run")
+    found = adjust_in_parts(freed(block), Division(parts=4, folder=tmp_path / "run"))
     names = {photo for photo, _ in found.datum.held}
     for node in range(len(read_manifest(tmp_path / "run").tree)):
         of_node = photogram.read_result(tmp_path / "run" / "results" / f"{node:05d}")
@@ -144,28 +132,37 @@ def test_a_held_photo_is_held_in_the_results_of_its_nodes(block, tmp_path):
 @pytest.mark.parametrize("unit_variance", ["free", "unity"])
 def test_every_unit_variance_is_that_of_one_process(block, unit_variance):
     weighted = block.replace(photo_position_sd=np.full((len(block.photo_ids), 3), 5.0))
-    found = adjust(weighted, parts=3, unit_variance=unit_variance)
+    found = adjust_in_parts(weighted, Division(parts=3), unit_variance=unit_variance)
     agrees(found, adjust(weighted, unit_variance=unit_variance))
 
 
 def test_weighted_cameras_and_unknowns_count_in_the_free_unit_variance():
     block = tied_block()
-    whole, found = adjust(block, unit_variance="free"), adjust(block, parts=2, unit_variance="free")
+    whole = adjust(block, unit_variance="free")
+    found = adjust_in_parts(block, Division(parts=2), unit_variance="free")
     assert found.degrees_of_freedom == whole.degrees_of_freedom
     assert found.variance_of_unit_weight == pytest.approx(whole.variance_of_unit_weight, rel=1e-9)
 
 
+def test_photos_without_poses_are_started_and_adjusted_in_parts(block):
+    started = photogram.first_values(block.replace(photo_positions=np.nan, photo_attitudes=np.nan))
+    found = adjust_started(started, by=adjust_in_parts, division=Division(parts=2))
+    assert type(found) is not photogram.Result
+    agrees(found, adjust_started(started))
+
+
 def test_without_covariances(block):
-    whole, found = adjust(block, covariance=False), adjust(block, parts=4, covariance=False)
+    whole = adjust(block, covariance=False)
+    found = adjust_in_parts(block, Division(parts=4), covariance=False)
     np.testing.assert_allclose(found.photo_positions, whole.photo_positions, rtol=0, atol=1e-9)
     assert np.isnan(found.photo_cofactors).all()
     assert found.variance_of_unit_weight == pytest.approx(whole.variance_of_unit_weight, rel=1e-11)
 
 
 def test_memory_decides_whether_there_are_parts(block, whole, monkeypatch):
-    assert type(adjust(block, memory="1GB")) is photogram.Result
-    monkeypatch.setattr(running, "WHOLE", 1e9 / len(block.image_xy))
-    found = adjust(block, memory="1GB")
+    assert type(adjust_in_parts(block, Division(memory="1GB"))) is photogram.Result
+    monkeypatch.setattr(of_blocks, "WHOLE", 1e9 / len(block.image_xy))
+    found = adjust_in_parts(block, Division(memory="1GB"))
     assert type(found) is not photogram.Result
     agrees(found, whole)
 
@@ -173,7 +170,7 @@ def test_memory_decides_whether_there_are_parts(block, whole, monkeypatch):
 def test_a_rig_across_parts():
     simulated = photogram.simulate(strips=4, photos_per_strip=12, points_per_photo=40, seed=3)
     block = with_rig(simulated, [[0.3, 0.0, 0.05]], [[0.0, 0.5, 0.02]], seed=1).block
-    found, alone = adjust(block, parts=4), adjust(block)
+    found, alone = adjust_in_parts(block, Division(parts=4)), adjust(block)
     agrees(found, alone)
     for one, other in zip(found.unknowns, alone.unknowns, strict=True):
         assert (np.abs(one.values - other.values) <= 1e-9 * one.sd).all()
@@ -186,7 +183,7 @@ def test_drifts_of_strips_across_parts():
     drifts = [each for each in block.unknowns if isinstance(each, Drift)]
     assert len(drifts) == 4
     assert all(each.epoch is None for each in drifts)
-    found, alone = adjust(block, parts=4), adjust(block)
+    found, alone = adjust_in_parts(block, Division(parts=4)), adjust(block)
     agrees(found, alone)
     for one, other in zip(found.unknowns, alone.unknowns, strict=True):
         assert one.name == other.name
@@ -222,10 +219,10 @@ def test_a_run_is_taken_up_in_its_folder_alone(block, whole, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        adjust(block, parts=2, folder=tmp_path, progress=stop)
-    agrees(adjust(block, parts=2, folder=tmp_path), whole)
+        adjust_in_parts(block, Division(parts=2, folder=tmp_path), progress=stop)
+    agrees(adjust_in_parts(block, Division(parts=2, folder=tmp_path)), whole)
     with pytest.raises(InputError, match="another block, or with other options"):
-        adjust(block, parts=2, folder=tmp_path, tolerance=1e-3)
+        adjust_in_parts(block, Division(parts=2, folder=tmp_path), tolerance=1e-3)
 
 
 def test_what_is_not_determined_is_named(block):
@@ -234,21 +231,21 @@ def test_what_is_not_determined_is_named(block):
     control = np.flatnonzero(np.isfinite(block.point_sd).all(axis=1))[0]
     sd[control] = block.point_sd[control]
     with pytest.raises(RankError):
-        adjust(block.replace(point_sd=sd), parts=2)
+        adjust_in_parts(block.replace(point_sd=sd), Division(parts=2))
 
 
 def test_what_parts_cannot_do_is_refused(block):
-    found = adjust(block, parts=2)
+    found = adjust_in_parts(block, Division(parts=2))
     with pytest.raises(AdjustmentError, match="adjusted in parts"):
         found.covariances()
-    with pytest.raises(InputError, match="no loss"):
-        adjust(block, parts=2, loss="huber")
     with pytest.raises(InputError, match="not based on redundancy"):
-        adjust(block, parts=2, unit_variance="redundancy")
+        adjust_in_parts(block, Division(parts=2), unit_variance="redundancy")
     with pytest.raises(InputError, match="memory is a number of bytes"):
-        adjust(block, memory="much")
+        Division(memory="much")
     with pytest.raises(InputError, match="parts must be 1 to"):
-        adjust(block, parts=0)
+        Division(parts=0)
+    with pytest.raises(InputError, match=r"less than 2\^63"):
+        Division(memory="9" * 400 + "GB")
 
 
 def test_the_example_is_right(capsys):
@@ -256,7 +253,7 @@ def test_the_example_is_right(capsys):
     script.main()
     assert "4 parts and 3 separators for 1 workers" in capsys.readouterr().out
     block = script.flown(seed=12)
-    values, redundancy = script.apart(adjust(block, parts=3), adjust(block))
+    values, redundancy = script.apart(adjust_in_parts(block, Division(parts=3)), adjust(block))
     assert values < 1e-9
     assert redundancy < 1e-9
 
@@ -270,7 +267,7 @@ def test_what_is_held_is_not_tested_in_parts():
     wrong = block.replace(
         point_positions=positions, point_sd=np.where(held[:, np.newaxis], 0.0, block.point_sd)
     )
-    parts, whole = (photogram.adjust(wrong, parts=each) for each in (2, None))
+    parts, whole = adjust_in_parts(wrong, Division(parts=2)), adjust(wrong)
     assert parts.verdict.code == whole.verdict.code == "model"
     names = [{each.name.split(":")[0] for each in result.verdict.tests} for result in (parts, whole)]
     assert names[1] - names[0] >= {"held values"}

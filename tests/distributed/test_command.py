@@ -10,8 +10,9 @@ from test_streamed import project_of
 from typer.testing import CliRunner
 
 import photogram
-from photogram import adjust, read_result
+from photogram import adjust, adjust_in_parts, read_result
 from photogram.cli.commands import app
+from photogram.distributed import Division
 from photogram.formats import read
 
 
@@ -34,6 +35,12 @@ def test_the_example_in_parts_has_the_report_of_one_process(tmp_path):
     pattern = r"sigma0 .*|degrees of freedom .*|rms of .*|mean redundancy .*"
     assert re.findall(pattern, one) == re.findall(pattern, other)
     assert len(re.findall(pattern, one)) > 4
+
+
+@pytest.mark.parametrize("chosen", [("--loss", "huber"), ("--datum", "inner")])
+def test_neither_loss_nor_datum_are_chosen_in_parts(tmp_path, chosen):
+    said = called("--example", "--parts", 2, *chosen, "--out", tmp_path / "out", code=1)
+    assert "in parts there is no loss and no datum to choose" in said
 
 
 def test_a_plan_adjusts_nothing(tmp_path, project):
@@ -69,7 +76,8 @@ def test_a_project_on_disk_is_adjusted_without_being_read_whole(tmp_path, projec
 
 def test_two_workers_give_the_bits_of_parts_one_after_the_other():
     block = photogram.simulate(strips=4, photos_per_strip=12, points_per_photo=30, seed=5).block
-    one, other = adjust(block, parts=4), adjust(block, parts=4, cluster="local", workers=2)
+    divisions = Division(parts=4), Division(parts=4, cluster="local", workers=2)
+    one, other = (adjust_in_parts(block, division) for division in divisions)
     for name in ("photo_positions", "photo_cofactors", "point_cofactors", "redundancy", "standardized"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
     agrees(other, adjust(block))

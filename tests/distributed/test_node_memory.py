@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram.adjustment.elsewhere import Division
-from photogram.distributed.entrance import plan_in_parts
+from photogram.distributed import Division, plan_in_parts
 from photogram.distributed.tasks import Shelf
 from photogram.memory import give_back, resident_memory
 

@@ -15,13 +15,12 @@ from test_parts import OPTIONS, tied_block
 from test_streamed import project_of
 
 import photogram
-from photogram import adjust
-from photogram.adjustment.elsewhere import Division
+from photogram import adjust_in_parts
+from photogram.distributed import Division, plan_in_parts
+from photogram.distributed.adjust import fingerprint
 from photogram.distributed.core import CoreEngine
-from photogram.distributed.entrance import plan_in_parts
 from photogram.distributed.files import alone
 from photogram.distributed.run import partition, read_node
-from photogram.distributed.running import fingerprint
 from photogram.distributed.tasks import shelf
 from photogram.distributed.workers import connected
 from photogram.errors import InputError
@@ -37,7 +36,7 @@ def block():
 @pytest.fixture(scope="module")
 def finished(block, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    adjust(block, parts=2, folder=folder)
+    adjust_in_parts(block, Division(parts=2, folder=folder))
     return folder
 
 
@@ -49,11 +48,11 @@ def run(finished, tmp_path):
 
 def refused(block, run, match):
     with pytest.raises(InputError, match=match):
-        adjust(block, parts=2, folder=run)
+        adjust_in_parts(block, Division(parts=2, folder=run))
 
 
 def test_a_finished_run_is_taken_up(block, run):
-    assert adjust(block, parts=2, folder=run).status == "converged"
+    assert adjust_in_parts(block, Division(parts=2, folder=run)).status == "converged"
 
 
 @pytest.mark.parametrize(
@@ -117,7 +116,8 @@ def test_states_are_those_that_were_written(block, run, kind):
 
 
 def test_the_progress_of_another_run_is_refused(block, run, tmp_path):
-    adjust(block.replace(image_xy=block.image_xy + 0.001), parts=2, folder=tmp_path / "other")
+    other = block.replace(image_xy=block.image_xy + 0.001)
+    adjust_in_parts(other, Division(parts=2, folder=tmp_path / "other"))
     shutil.copyfile(tmp_path / "other" / "progress.json", run / "progress.json")
     refused(block, run, r"progress\.json: is the progress of another run")
 
@@ -125,7 +125,7 @@ def test_the_progress_of_another_run_is_refused(block, run, tmp_path):
 def test_two_runs_in_one_folder_are_refused(block, tmp_path):
     with alone(tmp_path):
         refused(block, tmp_path, rf"another run works here \(process {os.getpid()} on")
-    assert adjust(block, parts=2, folder=tmp_path).status == "converged"
+    assert adjust_in_parts(block, Division(parts=2, folder=tmp_path)).status == "converged"
 
 
 def test_a_run_of_another_process_holds_its_folder_until_it_dies(block, tmp_path):
@@ -143,7 +143,7 @@ def test_a_run_of_another_process_holds_its_folder_until_it_dies(block, tmp_path
 
 def test_more_parts_than_photos_are_refused(block, tmp_path):
     with pytest.raises(InputError, match="100000 parts of 16 photos: a part needs a photo"):
-        adjust(block, parts=100_000, folder=tmp_path)
+        adjust_in_parts(block, Division(parts=100_000, folder=tmp_path))
     assert not (tmp_path / "parts").exists()
     assert len(plan_in_parts(block, Division(parts=16)).tree) == 31
 

@@ -44,6 +44,7 @@ class Watch:
 
     COMPUTATIONS = (
         ("photogram", "adjust"),
+        ("photogram", "adjust_in_parts"),
         ("photogram", "adjust_started"),
         ("photogram", "snoop"),
         ("photogram", "orient"),

@@ -6,13 +6,11 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from os import PathLike
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.elsewhere import Division, in_parts
 from photogram.adjustment.ends import behind, folded, harmful, rounded, too_coarse, undetermined
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.started import started
@@ -99,18 +97,14 @@ def adjust(
     ordering: Ordering = "auto",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
-    cluster: Any = None,
-    workers: int | None = None,
-    parts: int | None = None,
-    memory: int | str | None = None,
-    folder: str | PathLike[str] | None = None,
     verdict: bool = False,
 ) -> Result:
     """Adjust a block by least squares.
 
     Every unknown is a weighted parameter, from free to fixed. Points that their image points cannot determine
     are left out (the result's `messages` and `dropped` say which); the others start from the intersection of
-    their rays. Refraction, where the block has it, is applied in every iteration.
+    their rays. Refraction, where the block has it, is applied in every iteration. A block that is too large
+    for one process, or too slow in it, is for :func:`photogram.adjust_in_parts`.
 
     Parameters
     ----------
@@ -156,25 +150,10 @@ def adjust(
         processors. The result does not depend on it, to the last bit.
     progress
         Called now and then with what is going on; an exception it raises stops the adjustment.
-    cluster
-        Where to adjust in parts (docs/distributed.md): a `dask.distributed.Client`, the address of a
-        scheduler, or `local` for workers on this machine. The result is that of one process, to rounding;
-        covariances between photos or points, and other datums, are not asked of it.
-    workers
-        Of a local cluster: how many; one for each processor when None.
-    parts
-        How many parts; as many as `memory` and the workers ask for when None. Without a cluster they are
-        worked off one after the other in this process.
-    memory
-        Bytes that a worker, or this process, may take for them, or text such as `4GB`. A block that fits as a
-        whole, and is not for a cluster, is adjusted as a whole.
-    folder
-        Where parts and states are kept, on a disk that all workers see; a run that died is taken up there.
-        None: a temporary folder.
     verdict
         Whether the verdict, or a report, will be asked for: the adjustment takes about a twentieth longer,
         and keeps what the tests need until then, where there is memory, so that they form nothing again. It
-        does so without a loss, inner constraints, parts, and where it converges.
+        does so without a loss and inner constraints, and where it converges.
 
     Returns
     -------
@@ -238,13 +217,6 @@ def adjust(
         unit_variance=unit_variance,
         minimum=minimum_row(block, datum) if isinstance(datum, MinimumConstraints) else None,
     )
-    division = Division(cluster, workers, parts, memory, folder)
-    if division.is_asked_for:
-        if inner is not None or options.minimum is not None or row or as_published:
-            raise InputError("in parts there is no loss, no datum to choose and no published iteration")
-        found = in_parts()(block, options, division, threads, progress)
-        if found is not None:
-            return found
     return _adjusted(block, options, processors, progress, inner, as_published, keep=verdict)
 
 

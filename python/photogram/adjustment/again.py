@@ -8,6 +8,7 @@ that are being calibrated, and anew in each of these adjustments.)
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -34,7 +35,7 @@ MEDIAN_LENGTH = 1.1774
 """The length of a vector with two components of standard deviation 1 has this median."""
 
 
-def adjust_started(started: FirstValues, **options: Any) -> Result:
+def adjust_started(started: FirstValues, *, by: Callable[..., Result] = adjust, **options: Any) -> Result:
     """Adjust a block from first values, and judge what these set aside again by the adjusted block.
 
     Images that fit the adjusted cameras, photos and points within ten standard deviations return, photos that
@@ -45,20 +46,22 @@ def adjust_started(started: FirstValues, **options: Any) -> Result:
     ----------
     started
         First values of the block (:func:`photogram.first_values`).
+    by
+        What adjusts: :func:`photogram.adjust`, or :func:`photogram.adjust_in_parts`.
     options
-        Those of :func:`photogram.adjust`.
+        Those of the call that adjusts.
 
     Raises
     ------
     InputError, AdjustmentError, RankError, OutOfMemoryError
-        As :func:`photogram.adjust`.
+        As the call that adjusts.
     """
-    first, result = started, adjust(started.usable(), **options)
+    first, result = started, by(started.usable(), **options)
     while result.converged and (started.missing or started.set_aside.any()):
         again = _judged(started, result)
         if len(again.missing) == len(started.missing) and again.set_aside.sum() == started.set_aside.sum():
             break
-        more = adjust(again.usable(), **options)
+        more = by(again.usable(), **options)
         if not more.converged:
             break
         started, result = again, more

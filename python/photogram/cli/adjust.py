@@ -44,7 +44,9 @@ from photogram.cli.stating import stated, statement_files
 
 if TYPE_CHECKING:
     from photogram import Block, FirstValues, Result
+    from photogram.adjustment.robust import Loss
     from photogram.cli.pictures import Pictures
+    from photogram.distributed import Division
     from photogram.formats import Project
     from photogram.results.snooped import Snooped
     from photogram.results.statement.statement import Statement
@@ -110,6 +112,13 @@ class Choices:
         ),
     ] = None
 
+    def loss_of(self, project: Project) -> Loss | None:
+        """Return the robust loss: what is chosen, else that of the project; None for least squares."""
+        if self.loss is None:
+            return project.options.loss
+        losses: dict[LossName, Loss | None] = {LossName.HUBER: "huber", LossName.CAUCHY: "cauchy"}
+        return losses.get(self.loss)
+
     def of(self, project: Project) -> Project:
         """Return the project with what is chosen of cameras, coordinates and the variance of unit weight."""
         from photogram.formats.additions import held_points, self_calibrated
@@ -173,8 +182,8 @@ def adjust(
     documents.place(target)  # refused before anything is read
     with job:
         pictures = documents.pictures(job, target)
-        whole = not divided.division.is_asked_for or added != NOTHING
-        if not whole and _on_disk(job, path, target, divided, threads):
+        division = divided.division
+        if added == NOTHING and _on_disk(job, path, target, divided, threads):
             return
         project = read_project(job, path, added)
         check_maps(documents.map)  # now that all inputs are known, which it must not be
@@ -188,15 +197,21 @@ def adjust(
             check_place(project.block, documents.crs)
         block, started = started_block(project, keep_all=keep_all)
         if divided.plan:
-            _planned(project, block, divided)
+            _planned(project, block, division)
             return
         for remark in started.messages if started is not None and not quiet else ():
             print_remark(str(remark))
         run = partial(
-            adjusted_block, job, project, choices=choices, ordering=ordering, threads=threads, parts=divided
+            adjusted_block,
+            job,
+            project,
+            choices=choices,
+            ordering=ordering,
+            threads=threads,
+            division=division,
         )
         if snooping.snoop:
-            _check_snooping(project, choices, divided)
+            _check_snooping(project, choices, division)
             removed = _snooped(job, project, block, started, run, threads, snooping)
             result = cast("Result", removed.judged)
         else:
@@ -205,11 +220,11 @@ def adjust(
         _finish(job, project, result, removed, target, documents, pictures, sections, own, strict=strict)
 
 
-def _planned(project: Project, block: Block, divided: Parts) -> None:
+def _planned(project: Project, block: Block, division: Division | None) -> None:
     """Print how a block would be adjusted in parts."""
-    from photogram.distributed.entrance import plan_in_parts
+    from photogram.distributed import Division, plan_in_parts
 
-    plan = plan_in_parts(block, divided.division, unit_variance=project.options.unit_variance)
+    plan = plan_in_parts(block, division or Division(), unit_variance=project.options.unit_variance)
     output.print("\n".join(plan.lines()))
     plan.check()
 
@@ -288,6 +303,9 @@ def _in_system(result: Result, crs: str | None) -> tuple[dict[str, bytes], list[
 
 def _on_disk(job: Job, path: Path, target: Path, divided: Parts, threads: int | None) -> bool:
     """Plan or adjust a project that is read batch by batch; False where it has to be read whole."""
+    division = divided.division
+    if division is None:
+        return False
     from photogram.formats import Wishes
     from photogram.formats.plain.streamed import streamable
 
@@ -297,13 +315,13 @@ def _on_disk(job: Job, path: Path, target: Path, divided: Parts, threads: int | 
 
     folder = divided.run or target / "run"
     if divided.plan:
-        plan = planned_on_disk(path, Wishes(), folder, divided.division)
+        plan = planned_on_disk(path, Wishes(), folder, division)
         output.print("\n".join(plan.lines()))
         plan.check()
         return True
     with job.status("adjusting") as status:
         told = shown(status, "weighted sum of squares", 1.0) if status is not None else None
-        found = adjusted_on_disk(path, Wishes(), folder, divided.division, threads=threads, progress=told)
+        found = adjusted_on_disk(path, Wishes(), folder, division, threads=threads, progress=told)
     lines = [*found.lines(), f"what was found of each node: {folder / 'results'}"]
     report = {target / "report.txt": ("\n".join(lines) + "\n").encode()}
     code = 0 if found.outcome.status == "converged" else NOT_CONVERGED
@@ -326,9 +344,9 @@ def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValu
     return found.usable(), found
 
 
-def _check_snooping(project: Project, choices: Choices, divided: Parts) -> None:
+def _check_snooping(project: Project, choices: Choices, division: Division | None) -> None:
     """Refuse what does not go with taking gross errors out."""
-    if divided.division.is_asked_for:
+    if division is not None:
         raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--snoop")
     chosen = choices.datum is not None or choices.loss is not None
     if chosen or project.options.datum in ("inner", "minimum"):
@@ -374,36 +392,28 @@ def adjusted_block(
     choices: Choices = AS_SAID,
     ordering: OrderingName = OrderingName.AUTO,
     threads: int | None = None,
-    parts: Parts = WHOLE,
+    division: Division | None = None,
 ) -> Result:
     """Adjust a block as its project says, but for what a user chooses, with its features."""
-    from photogram import FirstValues, InnerConstraints, InputError, MinimumConstraints, adjust_started
-    from photogram import adjust as adjust_block
+    from photogram import FirstValues, InputError, adjust_started
     from photogram.diagnosis.adjusted import diagnosed, errors_explained
     from photogram.formats.additions import repeated_remarks
     from photogram.results.fitting import with_features
 
-    options = project.options
-    chosen = choices.datum.value if choices.datum is not None else options.datum
-    robust = options.loss
-    if choices.loss is not None:
-        robust = {"none": None, "huber": "huber", "cauchy": "cauchy"}[choices.loss.value]
+    chosen = choices.datum.value if choices.datum is not None else project.options.datum
     with job.status("adjusting") as status:
         how: dict[str, Any] = {
-            "unit_variance": options.unit_variance,
-            "loss": robust,
-            "datum": {"inner": InnerConstraints(), "minimum": MinimumConstraints()}.get(chosen or ""),
+            "unit_variance": project.options.unit_variance,
             "ordering": ordering.value,
             "threads": threads,
             "progress": shown(status, "weighted sum of squares", 1.0) if status is not None else None,
-            **vars(parts.division),
-            "verdict": True,
         }
         with errors_explained(block):
+            call = _call(chosen, choices.loss_of(project), division)
             if isinstance(block, FirstValues):
-                result = adjust_started(block, **how)
+                result = adjust_started(block, by=call, **how)
             else:
-                result = adjust_block(block, **how)
+                result = call(block, **how)
         result = diagnosed(result)
     if chosen == "control" and result.datum.is_chosen:
         raise InputError(
@@ -413,6 +423,21 @@ def adjusted_block(
     again = repeated_remarks(project, result) if not isinstance(block, FirstValues) else []
     told = replace(result, messages=[*project.messages, *again, *result.messages])
     return with_features(told, project.features)
+
+
+def _call(datum: str | None, loss: Loss | None, division: Division | None) -> Callable[..., Result]:
+    """Return the call that adjusts: in one process, or in parts, where neither datum nor loss are chosen."""
+    if division is None:
+        from photogram import InnerConstraints, MinimumConstraints, adjust
+
+        held: dict[str | None, InnerConstraints | MinimumConstraints]
+        held = {"inner": InnerConstraints(), "minimum": MinimumConstraints()}
+        return partial(adjust, datum=held.get(datum), loss=loss, verdict=True)
+    from photogram import InputError, adjust_in_parts
+
+    if datum in ("inner", "minimum") or loss is not None:
+        raise InputError("in parts there is no loss and no datum to choose")
+    return partial(adjust_in_parts, division=division)
 
 
 def _files(

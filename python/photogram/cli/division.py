@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +11,7 @@ import typer
 from photogram.cli.job import Writes
 
 if TYPE_CHECKING:
-    from photogram.adjustment.elsewhere import Division
+    from photogram.distributed import Division
 
 __all__ = ["WHOLE", "Parts"]
 
@@ -68,11 +68,19 @@ class Parts:
     plan: PlanOnly = False
 
     @property
-    def division(self) -> Division:
-        """As :func:`photogram.adjust` takes it."""
-        from photogram.adjustment.elsewhere import Division
+    def division(self) -> Division | None:
+        """As :func:`photogram.adjust_in_parts` takes it; None where nothing is asked for."""
+        if replace(self, plan=False) == WHOLE:
+            return None
+        from photogram.distributed import Division
 
-        return Division(self.cluster, self.workers, self.parts, self.memory, self.run)
+        return Division(
+            parts=self.parts,
+            cluster=self.cluster,
+            workers=self.workers,
+            memory=self.memory,
+            folder=self.run,
+        )
 
 
 WHOLE = Parts()

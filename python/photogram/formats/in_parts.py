@@ -8,20 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from photogram.adjustment.adjustment import Progress
-from photogram.adjustment.elsewhere import Division
-from photogram.distributed.driver import Outcome, Stop
+from photogram.distributed.division import Division
+from photogram.distributed.driver import Outcome
 from photogram.distributed.files import alone
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import Manifest, result_folder
-from photogram.distributed.running import Run, check, opened, parts_for
+from photogram.distributed.running import Run, core_options, opened
 from photogram.formats.format import Wishes
 from photogram.formats.plain.streamed import Streamed
-from photogram.network.core import CoreOptions
 
 __all__ = ["OnDisk", "adjusted_on_disk", "planned_on_disk"]
-
-TOLERANCE, MAX_ITERATIONS = 1e-5, 50
-"""As of :func:`photogram.adjust`."""
 
 
 @dataclass(frozen=True)
@@ -91,17 +87,15 @@ def adjusted_on_disk(
     division
         Cluster, workers, parts and memory.
     threads, progress
-        As of :func:`photogram.adjust`.
+        As of :func:`photogram.adjust_in_parts`.
 
     Raises
     ------
     RankError, AdjustmentError, OutOfMemoryError, InputError
-        As of :func:`photogram.adjust`, and as of projects that are read whole.
+        As of :func:`photogram.adjust_in_parts`, and as of projects that are read whole.
     """
     with _run(path, wishes, folder, division, threads) as run:
-        options = run.manifest.options
-        stop = Stop(TOLERANCE, MAX_ITERATIONS, options.covariance, options.unit_variance)
-        outcome = run.adjust(stop, progress)
+        outcome = run.adjust(progress)
         found = [result_folder(folder, node) for node in range(len(run.manifest.tree))]
         return OnDisk(outcome, run.manifest, found)
 
@@ -118,18 +112,14 @@ def _run(path: Path, wishes: Wishes, folder: Path, division: Division, threads: 
         stack.enter_context(alone(folder))
         streamed = Streamed(path, wishes, folder)
         stack.callback(streamed.close)
-        variance = streamed.project.options.unit_variance
-        options = CoreOptions("fraction", TOLERANCE, MAX_ITERATIONS, True, None, "auto", variance, None)
-        check(options)
-        source, photos = streamed.source(options), len(streamed.block.photo_ids)
+        options = core_options(streamed.project.options.unit_variance)
+        source = streamed.source(options)
         with opened(
             folder,
             source,
+            len(streamed.block.photo_ids),
+            lambda parts: streamed.counted(parts)[1],
             lambda parts: streamed.divided(folder, parts, options, source),
-            lambda workers, room: (
-                division.parts_of(photos)
-                or parts_for(lambda parts: streamed.counted(parts)[1], photos, workers, room)
-            ),
             division,
             threads,
         ) as run:

@@ -1,0 +1,187 @@
+"""Blocks that are in memory, adjusted in parts: on a cluster, or one part after the other."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from photogram.adjustment.adjustment import Ordering, Progress, UnitVariance, adjust, core_threads
+from photogram.adjustment.started import started
+from photogram.arguments.annotations import check_arguments
+from photogram.distributed.counts import Counts, counted_work
+from photogram.distributed.division import Division
+from photogram.distributed.files import alone
+from photogram.distributed.merging import merged
+from photogram.distributed.parts import incidence_of, vertices_of
+from photogram.distributed.planned import PartsPlan
+from photogram.distributed.run import partition, places_of
+from photogram.distributed.running import Run, core_options, opened
+from photogram.network.block import Block, checked
+from photogram.network.core import CoreOptions
+from photogram.network.refracted import check_cameras
+from photogram.results.result import Result
+
+__all__ = ["adjust_in_parts", "fingerprint", "plan_in_parts"]
+
+WHOLE = 950.0
+"""Bytes of an image point, with its share of its point and of the result, of a block adjusted as a whole."""
+
+
+def adjust_in_parts(
+    block: Block,
+    division: Division,
+    *,
+    unit_variance: UnitVariance = "constrained",
+    max_iterations: int = 50,
+    tolerance: float = 1e-5,
+    covariance: bool = True,
+    ordering: Ordering = "auto",
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Result:
+    """Adjust a block in parts, on a cluster or one part after the other (docs/distributed.md).
+
+    The result is that of :func:`photogram.adjust`, to rounding. What asks for the normal equations of the
+    whole block again is not had of it: covariances between photos or points, other datums.
+
+    Parameters
+    ----------
+    block
+        The block.
+    division
+        Into how many parts, on which cluster, within which memory, in which folder. A block that fits into
+        the memory as a whole is adjusted as a whole, where neither parts nor a cluster are given.
+    unit_variance, max_iterations, tolerance, covariance, progress
+        As of :func:`photogram.adjust`; `redundancy` is no unit variance in parts.
+    ordering
+        As of :func:`photogram.adjust`, where the block fits as a whole: photos of parts have an order of
+        their own.
+    threads
+        As of :func:`photogram.adjust`; on a cluster those of a worker, one when None.
+
+    Returns
+    -------
+    The result; its `status` says whether the adjustment converged.
+
+    Raises
+    ------
+    RankError, AdjustmentError, KeyboardInterrupt
+        As of :func:`photogram.adjust`.
+    OutOfMemoryError
+        A part, or what parts have in common, takes more than the memory; says what would do.
+    InputError
+        As of :func:`photogram.adjust`; more parts than photos, a cluster that does not answer or whose
+        workers cannot work together, the folder of another run.
+    ModuleNotFoundError
+        A cluster is asked for, and dask.distributed is not installed (extra `distributed`).
+    """
+    options = core_options(
+        unit_variance, tolerance=tolerance, max_iterations=max_iterations, covariance=covariance
+    )
+    core_threads(threads)  # refused here, not by a worker
+    block = _ready(block)
+    if division.parts is None and division.cluster is None and _fits(block, division.memory_bytes):
+        return adjust(
+            block,
+            unit_variance=unit_variance,
+            max_iterations=max_iterations,
+            tolerance=tolerance,
+            covariance=covariance,
+            ordering=ordering,
+            threads=threads,
+            progress=progress,
+        )
+    with _run(block, options, division, threads) as run:
+        return merged(run.folder, run.manifest, block, run.adjust(progress))
+
+
+def plan_in_parts(
+    block: Block,
+    division: Division,
+    *,
+    unit_variance: UnitVariance = "constrained",
+    tolerance: float = 1e-5,
+) -> PartsPlan:
+    """Plan the adjustment of a block in parts: what it takes, before anything is adjusted.
+
+    The parts are written; in the folder of the run, where the division has one, they wait for the adjustment.
+
+    Parameters
+    ----------
+    block, division, unit_variance, tolerance
+        As of :func:`adjust_in_parts`.
+
+    Returns
+    -------
+    The plan; its `check` refuses what does not fit.
+
+    Raises
+    ------
+    InputError, AdjustmentError
+        As of :func:`adjust_in_parts`.
+    """
+    options = core_options(unit_variance, tolerance=tolerance)
+    with _run(_ready(block), options, division, None) as run:
+        return run.plan()
+
+
+def _ready(block: Block) -> Block:
+    """Return a block whose common unknowns have values to start from; refuse what cannot be adjusted."""
+    check_cameras(checked(block))
+    return started(block)
+
+
+def _fits(block: Block, room: int | None) -> bool:
+    """Whether a block fits as a whole into so many bytes, where they are given."""
+    return room is not None and _counted(block, 1).factor_bytes[0] + WHOLE * len(block.image_xy) <= room
+
+
+@contextmanager
+def _run(block: Block, options: CoreOptions, division: Division, threads: int | None) -> Iterator[Run]:
+    """Open the run of a block."""
+    with ExitStack() as stack:
+        if division.folder is None:
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="photogram-")))
+        else:
+            folder = Path(division.folder)
+        stack.enter_context(alone(folder))
+        source = fingerprint(block, options)
+        yield stack.enter_context(
+            opened(
+                folder,
+                source,
+                len(block.photo_ids),
+                lambda parts: _counted(block, parts),
+                lambda parts: partition(block, folder, parts, options, source),
+                division,
+                threads,
+            )
+        )
+
+
+def _counted(block: Block, parts: int) -> Counts:
+    incidence, _, _ = incidence_of(block)
+    images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
+    return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts)[1]
+
+
+def fingerprint(block: Block, options: CoreOptions) -> str:
+    """Return what tells a block and how it is adjusted from others."""
+    digest = hashlib.sha256(repr(options).encode())
+    for name in (
+        *("photo_positions", "photo_attitudes", "photo_position_sd", "photo_attitude_sd", "photo_cameras"),
+        *("point_positions", "point_sd", "image_photos", "image_points", "image_xy", "image_sd"),
+    ):
+        values = getattr(block, name)
+        digest.update(b"" if values is None else np.ascontiguousarray(values).tobytes())
+    for each in (*block.cameras, *block.observations, *block.unknowns):
+        digest.update(repr(each).encode())
+    return digest.hexdigest()
+
+
+check_arguments(globals(), ["adjust_in_parts", "plan_in_parts"])
