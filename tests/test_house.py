@@ -43,7 +43,7 @@ def modules():
 
 
 def imports():
-    """Return what each file imports of the package: also within functions, and for types only."""
+    """Return what each file imports of the package: also within functions, by a string, and for types only."""
     found = modules()
     graph = {}
     for name, path in found.items():
@@ -54,6 +54,8 @@ def imports():
                 arrows |= inside or ({node.module} & set(found))
             elif isinstance(node, ast.Import):
                 arrows |= {each.name for each in node.names} & set(found)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                arrows |= {node.value} & set(found)
         graph[name] = arrows - {name}
     return graph
 
