@@ -43,7 +43,7 @@ def modules():
 
 
 def imports():
-    """Return what each file imports of the package: also within functions, by a string, and for types only."""
+    """Return what each file imports of the package: within functions, by a string, for types only, too."""
     found = modules()
     graph = {}
     for name, path in found.items():
