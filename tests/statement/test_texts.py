@@ -18,7 +18,9 @@ def test_languages_have_the_same_keys_and_fields(language):
     english, own = table_of("en"), table_of(language)
     assert sorted(own) == sorted(english)
     for key, sentence in own.items():
-        assert fields_of(sentence) == fields_of(english[key]), key
+        # The verdict of the adjustment stands on English pages as it is, on others by its code.
+        lacking = {"said"} if language != "en" and key.startswith("verdict.") else set()
+        assert fields_of(sentence) == fields_of(english[key]) - lacking, key
     assert Texts(language).missing == []
 
 

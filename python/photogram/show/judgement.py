@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from photogram.statistics.evidence import Test
     from photogram.statistics.verdict import Verdict
 
-__all__ = ["judged", "remarks_section", "tests_section", "verdict_table"]
+__all__ = ["judged", "remarks_section", "signs_of", "tests_section", "verdict_table"]
 
 MARKS: dict[Tone, str] = {
     "good": "Usable",
@@ -57,6 +57,11 @@ def verdict_table(verdict: Verdict) -> Table:
     return Table("Tests", columns, [_row(each) for each in verdict.tests], note)
 
 
+def signs_of(statistic: str) -> str:
+    """Return a statistic of a test in the signs of a page."""
+    return _STATISTICS.get(statistic, statistic)
+
+
 def tests_section(verdict: Verdict) -> Section:
     """Return the section of all tests of a verdict; empty, and so not shown, where there are none."""
     return Section("tests", "Tests", [verdict_table(verdict)] if verdict.tests else [])
@@ -75,7 +80,7 @@ def _row(test: Test) -> list[Cell | str | float | None]:
     name = test.name[:1].upper() + test.name[1:]
     return [
         name,
-        _STATISTICS.get(test.statistic, test.statistic),
+        signs_of(test.statistic),
         test.value,
         low,
         high,

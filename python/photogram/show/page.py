@@ -271,8 +271,9 @@ class Page:
         Seconds that the engine spent in its phases.
     head
         For whom and by whom it is.
-    language, first
-        Of its words, and what the link to its top is called.
+    language, first, contents, more
+        Of its words, what the link to its top and the list of its sections are called, and what stands for
+        how many sentences are folded away: `{}` is their number.
     """
 
     what: str
@@ -285,6 +286,8 @@ class Page:
     head: Sequence[Fact] = ()
     language: str = "en"
     first: str = "Verdict"
+    contents: str = "Sections"
+    more: str = "{} more"
 
     def with_sections(self, *more: Section) -> Page:
         """Return the page with more sections at its end."""

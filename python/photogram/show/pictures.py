@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.quiver import Quiver
 
-__all__ = ["arrows", "drawn", "ellipses", "files", "new_figure", "round_length"]
+__all__ = ["arrows", "decimal_sign", "drawn", "ellipses", "files", "new_figure", "round_length"]
 
 DPI = 120
 """Dots an inch of pictures that are made of dots."""
@@ -87,6 +87,20 @@ def ellipses(axes: Axes, places: Floats, covariances: Floats, scale: float = 1.0
             np.sqrt(np.maximum(variance, 0.0))[:, np.newaxis] * circle
         )
         axes.plot(*outline, **style)
+
+
+def decimal_sign(figure: Figure, sign: str) -> None:
+    """Write the numbers at all axes of a figure with the decimal sign of a language."""
+    from matplotlib.ticker import ScalarFormatter
+
+    class Signed(ScalarFormatter):
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            return super().__call__(x, pos).replace(".", sign)
+
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if isinstance(axis.get_major_formatter(), ScalarFormatter):
+                axis.set_major_formatter(Signed(useOffset=False))
 
 
 def round_length(value: float) -> float:

@@ -12,6 +12,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.results.cameras import AdjustedCamera, units
 from photogram.results.distortion import distortion_curve
+from photogram.results.statement import words
 from photogram.results.statement.budget import Budget, budget_line
 from photogram.results.statement.compared import in_order
 from photogram.results.statement.document import kinds_of
@@ -19,9 +20,8 @@ from photogram.results.statement.drawings import overlap
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.leave_one_out import limit_of
 from photogram.results.statement.sheets import Written, decimals_for
-from photogram.results.statement.sources import held_names
 from photogram.results.statement.statement import Statement
-from photogram.show.judgement import verdict_table
+from photogram.show.judgement import signs_of
 from photogram.show.page import (
     Cell,
     Column,
@@ -137,7 +137,7 @@ def left_out_annex(found: Statement) -> Section:
 def budgets_annex(found: Statement) -> Section:
     """Return annex C: what every source of error contributes."""
     texts = found.texts
-    held = held_names(found.result) or texts("annex.c.nothing")
+    held = words.held(texts, found.result) or texts("annex.c.nothing")
     parts: list[Part] = []
     for each in found.taken_apart:
         parts += _budget(found, each)
@@ -157,11 +157,10 @@ def _budget(found: Statement, own: Budget) -> list[Part]:
     estimated = own.freedom.basis == "components"
     rows: list[Row] = []
     for each in own.at("kind"):
-        key = f"kind.{each.name}"
         nu = own.freedom.of_kind.get(each.name, math.inf) if estimated else math.inf
         rows.append(
             [
-                texts(key) if texts.has(key) else each.name,
+                words.kind(texts, each.name),
                 each.number,
                 cells.figures(each.u, 2),
                 cells.number(100 * each.share, 1),
@@ -173,7 +172,8 @@ def _budget(found: Statement, own: Budget) -> list[Part]:
     if len(own.at("camera")) < 2:
         finer = [each for each in finer if each.level != "camera"]
     for each in sorted(finer, key=lambda one: -one.contribution)[:SOURCES]:
-        name = texts(f"level.{each.level}", name=each.name)
+        of = words.parameter(texts, each.name) if each.level == "parameter" else each.name
+        name = texts(f"level.{each.level}", name=of)
         share = cells.number(100 * each.share, 1)
         rows.append([f"– {name}", each.number, cells.figures(each.u, 2), share, None, ""])
     title = budget_line(texts, own)
@@ -186,7 +186,7 @@ def _budget(found: Statement, own: Budget) -> list[Part]:
     ]
     observed: list[Row] = [
         [
-            " ".join(each.observation),
+            words.observation(texts, each.observation),
             cells.figures(each.sd),
             cells.figures(each.sensitivity),
             cells.figures(math.sqrt(each.contribution), 2),
@@ -196,7 +196,7 @@ def _budget(found: Statement, own: Budget) -> list[Part]:
     ]
     return [
         Table(title, columns, rows),
-        Table(texts("table.single", quantity=own.quantity), single, observed),
+        Table(texts("table.single", quantity=words.quantity(texts, own.quantity)), single, observed),
     ]
 
 
@@ -270,21 +270,46 @@ def adjustment_annex(found: Statement) -> Section:
     ]
     rows: list[Row] = []
     for name, (count, redundancy, squares) in kinds_of(result).items():
-        key = f"kind.{name}"
-        label = texts(key) if texts.has(key) else name
-        rows.append([label, count, cells.number(redundancy, 1), cells.number(squares, 1)])
+        rows.append([words.kind(texts, name), count, cells.number(redundancy, 1), cells.number(squares, 1)])
     parts: list[Part] = [Table(texts("table.kinds"), columns, rows)]
     if result.verdict.tests:
-        parts.append(verdict_table(result.verdict))
+        parts.append(_tests(found))
     if found.removed:
-        parts += [Facts(texts("table.removed"), []), Remarks(list(found.removed), 60)]
+        removed = [words.named(texts, each) for each in found.removed]
+        parts += [Facts(texts("table.removed"), []), Remarks(removed, 60)]
     parts += [*_markers(found), _overlap(found)]
-    return Section("annex-e", texts("annex.e"), parts, result.verdict.headline, annex=True)
+    intro = words.verdict(texts, result.verdict)
+    return Section("annex-e", texts("annex.e"), parts, intro, annex=True)
+
+
+def _tests(found: Statement) -> Table:
+    """Return all tests of the verdict on the adjustment."""
+    texts, cells = found.texts, Written(found.texts)
+    columns = [
+        cells.column("test", text=True),
+        cells.column("statistic", text=True),
+        *(cells.column(key) for key in ("value", "low", "high", "p", "level", "tests")),
+        cells.column("outcome", text=True),
+    ]
+    rows: list[Row] = [
+        [
+            words.test(texts, each.name),
+            signs_of(each.statistic),
+            *(cells.figures(value, 4) for value in (each.value, *each.limits)),
+            cells.p(each.p, each.level),
+            cells.figures(each.level, 2),
+            each.tests,
+            Cell(texts("test.passes")) if each.accepted else Cell(texts("test.rejects"), tone="look"),
+        ]
+        for each in found.result.verdict.tests
+    ]
+    return Table(texts("table.tests"), columns, rows, texts("table.tests.note"))
 
 
 def _overlap(found: Statement) -> Drawing:
     texts, unit = found.texts, found.result.block.linear_unit
-    labels = {name: texts(f"column.{name}") for name in ("east", "north", "photos")} | {"unit": unit}
+    labels = {name: texts(f"column.{name}") for name in ("east", "north", "photos")}
+    labels |= {"unit": unit, "decimal": texts("number.decimal")}
     draw = partial(overlap, found.result, labels)
     return Drawing("map-overlap", texts("page.overlap"), texts("page.overlap.caption"), draw)
 
@@ -306,7 +331,7 @@ def _markers(found: Statement) -> list[Part]:
         cells.column("point", text=True),
         cells.column("use", text=True),
         cells.column("photos"),
-        Column("rms", unit),
+        cells.column("rms", unit),
         cells.column("largest", unit),
     ]
     rows: list[Row] = [
@@ -332,7 +357,7 @@ def survey_annex(found: Statement) -> Section:
     columns = [
         cells.column("point", text=True),
         cells.column("use", text=True),
-        *(Column(name, axis) for name, axis in own.system.axes),
+        *(Column(words.axis(texts, name), texts.word("unit", of)) for name, of in own.system.axes),
         *cells.columns(("sd",), unit),
     ]
     places = [8 if axis == "deg" else decimals for _, axis in own.system.axes]
@@ -363,7 +388,7 @@ def files_annex(found: Statement) -> Section:
     if found.inputs:
         columns = [
             Column(texts("page.file"), text=True),
-            cells.column("size", "bytes"),
+            cells.column("size", texts("unit.bytes")),
             Column("SHA-256", text=True),
         ]
         rows: list[Row] = [[each.path.name, each.size, each.sha256] for each in found.inputs]

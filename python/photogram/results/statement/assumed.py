@@ -9,10 +9,10 @@ import numpy as np
 
 from photogram.results.components import VarianceComponents
 from photogram.results.result import Result
+from photogram.results.statement import words
 from photogram.results.statement.asked import Asked
 from photogram.results.statement.compared import Compared
 from photogram.results.statement.layout import Layout
-from photogram.results.statement.sources import held_names
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
 
@@ -32,7 +32,7 @@ def assumptions(
 ) -> list[tuple[str, str]]:
     """Return keys and texts."""
     said = [*_weights(result, asked.components, texts)]
-    said += [_said(texts, "assume.read", said=each) for each in assumed]
+    said += [_said(texts, "assume.read", said=words.read(texts, each)) for each in assumed]
     said += [*_adjustment(result, texts, removed)]
     if len(found):
         said += _survey(asked, texts, found)
@@ -67,7 +67,7 @@ def _weights(result: Result, components: VarianceComponents | None, texts: Texts
     test = result.global_test
     if components is not None:
         parts = [
-            f"{each.name} x {texts.number(each.factor_of_sd, 2)}"
+            f"{words.kind(texts, each.name)} x {texts.number(each.factor_of_sd, 2)}"
             f" ({texts.number(each.interval[0] ** 0.5, 2)} – {texts.number(each.interval[1] ** 0.5, 2)})"
             for each in components.components
             if not each.held
@@ -86,15 +86,15 @@ def _weights(result: Result, components: VarianceComponents | None, texts: Texts
 def _adjustment(result: Result, texts: Texts, removed: Sequence[str]) -> list[tuple[str, str]]:
     total, out = int(result.used_images.sum()), len(removed) + len(result.set_aside)
     block = result.block
-    held = held_names(result)
-    refraction = texts("assume.no_refraction") if block.refraction is None else str(block.refraction)
-    frame = f"{block.frame}, {block.linear_unit}"
+    held = words.held(texts, result)
+    refraction = words.refraction(texts, block.refraction, block.linear_unit)
+    frame = f"{words.frame(texts, block.frame)}, {block.linear_unit}"
     return [
         _said(texts, "assume.removed", n=out, all=total + out, percent=texts.percent(out / (total + out)))
         if out
         else _said(texts, "assume.none_removed"),
         _said(texts, "assume.held", held=held) if held else _said(texts, "assume.none_held"),
-        _said(texts, "assume.datum", datum=str(result.datum), frame=frame),
+        _said(texts, "assume.datum", datum=words.datum(texts, result.datum), frame=frame),
         _said(texts, "assume.refraction", refraction=refraction),
     ]
 

@@ -20,6 +20,7 @@ from photogram.results.covariance import Covariances
 from photogram.results.group_sums import Left, Probing, observables
 from photogram.results.grouping import grouped
 from photogram.results.result import Result
+from photogram.results.statement import words
 from photogram.results.statement.quantities import Wanted
 from photogram.results.statement.sources import Rows, kind_of
 from photogram.results.statement.texts import Texts
@@ -241,7 +242,8 @@ def budget_line(texts: Texts, found: Budget) -> str:
     numbers = (texts.number(each * factor, decimals) for each in (found.value, found.sd, found.expanded))
     value, u, expanded = (f"{each} {unit}".rstrip() for each in numbers)
     k, p = texts.number(found.k, 2), texts.percent(found.coverage)
-    return texts("budget.line", quantity=found.quantity, value=value, u=u, expanded=expanded, k=k, p=p)
+    named = words.quantity(texts, found.quantity)
+    return texts("budget.line", quantity=named, value=value, u=u, expanded=expanded, k=k, p=p)
 
 
 class _Freedoms:

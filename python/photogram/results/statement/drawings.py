@@ -11,7 +11,7 @@ from photogram.results.footprints import footprints
 from photogram.results.result import Result
 from photogram.results.statement.compared import Compared
 from photogram.results.statement.standards import Lengths
-from photogram.show.pictures import arrows, ellipses, new_figure, round_length
+from photogram.show.pictures import arrows, decimal_sign, ellipses, new_figure, round_length
 from photogram.show.style import BLUE, INK, SOFT, VERMILION
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def differences(found: Compared, control: Floats, labels: dict[str, str]) -> Fig
     axes.ticklabel_format(useOffset=False, style="plain")
     axes.margins(0.12)
     axes.legend(loc="upper left", fontsize="small")
+    decimal_sign(figure, labels["decimal"])
     return figure
 
 
@@ -81,12 +82,9 @@ def _points(figure: Figure, axes: Axes, found: Compared, extent: float, labels: 
         own = found.blocks(found.covariance)[both, :2, :2]
         ellipses(axes, plan[both], own, NINETY_FIVE / scale, color=BLUE, linewidth=0.6, zorder=2)
         length = round_length(largest)
-        axes.plot(
-            [],
-            [],
-            color=VERMILION,
-            label=f"{length:g} {labels['unit']} = {length / scale:.3g} {labels['unit']}",
-        )
+        sizes = (f"{size:.3g} {labels['unit']}" for size in (length, length / scale))
+        label = " = ".join(sizes).replace(".", labels["decimal"])
+        axes.plot([], [], color=VERMILION, label=label)
     if len(found) <= NAMED:
         for name, place in zip(found.names, plan, strict=True):
             axes.annotate(name, place, (4, 4), textcoords="offset points", fontsize="x-small", color=SOFT)
@@ -107,6 +105,7 @@ def lengths(found: Lengths, labels: dict[str, str]) -> Figure:
     axes.axhline(0.0, color=SOFT, linewidth=0.6)
     axes.set_xlabel(f"{labels['length']}, {labels['unit']}")
     axes.set_ylabel(f"{labels['error']}, {labels['unit']}")
+    decimal_sign(figure, labels["decimal"])
     return figure
 
 
@@ -131,6 +130,7 @@ def overlap(result: Result, labels: dict[str, str]) -> Figure | None:
     axes.set_xlabel(f"{labels['east']}, {labels['unit']}")
     axes.set_ylabel(f"{labels['north']}, {labels['unit']}")
     axes.ticklabel_format(useOffset=False, style="plain")
+    decimal_sign(figure, labels["decimal"])
     return figure
 
 

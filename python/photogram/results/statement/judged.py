@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram.messages import listed
 from photogram.results.result import Result
+from photogram.results.statement import words
 from photogram.results.statement.asked import Asked
 from photogram.results.statement.asprs import wording
 from photogram.results.statement.assumed import assumptions
@@ -119,8 +119,8 @@ def judged(
         for each in against.control[:NAMED]
     ]
     fields: dict[str, str | int] = {
-        "verdict": result.verdict.headline,
-        "points": listed([each.point for each in against.control], NAMED),
+        "verdict": words.verdict(texts, result.verdict),
+        "points": texts.listed([each.point for each in against.control], NAMED),
         "n": 0 if of_all is None else of_all.n,
     }
     return Judged(
@@ -351,7 +351,8 @@ def _points(asked: Asked, texts: Texts, found: Compared, of_all: Figures | None)
             said.append(("point.wrong", text))
     if asked.without:
         reasons = "; ".join(f"{point}: {reason}" for point, reason in asked.without.items())
-        said.append(("point.left", texts("point.left", points=listed(list(asked.without)), reasons=reasons)))
+        points = texts.listed(list(asked.without))
+        said.append(_said(texts, "point.left", points=points, reasons=reasons))
     return said
 
 
@@ -365,7 +366,10 @@ def _remarks(
     layout: Layout | None,
     held: bool,
 ) -> list[str]:
-    said = [texts("unusable", point=name, reason=reason) for name, reason in found.not_usable[:NAMED]]
+    said = [
+        texts("unusable", point=name, reason=texts.word("reason", reason))
+        for name, reason in found.not_usable[:NAMED]
+    ]
     said += [texts("language.missing", sentence=key) for key in texts.missing]
     if held:
         said.append(texts("assume.fixed"))

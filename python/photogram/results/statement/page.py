@@ -8,9 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from photogram.messages import listed
-from photogram.results.features_report import through
-from photogram.results.features_report import written as feature_written
+from photogram.results.features import Features
+from photogram.results.statement import words
 from photogram.results.statement.annexes import (
     adjustment_annex,
     budgets_annex,
@@ -40,6 +39,7 @@ from photogram.show.page import (
     Section,
     Table,
     Text,
+    decimals_of,
 )
 from photogram.show.ways import page_of
 
@@ -83,6 +83,8 @@ def statement_page(found: Statement) -> Page:
         head=head,
         language=texts.language,
         first=texts("page.first"),
+        contents=texts("page.contents"),
+        more=texts("page.more", count="{}"),
     )
 
 
@@ -110,7 +112,7 @@ def _figures(found: Statement) -> list[Table]:
     ]
     rest = found.of_rest
     if rest is not None:
-        columns.append(Column(texts("column.without", points=listed(list(found.asked.without), 3))))
+        columns.append(Column(texts("column.without", points=texts.listed(list(found.asked.without), 3))))
     classes = bool(found.asked.classes)
     if classes:
         columns += [cells.column("class"), cells.column("verdict", text=True)]
@@ -184,9 +186,30 @@ def _map(found: Statement) -> Drawing:
         "north": texts("column.north"),
         "height": texts("component.h"),
         "unit": found.result.block.linear_unit,
+        "decimal": texts("number.decimal"),
     }
     draw = partial(differences, found.compared, control, labels)
     return Drawing("map-differences", texts("page.map"), texts("page.map.caption"), draw)
+
+
+def _features(texts: Texts, features: Features) -> Table:
+    """Return the quantities of features: two figures of the smallest deviation among those of one unit."""
+    cells = Written(texts)
+    columns = [
+        cells.column("feature", text=True),
+        cells.column("quantity", text=True),
+        *(cells.column(key) for key in ("value", "sd", "expanded")),
+        Column("", text=True),
+    ]
+    rows: list[Row] = []
+    for each in features:
+        name = f"{each.name}: {words.feature(texts, each)}"
+        for own in each.quantities:
+            alike = np.array([other.sd for other in each.quantities if other.unit == own.unit])
+            decimals = decimals_of(alike, smallest=True)
+            numbers = (cells.number(value, decimals) for value in (own.value, own.sd, own.expanded))
+            rows.append([name, texts.word("measured", own.name), *numbers, own.unit])
+    return Table(texts("table.features"), columns, rows, f"k = {texts.number(features.k, 2)}")
 
 
 def _metrology(found: Statement) -> list[Section]:
@@ -196,18 +219,7 @@ def _metrology(found: Statement) -> list[Section]:
     features, lengths = found.result.features, found.standards.lengths
     unit = found.result.block.linear_unit
     if features is not None and len(features):
-        rows: list[Row] = [
-            [f"{each.name}: {through(each)}", own.name, *feature_written(each, own), own.unit]
-            for each in features
-            for own in each.quantities
-        ]
-        columns = [
-            cells.column("feature", text=True),
-            cells.column("quantity", text=True),
-            *(cells.column(key) for key in ("value", "sd", "expanded")),
-            Column("", text=True),
-        ]
-        tables.append(Table(texts("table.features"), columns, rows, f"k = {texts.number(features.k, 2)}"))
+        tables.append(_features(texts, features))
     if lengths is not None:
         decimals = decimals_for(lengths.test.sd)
         columns = [
@@ -215,7 +227,7 @@ def _metrology(found: Statement) -> list[Section]:
             *(cells.column(key, unit) for key in ("length", "error", "sd", "normalised", "limit")),
         ]
         own_limits = lengths.test.limits
-        rows = [
+        rows: list[Row] = [
             [
                 f"{line}: {first} – {last}",
                 cells.number(float(lengths.calibrated[k]), decimals),
@@ -227,7 +239,8 @@ def _metrology(found: Statement) -> list[Section]:
             for k, (line, (first, last)) in enumerate(zip(lengths.lines, lengths.ends, strict=True))
         ]
         tables.append(Table(texts("table.lengths"), columns, rows))
-        labels = {name: texts(f"column.{name}") for name in ("length", "error")} | {"unit": unit}
+        labels = {name: texts(f"column.{name}") for name in ("length", "error")}
+        labels |= {"unit": unit, "decimal": texts("number.decimal")}
         draw = partial(drawn_lengths, lengths, labels)
         title, caption = texts("picture.lengths"), texts("picture.lengths.caption")
         tables.append(Drawing("lengths", title, caption, draw))

@@ -9,7 +9,6 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.messages import listed
 from photogram.results.group_sums import observables
 from photogram.results.grouping import Grouping
 from photogram.results.network_trial import (
@@ -23,12 +22,10 @@ from photogram.results.network_trial import (
 from photogram.results.result import Result
 from photogram.results.suspects import block_suspects, observations_of_core
 
-__all__ = ["Rows", "held_names", "kind_of"]
+__all__ = ["Rows", "kind_of"]
 
 PHOTOS = 100
 """Photos that are listed, those that contribute most."""
-SHARED = 20
-"""Names of what is held that are told."""
 _PLURALS = {IMAGE: "images", CONTROL: "control", POSITION: "photo positions", ATTITUDE: "photo attitudes"}
 
 
@@ -166,17 +163,3 @@ def _sums(
     yield from ((level, names[k], number, total) for k, number, total in values)
     if others is not None:
         yield level, *others
-
-
-def held_names(result: Result) -> str:
-    """Name what was held, and is taken as errorless; empty where nothing was."""
-    block, held = result.block, []
-    fixed = np.flatnonzero((block.point_sd == 0).any(axis=1)).tolist()
-    held += [f"point {block.point_ids[row]}" for row in fixed]
-    photos = (block.photo_position_sd == 0).any(axis=1) | (block.photo_attitude_sd == 0).any(axis=1)
-    held += [f"photo {block.photo_ids[row]}" for row in np.flatnonzero(photos).tolist()]
-    for camera in result.cameras:
-        own = [name for name, sd in zip(camera.names, camera.sd.tolist(), strict=True) if not sd > 0]
-        if own:
-            held.append(f"{', '.join(own)} of camera {camera.name}")
-    return listed(held, SHARED) if held else ""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import date
 from functools import cache
 from importlib.resources import files
@@ -12,7 +13,7 @@ from string import Formatter
 from typing import Any
 
 from photogram.errors import InputError
-from photogram.messages import nearest
+from photogram.messages import MOST_NAMES, nearest
 from photogram.show.page import fixed
 
 __all__ = ["LANGUAGES", "Texts", "fields_of", "table_of"]
@@ -24,9 +25,12 @@ NOTHING = "–"
 
 @cache
 def table_of(language: str) -> Mapping[str, str]:
-    """Return the table of a language: sentences by key."""
-    source = files("photogram.results.statement").joinpath("text", f"{language}.toml")
-    return dict(tomllib.loads(source.read_text(encoding="utf-8")))
+    """Return the table of a language: sentences, and words of other modules, by key."""
+    found: dict[str, str] = {}
+    for name in (f"{language}.toml", f"{language}.words.toml"):
+        source = files("photogram.results.statement").joinpath("text", name)
+        found |= tomllib.loads(source.read_text(encoding="utf-8"))
+    return found
 
 
 def fields_of(sentence: str) -> set[str]:
@@ -44,6 +48,18 @@ def fields_of(sentence: str) -> set[str]:
     if any(form or conversion for _, name, form, conversion in parts if name is not None):
         raise InputError(f"{sentence!r}: a field is a name in braces, such as {{n}}")
     return {name for _, name, _, _ in parts if name is not None}
+
+
+@cache
+def _patterns(family: str) -> list[tuple[str, re.Pattern[str]]]:
+    """Return the English sentences of the keys of a family as patterns, in the order of the table."""
+    found = []
+    for key, sentence in table_of("en").items():
+        if key.startswith(f"{family}."):
+            parts = [(re.escape(text), name) for text, name, *_ in Formatter().parse(sentence)]
+            pattern = "".join(text + (f"(?P<{name}>.+)" if name else "") for text, name in parts)
+            found.append((key, re.compile(pattern)))
+    return found
 
 
 class Texts:
@@ -108,7 +124,7 @@ class Texts:
         """Return a number with so many decimals."""
         if not math.isfinite(value):
             return NOTHING if math.isnan(value) else "∞" if value > 0 else "-∞"
-        return self._local(fixed(value, decimals))
+        return self.numeral(fixed(value, decimals))
 
     def significant(self, value: float, figures: int = 3) -> str:
         """Return a number with so many significant figures, at least."""
@@ -116,7 +132,8 @@ class Texts:
             return self.number(value, 0)
         return self.number(value, max(0, figures - 1 - math.floor(math.log10(abs(value)))))
 
-    def _local(self, written: str) -> str:
+    def numeral(self, written: str) -> str:
+        """Return a number that is written with a point as the language writes it."""
         sign = written[:1] if written[:1] in "-+" else ""
         whole, point, decimals = written.removeprefix(sign).partition(".")
         group = self._table["number.group"]
@@ -140,7 +157,7 @@ class Texts:
     def size(self, value: float) -> str:
         """Return a class as it was asked for: `5 cm`."""
         unit, factor = self.small(value)
-        return f"{self._local(f'{value * factor:.6g}')} {unit}"
+        return f"{self.numeral(f'{value * factor:.6g}')} {unit}"
 
     def small(self, value: float) -> tuple[str, float]:
         """Return the unit in which people read a length of this size, and what leads to it."""
@@ -154,7 +171,7 @@ class Texts:
         percent = 100 * probability
         if not math.isfinite(percent):
             return NOTHING
-        return self._local(f"{percent:.1f}".removesuffix(".0"))
+        return self.numeral(f"{percent:.1f}".removesuffix(".0"))
 
     def day(self, given: str) -> str:
         """Return a date (ISO) as the language writes it; anything else as it is."""
@@ -167,3 +184,20 @@ class Texts:
     def has(self, key: str) -> bool:
         """Return whether there is a sentence."""
         return key in self._table
+
+    def word(self, family: str, name: str) -> str:
+        """Return what a word of another module is called in the language; one without a key as it is."""
+        key = f"{family}.{name}"
+        return self(key) if key in self._table else name
+
+    def listed(self, names: Sequence[str], most: int = MOST_NAMES) -> str:
+        """Name all of a few, and some of many."""
+        shown = ", ".join(names[:most])
+        return shown if len(names) <= most else self("word.more", names=shown, count=len(names) - most)
+
+    def recognised(self, family: str, said: str) -> tuple[str, dict[str, str]] | None:
+        """Return the key of a family whose English sentence this is, and its fields; None without one."""
+        for key, pattern in _patterns(family):
+            if (found := pattern.fullmatch(said)) is not None:
+                return key, found.groupdict()
+        return None

@@ -19,7 +19,7 @@ for (const table of document.querySelectorAll("table")) {
       rows.sort((a, b) => {
         if (!known(a) || !known(b)) return known(b) - known(a);
         const order = text
-          ? value(a, column).localeCompare(value(b, column), "en", { numeric: true })
+          ? value(a, column).localeCompare(value(b, column), document.documentElement.lang, { numeric: true })
           : parseFloat(value(a, column)) - parseFloat(value(b, column));
         return up ? order : -order;
       });

@@ -1,0 +1,339 @@
+"""Words of other modules on pages in another language: a key for each, and nothing in English is left."""
+
+import ast
+import html
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+
+import photogram
+from photogram import _photocore, formats
+from photogram.formats.crs import axes_of
+from photogram.network.frame import Frame
+from photogram.network.observations import Observation
+from photogram.network.refraction import Air, Refraction, Water
+from photogram.network.unknowns import Unknown
+from photogram.results import datum as datums
+from photogram.results import patterns
+from photogram.results.features import KINDS as FORMS
+from photogram.results.features_report import through
+from photogram.results.group_sums import observables
+from photogram.results.groups_tested import PLURALS
+from photogram.results.held import HELD
+from photogram.results.result import adjusted
+from photogram.results.statement import sources, words
+from photogram.results.statement.texts import LANGUAGES, Texts, table_of
+
+PACKAGE = Path(photogram.__file__).parent
+CRATE = Path(__file__).parents[2] / "crates" / "photocore" / "src"
+ENGLISH, GERMAN = Texts("en"), Texts("de")
+
+
+def source(module):
+    return Path(module.__file__).read_text(encoding="utf-8")
+
+
+def verdicts():
+    """Return the source of what verdicts say."""
+    names = ("verdict.py", "evidence.py")
+    return "".join((PACKAGE / "statistics" / name).read_text(encoding="utf-8") for name in names)
+
+
+def below(kind):
+    for each in kind.__subclasses__():
+        yield each
+        yield from below(each)
+
+
+def shipped(kind):
+    return {each.KIND for each in below(kind) if each.KIND and each.__module__.startswith("photogram.")}
+
+
+def lacking(family, names):
+    return {name for name in names if f"{family}.{name}" not in table_of("de")}
+
+
+def test_every_kind_of_observation_has_a_word(result):
+    kinds = shipped(Observation) | shipped(Unknown)
+    assert len(kinds) > 15
+    names = {sources.kind_of(each) for each in kinds} | set(sources._PLURALS.values())
+    names |= {"images", "control", "camera", *observables(result).stations}
+    assert not lacking("kind", names)
+    singles = {sources.kind_of(each) for each in kinds} | {"image", "control", "camera", "attitude"}
+    assert not lacking("one", singles)
+    assert words.kind(GERMAN, "prior, lever arm") == "Vorwerte, Hebelarm"
+
+
+def test_every_component_has_a_word_or_is_a_letter():
+    names = {name for each in below(Observation) for name in each.COMPONENTS}
+    names |= {name for _, components in _photocore.UNKNOWNS for name, _ in components}
+    names |= {
+        name for crs in ("ENU:48,9", "EPSG:4978", "EPSG:25832", "EPSG:4979") for name in axes_of(crs)[0]
+    }
+    assert not lacking("axis", names - set(words.LETTERS) - {"", "length"} | {"column", "row"})
+
+
+def test_every_verdict_datum_frame_and_reason_has_a_sentence(result):
+    codes = set(re.findall(r'_Line\(\s*"([a-z-]+)"', verdicts()))
+    codes |= set(re.findall(r'"(not-tested|accepted)",', verdicts()))
+    assert len(codes) > 20
+    assert not lacking("verdict", codes)
+    kinds = set(re.findall(r'self\.kind == "([a-z ]+)"', source(datums))) | {"observations"}
+    assert len(kinds) == 5
+    assert not lacking("datum", kinds)
+    assert not lacking("frame", ("cartesian", "topocentric", "geocentric", "geographic"))
+    assert not lacking(
+        "refraction", (*(f"air.{each}" for each in get_args(Air)), "water.giant", "water.snell")
+    )
+    assert set(get_args(Water)) == {"giant", "snell"}
+    rust = "".join(path.read_text(encoding="utf-8") for path in (CRATE / "network").rglob("*.rs"))
+    reasons = set(re.findall(r'Reason::\w+ => "([^"]+)"', rust))
+    assert len(reasons) == 8
+    assert not lacking("reason", reasons | {"no images", "left out"})
+    assert not lacking("quantity", (set(adjusted(result).things) - {"step"}) | {"distance", "linear"})
+
+
+def test_every_test_of_a_verdict_is_known_again(result):
+    names = [*PLURALS.values(), HELD, "global", "check points", "check points together", "image coordinates"]
+    names += ["components of control", "components of stations", "observations of the kind distance"]
+    names += ["components of observations of the kind distance"]
+    patterned = re.findall(r'(?:name=|_regressed\(\s*)f?"([^"]+)"', source(patterns))
+    assert len(patterned) == 5
+    names += [re.sub(r"\{.*?\}", "X", each) for each in patterned]
+    for name in names:
+        assert ENGLISH.recognised("test", name.partition(": ")[0]) is not None, name
+    tests = [each.name for each in result.verdict.tests]
+    assert len(tests) > 8
+    for name in tests:
+        said = f"{name[:1].upper()}{name[1:]}"
+        assert words.test(ENGLISH, name) == said
+        assert words.test(GERMAN, name) != said, name
+
+
+@pytest.mark.parametrize(
+    ("said", "german"),
+    [
+        ("image of point 7 on photo 3", "Bildpunkt 7 in Bild 3"),
+        ("control point G1", "Passpunkt G1"),
+        ("X, Y of control point G1", "X, Y von Passpunkt G1"),
+        ("length of distance A - B", "Länge von Strecke A - B"),
+        ("position of photo 3, which is held", "Position von Bild 3, festgehalten"),
+        ("all of photo 3", "alles von Bild 3"),
+        ("equal height A - B - C", "gleiche Höhe A - B - C"),
+        ("unknown flight", "Unbekannte flight"),
+        ("corner of house", "corner of house"),
+        ("C04", "C04"),
+    ],
+)
+def test_names_of_observations_are_turned_and_those_of_users_are_not(said, german):
+    assert words.named(GERMAN, said) == german
+    assert words.named(ENGLISH, said) == said
+
+
+def test_names_of_points_are_the_users():
+    assert words.test(GERMAN, "check points: plane 3 of house") == "Kontrollpunkte: plane 3 of house"
+    assert words.test(GERMAN, "pattern by photo: line 4") == "Muster nach Bildern: line 4"
+    assert words.quantity(GERMAN, "point roof height z") == "Punkt roof height z"
+
+
+def test_quantities_and_parameters_are_named_in_the_language(result):
+    linear = "linear function of point C01, point C02"
+    for name, german in (
+        ("point C08 height", "Punkt C08 Höhe"),
+        ("distance C01 C30", "Strecke C01 C30"),
+        ("unknown flight z", "Unbekannte flight z"),
+        (linear, "lineare Funktion von Punkt C01, Punkt C02"),
+    ):
+        assert words.quantity(ENGLISH, name) == name
+        assert words.quantity(GERMAN, name) == german
+    assert words.parameter(GERMAN, "rig 1 rotation x") == "rig 1 Drehung x"
+    assert words.observation(GERMAN, ("image", "3", "7", "row")) == "Bildpunkt 3 7 Zeile"
+    gradient = {("point", "C01"): [0, 0, 1], ("point", "C02"): [0, 0, -1]}
+    found = result.statement(language="de", budgets=(gradient,), standards=("plain",))
+    assert any(each["text"].startswith("lineare Funktion von Punkt C01") for each in found.sentences)
+
+
+@pytest.mark.parametrize(
+    ("datum", "german"),
+    [
+        (datums.ResultDatum("observations"), "durch die Beobachtungen gegeben"),
+        (datums.ResultDatum("minimal control"), "durch gerade so viele Passpunkte gegeben, wie nötig sind"),
+        (
+            datums.ResultDatum("minimum constraints", (("1", "X"), ("1", "height"), ("2", "X"))),
+            "minimale Bedingungen: festgehalten sind X von 1, 2; Höhe von 1",
+        ),
+        (
+            datums.ResultDatum("inner constraints", points=("1", "2"), photos=("a",), scale=True),
+            "innere Bedingungen über 2 Punkte und 1 Bild, mit dem Maßstab",
+        ),
+        (
+            datums.ResultDatum("inner constraints", attitudes=tuple(map(str, range(9)))),
+            "innere Bedingungen über 9 Drehungen",
+        ),
+        (
+            datums.ResultDatum("relative", photos=tuple(map(str, range(14)))),
+            "relativ zu 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 und noch 2",
+        ),
+    ],
+)
+def test_the_datum_is_told_in_the_language(datum, german):
+    assert words.datum(ENGLISH, datum) == str(datum)
+    assert words.datum(GERMAN, datum) == german
+
+
+def test_frame_and_refraction_are_told_in_the_language():
+    frame = Frame("topocentric", "EPSG:4979", (48.5, 9.25, 500.0))
+    assert words.frame(ENGLISH, frame) == str(frame)
+    assert words.frame(GERMAN, frame) == "topozentrisch in Breite 48,5, Länge 9,25, Höhe 500 (EPSG:4979)"
+    for own in (
+        Refraction("standard", "snell", 3.25),
+        Refraction("giant"),
+        Refraction(None, "giant"),
+        Refraction(),
+    ):
+        assert words.refraction(ENGLISH, own, "m") == own.describe("m")
+    said = words.refraction(GERMAN, Refraction("standard", "snell", 3.25), "m")
+    assert said == (
+        "Luft: Normalatmosphäre; Wasser unter 3,250 m: Brechungsgesetz von Snellius, Brechzahl 1,34"
+    )
+    assert words.refraction(GERMAN, None, "m") == "keine"
+
+
+def test_refraction_and_what_is_held_are_assumptions(result):
+    block = result.block.replace(refraction=Refraction("standard"))
+    sd = np.where(np.array(block.point_ids)[:, np.newaxis] == "G01", 0.0, block.point_sd)
+    found = photogram.adjust(block.replace(point_sd=sd), unit_variance="unity")
+    said = {
+        language: {
+            each["key"]: each["text"] for each in found.statement(language=language, budgets=()).assumptions
+        }
+        for language in LANGUAGES
+    }
+    assert said["en"]["assume.refraction"] == "Refraction: air: standard atmosphere."
+    assert said["de"]["assume.refraction"] == "Refraktion: Luft: Normalatmosphäre."
+    assert said["en"]["assume.held"] == "Taken as errorless: point G01."
+    assert said["de"]["assume.held"] == "Als fehlerfrei angenommen: Punkt G01."
+
+
+def test_features_are_told_in_the_language(result):
+    names = [f"C{k:02}" for k in range(1, 13)]
+    wanted = {kind: (kind, names[:2] if kind == "distance" else names) for kind in FORMS}
+    measured = []
+    for name, definition in wanted.items():
+        measured += photogram.features(result, {name: definition})
+    assert len(measured) == len(FORMS)
+    for each in measured:
+        assert words.feature(ENGLISH, each) == through(each)
+        assert not lacking("measured", [own.name for own in each.quantities])
+    said = words.feature(GERMAN, measured[2])
+    assert said == "Ebene durch 12 Punkte: C01, C02, C03, C04 und noch 8"
+
+
+def test_a_point_that_says_nothing_has_its_reason_in_the_language(result):
+    block = result.block
+    images = block.image_points != block.point_ids.index("C05")
+    names = ("image_photos", "image_points", "image_xy", "image_sd")
+    fewer = block.replace(**{name: getattr(block, name)[images] for name in names})
+    found = photogram.adjust(fewer, unit_variance="unity").statement(language="de", budgets=())
+    assert "Kontrollpunkt C05 sagt nichts aus: keine Bildpunkte." in found.judged.remarks
+
+
+def test_a_verdict_is_told_by_its_code_and_in_english_as_it_stands(result, monkeypatch):
+    own = replace(result.verdict, code="check-points", headline="Check points disagree: C04", exit=4)
+    monkeypatch.setitem(vars(result), "verdict", own)
+    found = {
+        each: result.statement(language=each, budgets=(), removed=("control point G01",))
+        for each in LANGUAGES
+    }
+    assert found["en"].headline == "The adjustment cannot be used as it is: Check points disagree: C04"
+    assert found["de"].headline == (
+        "Die Ausgleichung ist so nicht verwendbar: Die Kontrollpunkte widersprechen der Ausgleichung"
+    )
+    assert "Passpunkt G01" in found["de"].to_html().decode()
+
+
+def assumed_of_files():
+    """Yield what readers of files say that lacks, with numbers in the place of what is put in."""
+    for path in sorted((PACKAGE / "formats").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for value in values_of(node):
+                yield from sentences(value)
+
+
+def values_of(node):
+    """Return what a node adds to a list of what lacks."""
+    names = ("lacks", "lacking")
+    if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "append":
+        place = node.func.value
+        return node.args if getattr(place, "id", getattr(place, "attr", "")) in names else []
+    if isinstance(node, ast.keyword) and node.arg == "lacks":
+        return [node.value]
+    if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") in names:
+        return [node.value]
+    return []
+
+
+def sentences(node):
+    if isinstance(node, ast.JoinedStr):
+        yield "".join(filled(each) for each in node.values)
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
+        yield node.value
+    elif isinstance(node, ast.List | ast.Tuple | ast.IfExp):
+        for each in ast.iter_child_nodes(node):
+            yield from sentences(each)
+
+
+def filled(part):
+    if isinstance(part, ast.Constant):
+        return part.value
+    if isinstance(part.value, ast.Call) and getattr(part.value.func, "id", "") == "counted":
+        return f"7 {part.value.args[1].value}s"
+    return "7"
+
+
+def test_what_is_assumed_of_files_is_told_in_the_language():
+    said = list(assumed_of_files())
+    assert len(said) > 10
+    for each in said:
+        assert ENGLISH.recognised("read", each) is not None, each
+        assert words.read(ENGLISH, each) == each
+    assumed = "no standard deviations of image coordinates: 0.5 px is assumed (--sd images=...)"
+    assert words.read(GERMAN, assumed) == (
+        "Standardabweichungen der Bildkoordinaten fehlen: Angenommen ist 0,5 px (--sd images=...)"
+    )
+
+
+STANDARDS = "ASPRS Positional Accuracy Standards, Edition 2"
+USERS = ("a site from 100 m", "Gravel and Sand Ltd", "Survey Office", "A. Surveyor")
+"""Of the packaged survey: not to be said in another language."""
+
+
+def visible(page):
+    """Return the text of a page, with that of its pictures."""
+    bare = re.sub(r"<(script|style)[^>]*>.*?</\1>", " ", page, flags=re.DOTALL)
+    labels = " ".join(re.findall(r'aria-label="([^"]*)"', bare))
+    return html.unescape(re.sub(r"<[^>]+>", " ", bare)) + " " + labels
+
+
+def letters(text):
+    return set(re.findall(r"[a-zäöüß]{2,}", text.lower()))
+
+
+def test_no_english_word_is_left_on_a_german_page():
+    project = formats.read(PACKAGE / "examples" / "survey")
+    adjusted_survey = photogram.adjust(project.block, unit_variance="unity")
+    asked = {**project.statement, "language": "de"}
+    page = visible(adjusted_survey.statement(**asked, strict=True).to_html().decode())
+    for own in (*USERS, STANDARDS):
+        page = page.replace(own, " ")
+    known = letters(" ".join(table_of("de").values()))
+    english = letters(" ".join(table_of("en").values()))
+    english |= letters(verdicts() + source(datums) + source(patterns))
+    # What the survey calls its camera, its lever arm and its files is its own.
+    own = {"drone", "flight", "photogram", "program"}
+    assert not (letters(page) & english) - known - own
+    assert "0.05" not in page
