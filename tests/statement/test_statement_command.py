@@ -159,3 +159,27 @@ def test_longitudes_and_latitudes_are_stated_as_a_local_frame_is(run, tmp_path, 
         assert first["point"] == second["point"]
         assert first["T"] == pytest.approx(second["T"], rel=1e-3)
         assert first["rank"] == second["rank"]
+
+
+def test_info_says_in_a_line_what_would_be_stated(run, site):
+    assert "Accuracy statement" not in run("info", site).output
+    text = (site / "project.toml").read_text()
+    (site / "project.toml").write_text(text + '\n[statement]\nclass_h = "5cm"\nclass_3d = "12cm"\n')
+    done = run("info", site, "--json", "info.json")
+    said = (
+        "asprs-2023, plain; classes: horizontal 5 cm, 3D 12 cm; 30 check points;"
+        " budgets: three that are chosen"
+    )
+    assert json.loads(Path("info.json").read_text())["Accuracy statement"] == [said]
+    assert "Accuracy statement" in done.output
+    (site / "lengths.csv").write_text("line,from,to,length,sd\na,C01,C30,230.0,0.001\n")
+    asked = '\n[statement]\nstandards = ["vdi-2634"]\nbudgets = ["point C08 z", "distance C01 C30"]\n'
+    (site / "project.toml").write_text(text + asked)
+    said = (
+        "vdi-2634; classes: none; 30 check points; 1 calibrated length;"
+        " budgets: point C08 z, distance C01 C30"
+    )
+    run("info", site, "--json", "info.json")
+    assert json.loads(Path("info.json").read_text())["Accuracy statement"] == [said]
+    (site / "project.toml").write_text(text + '\n[check]\nindependent = "yes"\n')
+    assert "classes: none; 30 check points" in " ".join(run("info", site).output.split())
