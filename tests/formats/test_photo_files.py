@@ -118,9 +118,31 @@ def test_heights_of_two_kinds_are_refused_by_photos_of_both(tmp_path):
         ):
             located(list(found.photos.values()), crs)
     assert located(list(found.photos.values()), "EPSG:4979").systems == ("EPSG:4979",) * 2
-    picture(tmp_path / "a.jpg", gps=tags(*PLACE, tag_5=b"\2", tag_31=3.0))
-    with pytest.raises(InputError, match="altitude reference 2 or 3"):
-        located(list(read_metadata(tmp_path).photos.values()), "EPSG:4979")
+
+
+def test_altitude_references_2_and_3_are_sea_level(tmp_path):
+    """EXIF 3.0; 0 and 1 were sea level before, and are the ellipsoid since: they are what a user says."""
+    for name, reference, sign in (("a.jpg", b"\2", 1.0), ("b.jpg", b"\3", -1.0)):
+        picture(tmp_path / name, gps=tags(*PLACE, tag_5=reference, tag_31=3.0))
+        assert read_metadata(tmp_path).photos[name].position.position[2] == sign * PLACE[2]
+    records = list(read_metadata(tmp_path).photos.values())
+    geoid = "EPSG:4326+geoid=47"
+    assert located(records, geoid).systems == (geoid,) * 2
+    with pytest.raises(
+        InputError, match=r"above sea level .* nothing says where that is: --photos-crs EPSG:4326\+"
+    ):
+        located(records)
+    for crs in ("EPSG:4979", "EPSG:4326"):
+        with pytest.raises(InputError, match=f"above sea level .* heights of {crs} are above the ellipsoid"):
+            located(records, crs)
+    picture(tmp_path / "b.jpg", gps=tags(*PLACE, tag_31=3.0))
+    records = list(read_metadata(tmp_path).photos.values())
+    assert located(records, geoid).systems == (geoid,) * 2
+    for crs in (None, "EPSG:4979"):
+        with pytest.raises(
+            InputError, match=r"those of a\.jpg \(EXIF\) are above the geoid, those of b\.jpg"
+        ):
+            located(records, crs)
 
 
 def all_sources(folder):

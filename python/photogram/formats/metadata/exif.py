@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from photogram.formats.metadata.said import (
-    OTHER_REFERENCE,
+    SEA_LEVEL,
     UNSAID,
     UNSAID_SYSTEM,
     Said,
@@ -47,8 +47,9 @@ def said_by_tags(tags: Mapping[int, Any], place: Place) -> Said | None:
     Notes
     -----
     Section 6 of the specification. `GPSHPositioningError` is horizontal and radial: east and north have its
-    value over the root of 2, heights twice that. What heights are above is not certain from
-    `GPSAltitudeRef`: who reads them says it.
+    value over the root of 2, heights twice that. `GPSAltitudeRef` 0 and 1 were sea level up to EXIF 2.32, and
+    are the ellipsoid from EXIF 3.0 on, which has 2 and 3 for sea level: what heights of 0 and 1 are above is
+    not certain, and who reads them says it.
     """
     error = _number(tags, ERROR, place)
     each = error / math.sqrt(2)
@@ -57,7 +58,7 @@ def said_by_tags(tags: Mapping[int, Any], place: Place) -> Said | None:
     if position is None and sd is None:
         return None
     remark = RADIAL if sd is not None else DOP_ALONE if not math.isnan(_number(tags, DOP, place)) else ""
-    heights = UNSAID if _reference(tags, place) < 2 else OTHER_REFERENCE
+    heights = UNSAID if _reference(tags, place) < 2 else SEA_LEVEL
     return Said("EXIF", place, UNSAID_SYSTEM, heights, position, sd, remark=remark)
 
 

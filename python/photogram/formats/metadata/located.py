@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.metadata.merged import PhotoRecord
-from photogram.formats.metadata.said import ELLIPSOIDAL, OTHER_REFERENCE, Said
+from photogram.formats.metadata.said import ELLIPSOIDAL, SEA_LEVEL, Said
 from photogram.formats.project import Frame
 from photogram.messages import listed
 from photogram.network.geometry import Spheroid
@@ -159,15 +159,24 @@ def _check_heights(records: Sequence[PhotoRecord], said: Sequence[Said], systems
             f"heights of two kinds: those of {listed(first, 3)} are {one}, those of {listed(second, 3)} are"
             f" {other}; give one kind (a table geo.txt, or a folder for each)"
         )
+    for own, system in zip(said, systems, strict=True):
+        if own.heights == SEA_LEVEL and not _is_above_geoid(system):
+            but = f"heights of {system} are above the ellipsoid" if system else "nothing says where that is"
+            raise own.place.error(
+                f"its height is above sea level (altitude reference 2 or 3), but {but}: {_OPTION}"
+            )
     if "" in systems:
         raise said[0].place.error(f"its height is {_UNKNOWN}, and nothing says which: {_SAY}")
 
 
 def _kind(said: Said, system: str) -> str:
     """Return what heights are above."""
+    if said.heights == SEA_LEVEL:
+        return ABOVE[True]
+    return ABOVE[_is_above_geoid(system)] if system else _UNKNOWN
+
+
+def _is_above_geoid(system: str) -> bool:
     from photogram.formats.crs import has_geoid_heights
 
-    kind = ABOVE[has_geoid_heights(system)] if system not in ("", ELLIPSOIDAL) else ABOVE[False]
-    if said.heights == OTHER_REFERENCE:
-        return f"{kind if system else _UNKNOWN} of altitude reference 2 or 3"
-    return kind if system else _UNKNOWN
+    return system not in ("", ELLIPSOIDAL) and has_geoid_heights(system)

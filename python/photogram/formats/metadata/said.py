@@ -11,7 +11,7 @@ from photogram.io.places import Place
 __all__ = [
     "ELLIPSOIDAL",
     "FIXED",
-    "OTHER_REFERENCE",
+    "SEA_LEVEL",
     "UNSAID",
     "UNSAID_SYSTEM",
     "Said",
@@ -28,8 +28,9 @@ ELLIPSOIDAL = "EPSG:4979"
 UNSAID_SYSTEM = "EPSG:4326"
 """Longitude and latitude of WGS 84, where nothing says what heights are above."""
 
-UNSAID, OTHER_REFERENCE = "unsaid", "unsaid, altitude reference 2 or 3"
-"""Heights of which the source does not say for certain what they are above: two kinds of them."""
+UNSAID, SEA_LEVEL = "unsaid", "above sea level"
+"""Heights of which the source does not say what they are above; and those of which it does, but not where the
+geoid is."""
 
 FIXED = "fixed"
 HIGHEST = 1e5
@@ -51,7 +52,7 @@ class Said:
     crs
         The system of the position; empty where the source does not say it.
     heights
-        Empty: those of the system; else :data:`UNSAID` or :data:`OTHER_REFERENCE`.
+        Empty: those of the system; else :data:`UNSAID` or :data:`SEA_LEVEL`.
     position
         Longitude (degrees) or easting, latitude or northing, height; the height is NaN without one. None: the
         source has no position.
