@@ -15,7 +15,7 @@ from photogram.formats.metadata.geo_txt import read_geo_txt
 from photogram.formats.metadata.mrk import number_of, read_exposures
 from photogram.formats.metadata.pictures import said_by_picture
 from photogram.formats.metadata.reference import is_reference, read_reference
-from photogram.formats.metadata.said import ELLIPSOIDAL, OTHER_REFERENCE, UNSAID, fix_of
+from photogram.formats.metadata.said import ELLIPSOIDAL, SEA_LEVEL, UNSAID, fix_of
 from photogram.formats.metadata.xmp import LARGEST, said_by_packet
 from photogram.io.places import Place
 from shared_data import SHARED
@@ -149,11 +149,11 @@ def test_accuracies_of_pix4d_stand_beside_any_position(tmp_path):
     assert (said.sd, said.position, said.rtk) == ((0.03, 0.03, 0.05), None, False)
 
 
-def test_heights_of_exif_have_a_sign_and_are_of_a_kind_that_it_does_not_say():
+def test_heights_of_exif_have_a_sign_and_are_of_a_kind_that_it_says_for_sea_level_only():
     assert said_by_tags(tags(8.5, 47.3, -12.5), Place()).position[2] == -12.5
     assert said_by_tags(tags(8.5, 47.3, 12.5), Place()).heights == UNSAID
     below = said_by_tags(tags(-8.5, -47.3, 12.5, tag_5=b"\3"), Place())
-    assert below.heights == OTHER_REFERENCE
+    assert below.heights == SEA_LEVEL
     np.testing.assert_allclose(below.position, (-8.5, -47.3, -12.5), rtol=0, atol=1e-9)
 
 
