@@ -66,6 +66,9 @@ def test_every_kind_of_observation_has_a_word(result):
     singles = {sources.kind_of(each) for each in kinds} | {"image", "control", "camera", "attitude"}
     assert not lacking("one", singles)
     assert words.kind(GERMAN, "prior, lever arm") == "Vorwerte, Hebelarm"
+    assert words.kind(GERMAN, "images, 2, x") == "Bildpunkte, 2, x"
+    assert words.kind(ENGLISH, "smoothness, 4 position coefficients") == "smoothness, 4 position coefficients"
+    assert words.kind(GERMAN, "smoothness, 4 position coefficients") == "Glattheit, 4 Positionskoeffizienten"
 
 
 def test_every_component_has_a_word_or_is_a_letter():
@@ -74,7 +77,7 @@ def test_every_component_has_a_word_or_is_a_letter():
     names |= {
         name for crs in ("ENU:48,9", "EPSG:4978", "EPSG:25832", "EPSG:4979") for name in axes_of(crs)[0]
     }
-    assert not lacking("axis", names - set(words.LETTERS) - {"", "length"} | {"column", "row"})
+    assert not lacking("axis", (names | {"column", "row"}) - set(words.LETTERS))
 
 
 def test_every_verdict_datum_frame_and_reason_has_a_sentence(result):

@@ -47,8 +47,13 @@ LINEAR = "linear function of "
 
 
 def kind(texts: Texts, name: str) -> str:
-    """Return what a kind of observations is called, in the plural: `images`, `prior, lever arm`."""
-    return ", ".join(texts.word("kind", each) for each in name.split(", "))
+    """Return what a kind is called, in the plural: `images`, `prior, lever arm`, `.., 4 coefficients`."""
+    found = []
+    for each in name.split(", "):
+        count, blank, rest = each.partition(" ")
+        counted = f"{count} {texts.word('kind', rest)}" if blank and count.isdigit() else ""
+        found.append(counted or texts.word("kind", each))
+    return ", ".join(found)
 
 
 def axis(texts: Texts, name: str) -> str:
