@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 from photogram.errors import InputError
 from photogram.results.statement import asprs, iso_19157
 from photogram.results.statement.asprs import accuracy, three_d, verdict
-from photogram.results.statement.lengths import Limit, at_reference, length_test, measured_lengths
+from photogram.results.statement.lengths import (
+    Limit,
+    angle_to_diagonal,
+    at_reference,
+    length_test,
+    measured_lengths,
+)
 from photogram.results.statement.nssda import nssda
 from photogram.statistics.freedom import effective_freedom
 
@@ -313,3 +319,36 @@ BAR = {"covariance": np.eye(2), "sd": [0.1, 0.1], "lines": ["a", "b"]}
 def test_what_is_no_figure_is_refused(call, said):
     with pytest.raises(InputError, match=said):
         call()
+
+
+def test_a_line_runs_along_one_of_the_four_diagonals_of_the_volume():
+    extent = (300.0, 200.0, 100.0)
+    for signs in ((1, 1, 1), (-1, 1, 1), (1, -1, 1), (1, 1, -1)):
+        assert angle_to_diagonal([np.multiply(extent, signs) / 5], extent) == pytest.approx(0.0, abs=1e-7)
+    edges = 250 * np.eye(3)
+    assert angle_to_diagonal(edges, extent) == pytest.approx(math.acos(3 / math.sqrt(14)))
+    assert angle_to_diagonal([*edges, extent], extent) == pytest.approx(0.0, abs=1e-7)
+    for steps, box in ((np.zeros((0, 3)), extent), ([(0.0, 0.0, 0.0)], extent), (edges, (0.0, 0.0, 0.0))):
+        with pytest.raises(InputError, match="steps"):
+            angle_to_diagonal(steps, box)
+
+
+def test_volumes_whose_diagonals_have_no_line_get_a_remark(result):
+    places = dict(zip(result.block.point_ids, result.point_positions, strict=True))
+
+    def stated(first, last, language="en"):
+        length = float(np.linalg.norm(places[first] - places[last]))
+        own = {"line": "a", "from": first, "to": last, "length": length, "sd": 0.001}
+        asked = {"standards": ("vdi-2634",), "lengths": [own], "budgets": (), "language": language}
+        return result.statement(**asked)
+
+    along, across = stated("G01", "G08"), stated("G04", "G05")
+    assert math.degrees(along.standards.lengths.test.off_diagonal) < 15.0
+    said = "No line runs along a diagonal of the measured volume: the nearest is"
+    assert not any(each.startswith(said) for each in along.judged.remarks)
+    assert any(each.startswith(said) for each in across.judged.remarks)
+    assert any("entlang einer Raumdiagonale" in each for each in stated("G04", "G05", "de").judged.remarks)
+    document = json.loads(across.to_json())["lengths"]
+    assert document["angle_to_diagonal"] > math.radians(15.0)
+    assert document["arrangement"] is False
+    assert across.exit == 0

@@ -81,7 +81,7 @@ def test_lengths_alone_take_the_green_mark_away(result):
     points = replace(found.of_all.points, p=np.ones(30), p_others=np.ones(30))
     agreed = replace(found.of_all, points=points)
     given = (found.result, found.asked, found.texts, found.compared, agreed, None, found.left_out, ())
-    enough = replace(found.standards.lengths.test, lines=7, least=5, longest=1.0)
+    enough = replace(found.standards.lengths.test, lines=7, least=5, longest=1.0, off_diagonal=0.0)
     for test, tone in ((enough, "look"), (replace(enough, together=None), "good")):
         lengths = replace(found.standards.lengths, test=test)
         assert judged(*given, replace(found.standards, lengths=lengths), None).tone == tone

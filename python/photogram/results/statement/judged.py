@@ -394,6 +394,8 @@ def _lengths_remarks(texts: Texts, found: Lengths) -> list[str]:
         said.append(texts("lengths.diagonal"))
     elif not test.long_enough:
         said.append(texts("lengths.short", share=texts.percent(test.longest)))
+    if not test.along_diagonal:
+        said.append(texts("lengths.direction", angle=texts.number(math.degrees(test.off_diagonal), 0)))
     if found.expansion is None:
         said.append(texts("lengths.warm"))
     return said

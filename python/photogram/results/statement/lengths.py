@@ -2,7 +2,7 @@
 
 Section 2.5 of the specification of the statement: in at least seven lines with at least five lengths each,
 every error stays within E = A + K L, no more than B, of which the user decides; the longest length is two
-thirds of the diagonal of the volume at least.
+thirds of the diagonal of the volume at least, and a line runs along a diagonal.
 """
 
 from __future__ import annotations
@@ -20,10 +20,19 @@ from photogram.errors import InputError
 from photogram.statistics.agreement import agreement
 from photogram.statistics.limits import GlobalTest
 
-__all__ = ["LengthTest", "Limit", "at_reference", "length_test", "measured_lengths"]
+__all__ = [
+    "LengthTest",
+    "Limit",
+    "angle_to_diagonal",
+    "at_reference",
+    "length_test",
+    "measured_lengths",
+]
 
 LINES, LENGTHS, LONGEST = 7, 5, 2 / 3
 """Asked for: lines, lengths on each, and the longest of all over the diagonal of the volume."""
+ALONG = math.radians(15.0)
+"""Between a line and a diagonal of the volume along which it runs, at the most."""
 REFERENCE = 20.0
 """Degrees Celsius: the temperature of which calibrated lengths are."""
 
@@ -67,6 +76,8 @@ class LengthTest:
         Lines, and lengths on the line that has the fewest.
     longest
         The longest calibrated length over the diagonal of the volume; NaN where that is not known.
+    off_diagonal
+        Smallest angle between a length and a diagonal of the volume, radians; NaN where that is not known.
     """
 
     errors: Floats
@@ -77,6 +88,7 @@ class LengthTest:
     lines: int
     least: int
     longest: float
+    off_diagonal: float
 
     @property
     def largest(self) -> float:
@@ -107,6 +119,11 @@ class LengthTest:
     def long_enough(self) -> bool:
         """Whether the longest length is two thirds of the diagonal at least, as far as that is known."""
         return not self.longest < LONGEST * (1 - 1e-9)
+
+    @property
+    def along_diagonal(self) -> bool:
+        """Whether a line runs along a diagonal of the volume, as far as that is known."""
+        return not self.off_diagonal > ALONG
 
 
 def measured_lengths(positions: ArrayLike, covariance: ArrayLike, pairs: ArrayLike) -> tuple[Floats, Floats]:
@@ -154,6 +171,32 @@ def measured_lengths(positions: ArrayLike, covariance: ArrayLike, pairs: ArrayLi
     return found, np.asarray(flat @ joint @ flat.T)
 
 
+def angle_to_diagonal(steps: ArrayLike, extent: ArrayLike) -> float:
+    """Return the smallest angle between lengths and the four diagonals of a box, radians.
+
+    Parameters
+    ----------
+    steps
+        (m, 3) from the one end of each length to the other, m at least 1; none is zero.
+    extent
+        (3,) of the box along the same axes.
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes, a step or a box without a length.
+    """
+    own, box = numbers("steps", steps), shaped("extent", extent, (3,))
+    if own.ndim != 2 or own.shape[1] != 3 or not len(own):
+        raise InputError(f"steps has the shape {own.shape}, not (m, 3) with one step at least")
+    sizes = np.linalg.norm(own, axis=1) * float(np.linalg.norm(box))
+    if not (sizes > 0).all():
+        raise InputError("steps and extent have lengths that are not zero")
+    # Of the four diagonals the one whose components have the signs of the step is the nearest.
+    nearest = float((np.abs(own) @ np.abs(box) / sizes).max())
+    return math.acos(min(nearest, 1.0))
+
+
 def at_reference(lengths: ArrayLike, temperatures: ArrayLike, expansion: float) -> Floats:
     """Return what lengths of a body that was measured at some temperature are at 20 degrees Celsius.
 
@@ -187,6 +230,7 @@ def length_test(
     lines: Sequence[object],
     limit: Limit | None = None,
     diagonal: float = math.nan,
+    off_diagonal: float = math.nan,
     freedom: float = math.inf,
 ) -> LengthTest:
     """Test measured lengths against calibrated ones.
@@ -203,8 +247,9 @@ def length_test(
         (m,) names of the lines on which they lie.
     limit
         Of the errors.
-    diagonal
-        Of the volume that was measured, in the same unit; NaN where it is not known.
+    diagonal, off_diagonal
+        Of the volume that was measured, in the same unit, and the smallest angle between a length and a
+        diagonal (:func:`angle_to_diagonal`); NaN where that is not known.
     freedom
         Degrees of freedom with which the unit weight of the covariance was estimated.
 
@@ -242,4 +287,5 @@ def length_test(
         len(set(on)),
         min(on.count(each) for each in set(on)),
         float(given.max()) / diagonal,
+        off_diagonal,
     )

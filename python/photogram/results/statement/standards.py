@@ -21,7 +21,14 @@ from photogram.results.statement.figures import Figures
 from photogram.results.statement.iso_19157 import RELATIVE, measures
 from photogram.results.statement.layout import area_in_plan
 from photogram.results.statement.leave_one_out import LeftOut
-from photogram.results.statement.lengths import LengthTest, Limit, at_reference, length_test, measured_lengths
+from photogram.results.statement.lengths import (
+    LengthTest,
+    Limit,
+    angle_to_diagonal,
+    at_reference,
+    length_test,
+    measured_lengths,
+)
 from photogram.results.statement.nssda import Nssda, nssda
 from photogram.results.statement.quantities import hint
 
@@ -120,7 +127,8 @@ class Lengths:
             "rmse": test.rms,
             "met": test.met,
             "lines": test.lines,
-            "arrangement": test.enough and test.long_enough,
+            "arrangement": test.enough and test.long_enough and test.along_diagonal,
+            "angle_to_diagonal": test.off_diagonal,
             "at_reference_temperature": self.expansion is not None,
             "T": None if together is None else together.weighted_sum_of_squares,
             "rank": None if together is None else together.degrees_of_freedom,
@@ -292,7 +300,8 @@ def _lengths(result: Result, asked: Asked) -> Lengths:
     if turned and asked.expansion is not None:
         measured = at_reference(measured, temperatures, asked.expansion)
     limit = None if asked.limit is None else Limit(*asked.limit)
-    every = plan_positions(block, result.point_positions[result.used_points])
+    extent = np.ptp(plan_positions(block, result.point_positions[result.used_points]), axis=0)
+    ends_in_plan = plan_positions(block, result.point_positions[rows])[pairs]
     lines = [str(each["line"]) for each in asked.lengths]
     calibrated = np.array([each["length"] for each in asked.lengths], dtype=float)
     test = length_test(
@@ -302,7 +311,8 @@ def _lengths(result: Result, asked: Asked) -> Lengths:
         sd=np.array([each["sd"] for each in asked.lengths], dtype=float),
         lines=lines,
         limit=limit,
-        diagonal=float(np.linalg.norm(np.ptp(every, axis=0))),
+        diagonal=float(np.linalg.norm(extent)),
+        off_diagonal=angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
         freedom=result.freedom_of_scale,
     )
     ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]
