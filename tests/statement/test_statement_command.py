@@ -183,3 +183,35 @@ def test_info_says_in_a_line_what_would_be_stated(run, site):
     assert json.loads(Path("info.json").read_text())["Accuracy statement"] == [said]
     (site / "project.toml").write_text(text + '\n[check]\nindependent = "yes"\n')
     assert "classes: none; 30 check points" in " ".join(run("info", site).output.split())
+
+
+def test_a_result_as_data_is_stated_as_the_project_asks_in_whose_folder_it_lies(run, site, monkeypatch):
+    text = (site / "project.toml").read_text()
+    asked = '\n[check]\nindependent = "yes"\n[statement]\nclass_h = "5cm"\nclient = "Town"\nlanguage = "de"\n'
+    (site / "project.toml").write_text(text + asked)
+    assert run("adjust", site, "--out", "out", "--parquet", site / "data", "--no-html").exit_code == 0
+    for path, options, client in ((site / "data", (), "Town"), (".", ("--client", "Another"), "Another")):
+        done = run("statement", path, "--out", "stated", *options)
+        assert done.exit_code == 0, done.output
+        document = json.loads(Path("stated/statement.json").read_text())
+        assert (document["language"], document["client"]) == ("de", client)
+        assert document["asprs"]["class_h_m"] == 0.05
+        assert "assume.independent.yes" in {each["key"] for each in document["assumptions"]}
+        names = {each["name"] for each in document["files"]}
+        assert "project.toml" in names
+        assert "control.csv" not in names
+        monkeypatch.chdir(site / "data" if path != "." else ".")
+
+
+def test_settings_beside_a_result_that_are_of_another_block_are_told_and_not_taken(run, site):
+    run("adjust", site, "--out", "out", "--parquet", "here/data", "--no-html")
+    run("new", "here/other", "--kind", "survey")
+    for path in Path("here/other").iterdir():
+        shutil.move(path, Path("here", path.name))
+    names = Path("here/points.csv").read_text().replace("t046", "t999")
+    Path("here/points.csv").write_text(names)
+    Path("here/images.csv").write_text(Path("here/images.csv").read_text().replace("t046", "t999"))
+    done = run("statement", "here/data", "--out", "stated")
+    assert done.exit_code == 0, done.output
+    assert "of another block" in " ".join(done.stderr.split())
+    assert json.loads(Path("stated/statement.json").read_text())["client"] is None

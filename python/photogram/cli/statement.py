@@ -21,7 +21,7 @@ from photogram.cli.projects import (
     with_additions,
     with_options,
 )
-from photogram.cli.results import result_at
+from photogram.cli.results import project_beside, result_at
 from photogram.cli.stating import stated, statement_files
 
 if TYPE_CHECKING:
@@ -161,6 +161,7 @@ def statement(
     """State how accurate a block is, by whose standard, found how, assuming what: a page to hand over.
 
     PATH is a result that `photogram adjust --parquet` has written, or a project, which is adjusted first.
+    Of a result in the folder of its project, what the project asks for is taken.
     Check points need standard deviations of their survey: in the table of control, or --sd check=0.01.
     --example is that of `photogram new --kind survey`.
     """
@@ -170,6 +171,7 @@ def statement(
         from photogram.formats.additions import deviations
 
         result, project = result_at(job, source, added, threads)
+        project = project or project_beside(job, source, result)
         declared = {} if project is None else project.statement
         assumed = () if project is None else project.lacks
         own = wanted.options(result.block.linear_unit)
