@@ -5,7 +5,7 @@ space. All functions release the GIL.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, final
+from typing import Any, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,20 @@ _DatumRow = tuple[str, list[int], list[int], bool, list[int], float | None]
 RefractionRow = tuple[str | None, str | None, float, float, float]
 """Model of the air (`giant`, `standard` or None), model of the water (`giant`, `snell` or None), water level
 (linear unit), refractive index of the water, metres in the linear unit."""
+
+class TrajectoryRow(TypedDict):
+    """A trajectory as the core takes it; coefficients are indices among the common unknowns."""
+
+    times: list[float]
+    positions: _Floats
+    velocities: _Floats | None
+    interpolation: str
+    attitudes: tuple[list[float], _Floats, str]
+    position_basis: tuple[str, int, list[float]]
+    rotation_basis: tuple[str, int, list[float]]
+    position: list[int]
+    rotation: list[int]
+    body: tuple[list[float], _Floats, str] | None
 
 __version__: str
 
@@ -579,6 +593,10 @@ def block_network(
     observation_groups: list[tuple[str, _Indices, _Indices, _Indices, _Floats, _Floats]],
     unknowns: list[tuple[str, list[float], list[float], list[float]]],
     mounts: list[tuple[int, int, int]],
+    trajectories: list[TrajectoryRow],
+    timed: list[tuple[int, int, float, int | None, int | None]],
+    image_times: list[float],
+    records: int,
     spheroid: tuple[float, float] | None,
     photo_to_ground: bool,
     refraction: RefractionRow | None,
@@ -626,12 +644,25 @@ def block_network(
         coordinates, the lever arm where it is known and the time (unknowns: lever arm, shift, drift),
         `attitude` two matrices row by row (body to object; body to photo where that is known; unknown:
         boresight), `relative` a translation and a matrix, `base` the length (two sensors, -1 for the frame),
-        `prior` none. Lengths in the unit of the object space, angles in radians, times in seconds.
+        `prior` none, `velocity` three components and
+        the lever arm where it is known (unknown: lever arm), `rate` three components and the matrix body to
+        photo where that is known (unknowns: boresight, bias), `smoothness` three components and a factor for
+        each coefficient. Lengths in the unit of the object space, angles in radians, times in seconds.
     unknowns
         Common unknowns: type (see `UNKNOWNS`), position, rotation matrix row by row, standard deviations.
     mounts
         Photos on frames: index of the photo, of the photo that stands for the frame, and of the sensor among
         the common unknowns.
+    trajectories
+        What is known of each beforehand, what its corrections are made of, and the indices of their
+        coefficients among the common unknowns.
+    timed
+        Photos on trajectories: indices of photo and trajectory, the time of the photo there in seconds, and
+        the indices of the rate and of the offset of its times among the common unknowns.
+    image_times
+        (m,) the number of each image that the rate is multiplied by; empty where all are 0.
+    records
+        How many photos, the last, are records of trajectories: they have no images, and the last camera.
     spheroid
         Semi-axes (a, b) for geographic space, None for rectangular space.
     photo_to_ground

@@ -58,6 +58,8 @@ fn block() -> Network {
         observations: vec![],
         commons: vec![],
         mounts: vec![],
+        trajectories: vec![],
+        image_times: vec![],
     }
 }
 

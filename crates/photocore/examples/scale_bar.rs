@@ -53,6 +53,8 @@ fn network() -> Network {
         observations: vec![Distance { points: [0, 1], length: BAR.0, sd: BAR.1, instrument: None }.into()],
         commons: vec![],
         mounts: vec![],
+        trajectories: vec![],
+        image_times: vec![],
     }
 }
 

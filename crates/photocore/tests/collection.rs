@@ -157,6 +157,8 @@ fn collection(photos: usize, points: usize, coarseness: f64) -> Network {
         observations: vec![],
         commons: vec![],
         mounts: vec![],
+        trajectories: vec![],
+        image_times: vec![],
     }
 }
 

@@ -8,12 +8,11 @@ use faer::{Mat, Side};
 use num_complex::Complex64 as C;
 use photocore::Threads;
 use photocore::adjustment::{self, Loss, Method, Status, Stop};
-use photocore::geometry::angle_axis::rotation_angle_axis;
 use photocore::geometry::{
     self, AttitudeNumbers, Matrix3, ObjectSpace, Perspective, Pose, PoseNumbers, RotationSense, Vector3,
-    angle_axis_rotation, rotation,
+    rotation,
 };
-use photocore::network::mounts::{OnFrame, Rolling};
+use photocore::network::mounts::OnFrame;
 use photocore::network::observations::{
     Attitude, Base, Control, Difference, Distance, EqualHeight, Fault, OnLevel, OnLine, OnPlane, OnPlumbLine,
     Position, Prior, Quantity, Relative,
@@ -107,6 +106,8 @@ fn images_alone() -> Network {
         observations: vec![],
         commons: vec![],
         mounts: vec![],
+        trajectories: vec![],
+        image_times: vec![],
     }
 }
 
@@ -201,10 +202,8 @@ const SENSOR: usize = 9;
 /// Photos on frames; that of the last has no images itself.
 const MOUNTED: [usize; 3] = [5, 6, 8];
 const FRAMES: [usize; 3] = [0, 1, 7];
-const VELOCITY: usize = 10;
-/// Photos that move while they are read: the frame of another, and one by itself. Seconds per unit of image coordinates.
-const ROLLING: [usize; 2] = [1, 3];
-const BY_XY: [f64; 2] = [0.001, -0.01];
+/// Those that a network without trajectories has.
+const KINDS: usize = 10;
 const ALL: usize = 9;
 
 /// What a common unknown is, without errors.
@@ -219,8 +218,7 @@ fn truth(common: usize) -> Pose {
         CommonKind::Line => place(10),
         CommonKind::Plane => place(3),
         CommonKind::Sensor => [0.4, 0.05, -0.1],
-        CommonKind::Velocity => [0.3, -0.4, 0.2],
-        CommonKind::Boresight => [0.0; 3],
+        _ => [0.0; 3],
     };
     let attitude = match CommonKind::ALL[common] {
         CommonKind::Boresight => rotation([1.5, 0.1, -0.4]),
@@ -231,7 +229,6 @@ fn truth(common: usize) -> Pose {
         }
         CommonKind::Plane => rotation([0.3, -0.6, 0.2]),
         CommonKind::Sensor => rotation([0.1, -0.2, 0.15]),
-        CommonKind::Velocity => angle_axis_rotation(&Vector3::new(0.2, -0.1, 0.4)),
         _ => Matrix3::identity(),
     };
     Pose { position: position.into(), attitude }
@@ -239,18 +236,7 @@ fn truth(common: usize) -> Pose {
 
 /// The pose of a photo, on a frame or not.
 fn seen(photo: usize) -> Pose {
-    seen_at(photo, 0.0)
-}
-
-/// That of an image so many seconds later.
-fn seen_at(photo: usize, time: f64) -> Pose {
-    let own = |k: usize| {
-        let (time, Pose { position: v, attitude: turn }) =
-            (if ROLLING.contains(&k) { time } else { 0.0 }, truth(VELOCITY));
-        let (centre, a) = (position(&pose(k)), attitude(&pose(k)));
-        let attitude = a * angle_axis_rotation(&(time * rotation_angle_axis(&turn)));
-        Pose { position: centre + time * a * v, attitude }
-    };
+    let own = |k: usize| Pose { position: position(&pose(k)), attitude: attitude(&pose(k)) };
     match MOUNTED.iter().position(|&mounted| mounted == photo) {
         None => own(photo),
         Some(k) => {
@@ -263,14 +249,10 @@ fn seen_at(photo: usize, time: f64) -> Pose {
     }
 }
 
-/// The image of a point without errors: its time depends on where it is.
+/// The image of a point without errors.
 fn imaged(photo: usize, point: usize) -> [f64; 2] {
-    let mut xy = [0.0; 2];
-    for _ in 0..20 {
-        let u = seen_at(photo, BY_XY[0] * xy[0] + BY_XY[1] * xy[1]).sight(&place(point).into());
-        xy = [0, 1].map(|k| PRINCIPAL_DISTANCE * u[k] / u[2]);
-    }
-    xy
+    let u = seen(photo).sight(&place(point).into());
+    [0, 1].map(|k| PRINCIPAL_DISTANCE * u[k] / u[2])
 }
 
 /// Adds a rig, common unknowns of all types, and what is observed of them.
@@ -284,16 +266,8 @@ fn with_commons(network: &mut Network) {
         let xy = [0, 1].map(|k| imaged(photo, point)[k] + IMAGE_SD * noise(1500 + 29 * point + k));
         network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
     }
-    for Image { photo, point, xy, .. } in
-        network.images.iter_mut().filter(|image| ROLLING.contains(&image.photo))
-    {
-        let u = seen(*photo).sight(&place(*point).into());
-        (0..2).for_each(|k| xy[k] += imaged(*photo, *point)[k] - PRINCIPAL_DISTANCE * u[k] / u[2]);
-    }
     let mount = |k: usize| OnFrame { photo: MOUNTED[k], frame: FRAMES[k], sensor: SENSOR }.into();
     network.mounts = [0, 1, 2].map(mount).to_vec();
-    let moving = |photo| -> Mount { Rolling { photo, velocity: VELOCITY, start: 0.0, by_xy: BY_XY }.into() };
-    network.mounts.extend(ROLLING.map(moving));
     let infinite = f64::INFINITY;
     let deviations = |kind: CommonKind| match kind {
         CommonKind::LeverArm => vec![0.02, 0.03, infinite],
@@ -307,8 +281,6 @@ fn with_commons(network: &mut Network) {
         let small = |first: usize, size: f64| [0, 1, 2].map(|k| size * noise(1600 + 10 * common + first + k));
         let turns = kind.unknowns().iter().any(|&(_, component, _)| component > 2);
         let size = if kind == CommonKind::Drift || kind == CommonKind::Instrument { 0.001 } else { 0.01 };
-        let turns = turns && kind != CommonKind::Velocity;
-        let attitude = if kind == CommonKind::Velocity { Matrix3::identity() } else { attitude };
         let attitude = if turns { attitude * rotation(small(3, 0.02)) } else { attitude };
         Common {
             kind,
@@ -317,7 +289,7 @@ fn with_commons(network: &mut Network) {
             sd: deviations(kind),
         }
     };
-    network.commons = CommonKind::ALL.iter().enumerate().map(given).collect();
+    network.commons = CommonKind::ALL[..KINDS].iter().enumerate().map(given).collect();
     network.observations.extend(of_commons());
 }
 
@@ -544,23 +516,10 @@ mod dense {
 
         /// The pose of a photo.
         pub fn photo(&self, x: &[C], i: usize) -> (V, M) {
-            self.photo_at(x, i, 0.0)
-        }
-
-        /// That of an image so many seconds later.
-        fn photo_at(&self, x: &[C], i: usize, time: f64) -> (V, M) {
             let own = |i: usize| -> (V, M) {
                 let own = &x[3 * self.network.points.len() + 6 * i..][..6];
                 let m = product(&about(2, own[5]), &product(&about(1, own[4]), &about(0, own[3])));
-                let ([x0, y0, z0], a) = ([own[0], own[1], own[2]], transposed(&m));
-                if !ROLLING.contains(&i) || self.network.mounts.is_empty() {
-                    return ([x0, y0, z0], a);
-                }
-                // Its rotation is given as none.
-                let first = self.first(VELOCITY) + 3;
-                let way = times(&a, &self.common(x, VELOCITY).1.map(|v| time * v));
-                let turn = exponential(&std::array::from_fn(|k| time * x[first + k]));
-                ([x0 + way[0], y0 + way[1], z0 + way[2]], product(&a, &turn))
+                ([own[0], own[1], own[2]], transposed(&m))
             };
             let mut mounts = self.network.mounts.iter();
             let Some(Mount::OnFrame(mount)) =
@@ -580,8 +539,7 @@ mod dense {
             let place = |i: usize| -> V { self.network.commons[i].position.map(C::from) };
             let mut all = vec![];
             for image in &self.network.images {
-                let time = BY_XY[0] * image.xy[0] + BY_XY[1] * image.xy[1];
-                let (centre, a) = self.photo_at(x, image.photo, time);
+                let (centre, a) = photo(image.photo);
                 let u = times(&transposed(&a), &minus(&point(image.point), &centre));
                 all.extend([0, 1].map(|k| image.xy[k] - PRINCIPAL_DISTANCE * u[k] / u[2]));
             }
@@ -666,6 +624,7 @@ mod dense {
                         let r = product(&transposed(&ai), &aj);
                         all.extend(logarithm(&product(&transposed(&r), &matrix(&own.pose.attitude))));
                     }
+                    other => unreachable!("{} is of trajectories", other.kind()),
                 }
             }
             all
@@ -868,7 +827,9 @@ fn every_kind_agrees_with_dense_algebra() {
     close(solution.sums_of_squares.total(), square, square, 1e-9, "sum of squares");
     close(solution.variance_of_unit_weight.unwrap(), square / freedom as f64, 1.0, 1e-9, "variance");
     let names: Vec<&str> = solution.kinds(&network).iter().map(|sums| sums.kind).collect();
-    assert_eq!(names, photocore::network::observations::KINDS);
+    // The last three are of trajectories.
+    let kinds = photocore::network::observations::KINDS;
+    assert_eq!(names, kinds[..kinds.len() - 3]);
     let counts: Vec<[usize; 2]> =
         solution.kinds(&network).iter().map(|sums| [sums.observations, sums.components]).collect();
     let counted = [

@@ -70,6 +70,8 @@ fn block(strips: usize, points: usize) -> Network {
         observations: vec![],
         commons: vec![],
         mounts: vec![],
+        trajectories: vec![],
+        image_times: vec![],
     }
 }
 

@@ -155,6 +155,8 @@ fn network() -> Network {
         observations: [[20, 21], [4, 30]].map(length).into(),
         commons: vec![],
         mounts: vec![],
+        trajectories: vec![],
+        image_times: vec![],
     }
 }
 

@@ -24,6 +24,7 @@ fn measured(measure: Measure) -> &'static str {
         Measure::Speed => "speed",
         Measure::Angle => "angle",
         Measure::Rate => "rate",
+        Measure::Time => "time",
         Measure::Ratio => "ratio",
     }
 }

@@ -18,6 +18,7 @@ mod similarity;
 mod solution;
 mod stellar;
 mod text;
+mod trajectories;
 mod work;
 
 use pyo3::prelude::*;

@@ -117,21 +117,22 @@ def _matrices(block: Block, angles: Floats) -> Floats:
 def _take_observations(block: Block, axes: Cartesian, centres: Floats, turned: Floats) -> None:
     """Put observed attitudes, A_obs B', and positions, less their lever arms, in place."""
     place = {name: row for row, name in enumerate(block.photo_ids)}
-    positions = [each for each in block.observations if isinstance(each, Position)]
+    of_photos = [each for each in block.observations if each.moment is None]
+    positions = [each for each in of_photos if isinstance(each, Position)]
     for antenna in positions:
-        centres[place[antenna.photo]] = axes.positions(antenna.observed[np.newaxis, :3])[0]
+        centres[place[antenna.photos[0]]] = axes.positions(antenna.observed[np.newaxis, :3])[0]
         if antenna.shift is not None and axes.spheroid is None:
-            centres[place[antenna.photo]] -= antenna.shift.position
-    for each in block.observations:
+            centres[place[antenna.photos[0]]] -= antenna.shift.position
+    for each in of_photos:
         if isinstance(each, Attitude):
-            row = place[each.photo]
+            row = place[each.photos[0]]
             given, known = each.boresight, each.observed[9:18].reshape(3, 3)
             boresight = given.attitude if isinstance(given, Boresight) else known
             own = each.observed[:9].reshape(3, 3) @ boresight.T
             at = axes.from_cartesian(centres[row : row + 1])
             turned[row] = axes.from_local(own[np.newaxis], at)[0]
     for antenna in positions:
-        row = place[antenna.photo]
+        row = place[antenna.photos[0]]
         if np.isfinite(turned[row]).all():
             unknown = antenna.lever_arm
             arm = unknown.position if isinstance(unknown, LeverArm) else antenna.observed[3:6]

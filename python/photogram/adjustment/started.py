@@ -174,7 +174,11 @@ def _level(sites: _Sites, level: Unknown, own: Sequence[Observation]) -> Unknown
 def _boresight(sites: _Sites, boresight: Unknown, own: Sequence[Observation]) -> Unknown:
     turns = []
     for each in own:
-        if isinstance(each, Attitude):
+        if isinstance(each, Attitude) and each.moment is not None:
+            table, time = each.moment.trajectory.table, each.moment.time
+            about = table.attitudes[np.argmin(np.abs(table.attitude_times - time))]
+            turns.append(about.T @ each.observed[:9].reshape(3, 3))
+        elif isinstance(each, Attitude):
             row = sites.photos[each.photos[0]]
             at = sites.block.photo_positions[row : row + 1]
             observed = sites.axes.from_local(each.observed[:9].reshape(1, 3, 3), at)[0]

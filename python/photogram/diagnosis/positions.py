@@ -214,7 +214,7 @@ def _later(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Tri
     """Try positions of another time: Omega is a parabola of it, whose least value three adjustments give."""
     axes = local_axes(block)
     number = {name: row for row, name in enumerate(block.photo_ids)}
-    centres = axes.positions(block.photo_positions)[[number[each.photo] for each in given]]
+    centres = axes.positions(block.photo_positions)[[number[each.photos[0]] for each in given]]
     # Initial positions are coarse; differences of observed ones are not, whatever all of them are off by.
     flown = axes.positions(np.array([each.observed[:3] for each in given]))
     times = np.array([each.time for each in given])

@@ -21,6 +21,7 @@ from photogram.network.cameras import Camera, CameraRow, camera_rows, checked_ca
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation, observation_rows
+from photogram.network.observations.smoothness import with_smoothness
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.rigs import Mount, checked_mounts
 from photogram.network.tables import (
@@ -32,6 +33,8 @@ from photogram.network.tables import (
     numbered,
     table_arguments,
 )
+from photogram.network.timed import Timed, checked_timed, own_trajectories
+from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
 from photogram.show.brief import Brief, Rows, few
 
@@ -111,6 +114,8 @@ class Block(Valued, Brief):
         One for all photos; None where there is one camera, or one for each photo.
     mounts
         Which photos are on a frame with others, and in which pose (:mod:`photogram.network.rigs`).
+    timed
+        Which photos are on trajectories: rolling shutters, line scanners (:mod:`photogram.network.timed`).
     frame
         Where on the earth the coordinates are, for maps and other systems; the adjustment does not ask.
 
@@ -147,8 +152,10 @@ class Block(Valued, Brief):
     cameras: Sequence[Camera] = ()
     photo_cameras: Indices | None = None
     mounts: Sequence[Mount] = ()
+    timed: Sequence[Timed] = ()
     frame: Frame = field(default_factory=Frame)
     point_check_sd: Floats | None = None
+    trajectories: list[Trajectory] = field(init=False, repr=False, compare=False)
 
     if TYPE_CHECKING:
         # What checkers of types are told: more can be given than what the fields then hold.
@@ -179,6 +186,7 @@ class Block(Valued, Brief):
             cameras: Sequence[Camera] = (),
             photo_cameras: ArrayLike | Sequence[str] | None = None,
             mounts: Sequence[Mount] = (),
+            timed: Sequence[Timed] = (),
             frame: Frame = ...,
             point_check_sd: ArrayLike | None = None,
         ) -> None: ...
@@ -319,6 +327,14 @@ class Block(Valued, Brief):
         for name in ("photo_position_sd", "photo_attitude_sd"):
             self._refuse(name, mounted & np.isfinite(getattr(self, name)), why, self.photo_ids)
 
+    def _check_timed(self) -> None:
+        self._set("timed", checked_timed(self.timed, self.photo_ids))
+        self._set("trajectories", own_trajectories(self))
+        on_frames = {each.photo for each in self.mounts} | {each.frame for each in self.mounts}
+        both = [each.photo for each in self.timed if each.photo in on_frames]
+        if both:
+            raise InputError(f"the photo {both[0]} is on a trajectory and on a frame: say so by its sensor")
+
     def _check_observations(self) -> None:
         if not isinstance(self.observations, Sequence):
             raise InputError(f"observations is no list: {shown(self.observations)}")
@@ -327,6 +343,8 @@ class Block(Valued, Brief):
             if not isinstance(each, Observation) or not each.KIND:
                 raise InputError(f"observations[{row}] is no observation: {shown(each)}")
         self._check_mounts()
+        self._check_timed()
+        self._set("observations", with_smoothness(self.observations, self.trajectories))
         observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
 
     def _refuse(self, name: str, bad: NDArray[np.bool_], why: str, owners: list[str] | None) -> None:
@@ -360,6 +378,8 @@ class Block(Valued, Brief):
             rows.append(("observations", ", ".join(f"{count} {name}" for name, count in kinds.items())))
         if self.mounts:
             rows.append(("on frames", few([each.photo for each in self.mounts])))
+        if self.timed:
+            rows.append(("on trajectories", few([each.photo for each in self.timed])))
         if self.refraction is not None:
             rows.append(("refraction", str(self.refraction)))
         return f"Block: {self.title}" if self.title else "Block", rows
@@ -371,9 +391,14 @@ class Block(Valued, Brief):
 
     @property
     def unknowns(self) -> list[Unknown]:
-        """What observations, and photos on frames, have in common, in the order in which it comes."""
+        """What observations, and photos on frames or trajectories, have in common, in order."""
         of_observations = (each for own in self.observations for each in own.unknowns if each is not None)
-        return different_unknowns([*(mount.sensor for mount in self.mounts), *of_observations])
+        sensors = [mount.sensor for mount in self.mounts]
+        sensors += [each.sensor for each in self.timed if each.sensor is not None]
+        of_times = [scalar for each in self.timed for scalar in each.scalars]
+        coefficients = [each for own in self.trajectories for all_ in own.coefficients for each in all_]
+        of_records = (each for own in self.observations if own.moment for each in own.moment.unknowns)
+        return different_unknowns([*sensors, *of_times, *coefficients, *of_records, *of_observations])
 
     @property
     def image_unit(self) -> str:
@@ -484,7 +509,7 @@ class Block(Valued, Brief):
         InputError
             A name that is no field, or whatever the class refuses.
         """
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
         if unknown := changes.keys() - values.keys():
             raise InputError(f"a block has no {', '.join(sorted(unknown))}")
         points = changes.get("point_ids")
@@ -524,6 +549,8 @@ def of_images_alone(block: Block, what: str) -> Block:
         raise InputError(f"{what}: the block has observations beside images, which are not taken there")
     if block.mounts:
         raise InputError(f"{what}: the block has photos on frames, which are not taken there")
+    if block.timed:
+        raise InputError(f"{what}: the block has photos on trajectories, which are not taken there")
     return block
 
 

@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from photogram import _photocore
+from photogram.arguments.types import Floats
 from photogram.memory import available_memory
 from photogram.network.block import Block
+from photogram.network.flown import flown
 from photogram.network.observations import observation_rows
 from photogram.network.rigs import mount_rows
 from photogram.network.unknowns import Unknown
@@ -58,27 +62,37 @@ def block_network(
     they stand behind its own.
     """
     unknowns = [*block.unknowns, *further]
+    own = flown(block, unknowns)
     groups = observation_rows(block.observations, block.point_ids, block.photo_ids, unknowns)
     cameras, photo_cameras = block.core_cameras()
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
+    known = np.zeros_like(own.positions)
+    if own.records:
+        # They have a camera of their own, and are known but for their trajectory.
+        cameras = [*cameras, ("perspective", [-1.0], [0.0], None)]
+        photo_cameras = np.append(photo_cameras, np.full(own.records, len(cameras) - 1))
     return _photocore.block_network(
-        block.photo_positions,
-        block.photo_attitudes,
-        block.photo_positions if positions is None else positions,
-        block.photo_attitudes if attitudes is None else attitudes,
-        block.photo_position_sd,
-        block.photo_attitude_sd,
+        _and(block.photo_positions, own.positions),
+        _and(block.photo_attitudes, known),
+        _and(block.photo_positions if positions is None else positions, own.positions),
+        _and(block.photo_attitudes if attitudes is None else attitudes, known),
+        _and(block.photo_position_sd, known),
+        _and(block.photo_attitude_sd, known),
         photo_cameras,
         cameras,
         block.point_positions,
         block.point_sd,
         block.image_photos,
         block.image_points,
-        block.image_xy,
+        own.image_xy,
         block.image_sd,
         observation_groups=[group for _, group in groups],
         unknowns=[each.row() for each in unknowns],
-        mounts=mount_rows(block.mounts, block.photo_ids, unknowns),
+        mounts=mount_rows(block.mounts, block.timed, block.photo_ids, unknowns),
+        trajectories=own.trajectories,
+        timed=own.timed,
+        image_times=own.image_times,
+        records=own.records,
         spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
         photo_to_ground=block.photo_to_ground,
         refraction=block.refraction.row(block.linear_unit) if block.refraction else None,
@@ -93,6 +107,11 @@ def block_network(
         points_given=options.points_given,
         memory=None if fits_anywhere(block) else available_memory(),
     )
+
+
+def _and(photos: Floats, records: Floats) -> Floats:
+    """Return rows of photos, then those of records."""
+    return np.vstack([photos, records]) if len(records) else photos
 
 
 def fits_anywhere(block: Block) -> bool:

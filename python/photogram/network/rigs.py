@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from photogram.arguments.arrays import names, shown
 from photogram.errors import InputError
+from photogram.network.timed import Timed
 from photogram.network.unknowns import Sensor, Unknown
 
 __all__ = ["Mount", "MountRow", "checked_mounts", "mount_rows"]
@@ -68,8 +69,12 @@ def checked_mounts(mounts: object, photos: Sequence[str]) -> tuple[Mount, ...]:
     return tuple(mounts)
 
 
-def mount_rows(mounts: Sequence[Mount], photos: Sequence[str], unknowns: Sequence[Unknown]) -> list[MountRow]:
-    """Return what the core takes."""
-    places = {name: row for row, name in enumerate(photos)} if mounts else {}
+def mount_rows(
+    mounts: Sequence[Mount], timed: Sequence[Timed], photos: Sequence[str], unknowns: Sequence[Unknown]
+) -> list[MountRow]:
+    """Return what the core takes; where a frame is on a trajectory, the photo stands for it itself."""
+    on_frames = [(each.photo, each.frame, each.sensor) for each in mounts]
+    on_frames += [(each.photo, each.photo, each.sensor) for each in timed if each.sensor is not None]
+    places = {name: row for row, name in enumerate(photos)} if on_frames else {}
     sensors = {id(each): row for row, each in enumerate(unknowns)}
-    return [(places[each.photo], places[each.frame], sensors[id(each.sensor)]) for each in mounts]
+    return [(places[photo], places[frame], sensors[id(sensor)]) for photo, frame, sensor in on_frames]

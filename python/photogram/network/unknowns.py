@@ -126,6 +126,7 @@ class Unknown:
     def units(self, linear_unit: str) -> tuple[str, ...]:
         """Return the units of its unknowns; nothing for plain numbers."""
         units = {"length": linear_unit, "speed": f"{linear_unit}/s", "angle": "rad", "ratio": ""}
+        units |= {"rate": "rad/s", "time": "s"}
         return tuple(units[measure] for _, measure in _UNKNOWNS[self.KIND])
 
     @property

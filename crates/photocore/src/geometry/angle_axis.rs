@@ -99,3 +99,35 @@ pub fn right_jacobian_inverse(r: &Vector3) -> Matrix3 {
     let skew = r.cross_matrix();
     Matrix3::identity() + 0.5 * skew + second * skew * skew
 }
+
+/// Jr, the right Jacobian: Exp(r + dr) = Exp(r) Exp(Jr dr) to first order.
+pub fn right_jacobian(r: &Vector3) -> Matrix3 {
+    angle_axis_with_jacobian(r).1.transpose()
+}
+
+/// How [`right_jacobian`] changes where r changes by r' in a second.
+pub fn right_jacobian_rate(r: &Vector3, rate: &Vector3) -> Matrix3 {
+    let square = r.norm_squared();
+    let (_, versine, rest) = ratios(square);
+    // Derivatives of (1 - cos a) / a^2 and of (a - sin a) / a^3, divided by a.
+    let (by_versine, by_rest) = if square > SMALL {
+        let angle = square.sqrt();
+        let (sine, chord) = (angle.sin(), 1.0 - angle.cos());
+        let fourth = square * square;
+        ((angle * sine - 2.0 * chord) / fourth, (angle * chord - 3.0 * (angle - sine)) / (fourth * angle))
+    } else {
+        // sum of (-1)^k 2k a^(2k-2) / (2k + n)!
+        let series = |n: usize| {
+            let factorial = |m: usize| (1..=m).map(|i| i as f64).product::<f64>();
+            (1..8).rev().fold(0.0, |sum, k| {
+                let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+                sum * square + sign * (2 * k) as f64 / factorial(2 * k + n)
+            })
+        };
+        (series(2), series(3))
+    };
+    let (along, skew, turning) = (r.dot(rate), r.cross_matrix(), rate.cross_matrix());
+    -versine * turning - by_versine * along * skew
+        + rest * (skew * turning + turning * skew)
+        + by_rest * along * skew * skew
+}

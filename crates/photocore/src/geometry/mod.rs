@@ -12,6 +12,7 @@
 //! * [`mod@pointing`]: the attitude of a camera under the sky;
 //! * [`refraction`]: how air and water displace a point, [`atmosphere`]: the air;
 //! * [`mod@nearest`]: the nearest of many points in a plane;
+//! * [`mod@trajectory`]: poses as functions of time;
 //! * [`cramer`]: three linear equations.
 //!
 //! Vectors and matrices in cartesian axes are those of `nalgebra`; three numbers whose units or meanings differ (coordinates of
@@ -50,6 +51,7 @@ pub mod refraction;
 pub mod rotation;
 pub mod sky;
 pub mod space;
+pub mod trajectory;
 
 pub use angle_axis::{angle_axis_rotation, angle_axis_with_jacobian};
 pub use attitude::{AttitudeNumbers, RotationSense};

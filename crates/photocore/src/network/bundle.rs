@@ -7,7 +7,7 @@ use super::blocks::Blocks;
 use super::camera_priors::CameraPrior;
 use super::commons::PlacedCommon;
 use super::model::{Bundle, GivenDatum};
-use super::mounts::{Mounts, When};
+use super::mounts::{AT_PHOTO, Mounts};
 use super::observations::{Fault, Observation, TiedObservation, Touches};
 use super::selection::{Selected, TOGETHER};
 use super::{Camera, Image, Network, NetworkError, Photo, Point, Screens};
@@ -28,7 +28,12 @@ impl Network {
             let Point { coordinates, sd } = self.points[selected.points[place]];
             Point { coordinates: std::array::from_fn(|k| coordinates[k] - origin[k]), sd }
         });
-        let mounts = Mounts::new(&self.mounts, self.photos.len());
+        let mounts = self.placed_mounts(origin);
+        let of_images = &selected.images.order;
+        let image_times: Vec<f64> = match self.image_times[..] {
+            [] => vec![],
+            _ => of_images.iter().map(|&image| self.image_times[image]).collect(),
+        };
         let mut bundle = Bundle {
             space: self.space,
             poses: self.poses,
@@ -39,9 +44,10 @@ impl Network {
             cameras: self.photos.iter().map(|photo| self.camera(photo).camera).collect(),
             blocks: Blocks::new(self, self.shared_cameras(&selected.surroundings)),
             camera_priors: vec![],
-            commons: self.placed_commons(selected, &mounts, &images, middle),
+            commons: self.placed_commons(selected, &mounts, (&images, &image_times), middle),
             datum: self.given_datum(selected, &mounts),
             mounts,
+            image_times,
             origin,
             locals: selected.locals,
             points,
@@ -62,22 +68,32 @@ impl Network {
         Ok(bundle)
     }
 
+    /// The mounts, with what they are made of, coordinates counted from an origin.
+    pub(super) fn placed_mounts(&self, origin: [f64; 3]) -> Mounts {
+        Mounts::new((&self.mounts, self.photos.len()), (&self.trajectories, origin), &self.commons)
+    }
+
     /// The common unknowns, with how many observations and images that take part are of each.
     fn placed_commons(
         &self,
         selected: &Selected,
         mounts: &Mounts,
-        images: &[Image],
+        (images, times): (&[Image], &[f64]),
         middle: [f64; 3],
     ) -> Vec<PlacedCommon> {
         let (origin, vertical) = (self.origin(middle), self.vertical(middle));
         let place = |common| PlacedCommon::new(common, self.space, origin, &vertical);
         let mut placed: Vec<PlacedCommon> = self.commons.iter().map(place).collect();
-        let of_image = |image: &Image| mounts.commons(image.photo, Some(When::Image(image.xy)));
-        images.iter().flat_map(of_image).for_each(|common| placed[common].uses += 1);
-        let of_observation = |&observation: &usize| self.observations[observation].touches().commons;
-        let touched = selected.observations.iter().flat_map(of_observation);
-        touched.for_each(|(common, _)| placed[common].uses += 1);
+        let time = |image: usize| times.get(image).copied().unwrap_or(AT_PHOTO);
+        let of_image = |(image, own): (usize, &Image)| mounts.commons(own.photo, Some(time(image)));
+        images.iter().enumerate().flat_map(of_image).for_each(|common| placed[common].uses += 1);
+        for Touches { photos, commons, .. } in
+            selected.observations.iter().map(|&k| self.observations[k].touches())
+        {
+            let of_poses = photos.into_iter().flat_map(|photo| mounts.commons(photo, Some(AT_PHOTO)));
+            let own = commons.into_iter().map(|(common, _)| common);
+            own.chain(of_poses).for_each(|common| placed[common].uses += 1);
+        }
         placed
     }
 
@@ -91,7 +107,7 @@ impl Network {
 
     /// Whether the datum is the user's.
     pub(super) fn is_placed(&self, selected: &Selected) -> bool {
-        self.given_datum(selected, &Mounts::new(&self.mounts, self.photos.len())).placed
+        self.given_datum(selected, &self.placed_mounts([0.0; 3])).placed
     }
 
     /// What the network itself says of the datum.
@@ -99,10 +115,12 @@ impl Network {
         // Angles alone leave position and scale open.
         let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { POSE };
         let own = |photo: &Photo| photo.sd[..positions].iter().any(|sd| sd.is_finite());
-        let carried = |index: usize| mounts.carrier(index) != index;
-        let mut photos = (0..self.photos.len()).filter(|&index| !carried(index) && own(&self.photos[index]));
+        let counts = |index: usize| !mounts.is_carried(index) && own(&self.photos[index]);
+        let mut photos = (0..self.photos.len()).filter(|&index| counts(index));
         let fixed = |index: usize| self.photos[index].sd[..positions].iter().all(|&sd| sd == 0.0);
         let (placed, anchor) = match (photos.next(), photos.next()) {
+            // What moves a trajectory as a whole is not worked out: its datum is that of the observations.
+            _ if mounts.fly() => (true, None),
             _ if selected.points.iter().any(|&point| self.points[point].held() != [false; 3]) => (true, None),
             (None, _) => (false, None),
             (first, None) if first.is_some_and(fixed) => (false, first),

@@ -2,8 +2,10 @@
 
 use std::mem::discriminant;
 
+use super::mounts::AT_PHOTO;
+use super::observations::{Fault, Observation};
 use super::surroundings::{BlockOf, Surroundings};
-use super::{Image, Mount, Network, NetworkError};
+use super::{CommonKind, Image, Mount, Network, NetworkError, Trajectory};
 use crate::geometry::{ObjectSpace, PoseNumbers};
 
 impl Network {
@@ -37,13 +39,47 @@ impl Network {
                 return Err(NetworkError::CommonDeviations(index));
             }
         }
+        self.check_trajectories()?;
         self.check_mounts()?;
+        let flies = self.flies();
         for (index, observation) in self.observations.iter().enumerate() {
-            let checked = observation.check(self.points.len(), self.photos.len(), &self.commons);
+            let checked = observation
+                .check(self.points.len(), self.photos.len(), &self.commons)
+                .and_then(|()| check_motion(observation, &flies));
             checked.map_err(|fault| NetworkError::Observation { index, kind: observation.kind(), fault })?;
         }
         let cartesian = self.space == ObjectSpace::Rectangular && self.refraction.is_none();
         if self.poses == PoseNumbers::Vectors && !cartesian { Err(NetworkError::Vectors) } else { Ok(()) }
+    }
+
+    /// Which photos are on a trajectory, and on nothing else.
+    fn flies(&self) -> Vec<bool> {
+        let mut mounts = vec![(0, false); self.photos.len()];
+        for mount in &self.mounts {
+            let (count, flies) = &mut mounts[mount.photo()];
+            *count += 1;
+            *flies = mount.trajectory().is_some();
+        }
+        mounts.into_iter().map(|(count, flies)| flies && count == 1).collect()
+    }
+
+    /// Refuses trajectories without the coefficients that they need, images without a time where others have one.
+    fn check_trajectories(&self) -> Result<(), NetworkError> {
+        let of_kind = |all: &[usize], kind: CommonKind| {
+            all.iter().all(|&common| self.commons.get(common).is_some_and(|own| own.kind == kind))
+        };
+        for (index, Trajectory { course, position, rotation }) in self.trajectories.iter().enumerate() {
+            let sound = course.position.is_sound() && course.rotation.is_sound();
+            if !sound
+                || (position.len(), rotation.len()) != (course.position.count(), course.rotation.count())
+                || !of_kind(position, CommonKind::PositionCoefficient)
+                || !of_kind(rotation, CommonKind::RotationCoefficient)
+            {
+                return Err(NetworkError::Trajectory(index));
+            }
+        }
+        let times = self.image_times.len();
+        if times == 0 || times == self.images.len() { Ok(()) } else { Err(NetworkError::ImageTimes(times)) }
     }
 
     /// Refuses mounts that contradict the network or each other.
@@ -52,22 +88,49 @@ impl Network {
         let mut carries = vec![false; self.photos.len()];
         for (index, mount) in self.mounts.iter().enumerate() {
             let (photo, frame) = (mount.photo(), mount.frame());
-            let of_type =
-                |&common: &usize| self.commons.get(common).map(|own| own.kind) == Some(mount.unknowns());
+            let of_type = |(common, kind): (usize, CommonKind)| {
+                self.commons.get(common).is_some_and(|own| own.kind == kind)
+            };
             let there = photo.max(frame.unwrap_or(photo)) < self.photos.len();
-            if !there || !mount.commons(None).iter().all(of_type) {
+            let flies = mount.trajectory().is_none_or(|own| own < self.trajectories.len());
+            if !there || !flies || !mount.unknowns().into_iter().all(of_type) {
                 return Err(NetworkError::Mount(index));
             }
-            // On a frame first, then what moves it, once each.
+            // On another photo's frame first, once each; where a trajectory is, first that, then a sensor on it.
             let before: &mut Vec<&Mount> = &mut mounted[photo];
-            if before.iter().any(|own| frame.is_some() || discriminant(*own) == discriminant(mount)) {
+            let carried = frame.is_some_and(|frame| frame != photo);
+            let again = |own: &&Mount| discriminant(*own) == discriminant(mount);
+            if before.iter().any(|own| carried || mount.replaces() || again(own)) {
                 return Err(NetworkError::Mount(index));
             }
             before.push(mount);
-            frame.into_iter().for_each(|frame| carries[frame] = true);
+            frame.filter(|_| carried).into_iter().for_each(|frame| carries[frame] = true);
         }
-        let both = self.mounts.iter().position(|mount| mount.frame().is_some() && carries[mount.photo()]);
-        both.map_or(Ok(()), |index| Err(NetworkError::Mount(index)))
+        let on_another = |mount: &Mount| mount.frame().is_some_and(|frame| frame != mount.photo());
+        let both = self.mounts.iter().position(|mount| on_another(mount) && carries[mount.photo()]);
+        both.map_or(Ok(()), |index| Err(NetworkError::Mount(index)))?;
+        self.check_flights()
+    }
+
+    /// Refuses photos and images at times that their trajectory does not reach.
+    fn check_flights(&self) -> Result<(), NetworkError> {
+        if self.trajectories.is_empty() {
+            return Ok(());
+        }
+        let known = self.placed_mounts([0.0; 3]);
+        let spans: Vec<(f64, f64)> = self.trajectories.iter().map(|own| own.course.span()).collect();
+        let reach = |photo: usize, at: f64| {
+            let flight = known.of(known.carrier(photo)).first().and_then(|mount| mount.flight(at, &known));
+            let Some((trajectory, time)) = flight else { return Ok(()) };
+            let (first, last) = spans[trajectory];
+            if first <= time && time <= last {
+                return Ok(());
+            }
+            Err(NetworkError::OutsideTrajectory { photo, trajectory, time, first, last })
+        };
+        (0..self.photos.len()).try_for_each(|photo| reach(photo, AT_PHOTO))?;
+        let images = self.images.iter().zip(&self.image_times);
+        images.into_iter().try_for_each(|(image, &at)| reach(image.photo, at))
     }
 
     /// Refuses names of blocks that are not there.
@@ -86,4 +149,11 @@ impl Network {
         let missing = all.find(|&block| !there(block));
         missing.map_or(Ok(()), |block| Err(NetworkError::NoBlock(block)))
     }
+}
+
+/// Refuses motions of what does not move.
+fn check_motion(observation: &Observation, flies: &[bool]) -> Result<(), Fault> {
+    let at_rest = |&photo: &usize| observation.moves() && !flies[photo];
+    let photo = observation.touches().photos.into_iter().find(at_rest);
+    photo.map_or(Ok(()), |photo| Err(Fault::AtRest(photo)))
 }

@@ -2,10 +2,9 @@
 
 use nalgebra::{DMatrix, Matrix6};
 
-use super::Image;
 use super::commons::CommonState;
 use super::model::Bundle;
-use super::mounts::{AT_PHOTO, Composed, Grounds, When};
+use super::mounts::{AT_PHOTO, Composed, Grounds, Moving};
 use super::stations::{Bent, Mounted, Station, Stations};
 use crate::geometry::{Orientation, POSE, Steps};
 use crate::normals::{Cofactors, GroupRows, Layout};
@@ -16,15 +15,23 @@ impl Bundle {
         self.mounts.carrier(photo)
     }
 
-    /// Whether it is another.
+    /// Whether its own six count for nothing.
     pub(super) fn is_carried(&self, photo: usize) -> bool {
-        self.carrier(photo) != photo
+        self.mounts.is_carried(photo)
     }
 
-    /// The retained blocks that a pose is made of: that of the carrier of its photo, then those of common unknowns that are not known.
-    pub(super) fn blocks_of_pose(&self, photo: usize, when: When) -> impl Iterator<Item = usize> {
-        let commons = self.mounts.commons(photo, Some(when)).into_iter();
-        std::iter::once(self.carrier(photo)).chain(commons.filter_map(|common| self.blocks.of_common[common]))
+    /// The retained blocks that a pose is made of: the main one, then those of common unknowns that are not known.
+    pub(super) fn blocks_of_pose(&self, photo: usize, at: f64) -> impl Iterator<Item = usize> {
+        let main = self.main_block_of_pose(photo);
+        let commons = self.mounts.commons(photo, Some(at)).into_iter();
+        let others =
+            commons.filter_map(|common| self.blocks.of_common[common]).filter(move |&own| own != main);
+        std::iter::once(main).chain(others)
+    }
+
+    /// The first of them, which is that of all poses of a photo.
+    pub(super) fn main_block_of_pose(&self, photo: usize) -> usize {
+        self.mounts.main_block(photo, &|common| self.blocks.of_common[common])
     }
 
     fn grounds<'a>(
@@ -74,18 +81,31 @@ impl Bundle {
     pub(super) fn observe_bent(
         &self,
         (stations, bent): (&Stations, &Bent),
-        image: &Image,
+        group: usize,
         local: usize,
         rows: &mut GroupRows<'_>,
     ) {
-        let timed =
-            bent.mounted.as_ref().filter(|_| self.mounts.are_timed(image.photo)).and_then(|mounted| {
-                let photo = |photo: usize| mounted.own[photo];
-                let common =
-                    |common: usize| (stations.commons[common].clone(), self.blocks.of_common[common]);
-                self.grounds(&photo, &common).composed(image.photo, When::Image(image.xy))
-            });
+        let image = &self.images[group];
+        let timed = bent.mounted.as_ref().and_then(|mounted| self.timed(mounted, &stations.commons, group));
         bent.write(self.space, stations, timed.as_ref(), image, local, rows);
+    }
+
+    /// The pose of an image that has one of its own.
+    pub(super) fn timed(&self, mounted: &Mounted, commons: &[CommonState], image: usize) -> Option<Composed> {
+        let own = self.images[image].photo;
+        if !self.mounts.are_timed(own) {
+            return None;
+        }
+        let photo = |photo: usize| mounted.own[photo];
+        let common = |common: usize| (commons[common].clone(), self.blocks.of_common[common]);
+        self.grounds(&photo, &common).composed(own, self.time_of(image))
+    }
+
+    /// How a photo moves; None where it is on no trajectory.
+    pub(super) fn moving(&self, mounted: &Mounted, commons: &[CommonState], photo: usize) -> Option<Moving> {
+        let own = |photo: usize| mounted.own[photo];
+        let common = |common: usize| (commons[common].clone(), self.blocks.of_common[common]);
+        self.grounds(&own, &common).moving(photo, AT_PHOTO)
     }
 
     /// The six numbers of a pose, counted from the origin, and what leads to them from its own unknowns; None where angles are singular.

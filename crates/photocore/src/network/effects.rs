@@ -138,7 +138,8 @@ impl Trial {
         let mut found = vec![];
         for j in 0..own.suspects.len() {
             for i in 0..j {
-                let out = |k: usize| !self.suspects.all[own.suspects[k]].rows.iter().any(|row| self.is_in(row.0));
+                let out =
+                    |k: usize| !self.suspects.all[own.suspects[k]].rows.iter().any(|row| self.is_in(row.0));
                 if out(i) || out(j) {
                     continue;
                 }

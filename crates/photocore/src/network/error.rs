@@ -9,7 +9,7 @@ use crate::adjustment::{CofactorError, DatumError, gib};
 use crate::normals::LayoutError;
 
 /// Why a network cannot be adjusted, or has no cofactors. Photos, cameras and points are indices into the network.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Error)]
 pub enum NetworkError {
     /// An image names a photo or point that is not there.
     #[error("image {0} names a photo or point that is not there")]
@@ -57,6 +57,30 @@ pub enum NetworkError {
         "mount {0} names a photo or sensor that is not there, or a photo that is mounted twice or has others mounted on it"
     )]
     Mount(usize),
+    /// A trajectory whose basis is none, or that has not a coefficient of the right type for each function.
+    #[error(
+        "trajectory {0} has knots that are none, or more or fewer coefficients than functions of its basis"
+    )]
+    Trajectory(usize),
+    /// Some images have a time, and others have none.
+    #[error("{0} times are given for another number of images")]
+    ImageTimes(usize),
+    /// A photo or an image at a time that a trajectory does not reach.
+    #[error(
+        "photo {photo} is at {time} s of trajectory {trajectory}, which reaches from {first} to {last} s: half a record beyond its table, within its knots"
+    )]
+    OutsideTrajectory {
+        /// The photo.
+        photo: usize,
+        /// The trajectory.
+        trajectory: usize,
+        /// The time of the photo or of one of its images.
+        time: f64,
+        /// The first time that may be asked for.
+        first: f64,
+        /// The last.
+        last: f64,
+    },
     /// A constant of a camera has a standard deviation.
     #[error(
         "{parameter} of camera {camera} is a constant and cannot be free or weighted: its standard deviation is 0"

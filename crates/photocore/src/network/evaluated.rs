@@ -19,14 +19,14 @@ pub(super) struct At<'a> {
 impl Bundle {
     /// The equations of an image.
     pub(super) fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let image = &self.images[group];
         match &stations.bent {
             None => {
+                let image = &self.images[group];
                 let Station { orientation, camera } = &stations.photos[image.photo];
                 let point = &stations.points[local];
                 each_camera!(camera, camera => write(orientation, camera, point, image, rows));
             }
-            Some(bent) => self.observe_bent((stations, bent), image, local, rows),
+            Some(bent) => self.observe_bent((stations, bent), group, local, rows),
         }
     }
 
@@ -87,7 +87,7 @@ impl Model for Bundle {
     /// Intersects the points anew.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
         let photos = self.of_stations();
-        let Ok(coordinates) = self.intersect(&self.photos(&unknowns[photos.clone()])) else { return false };
+        let Ok(coordinates) = self.intersect(&self.placed(&unknowns[photos.clone()])) else { return false };
         let (local, tied) = coordinates.split_at(self.locals);
         unknowns[..photos.start].copy_from_slice(local.as_flattened());
         unknowns[photos.end..].copy_from_slice(tied.as_flattened());

@@ -2,7 +2,7 @@
 
 use super::median::median;
 use super::model::Bundle;
-use super::stations::Station;
+use super::stations::{Placed, Station};
 use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Point, Ray, Vector3};
 use crate::parallel;
@@ -22,34 +22,43 @@ impl Bundle {
     ///
     /// # Errors
     /// The point whose rays give it no place.
-    pub fn intersect(&self, photos: &[Station]) -> Result<Vec<[f64; 3]>, usize> {
+    pub fn intersect(&self, placed: &Placed) -> Result<Vec<[f64; 3]>, usize> {
         let met: Vec<Option<Vector3>> = parallel::by_parts(self.points.len(), TOGETHER, &|points| {
             let mut rays = Vec::new();
             let meeting = |point: usize| {
                 rays.clear();
-                rays.extend(self.rays(photos, point));
+                rays.extend(self.rays(placed, point));
                 meet(&rays)
             };
             points.map(meeting).collect()
         });
         // Hardly ever is there one that needs it.
-        let distance = if met.contains(&None) { self.median_distance(photos, &met) } else { None };
+        let distance = if met.contains(&None) { self.median_distance(&placed.photos, &met) } else { None };
         let place = |point: usize| {
             let met = met[point];
-            let position = met.or_else(|| Some(along(&self.rays(photos, point).next()?, distance?)));
+            let position = met.or_else(|| Some(along(&self.rays(placed, point).next()?, distance?)));
             let start = match position {
                 Some(position) => self.space.coordinates(position),
                 None => self.points[point].coordinates,
             };
-            let placed = self.hold(photos, point, start);
-            if placed.iter().all(|value| value.is_finite()) { Ok(placed) } else { Err(point) }
+            let there = self.hold(placed, point, start);
+            if there.iter().all(|value| value.is_finite()) { Ok(there) } else { Err(point) }
         };
-        let placed: Vec<Result<[f64; 3], usize>> = parallel::map(self.points.len(), TOGETHER, place);
-        placed.into_iter().collect()
+        let all: Vec<Result<[f64; 3], usize>> = parallel::map(self.points.len(), TOGETHER, place);
+        all.into_iter().collect()
     }
 
-    fn rays(&self, photos: &[Station], point: usize) -> impl Iterator<Item = Ray> {
-        self.images_of(point).iter().filter_map(|image| photos[image.photo].ray(image.xy))
+    /// The rays of a point, each from the pose of its image.
+    fn rays(&self, placed: &Placed, point: usize) -> impl Iterator<Item = Ray> {
+        let Placed { photos, commons, mounted } = placed;
+        let ray = move |image: usize| {
+            let (own, photo) = (&self.images[image], &photos[self.images[image].photo]);
+            match mounted.as_ref().and_then(|mounted| self.timed(mounted, commons, image)) {
+                None => photo.ray(own.xy),
+                Some(composed) => Station { orientation: composed.orientation, ..*photo }.ray(own.xy),
+            }
+        };
+        (self.point_images.start[point]..self.point_images.start[point + 1]).filter_map(ray)
     }
 
     /// Median distance of the intersected points from their first photos.
@@ -62,7 +71,7 @@ impl Bundle {
 
     /// Puts the held components in place and moves the others to where the rays then pass nearest: least squares of the distances
     /// from the rays, linear in rectangular space and all but linear in geographic space.
-    fn hold(&self, photos: &[Station], point: usize, start: [f64; 3]) -> [f64; 3] {
+    fn hold(&self, placed: &Placed, point: usize, start: [f64; 3]) -> [f64; 3] {
         let (held, given) = (self.points[point].held(), self.points[point].coordinates);
         // One ray and two held components need no start for the third.
         let unknown = if held.contains(&true) { 0.0 } else { f64::NAN };
@@ -74,7 +83,7 @@ impl Bundle {
         if held == [false; 3] || held == [true; 3] {
             return coordinates;
         }
-        let rays: Vec<Ray> = self.rays(photos, point).collect();
+        let rays: Vec<Ray> = self.rays(placed, point).collect();
         for _ in 0..3 {
             let at = Point::new(self.space, coordinates);
             let column = |k: usize| Vector3::from(at.partials().column(k));

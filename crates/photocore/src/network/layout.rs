@@ -10,14 +10,12 @@ pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, Ne
     let (groups, tied) = (model.point_images.start[model.locals], model.points.len() - model.locals);
     let widths = model.blocks.first.windows(2).map(|pair| pair[1] - pair[0]);
     let widths: Vec<usize> = widths.chain(vec![3; tied]).collect();
-    let images = &model.images[..groups];
-    let photo_of = images.iter().map(|image| model.carrier(image.photo) as u32).collect();
-    let mut layout =
-        Layout::new(2, 3, &widths, model.point_images.start[..=model.locals].to_vec(), photo_of)?;
+    let main_of = (0..groups).map(|image| model.main_block(image) as u32).collect();
+    let mut layout = Layout::new(2, 3, &widths, model.point_images.start[..=model.locals].to_vec(), main_of)?;
     if !(model.blocks.shared.is_empty() && model.mounts.is_empty()) {
         let (mut shared_ptr, mut shared) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
         shared_ptr.push(0);
-        for image in images {
+        for image in 0..groups {
             shared.extend(model.blocks_of_image(image).skip(1).map(|block| block as u32));
             shared_ptr.push(shared.len());
         }

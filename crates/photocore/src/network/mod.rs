@@ -100,7 +100,7 @@ pub use group_tests::Tests;
 pub use groups::Groups;
 pub(crate) use intersection::meet;
 pub(crate) use median::median;
-pub use mounts::Mount;
+pub use mounts::{Mount, Trajectory};
 pub use node::{FormedNode, Node, NodePrediction};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use predictions::{OnPoint, Prediction};
@@ -227,8 +227,12 @@ pub struct Network {
     pub observations: Vec<Observation>,
     /// Unknowns that observations, and photos that are mounted, have in common.
     pub commons: Vec<Common>,
-    /// Which photos are on a frame with others, or move while they are taken.
+    /// Which photos are on a frame with others, or on a trajectory.
     pub mounts: Vec<Mount>,
+    /// The trajectories.
+    pub trajectories: Vec<Trajectory>,
+    /// Of each image its number on the scale of its photo's time (see [`mounts::OnTrajectory`]); nothing at all where all are zero.
+    pub image_times: Vec<f64>,
 }
 
 impl Network {
@@ -251,6 +255,8 @@ impl Default for Network {
             observations: vec![],
             commons: vec![],
             mounts: vec![],
+            trajectories: vec![],
+            image_times: vec![],
         }
     }
 }

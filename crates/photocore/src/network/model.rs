@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use super::blocks::Blocks;
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
-use super::mounts::{AT_PHOTO, Mounts, When};
+use super::mounts::{AT_PHOTO, Mounts};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::parts::Parts;
 use super::selection::PointImages;
@@ -36,8 +36,10 @@ pub struct Bundle {
     pub camera_priors: Vec<CameraPrior>,
     /// The common unknowns.
     pub commons: Vec<PlacedCommon>,
-    /// Which photos are on a frame, or move.
+    /// Which photos are on a frame, or on a trajectory.
     pub mounts: Mounts,
+    /// The number of each image on the scale of its photo's time; none at all where all are zero.
+    pub image_times: Vec<f64>,
     /// What coordinates are counted from.
     pub origin: [f64; 3],
     /// The points, local ones first; coordinates counted from the origin.
@@ -124,13 +126,12 @@ impl Bundle {
 
     /// The ties: images of points that are not local, then observations.
     pub fn ties(&self) -> Vec<Tie> {
-        let images =
-            self.images[self.point_images.start[self.locals]..].iter().enumerate().map(|(tie, image)| {
-                let point = self.point_of(self.point_images.start[self.locals] + tie);
-                let others = self.blocks_of_image(image);
-                let blocks = std::iter::once(self.block_of_point(point)).chain(others);
-                Tie { rows: 2, retained: blocks.map(|block| block as u32).collect() }
-            });
+        let images = (self.point_images.start[self.locals]..self.images.len()).map(|image| {
+            let point = self.point_of(image);
+            let others = self.blocks_of_image(image);
+            let blocks = std::iter::once(self.block_of_point(point)).chain(others);
+            Tie { rows: 2, retained: blocks.map(|block| block as u32).collect() }
+        });
         let observations = self.observations.iter().map(|tied| Tie {
             rows: tied.root.nrows(),
             retained: tied.blocks.iter().map(|&block| block as u32).collect(),
@@ -148,9 +149,22 @@ impl Bundle {
         if block < self.stations() { self.of_block(block).len() } else { 3 }
     }
 
-    /// The retained blocks of an image: those of its pose, then the camera where that is shared.
-    pub fn blocks_of_image(&self, image: &Image) -> impl Iterator<Item = usize> {
-        self.blocks_of_pose(image.photo, When::Image(image.xy)).chain(self.blocks.of_camera[image.photo])
+    /// The retained blocks of an image: those of its pose, the main one first, then the camera where that is shared.
+    pub fn blocks_of_image(&self, image: usize) -> impl Iterator<Item = usize> {
+        let photo = self.images[image].photo;
+        self.blocks_of_pose(photo, self.time_of(image)).chain(self.blocks.of_camera[photo])
+    }
+
+    /// The number of an image on the scale of its photo's time.
+    #[inline]
+    pub fn time_of(&self, image: usize) -> f64 {
+        self.image_times.get(image).copied().unwrap_or(AT_PHOTO)
+    }
+
+    /// The retained block that the equations of an image are kept with.
+    pub fn main_block(&self, image: usize) -> usize {
+        let photo = self.images[image].photo;
+        if self.mounts.is_empty() { photo } else { self.main_block_of_pose(photo) }
     }
 
     /// The retained blocks of what an observation touches, each once; points as the model numbers them.
@@ -177,7 +191,7 @@ impl Bundle {
     /// Writes the equations of an image whose point is not local.
     pub(super) fn observe_tied_image(&self, stations: &Stations, image: usize, rows: &mut TieRows<'_>) {
         let all = rows.coefficients.len() / 2;
-        let width = self.of_block(self.carrier(self.images[image].photo)).len();
+        let width = self.of_block(self.main_block(image)).len();
         let shared = all - 3 - width;
         let (mut local, mut retained, mut common) = ([0.0; 6], vec![0.0; 2 * width], vec![0.0; 2 * shared]);
         let constant = &mut *rows.constant;
@@ -202,16 +216,20 @@ impl Bundle {
         let photo = |photo: usize| match mounted.and_then(|mounted| mounted.of(photo)) {
             None => PhotoSite { orientation: &stations.photos[photo].orientation, block: photo, parts: &[] },
             Some(own) => {
-                PhotoSite { orientation: &own.orientation, block: self.carrier(photo), parts: &own.parts }
+                let block = self.main_block_of_pose(photo);
+                PhotoSite { orientation: &own.orientation, block, parts: &own.parts }
             }
         };
         let common = |common: usize| CommonSite {
             state: &stations.commons[common],
             block: self.blocks.of_common[common],
         };
+        let moving =
+            |photo: usize| self.moving(stations.bent.as_ref()?.mounted.as_ref()?, &stations.commons, photo);
         take(&TiedModel {
             space: self.space,
             origin: self.origin,
+            moving: &moving,
             point: &point,
             photo: &photo,
             common: &common,

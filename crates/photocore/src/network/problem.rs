@@ -7,7 +7,7 @@ use super::model::Bundle;
 use super::observations::{Fault, TiedObservation};
 use super::selection::{Dropped, LeftOut, Selected, TOGETHER};
 use super::state::State;
-use super::stations::Station;
+use super::stations::{Placed, Station};
 use super::surroundings::Surroundings;
 use super::{Image, Network, NetworkError, Options, Point, Start};
 use crate::adjustment::{Method, Problem};
@@ -172,10 +172,9 @@ impl Network {
             |reached| reached.stations.clone(),
         );
         let placed = model.placed(&values);
-        let stations = placed.photos;
         let start = match reached {
             Some(reached) => selected.points.iter().map(|&point| reached.points[point]).collect(),
-            None => self.start(options.start, &selected, &model, &stations)?,
+            None => self.start(options.start, &selected, &model, &placed)?,
         };
         let of_points =
             |each: fn(&Point) -> [f64; 3]| -> Vec<[f64; 3]> { model.points.iter().map(each).collect() };
@@ -193,7 +192,7 @@ impl Network {
                 &mut || sd = unknowns(&of_points(|point| point.sd), &station_sd),
             );
         });
-        let places = self.places(&model, &stations, &start[model.locals..]);
+        let places = self.places(&model, &placed.photos, &start[model.locals..]);
         let observation_sd = observation_sd(&model);
         let held: Vec<bool> = sd.iter().map(|&sd| sd == 0.0).collect();
         let (outer, below) = selected.surroundings.blocks(&model, &selected.points)?;
@@ -255,17 +254,17 @@ impl Network {
         start: Start,
         selected: &Selected,
         model: &Bundle,
-        stations: &[Station],
+        placed: &Placed,
     ) -> Result<Vec<[f64; 3]>, NetworkError> {
         let given = || model.points.iter().map(|point| point.coordinates);
         if start == Start::Given && given().flatten().all(|value| !value.is_nan()) {
             let given: Vec<[f64; 3]> = given().collect();
-            let distance = model.middle_distance(stations, Some(&given));
+            let distance = model.middle_distance(&placed.photos, Some(&given));
             self.check_resolution(selected, model, distance, start)?;
             return Ok(given);
         }
-        let met = model.intersect(stations);
-        let distance = model.middle_distance(stations, met.as_deref().ok());
+        let met = model.intersect(placed);
+        let distance = model.middle_distance(&placed.photos, met.as_deref().ok());
         self.check_resolution(selected, model, distance, start)?;
         let mut met = met.map_err(|point| NetworkError::NoIntersection(selected.points[point]))?;
         if start == Start::Given {

@@ -70,7 +70,10 @@ impl Covariances {
             ObservationRows::products(problem, values, self.linearized.held(), &solutions, threads);
         let (width, suspects) = (solutions.len(), self.suspects());
         let rows = || suspects.rows_of(0..suspects.all.len(), problem.layout().equations());
-        Ok((0..width).flat_map(|k| rows().map(move |row| (row, k))).map(|(row, k)| products[row * width + k]).collect())
+        Ok((0..width)
+            .flat_map(|k| rows().map(move |row| (row, k)))
+            .map(|(row, k)| products[row * width + k])
+            .collect())
     }
 }
 
@@ -83,8 +86,7 @@ impl Trial {
     pub fn responses(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<f64>, NetworkError> {
         let all = self.rows_of(0..self.suspects.all.len());
         let starts = self.suspects.row_starts();
-        let asked: Vec<usize> =
-            suspects.iter().flat_map(|&index| starts[index]..starts[index + 1]).collect();
+        let asked: Vec<usize> = suspects.iter().flat_map(|&index| starts[index]..starts[index + 1]).collect();
         let mut columns = Vec::with_capacity(all.len() * asked.len());
         let rows: Vec<usize> = asked.iter().map(|&row| all[row]).collect();
         self.solutions(&rows, threads, |index, solution, equations| {

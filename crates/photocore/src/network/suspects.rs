@@ -216,12 +216,7 @@ fn observations(assembled: &Assembled) -> Vec<Suspect> {
 }
 
 /// The weighted ones of some unknowns as observations of themselves; None where none is.
-fn weighted(
-    assembled: &Assembled,
-    subject: Subject,
-    home: Home,
-    unknowns: Range<usize>,
-) -> Option<Suspect> {
+fn weighted(assembled: &Assembled, subject: Subject, home: Home, unknowns: Range<usize>) -> Option<Suspect> {
     let of = |(k, unknown): (usize, usize)| {
         assembled.problem.is_weighted(unknown).then_some((Row::Unknown(unknown), k))
     };

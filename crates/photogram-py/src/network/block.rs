@@ -16,6 +16,7 @@ use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, 
 use crate::memory::LOADED;
 use crate::observations::{Group, observations};
 use crate::options::{named_loss, named_ordering, unknown};
+use crate::trajectories::{TimedRow, TrajectoryRow, on_trajectory, trajectory};
 
 /// Adds the function to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -36,7 +37,7 @@ fn camera((model, parameters, sd, covariance): CameraRow) -> PyResult<Camera> {
 #[pyfunction]
 #[pyo3(signature = (
     photo_positions, photo_attitudes, photo_positions_observed, photo_attitudes_observed, photo_position_sd, photo_attitude_sd,
-    photo_cameras, cameras, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, unknowns, mounts, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
+    photo_cameras, cameras, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, unknowns, mounts, trajectories, timed, image_times, records, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
     covariance, loss, ordering, unit_variance, minimum, memory, points_given
 ))]
 fn block_network(
@@ -57,6 +58,10 @@ fn block_network(
     observation_groups: Vec<Group<'_>>,
     unknowns: Vec<CommonRow>,
     mounts: Vec<MountRow>,
+    trajectories: Vec<TrajectoryRow<'_>>,
+    timed: Vec<TimedRow>,
+    image_times: Vec<f64>,
+    records: usize,
     spheroid: Option<(f64, f64)>,
     photo_to_ground: bool,
     refraction: Option<RefractionRow>,
@@ -106,7 +111,14 @@ fn block_network(
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
         observations: observations(&observation_groups)?,
         commons: unknowns.into_iter().map(common).collect::<PyResult<_>>()?,
-        mounts: mounts.into_iter().map(mount).collect(),
+        // A trajectory comes before the sensors on it.
+        mounts: timed
+            .into_iter()
+            .map(|own| on_trajectory(own).into())
+            .chain(mounts.into_iter().map(mount))
+            .collect(),
+        trajectories: trajectories.into_iter().map(trajectory).collect::<PyResult<_>>()?,
+        image_times,
     };
     let method = match criterion {
         "fraction" => Method::Damped(Stop::Fraction(limit)),
@@ -136,7 +148,7 @@ fn block_network(
         minimum: minimum.map(|(photo, coordinate)| Minimum { photo, coordinate }),
         screens: Screens::default(),
     };
-    Ok(BlockNetwork { network, options })
+    Ok(BlockNetwork { network, options, records })
 }
 
 fn six([a, b, c]: [f64; 3], [d, e, f]: [f64; 3]) -> [f64; 6] {

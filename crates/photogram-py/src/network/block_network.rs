@@ -1,7 +1,8 @@
 //! A block as the core has it: adjusted, taken to other datums, asked for covariances.
 
+use photocore::Threads;
 use photocore::adjustment::DatumError;
-use photocore::network::{Network, NetworkDatum, NetworkError as Failure, Options};
+use photocore::network::{Network, NetworkDatum, NetworkError as Failure, Options, Solution};
 use pyo3::prelude::*;
 
 use super::covariances::{BlockCovariances, factored, refused};
@@ -23,6 +24,19 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 pub struct BlockNetwork {
     pub network: Network,
     pub options: Options,
+    /// How many of its photos, the last, are records on trajectories; they have the last camera.
+    pub records: usize,
+}
+
+impl BlockNetwork {
+    /// A solution as callers know it: without what stands for records.
+    fn told(&self, mut solution: Solution, pool: &Threads) -> Told {
+        solution.photos.truncate(self.network.photos.len() - self.records);
+        if self.records > 0 {
+            solution.cameras.pop();
+        }
+        Told::new(solution, pool)
+    }
 }
 
 #[pymethods]
@@ -48,7 +62,7 @@ impl BlockNetwork {
                 _ if keep => adjustment.kept(),
                 _ => adjustment,
             };
-            adjustment.run().map(|solution| Told::new(solution, pool))
+            adjustment.run().map(|solution| self.told(solution, pool))
         })?;
         BlockSolution::new(py, told.map_err(|error| refused(&error))?, 6)
     }
@@ -66,7 +80,7 @@ impl BlockNetwork {
         let datum = datum_of(datum)?;
         let told = watched(py, workers, progress, |pool, watch| {
             let solution = self.network.in_datum(&self.options, &state.state, &datum, pool, watch);
-            solution.map(|solution| Told::new(solution, pool))
+            solution.map(|solution| self.told(solution, pool))
         })?;
         BlockSolution::new(py, told.map_err(|error| refused(&error))?, 6)
     }
@@ -90,7 +104,7 @@ impl BlockNetwork {
         threads: usize,
         kept: bool,
     ) -> PyResult<NetworkTrial> {
-        tried(py, (&self.network, &self.options), refused, state, threads, kept)
+        tried(py, (&self.network, &self.options, self.records), refused, state, threads, kept)
     }
 
     #[pyo3(signature = (state, *, threads))]

@@ -79,7 +79,7 @@ impl CollectionNetwork {
         state: Option<PyRef<'_, BlockState>>,
         threads: usize,
     ) -> PyResult<NetworkTrial> {
-        tried(py, (&self.network, &self.options), refused, state, threads, false)
+        tried(py, (&self.network, &self.options, 0), refused, state, threads, false)
     }
 }
 

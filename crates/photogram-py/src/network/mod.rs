@@ -114,6 +114,9 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::State
         | Failure::CommonDeviations(_)
         | Failure::Mount(_)
+        | Failure::Trajectory(_)
+        | Failure::ImageTimes(_)
+        | Failure::OutsideTrajectory { .. }
         | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors

@@ -24,6 +24,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 pub struct NetworkTrial {
     trial: Trial,
     images: usize,
+    /// Photos without those that stand for records.
+    photos: usize,
     threads: usize,
     refused: Refused,
 }
@@ -53,23 +55,25 @@ type MovedRow = (&'static str, usize, usize, f64, f64);
 /// * `kept`: whether the state is of this very network, so that what its adjustment has kept may be taken.
 pub fn tried(
     py: Python<'_>,
-    (network, options): (&Network, &Options),
+    (network, options, records): (&Network, &Options, usize),
     refused: Refused,
     state: Option<PyRef<'_, BlockState>>,
     threads: usize,
     kept: bool,
 ) -> PyResult<NetworkTrial> {
-    let images = network.images.len();
+    let (images, photos) = (network.images.len(), network.photos.len() - records);
     let converged = state.as_ref().filter(|_| kept).and_then(|state| state.take_kept());
     if let Some(converged) = converged {
         let trial = py.detach(|| converged.trial(network));
-        return Ok(NetworkTrial { trial, images, threads, refused });
+        return Ok(NetworkTrial { trial, images, photos, threads, refused });
     }
     let state = state.map(|state| state.state.clone());
     let found = watched(py, Workers::of(threads, images), None, |pool, _| {
         network.trial(options, state.as_ref(), pool)
     })?;
-    found.map(|trial| NetworkTrial { trial, images, threads, refused }).map_err(|error| refused(&error))
+    found
+        .map(|trial| NetworkTrial { trial, images, photos, threads, refused })
+        .map_err(|error| refused(&error))
 }
 
 #[pymethods]
@@ -81,7 +85,9 @@ impl NetworkTrial {
 
     #[getter]
     fn photos(&self) -> Vec<Vec<f64>> {
-        self.trial.photos()
+        let mut all = self.trial.photos();
+        all.truncate(self.photos);
+        all
     }
 
     #[getter]

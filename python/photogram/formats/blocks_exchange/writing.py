@@ -61,7 +61,9 @@ def write(project: Project) -> Mapping[str, bytes]:
     lines += ["</SpatialReferenceSystems>", "<Block>", f"<Name>{_text(block.title or 'block')}</Name>"]
     lines += ["<Type>Aerial</Type>", "<SRSId>0</SRSId>", "<Photogroups>"]
     gnss = {
-        each.photo: each.observed[:3].tolist() for each in block.observations if isinstance(each, Position)
+        each.photos[0]: each.observed[:3].tolist()
+        for each in block.observations
+        if isinstance(each, Position)
     }
     rotations = Y_DOWN @ attitude_matrices(block).transpose(0, 2, 1)
     for row, (camera, size) in enumerate(zip(cameras, sizes_of(project), strict=True)):

@@ -11,13 +11,16 @@ from photogram.network.observations.control import Control
 from photogram.network.observations.difference import Difference
 from photogram.network.observations.distance import Distance
 from photogram.network.observations.equal_height import EqualHeight
-from photogram.network.observations.observation import Observation, observation_rows
+from photogram.network.observations.observation import Observation, moments, observation_rows
 from photogram.network.observations.on_level import OnLevel
 from photogram.network.observations.on_line import OnLine, OnPlumbLine
 from photogram.network.observations.on_plane import OnPlane
 from photogram.network.observations.position import Position
 from photogram.network.observations.prior import Prior
+from photogram.network.observations.rate import Rate
 from photogram.network.observations.relative import Relative
+from photogram.network.observations.smoothness import Smoothness
+from photogram.network.observations.velocity import Velocity
 
 __all__ = [
     "Attitude",
@@ -33,6 +36,10 @@ __all__ = [
     "OnPlumbLine",
     "Position",
     "Prior",
+    "Rate",
     "Relative",
+    "Smoothness",
+    "Velocity",
+    "moments",
     "observation_rows",
 ]

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from photogram.network.observations.observation import ROTATIONS, Observation
+from photogram.network.timed import Moment
+from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Boresight
 
 __all__ = ["Attitude"]
@@ -19,7 +21,7 @@ class Attitude(Observation):
     Parameters
     ----------
     photo
-        Its name.
+        Its name; None where it is of a trajectory.
     attitude
         (3, 3) observed, body to object: its columns are the axes of the body in X, Y, Z; or in east, north,
         up at the photo where the object space is geographic.
@@ -30,6 +32,8 @@ class Attitude(Observation):
     boresight
         (3, 3) B, body to the axes of the photo (x right, y up, z back towards the viewer); or one that is
         unknown. None where what is observed is the attitude of the photo itself.
+    trajectory, time, clock
+        What it is of in the place of a photo, at a time in seconds, and the offset of that clock.
 
     Raises
     ------
@@ -43,8 +47,16 @@ class Attitude(Observation):
     VALUES = (("attitude", (3, 3)), ("boresight", (3, 3)))
     COMPONENTS = ROTATIONS
 
-    photo: str
+    photo: str | None
     attitude: ArrayLike
     sd: ArrayLike | None = None
     covariance: ArrayLike | None = None
     boresight: ArrayLike | Boresight | None = None
+    trajectory: Trajectory | None = None
+    time: float = 0.0
+    clock: Clock | None = None
+
+    @property
+    def moment(self) -> Moment | None:
+        """The time on a trajectory that it is of."""
+        return None if self.trajectory is None else Moment(self.trajectory, float(self.time), self.clock)

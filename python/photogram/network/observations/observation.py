@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import is_covariance, names, shaped, shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.network.timed import Moment
 from photogram.network.unknowns import Unknown, rotation
 
-__all__ = ["AXES", "ROTATIONS", "Group", "Observation", "observation_rows"]
+__all__ = ["AXES", "ROTATIONS", "Group", "Observation", "moments", "observation_rows"]
 
 Group = tuple[str, Indices, Indices, Indices, Floats, Floats]
 """A kind, (k, p) indices of points, (k, q) photos, (k, c) unknowns; (k, v) values, (k, r, r) covariances."""
@@ -69,8 +70,12 @@ class Observation:
     precision: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for what, fields in (("points", self.POINTS), ("photos", self.PHOTOS)):
-            self._set(what, tuple(names(self.KIND, [getattr(self, name) for name in fields])))
+        moment = self.moment
+        self._set("points", tuple(names(self.KIND, [getattr(self, name) for name in self.POINTS])))
+        of = [getattr(self, name) for name in self.PHOTOS]
+        if moment is not None and any(each is not None for each in of):
+            raise InputError(f"the {self.KIND} of {of[0]} is of a trajectory, and so of no photo")
+        self._set("photos", tuple(names(self.KIND, of if moment is None else [moment.name])))
         self._set("unknowns", tuple(self._unknown(name, kind) for name, kind in self.UNKNOWNS))
         for what, own in (("point", self.points), ("photo", self.photos)):
             if len(set(own)) < len(own):
@@ -89,6 +94,11 @@ class Observation:
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
+
+    @property
+    def moment(self) -> Moment | None:
+        """The time on a trajectory that it is of, in the place of a photo."""
+        return None
 
     @property
     def of(self) -> tuple[str, ...]:
@@ -169,6 +179,11 @@ class Observation:
         return matrix
 
 
+def moments(observations: Sequence[Observation]) -> list[Moment]:
+    """Return the different times on trajectories that observations are of."""
+    return list({each.moment.name: each.moment for each in observations if each.moment is not None}.values())
+
+
 def observation_rows(
     observations: Sequence[Observation],
     points: Sequence[str],
@@ -177,6 +192,8 @@ def observation_rows(
 ) -> list[tuple[list[int], Group]]:
     """Return observations kind by kind: their rows among the given ones, and what the core takes.
 
+    Times on trajectories stand behind the photos.
+
     Raises
     ------
     InputError
@@ -184,7 +201,8 @@ def observation_rows(
     """
     if not observations:
         return []
-    of_points, of_photos = ({name: row for row, name in enumerate(each)} for each in (points, photos))
+    all_photos = [*photos, *(each.name for each in moments(observations))]
+    of_points, of_photos = ({name: row for row, name in enumerate(each)} for each in (points, all_photos))
     of_unknowns = {id(each): row for row, each in enumerate(unknowns)}
 
     def places(each: Observation, own: tuple[str, ...], known: dict[str, int], what: str) -> list[int]:

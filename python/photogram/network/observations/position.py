@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.network.observations.observation import AXES, Observation
+from photogram.network.timed import Moment
+from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Drift, LeverArm, Shift, Unknown
 
 __all__ = ["Position", "epochs_of", "with_epochs"]
@@ -23,7 +25,7 @@ class Position(Observation):
     Parameters
     ----------
     photo
-        Its name.
+        Its name; None where it is of a trajectory.
     position
         (3,) observed X, Y, Z of the antenna; or longitude (rad), latitude (rad), height.
     sd
@@ -39,6 +41,8 @@ class Position(Observation):
         d; None without. It counts from its epoch, or the mean time of the observations that it is given to.
     time
         Seconds.
+    trajectory, clock
+        What it is of in the place of a photo, at `time`, and the offset of the receiver's clock.
 
     Raises
     ------
@@ -53,7 +57,7 @@ class Position(Observation):
     COMPONENTS = AXES
     LOCAL = True
 
-    photo: str
+    photo: str | None
     position: ArrayLike
     sd: ArrayLike | None = None
     covariance: ArrayLike | None = None
@@ -61,6 +65,13 @@ class Position(Observation):
     shift: Shift | None = None
     drift: Drift | None = None
     time: float = 0.0
+    trajectory: Trajectory | None = None
+    clock: Clock | None = None
+
+    @property
+    def moment(self) -> Moment | None:
+        """The time on a trajectory that it is of."""
+        return None if self.trajectory is None else Moment(self.trajectory, float(self.time), self.clock)
 
     @classmethod
     def values_of(cls, observations: Sequence[Observation]) -> Floats:

@@ -43,6 +43,8 @@ pub enum Measure {
     Angle,
     /// An angle in a second.
     Rate,
+    /// Seconds.
+    Time,
     /// A ratio.
     Ratio,
 }
@@ -110,11 +112,16 @@ kinds! {
         ("x", 0, Length), ("y", 1, Length), ("z", 2, Length),
         ("rotation x", 3, Angle), ("rotation y", 4, Angle), ("rotation z", 5, Angle)
     ];
-    /// A uniform motion in the axes of what moves: its position is the way, its rotation the turn of one second.
-    Velocity = "velocity", Scales, [
-        ("x", 0, Speed), ("y", 1, Speed), ("z", 2, Speed),
-        ("rotation x", 3, Rate), ("rotation y", 4, Rate), ("rotation z", 5, Rate)
-    ];
+    /// c_k, a coefficient of the positions of a trajectory, in their axes.
+    PositionCoefficient = "position coefficient", Stays, [("x", 0, Length), ("y", 1, Length), ("z", 2, Length)];
+    /// r_k, a coefficient of its rotation vectors, about the axes of the photo.
+    RotationCoefficient = "rotation coefficient", Stays, [("x", 0, Angle), ("y", 1, Angle), ("z", 2, Angle)];
+    /// b, what a gyroscope says of a body at rest.
+    GyroBias = "gyro bias", Stays, [("x", 0, Rate), ("y", 1, Rate), ("z", 2, Rate)];
+    /// The readout time of all rows of a rolling shutter, or the factor of the line rates of a scanner, which is about 1.
+    Readout = "readout", Stays, [("time", 0, Time)];
+    /// d, by which the clock of a receiver is behind that of a trajectory.
+    Clock = "clock", Stays, [("offset", 0, Time)];
 }
 
 impl CommonKind {
@@ -270,7 +277,7 @@ pub struct CommonState {
 }
 
 impl CommonState {
-    /// Its position as a vector: of a lever arm, shift, drift, instrument, sensor or velocity.
+    /// Its position as a vector: of a lever arm, shift, drift, instrument, sensor or coefficient.
     pub fn vector(&self) -> Vector3 {
         self.base + self.offset
     }
@@ -280,7 +287,7 @@ impl CommonState {
         &self.attitude
     }
 
-    /// Its position and rotation: of a sensor or a velocity.
+    /// Its position and rotation: of a sensor.
     pub fn pose(&self) -> Pose {
         Pose { position: self.vector(), attitude: self.attitude }
     }

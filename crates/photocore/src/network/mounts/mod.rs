@@ -1,26 +1,28 @@
-//! What the pose of an image is made of where it is not the six unknowns of its photo: photos on a frame, photos that move.
+//! What the pose of an image is made of where it is not the six unknowns of its photo: photos on a frame, images on a trajectory.
 //!
 //! Each kind is a file with a type that implements [`MountModel`], and a line of `kinds!` below. A pose is handed on from mount to mount
 //! with the list of the blocks that it is made of, and how it steps with the unknowns of each.
 
 use std::ops::Deref;
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix3xX, Matrix6};
 
-use super::commons::{CommonKind, CommonState};
-use crate::geometry::{ObjectSpace, Orientation, Pose, Steps, steps};
+use super::commons::{Common, CommonKind, CommonState};
+use crate::geometry::{self, ObjectSpace, Orientation, POSE, Pose, Steps, Vector3, steps};
 
-/// What a pose is asked for. A photo itself is at the time zero.
-#[derive(Debug, Clone, Copy)]
-pub enum When {
-    /// An image, at its place in the photo.
-    Image([f64; 2]),
-    /// A time, counted from that of the photo.
-    Time(f64),
+/// The photos themselves: the time of their images counts from theirs (see [`OnTrajectory`]).
+pub(super) const AT_PHOTO: f64 = 0.0;
+
+/// A trajectory of a network: a pose as a function of time, and the common unknowns that are its coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    /// Table and bases. Rectangular coordinates as those of photos and points; geocentric ones where the space is geographic.
+    pub course: geometry::trajectory::Trajectory,
+    /// Common unknowns: those of positions, one for each function of the basis.
+    pub position: Vec<usize>,
+    /// The same of rotations.
+    pub rotation: Vec<usize>,
 }
-
-/// The photos themselves.
-pub(super) const AT_PHOTO: When = When::Time(0.0);
 
 /// How the pose of a photo, or of its images, follows from another pose and from common unknowns.
 pub trait MountModel {
@@ -32,17 +34,42 @@ pub trait MountModel {
         None
     }
 
-    /// The type of the common unknowns.
-    fn unknowns(&self) -> CommonKind;
+    /// The trajectory that it is on.
+    fn trajectory(&self) -> Option<usize> {
+        None
+    }
 
-    /// Those that a pose is made of; None for those of all poses.
-    fn commons(&self, when: Option<When>) -> Vec<usize>;
+    /// That, and the time there of an image with a number, common unknowns as they are given.
+    fn flight(&self, _at: f64, _known: &Mounts) -> Option<(usize, f64)> {
+        None
+    }
+
+    /// The common unknowns that it is given, with their types.
+    fn unknowns(&self) -> Vec<(usize, CommonKind)>;
+
+    /// All that poses at a time are made of, in the order of [`MountModel::compose`]; None for those at all times.
+    fn commons(&self, at: Option<f64>, known: &Mounts) -> Vec<usize>;
+
+    /// Whether the pose that it begins with, and the six unknowns of that, count for nothing.
+    fn replaces(&self) -> bool {
+        false
+    }
+
+    /// Where it replaces: the common unknown that every pose begins with, and that no other is made of besides; None where there is none.
+    fn main(&self, _known: &Mounts) -> Option<usize> {
+        None
+    }
 
     /// Whether images of one photo have poses of their own.
     fn is_timed(&self) -> bool;
 
+    /// How the pose that is asked for moves; None where it does not.
+    fn moving(&self, _at: f64, _grounds: &Grounds<'_>) -> Option<Moving> {
+        None
+    }
+
     /// Leads from the pose that it begins with to the one that is asked for.
-    fn compose(&self, when: When, grounds: &Grounds<'_>, pose: &mut Chain);
+    fn compose(&self, at: f64, grounds: &Grounds<'_>, pose: &mut Chain);
 }
 
 macro_rules! kinds {
@@ -76,55 +103,103 @@ macro_rules! kinds {
 
 kinds! {
     on_frame::OnFrame;
-    rolling::Rolling;
+    on_trajectory::OnTrajectory;
 }
 
 /// The mounts of a network by their photos, in their order; none at all where there are none.
 #[derive(Debug, Default)]
-pub(super) struct Mounts(Vec<Vec<Mount>>);
+pub struct Mounts {
+    by_photo: Vec<Vec<Mount>>,
+    /// The trajectories that they name, their coordinates counted from the origin.
+    trajectories: Vec<Trajectory>,
+    /// Of the common unknowns, what is given as the first component, and whether that is known.
+    given: Vec<(f64, bool)>,
+}
 
 impl Mounts {
-    /// Those of a network of so many photos.
-    pub fn new(mounts: &[Mount], photos: usize) -> Self {
+    /// Those of so many photos, with trajectories whose coordinates are to be counted from an origin, and the common unknowns.
+    pub(super) fn new(
+        (mounts, photos): (&[Mount], usize),
+        (trajectories, origin): (&[Trajectory], [f64; 3]),
+        commons: &[Common],
+    ) -> Self {
         if mounts.is_empty() {
             return Self::default();
         }
-        let mut all = vec![vec![]; photos];
-        mounts.iter().for_each(|mount| all[mount.photo()].push(*mount));
-        Self(all)
+        let mut by_photo = vec![vec![]; photos];
+        mounts.iter().for_each(|mount| by_photo[mount.photo()].push(*mount));
+        let counted =
+            |own: &Trajectory| Trajectory { course: own.course.counted_from(origin), ..own.clone() };
+        Self {
+            by_photo,
+            trajectories: trajectories.iter().map(counted).collect(),
+            given: commons.iter().map(|own| (own.position[0], own.sd[0] == 0.0)).collect(),
+        }
     }
 
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+    pub(super) fn is_empty(&self) -> bool {
+        self.by_photo.is_empty()
+    }
+
+    /// Whether there are trajectories.
+    pub(super) fn fly(&self) -> bool {
+        !self.trajectories.is_empty()
+    }
+
+    /// A trajectory.
+    pub fn trajectory(&self, trajectory: usize) -> &Trajectory {
+        &self.trajectories[trajectory]
+    }
+
+    /// The first component of a common unknown as it is given, and whether it is known.
+    pub fn given(&self, common: usize) -> (f64, bool) {
+        self.given[common]
     }
 
     /// Those of a photo.
     #[inline]
-    pub fn of(&self, photo: usize) -> &[Mount] {
-        self.0.get(photo).map_or(&[], Vec::as_slice)
+    pub(super) fn of(&self, photo: usize) -> &[Mount] {
+        self.by_photo.get(photo).map_or(&[], Vec::as_slice)
     }
 
     /// All of them.
-    pub fn all(&self) -> impl Iterator<Item = &Mount> {
-        self.0.iter().flatten()
+    pub(super) fn all(&self) -> impl Iterator<Item = &Mount> {
+        self.by_photo.iter().flatten()
     }
 
     /// The photo whose six unknowns the pose of a photo begins with: its frame, or itself.
-    pub fn carrier(&self, photo: usize) -> usize {
+    pub(super) fn carrier(&self, photo: usize) -> usize {
         self.of(photo).first().and_then(|mount| mount.frame()).unwrap_or(photo)
+    }
+
+    /// Whether the six unknowns of a photo count for nothing: others do, or coefficients.
+    pub(super) fn is_carried(&self, photo: usize) -> bool {
+        self.carrier(photo) != photo || self.is_replaced(photo)
+    }
+
+    fn is_replaced(&self, photo: usize) -> bool {
+        self.of(photo).iter().any(|mount| mount.replaces())
+    }
+
+    /// The main block of a pose, given those of common unknowns: that of its carrier, also where the six of that count for nothing and no
+    /// common unknown stands for them.
+    pub(super) fn main_block(&self, photo: usize, block: &dyn Fn(usize) -> Option<usize>) -> usize {
+        let carrier = self.carrier(photo);
+        let replacing = self.of(carrier).iter().find(|mount| mount.replaces());
+        replacing.and_then(|mount| mount.main(self)).and_then(block).unwrap_or(carrier)
     }
 
     /// The common unknowns that a pose is made of, each once; None for all of a photo.
     #[inline]
-    pub fn commons(&self, photo: usize, when: Option<When>) -> Vec<usize> {
+    pub(super) fn commons(&self, photo: usize, at: Option<f64>) -> Vec<usize> {
         // It is asked of every image.
-        if self.is_empty() { vec![] } else { self.commons_of_mounts(photo, when) }
+        if self.is_empty() { vec![] } else { self.commons_of_mounts(photo, at) }
     }
 
-    fn commons_of_mounts(&self, photo: usize, when: Option<When>) -> Vec<usize> {
+    fn commons_of_mounts(&self, photo: usize, at: Option<f64>) -> Vec<usize> {
         let carrier = self.carrier(photo);
-        let mut all = if carrier == photo { vec![] } else { self.commons_of_mounts(carrier, when) };
-        for common in self.of(photo).iter().flat_map(|mount| mount.commons(when)) {
+        let mut all = if carrier == photo { vec![] } else { self.commons_of_mounts(carrier, at) };
+        for common in self.of(photo).iter().flat_map(|mount| mount.commons(at, self)) {
             if !all.contains(&common) {
                 all.push(common);
             }
@@ -133,7 +208,7 @@ impl Mounts {
     }
 
     /// Whether images of a photo have poses of their own.
-    pub fn are_timed(&self, photo: usize) -> bool {
+    pub(super) fn are_timed(&self, photo: usize) -> bool {
         [photo, self.carrier(photo)].iter().any(|&photo| self.of(photo).iter().any(|mount| mount.is_timed()))
     }
 }
@@ -156,7 +231,13 @@ impl Chain {
         self.pose = self.pose.of_inner(inner);
     }
 
-    fn add(&mut self, block: usize, steps: Steps) {
+    /// Goes on from a pose that nothing before has made.
+    pub fn stand(&mut self, pose: Pose) {
+        *self = Self { pose, steps: vec![] };
+    }
+
+    /// Steps so with the first unknowns of a block, besides.
+    pub fn add(&mut self, block: usize, steps: Steps) {
         match self.steps.iter_mut().find(|own| own.0 == block) {
             Some((_, all)) => *all += steps,
             None => self.steps.push((block, steps)),
@@ -164,12 +245,25 @@ impl Chain {
     }
 }
 
+/// How a photo on a trajectory moves, in the axes of the object space and about its own.
+#[derive(Debug, Clone)]
+pub struct Moving {
+    /// C', in a second.
+    pub velocity: Vector3,
+    /// w, in radians in a second.
+    pub rate: Vector3,
+    /// The partials of C' by the first unknowns of retained blocks.
+    pub velocity_by: Vec<(usize, Matrix3xX<f64>)>,
+    /// The same of w.
+    pub rate_by: Vec<(usize, Matrix3xX<f64>)>,
+}
+
 /// A pose that is made of the unknowns of several blocks.
 #[derive(Debug, Clone)]
 pub(super) struct Composed {
     /// With six unknowns of its own: its coordinates and a rotation about its axes.
     pub orientation: Orientation,
-    /// The retained blocks, and how these six step with the first unknowns of each: that of the carrier, then those of common unknowns.
+    /// The retained blocks, and how these six step with the first unknowns of each: the main one, then those of common unknowns.
     pub parts: Vec<(usize, Steps)>,
 }
 
@@ -184,35 +278,52 @@ pub struct Grounds<'a> {
 }
 
 impl Grounds<'_> {
+    /// The trajectories, and what is given.
+    pub fn known(&self) -> &Mounts {
+        self.mounts
+    }
+
     /// A common unknown, and its block unless it is known.
     pub fn common(&self, common: usize) -> (CommonState, Option<usize>) {
         (self.common)(common)
     }
 
     /// A pose of a photo; None where nothing but its six unknowns counts.
-    pub(super) fn composed(&self, photo: usize, when: When) -> Option<Composed> {
+    pub(super) fn composed(&self, photo: usize, at: f64) -> Option<Composed> {
         if self.mounts.of(photo).is_empty() {
             return None;
         }
-        let Chain { pose, steps } = self.chain(photo, when);
+        let Chain { pose, steps } = self.chain(photo, at);
         let orientation = Orientation::of_pose(self.space, &pose);
         let unknowns = orientation.unknowns_by_step().unwrap_or_else(|| Matrix6::repeat(f64::NAN));
-        let parts = steps.into_iter().map(|(block, steps)| (block, unknowns * steps)).collect();
+        let mut parts: Vec<_> = steps.into_iter().map(|(block, steps)| (block, unknowns * steps)).collect();
+        let main = self.mounts.main_block(photo, &|common| (self.common)(common).1);
+        if parts.first().map(|part| part.0) != Some(main) {
+            parts.insert(0, (main, Steps::zeros(POSE)));
+        }
         Some(Composed { orientation, parts })
     }
 
-    fn chain(&self, photo: usize, when: When) -> Chain {
+    /// How a photo moves; None where it is on no trajectory, or on a frame that is.
+    pub(super) fn moving(&self, photo: usize, at: f64) -> Option<Moving> {
+        match self.mounts.of(photo) {
+            [mount] => mount.moving(at, self),
+            _ => None,
+        }
+    }
+
+    fn chain(&self, photo: usize, at: f64) -> Chain {
         let carrier = self.mounts.carrier(photo);
         let mut chain = if carrier == photo {
             let own = (self.photo)(photo);
             Chain { pose: *own.pose(), steps: vec![(photo, steps(own.steps()))] }
         } else {
-            self.chain(carrier, when)
+            self.chain(carrier, at)
         };
-        self.mounts.of(photo).iter().for_each(|mount| mount.compose(when, self, &mut chain));
+        self.mounts.of(photo).iter().for_each(|mount| mount.compose(at, self, &mut chain));
         chain
     }
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -1,6 +1,6 @@
 //! Rigs: photos on a frame with others, each in a pose of its own there.
 
-use super::{Chain, Grounds, MountModel, When};
+use super::{Chain, Grounds, MountModel, Mounts};
 use crate::geometry::steps;
 use crate::network::commons::CommonKind;
 
@@ -10,7 +10,7 @@ use crate::network::commons::CommonKind;
 pub struct OnFrame {
     /// The photo. Of its own pose nothing counts but where it is about.
     pub photo: usize,
-    /// The photo that stands for the frame; it may have no images.
+    /// The photo that stands for the frame; it may have no images. The photo itself where its frame is on a trajectory.
     pub frame: usize,
     /// The common unknown that is the pose of its sensor in the frame.
     pub sensor: usize,
@@ -25,11 +25,11 @@ impl MountModel for OnFrame {
         Some(self.frame)
     }
 
-    fn unknowns(&self) -> CommonKind {
-        CommonKind::Sensor
+    fn unknowns(&self) -> Vec<(usize, CommonKind)> {
+        vec![(self.sensor, CommonKind::Sensor)]
     }
 
-    fn commons(&self, _: Option<When>) -> Vec<usize> {
+    fn commons(&self, _: Option<f64>, _: &Mounts) -> Vec<usize> {
         vec![self.sensor]
     }
 
@@ -37,7 +37,7 @@ impl MountModel for OnFrame {
         false
     }
 
-    fn compose(&self, _: When, grounds: &Grounds<'_>, pose: &mut Chain) {
+    fn compose(&self, _: f64, grounds: &Grounds<'_>, pose: &mut Chain) {
         let (sensor, block) = grounds.common(self.sensor);
         pose.lead_to(&sensor.pose(), block.map(|block| (block, steps(sensor.steps()))));
     }
@@ -46,10 +46,10 @@ impl MountModel for OnFrame {
 #[cfg(test)]
 mod tests {
     use super::super::tests::agrees;
-    use super::OnFrame;
+    use super::{CommonKind, OnFrame};
 
     #[test]
     fn steps_agree_with_differences() {
-        agrees(OnFrame { photo: 0, frame: 1, sensor: 1 }.into());
+        agrees(OnFrame { photo: 0, frame: 1, sensor: 1 }.into(), &[CommonKind::Sensor; 2], &[]);
     }
 }

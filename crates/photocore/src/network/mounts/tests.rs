@@ -4,50 +4,60 @@
 
 use nalgebra::Vector6;
 
-use super::{Composed, Grounds, Mount, Mounts, When};
+use super::{Composed, Grounds, Mount, Mounts, Trajectory};
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::{
     Ellipsoid, Matrix3, ObjectSpace, Orientation, PoseNumbers, RotationSense, Vector3, rotation,
 };
-use crate::network::commons::{Common, PlacedCommon};
+use crate::network::commons::{Common, CommonKind, PlacedCommon};
 
-/// Asserts that the poses of the first of two photos step as central differences of the fourth order do, in both spaces. All common
-/// unknowns are of the type of the mount, and not at their origin.
-pub fn agrees(mount: Mount) {
+/// One mount, of so many photos.
+pub fn mounted(mount: Mount, photos: usize) -> Mounts {
+    Mounts::new((&[mount], photos), (&[], [0.0; 3]), &[])
+}
+
+/// Asserts that the poses of the first of two photos step as central differences of the fourth order do, in both spaces. Common unknowns
+/// are of the types that they have to be, and not at their origin.
+pub fn agrees(mount: Mount, commons: &[CommonKind], trajectories: &[Trajectory]) {
     let geographic = ObjectSpace::Geographic(Ellipsoid::new(300.0, 290.0).unwrap());
     for space in [ObjectSpace::Rectangular, geographic] {
-        for when in [When::Time(0.0), When::Time(-1.7), When::Image([0.0; 2]), When::Image([3.0, -20.0])] {
-            agrees_at(mount, space, when);
+        for at in [0.0, -1.7, 0.3] {
+            agrees_at(mount, (commons, trajectories), space, at);
         }
     }
 }
 
-fn agrees_at(mount: Mount, space: ObjectSpace, when: When) {
-    let (poses, mounts) = (PoseNumbers::Angles(RotationSense::GroundToPhoto), Mounts::new(&[mount], 2));
-    let count = 1 + mount.commons(None).into_iter().max().unwrap();
-    let width = mount.unknowns().unknowns().len();
-    let placed = |k: usize| {
-        let turns = mount.unknowns().unknowns().iter().any(|&(_, component, _)| component > 2);
+fn agrees_at(
+    mount: Mount,
+    (kinds, trajectories): (&[CommonKind], &[Trajectory]),
+    space: ObjectSpace,
+    at: f64,
+) {
+    let poses = PoseNumbers::Angles(RotationSense::GroundToPhoto);
+    let common = |(k, &kind): (usize, &CommonKind)| {
+        let turns = kind.unknowns().iter().any(|&(_, component, _)| component > 2);
         let attitude = if turns { rotation([0.2, -0.4, 0.9 - k as f64]) } else { Matrix3::identity() };
-        let common =
-            Common { kind: mount.unknowns(), position: [0.4, 0.2, -0.7], attitude, sd: vec![1.0; width] };
-        PlacedCommon::new(&common, space, [0.0; 3], &Matrix3::identity())
+        Common { kind, position: [0.4, 0.2, -0.7], attitude, sd: vec![1.0; kind.unknowns().len()] }
     };
-    let commons: Vec<PlacedCommon> = (0..count).map(placed).collect();
+    let given: Vec<Common> = kinds.iter().enumerate().map(common).collect();
+    let mounts = Mounts::new((&[mount], 2), (trajectories, [0.0; 3]), &given);
+    let placed = |common| PlacedCommon::new(common, space, [0.0; 3], &Matrix3::identity());
+    let commons: Vec<PlacedCommon> = given.iter().map(placed).collect();
+    let widths: Vec<usize> = [6, 6].into_iter().chain(given.iter().map(|own| own.sd.len())).collect();
+    let first = |block: usize| widths[..block].iter().sum::<usize>();
     let photos = vec![0.31, 0.7, 2.0, 0.4, -0.3, 1.2, 0.3, 0.69, 1.5, 1.1, 0.5, -0.7];
-    let small = (0..count * width).map(|k| 0.3 * (1.7 * k as f64).sin());
+    let small = (0..first(widths.len()) - 12).map(|k| 0.3 * (1.7 * k as f64).sin());
     let values: Vec<f64> = photos.into_iter().chain(small).collect();
-    let first = |block: usize| 6 * block.min(2) + width * block.saturating_sub(2);
-    let at = |values: &[f64]| -> Composed {
+    let composed = |values: &[f64]| -> Composed {
         let photo =
             |photo: usize| Orientation::new(poses, space, &std::array::from_fn(|k| values[6 * photo + k]));
         let common = |common: usize| {
             let block = 2 + common;
-            (commons[common].at(&values[first(block)..][..width]), Some(block))
+            (commons[common].at(&values[first(block)..][..widths[block]]), Some(block))
         };
-        Grounds { space, mounts: &mounts, photo: &photo, common: &common }.composed(0, when).unwrap()
+        Grounds { space, mounts: &mounts, photo: &photo, common: &common }.composed(0, at).unwrap()
     };
-    let Composed { orientation, parts } = at(&values);
+    let Composed { orientation, parts } = composed(&values);
     let (pose, unknowns) = (orientation.pose(), orientation.unknowns_by_step().unwrap());
     for (block, steps) in &parts {
         for (k, step) in steps.column_iter().enumerate() {
@@ -55,7 +65,7 @@ fn agrees_at(mount: Mount, space: ObjectSpace, when: When) {
             let apart = |times: f64| {
                 let mut moved = values.clone();
                 moved[unknown] += 1e-3 * times;
-                let moved = *at(&moved).orientation.pose();
+                let moved = *composed(&moved).orientation.pose();
                 let shift = moved.position - pose.position;
                 let rho: Vector3 = rotation_angle_axis(&pose.attitude.tr_mul(&moved.attitude));
                 Vector6::new(shift.x, shift.y, shift.z, rho.x, rho.y, rho.z)
@@ -63,9 +73,12 @@ fn agrees_at(mount: Mount, space: ObjectSpace, when: When) {
             let difference = 8.0 * (apart(1.0) - apart(-1.0)) - (apart(2.0) - apart(-2.0));
             let expected = unknowns * difference / 12e-3;
             let error = (step - expected).amax() / expected.amax().max(1.0);
-            assert!(error < 1e-9, "{space:?}, {when:?}, block {block}, unknown {k}: {error:e}");
+            assert!(error < 1e-9, "{space:?}, {at}, block {block}, unknown {k}: {error:e}");
         }
     }
     let columns: usize = parts.iter().map(|(_, steps)| steps.ncols()).sum();
-    assert_eq!(columns, 6 + mount.commons(Some(when)).len() * width, "all that it is made of");
+    let main = mounts.main_block(0, &|common| Some(2 + common));
+    let own = if main < 2 { 6 } else { 0 };
+    let of_commons = mounts.commons(0, Some(at)).into_iter().map(|common| widths[2 + common]);
+    assert_eq!(columns, own + of_commons.sum::<usize>(), "all that it is made of");
 }

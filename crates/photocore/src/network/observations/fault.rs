@@ -24,6 +24,9 @@ pub enum Fault {
         /// The type.
         needed: CommonKind,
     },
+    /// A photo that is on no trajectory: it has no velocity.
+    #[error("is of the motion of photo {0}, which is on no trajectory")]
+    AtRest(usize),
     /// Nothing of what it is of is unknown.
     #[error("is of known quantities alone")]
     NothingUnknown,

@@ -10,7 +10,8 @@ use super::tied::TiedModel;
 use super::{Named, Observation, TiedObservation};
 use crate::geometry::{Camera, Matrix3, ObjectSpace, Orientation, Perspective, Point, Vector3};
 use crate::network::commons::{Common, CommonKind, CommonState, PlacedCommon};
-use crate::network::mounts::{AT_PHOTO, Composed, Grounds, Mounts, OnFrame};
+use crate::network::mounts::tests::mounted;
+use crate::network::mounts::{AT_PHOTO, Composed, Grounds, OnFrame};
 
 #[path = "../../../tests/golden/mod.rs"]
 mod data;
@@ -135,6 +136,7 @@ fn assert_case(case: &Value) -> bool {
         origin: [0.0; 3],
         point: &|i| PointSite { point: Point::new(SPACE, points[i]), coordinates: points[i], block: i },
         photo: &|i| PhotoSite { orientation: &photos[i], block: 100 + i, parts: &[] },
+        moving: &|_| None,
         common: &|i| CommonSite { state: &commons[i].0, block: Some(200 + i) },
         width: &width,
     };
@@ -171,7 +173,7 @@ fn assert_rig(case: &Value) {
     let frame = orientation(&blocks[0]);
     let in_frame = list(&blocks[1]["position"]).try_into().unwrap();
     let sensor = state(CommonKind::Sensor, in_frame, matrix(&blocks[1]["matrix_photo_to_object"]));
-    let mounts = Mounts::new(&[OnFrame { photo: 1, frame: 0, sensor: 0 }.into()], 2);
+    let mounts = mounted(OnFrame { photo: 1, frame: 0, sensor: 0 }.into(), 2);
     let common = |_| (sensor.clone(), Some(2));
     let grounds = Grounds { space: SPACE, mounts: &mounts, photo: &|_| frame, common: &common };
     let Composed { orientation: photo, parts } = grounds.composed(1, AT_PHOTO).unwrap();

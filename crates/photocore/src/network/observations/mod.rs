@@ -92,6 +92,13 @@ macro_rules! kinds {
                 }
             }
 
+            /// See [`ObservationModel::moves`].
+            pub(super) fn moves(&self) -> bool {
+                match self {
+                    $(Self::$name(own) => own.moves(),)*
+                }
+            }
+
             fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
                 match self {
                     $(Self::$name(own) => own.axes(sites),)*
@@ -121,6 +128,9 @@ kinds! {
     relative::Relative;
     base::Base;
     prior::Prior;
+    velocity::Velocity;
+    rate::Rate;
+    smoothness::Smoothness;
 }
 
 impl Observation {

@@ -19,6 +19,11 @@ pub trait ObservationModel: Sized {
     /// What it is of: points, photos and common unknowns are known by their place in these lists to [`ObservationModel::write`].
     fn touches(&self) -> Touches;
 
+    /// Whether it is of how a photo moves, which then is on a trajectory: [`Sites::moving`].
+    fn moves(&self) -> bool {
+        false
+    }
+
     /// How many components it has.
     fn rows(&self) -> usize;
 

@@ -1,9 +1,10 @@
 //! What an observation is computed from, and the one place where partials by positions and rotations become those by unknowns.
 
-use nalgebra::{DMatrix, SMatrix};
+use nalgebra::{DMatrix, Matrix3xX, SMatrix};
 
 use crate::geometry::{Matrix3, ObjectSpace, Orientation, POSE, Point, Pose, Steps, Vector3, local_vertical};
 use crate::network::commons::CommonState;
+use crate::network::mounts::Moving;
 
 /// The points, photos and common unknowns that an observation touches, each known by its place in [`super::Touches`], at given values
 /// of the unknowns. Cartesian positions are counted from an origin amid the network.
@@ -13,6 +14,8 @@ pub struct Sites<'a> {
     pub(super) origin: [f64; 3],
     pub(super) points: Vec<PointSite>,
     pub(super) photos: Vec<PhotoSite<'a>>,
+    /// How these move, where that is asked for.
+    pub(super) moving: Vec<Option<Moving>>,
     pub(super) commons: Vec<CommonSite<'a>>,
 }
 
@@ -59,6 +62,11 @@ impl Sites<'_> {
     /// The pose of a photo.
     pub fn pose(&self, photo: usize) -> &Pose {
         self.photos[photo].orientation.pose()
+    }
+
+    /// How a photo moves; None where it is on no trajectory.
+    pub fn moving(&self, photo: usize) -> Option<&Moving> {
+        self.moving.get(photo)?.as_ref()
     }
 
     /// A common unknown.
@@ -177,6 +185,29 @@ impl Rows<'_> {
         let Some(block) = block else { return };
         for (k, step) in state.steps().enumerate() {
             self.add(row, block, k, partials(step).iter());
+        }
+    }
+
+    /// Partials of some rows by the velocity of a photo (see [`Sites::moving`]).
+    pub fn by_velocity<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
+        self.by_motion(row, self.sites.moving(photo).map(|own| &own.velocity_by), partials);
+    }
+
+    /// Partials of some rows by the rate of a photo.
+    pub fn by_rate<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
+        self.by_motion(row, self.sites.moving(photo).map(|own| &own.rate_by), partials);
+    }
+
+    fn by_motion<const N: usize>(
+        &mut self,
+        row: usize,
+        by: Option<&Vec<(usize, Matrix3xX<f64>)>>,
+        partials: &SMatrix<f64, N, 3>,
+    ) {
+        for (block, columns) in by.into_iter().flatten() {
+            for (k, column) in columns.column_iter().enumerate() {
+                self.add(row, *block, k, (partials * column).iter());
+            }
         }
     }
 

@@ -9,7 +9,8 @@ use crate::geometry::{
     Ellipsoid, Matrix3, ObjectSpace, Orientation, Point, PoseNumbers, RotationSense, rotation,
 };
 use crate::network::commons::{CommonState, PlacedCommon};
-use crate::network::mounts::{AT_PHOTO, Composed, Grounds, Mounts, OnFrame};
+use crate::network::mounts::tests::mounted;
+use crate::network::mounts::{AT_PHOTO, Composed, Grounds, OnFrame};
 
 /// Two points or photos in rectangular space.
 pub const PLACES: [[f64; 3]; 2] = [[10.0, 20.0, 1.5], [13.0, 18.5, 2.0]];
@@ -115,7 +116,7 @@ impl Scene {
     fn orientations(&self, unknowns: &[f64]) -> ([Orientation; 2], Option<Composed>) {
         let pose = |k: usize| std::array::from_fn(|i| unknowns[6 + PHOTO * k + i]);
         let [first, second] = [0, 1].map(|k| Orientation::new(self.poses, self.space, &pose(k)));
-        let mounts = Mounts::new(&[OnFrame { photo: 3, frame: 2, sensor: SENSORS[0] }.into()], BLOCKS);
+        let mounts = mounted(OnFrame { photo: 3, frame: 2, sensor: SENSORS[0] }.into(), BLOCKS);
         let states = self.states(unknowns);
         let common = |common: usize| (states[common].clone(), Some(BLOCKS + common));
         let grounds = Grounds { space: self.space, mounts: &mounts, photo: &|_| first, common: &common };
@@ -153,6 +154,7 @@ impl Scene {
             point: &point,
             photo: &photo,
             common: &|i| CommonSite { state: &states[i], block: Some(BLOCKS + i) },
+            moving: &|_| None,
             width: &|block| self.of_block(block).len(),
         };
         let (mut constant, mut coefficients) = (vec![0.0; rows], vec![f64::NAN; rows * width]);

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::rows::{CommonSite, PhotoSite, PointSite};
 use super::{Observation, Rows, Sites, Touches};
 use crate::geometry::{ObjectSpace, Vector3};
+use crate::network::mounts::Moving;
 
 /// An observation of points, photos and common unknowns of a model.
 #[derive(Debug)]
@@ -27,6 +28,8 @@ pub struct TiedModel<'a> {
     pub point: &'a dyn Fn(usize) -> PointSite,
     pub photo: &'a dyn Fn(usize) -> PhotoSite<'a>,
     pub common: &'a dyn Fn(usize) -> CommonSite<'a>,
+    /// How a photo moves; None where it is on no trajectory.
+    pub moving: &'a dyn Fn(usize) -> Option<Moving>,
     /// How many unknowns each block has.
     pub width: &'a dyn Fn(usize) -> usize,
 }
@@ -76,6 +79,11 @@ impl TiedObservation {
             origin: model.origin,
             points: self.touches.points.iter().map(|&point| (model.point)(point)).collect(),
             photos: self.touches.photos.iter().map(|&photo| (model.photo)(photo)).collect(),
+            moving: if self.observation.moves() {
+                self.touches.photos.iter().map(|&photo| (model.moving)(photo)).collect()
+            } else {
+                vec![]
+            },
             commons: self.touches.commons.iter().map(|&(common, _)| (model.common)(common)).collect(),
         }
     }

@@ -1,18 +1,20 @@
-//! Photos that move while they are read: their motion is found with its covariance, and named where nothing shows it.
+//! Photos on trajectories, which move while they are read: their motion is found with its covariance, and named where nothing shows it.
 
 #![allow(clippy::unwrap_used)]
 
-use nalgebra::{Matrix6, Vector6};
 use photocore::Threads;
 use photocore::adjustment::Status;
-use photocore::geometry::angle_axis::rotation_angle_axis;
+use photocore::geometry::trajectory::{
+    Attitudes, Basis, Interpolation, Polynomial, Positions, Trajectory as Course,
+};
 use photocore::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Perspective, Pose, PoseNumbers, RotationSense, Vector3,
     angle_axis_rotation, rotation,
 };
-use photocore::network::mounts::Rolling;
+use photocore::network::mounts::OnTrajectory;
 use photocore::network::{
     Camera, Combination, Common, CommonKind, Image, Network, NetworkError, Options, Photo, Point, Solution,
+    Trajectory,
 };
 
 const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
@@ -25,7 +27,7 @@ const START: f64 = 0.02;
 const PHOTOS: usize = 8;
 const POINTS: usize = 42;
 
-/// The way and the turn of a second: of the photos of a strip, and of those of the strip back.
+/// The way in object space and the turn of a second: of the photos of a strip, and of those of the strip back.
 const MOTIONS: [([f64; 3], [f64; 3]); 2] =
     [([5.0, 0.3, -0.1], [0.05, -0.2, 0.1]), ([-4.0, 0.2, 0.3], [-0.1, 0.15, 0.05])];
 
@@ -65,7 +67,7 @@ fn image(photo: usize, point: usize) -> [f64; 2] {
     for _ in 0..30 {
         let t = START + BY_XY[0] * xy[0] + BY_XY[1] * xy[1];
         let at = Pose {
-            position: position + t * attitude * Vector3::from(v),
+            position: position + t * Vector3::from(v),
             attitude: attitude * angle_axis_rotation(&(t * Vector3::from(w))),
         };
         let u = at.sight(&place(point));
@@ -77,20 +79,38 @@ fn image(photo: usize, point: usize) -> [f64; 2] {
 /// The block with errors of a seed; the motions start at rest.
 fn network(seed: u64) -> Network {
     let mut normal = Normal(seed);
-    let mut images = vec![];
+    let (mut images, mut times) = (vec![], vec![]);
     for photo in 0..PHOTOS {
         for point in 0..POINTS {
             let exact = image(photo, point);
             if exact[0].abs() < 14.0 && exact[1].abs() < 14.0 {
                 images.push(Image { photo, point, xy: exact.map(|x| x + SD * normal.next()), sd: [SD; 2] });
+                times.push(START + BY_XY[0] * exact[0] + BY_XY[1] * exact[1]);
             }
         }
     }
     let photo = |k: usize| {
         let Pose { position, attitude } = pose(k);
         let [omega, phi, kappa] = AttitudeNumbers::OmegaPhiKappa(SENSE).numbers(&attitude);
-        let pose = [position.x + 0.1, position.y, position.z - 0.1, omega, phi, kappa + 0.01];
+        let pose = [position.x, position.y, position.z, omega, phi, kappa];
         Photo { pose, observed: pose, sd: [FREE; 6], camera: 0 }
+    };
+    // Where each photo is about, and its attitude.
+    let line = || Basis::Polynomial(Polynomial { degree: 1, reference: 0.0, scale: 1.0 });
+    let trajectory = |k: usize| {
+        let Pose { position, attitude } = pose(k);
+        let about = vec![position + Vector3::new(0.1, 0.0, -0.1)];
+        Trajectory {
+            course: Course {
+                positions: Positions::new(vec![0.0], about, vec![], Interpolation::Linear).unwrap(),
+                attitudes: Attitudes::new(vec![0.0], vec![attitude], Interpolation::Linear).unwrap(),
+                position: line(),
+                rotation: line(),
+                body: None,
+            },
+            position: vec![MOTIONS.len() * 2 + 2 * k, 2 * (k / 4)],
+            rotation: vec![MOTIONS.len() * 2 + 2 * k + 1, 2 * (k / 4) + 1],
+        }
     };
     let mut point = |k: usize| {
         if !k.is_multiple_of(4) {
@@ -99,13 +119,13 @@ fn network(seed: u64) -> Network {
         let coordinates = place(k).map(|x| x + 0.005 * normal.next());
         Point { coordinates: coordinates.into(), sd: [0.005; 3] }
     };
-    let motion = |_| Common {
-        kind: CommonKind::Velocity,
-        position: [0.0; 3],
-        attitude: Matrix3::identity(),
-        sd: vec![FREE; 6],
+    // Of each strip a velocity and a rate, of each photo a shift and a turn.
+    let coefficient = |index: usize| {
+        let kinds = [CommonKind::PositionCoefficient, CommonKind::RotationCoefficient];
+        Common::vector(kinds[index % 2], [0.0; 3], &[FREE; 3])
     };
-    let moves = |photo: usize| Rolling { photo, velocity: photo / 4, start: START, by_xy: BY_XY }.into();
+    let moves =
+        |photo: usize| OnTrajectory { photo, trajectory: photo, time: 0.0, rate: None, offset: None }.into();
     Network {
         space: ObjectSpace::Rectangular,
         poses: PoseNumbers::Angles(SENSE),
@@ -115,8 +135,10 @@ fn network(seed: u64) -> Network {
         points: (0..POINTS).map(&mut point).collect(),
         images,
         observations: vec![],
-        commons: (0..2).map(motion).collect(),
+        commons: (0..2 * (MOTIONS.len() + PHOTOS)).map(coefficient).collect(),
         mounts: (0..PHOTOS).map(moves).collect(),
+        trajectories: (0..PHOTOS).map(trajectory).collect(),
+        image_times: times,
     }
 }
 
@@ -132,25 +154,25 @@ fn motions_are_found_within_their_covariance() {
     for seed in 0..DRAWS {
         let solution = adjust(&network(seed)).unwrap();
         assert_eq!(solution.adjustment.status, Status::Converged);
-        for (found, (v, w)) in solution.commons.iter().zip(MOTIONS) {
-            let way = Vector3::from(found.position) - Vector3::from(v);
-            let truth = angle_axis_rotation(&Vector3::from(w));
-            let turn = rotation_angle_axis(&truth.tr_mul(&found.attitude));
-            let error = Vector6::new(way.x, way.y, way.z, turn.x, turn.y, turn.z);
-            let cofactors = Matrix6::from_row_slice(found.cofactors.as_slice());
-            sum += error.dot(&(cofactors.try_inverse().unwrap() * error));
+        for (found, (v, w)) in solution.commons.chunks(2).zip(MOTIONS) {
+            for (found, truth) in found.iter().zip([v, w]) {
+                let error = Vector3::from(found.position) - Vector3::from(truth);
+                let cofactors = Matrix3::from_row_slice(found.cofactors.as_slice());
+                sum += error.dot(&(cofactors.try_inverse().unwrap() * error));
+            }
         }
     }
-    // Of so many times six components; four standard deviations of their mean.
-    let (count, mean) = (2.0 * DRAWS as f64, sum / (2.0 * DRAWS as f64));
-    assert!((mean - 6.0).abs() < 4.0 * (12.0 / count).sqrt(), "{mean}");
+    // Of so many times three components; four standard deviations of their mean.
+    let (count, mean) = (4.0 * DRAWS as f64, sum / (4.0 * DRAWS as f64));
+    assert!((mean - 3.0).abs() < 4.0 * (6.0 / count).sqrt(), "{mean}");
 }
 
 #[test]
 fn redundancy_numbers_add_up_to_the_degrees_of_freedom() {
     let mut network = network(100);
     // One motion is known beforehand.
-    network.commons[1].sd = vec![0.5, 0.5, 0.5, 0.05, 0.05, 0.05];
+    network.commons[2].sd = vec![0.5; 3];
+    network.commons[3].sd = vec![0.05; 3];
     let solution = adjust(&network).unwrap();
     let points = || network.points.iter().zip(&solution.points).filter(|(_, found)| found.is_some());
     let (seen, control) = (points().count(), points().filter(|(point, _)| point.held() == [true; 3]).count());
@@ -165,22 +187,26 @@ fn redundancy_numbers_add_up_to_the_degrees_of_freedom() {
 #[test]
 fn a_motion_that_no_row_shows_is_named() {
     let mut network = network(200);
-    let at_once = |photo| Rolling { photo, velocity: 1, start: 0.0, by_xy: [0.0; 2] }.into();
-    (4..PHOTOS).for_each(|photo| network.mounts[photo] = at_once(photo));
-    let combination = Combination { commons: vec![1], ..Combination::default() };
-    assert_eq!(adjust(&network).err(), Some(NetworkError::Undetermined(vec![combination; 6])));
-    // Readings at one time are those of another pose.
-    let later = |photo| Rolling { photo, velocity: 1, start: 0.1, by_xy: [0.0; 2] }.into();
-    (4..PHOTOS).for_each(|photo| network.mounts[photo] = later(photo));
+    let of_strip = |network: &Network, k: usize| network.images[k].photo >= 4;
+    let times: Vec<usize> = (0..network.images.len()).filter(|&k| of_strip(&network, k)).collect();
+    times.iter().for_each(|&k| network.image_times[k] = 0.0);
+    let of = |common| Combination { commons: vec![common], ..Combination::default() };
+    let expected = [vec![of(2); 3], vec![of(3); 3]].concat();
     let Err(NetworkError::Undetermined(found)) = adjust(&network) else { unreachable!() };
-    assert!(found.iter().all(|own| own.commons == [1] && !own.photos.is_empty()), "{found:?}");
+    assert_eq!(found, expected);
 }
 
 #[test]
 fn photos_at_rest_are_photos() {
     let mut resting = network(300);
-    resting.commons.iter_mut().for_each(|motion| motion.sd.fill(0.0));
-    let plain = Network { mounts: vec![], ..resting.clone() };
+    resting.commons[..4].iter_mut().for_each(|motion| motion.sd.fill(0.0));
+    let plain = Network {
+        mounts: vec![],
+        trajectories: vec![],
+        image_times: vec![],
+        commons: vec![],
+        ..resting.clone()
+    };
     let [resting, plain] = [&resting, &plain].map(|network| adjust(network).unwrap());
     for (a, b) in resting.photos.iter().zip(&plain.photos) {
         for k in 0..36 {
@@ -189,4 +215,20 @@ fn photos_at_rest_are_photos() {
             assert!((a.pose[k / 6] - b.pose[k / 6]).abs() < 1e-9);
         }
     }
+}
+
+#[test]
+fn what_a_trajectory_does_not_reach_is_refused() {
+    let mut network = network(400);
+    let times: Vec<f64> = (0..3).map(f64::from).collect();
+    let places = vec![Vector3::zeros(); 3];
+    network.trajectories[1].course.positions =
+        Positions::new(times, places, vec![], Interpolation::Linear).unwrap();
+    network.mounts[1] = OnTrajectory { photo: 1, trajectory: 1, time: 3.0, rate: None, offset: None }.into();
+    let found = adjust(&network).err().unwrap();
+    assert!(found.to_string().starts_with("photo 1 is at 3 s of trajectory 1"), "{found}");
+    network.mounts[1] = OnTrajectory { photo: 1, trajectory: 9, time: 0.0, rate: None, offset: None }.into();
+    assert_eq!(adjust(&network).err(), Some(NetworkError::Mount(1)));
+    network.trajectories[1].position.pop();
+    assert_eq!(adjust(&network).err(), Some(NetworkError::Trajectory(1)));
 }

@@ -1,0 +1,148 @@
+//! Poses as functions of time: a table of what is known beforehand, and corrections in a basis of functions of time.
+//!
+//! ```text
+//! C(t) = C0(t) + sum B_k(t) c_k        A(t) = A0(t) Exp(r(t)),  r(t) = sum B_k(t) r_k
+//! ```
+//!
+//! C0, A0 are the table. c_k, in the axes of the table, and the rotation vectors r_k, in those of the photo, are the coefficients. A frame is
+//! the case of one record and degree 0. Continuous-time splines: Furgale and others 2012; line scanners: Poli 2007.
+
+mod basis;
+mod lagrange;
+mod polynomial;
+mod spline;
+mod table;
+
+pub use basis::{Active, Basis, BasisModel};
+pub use polynomial::Polynomial;
+pub use spline::Spline;
+pub use table::{Attitudes, Interpolation, Positions};
+
+use super::angle_axis::{angle_axis_rotation, right_jacobian, right_jacobian_rate};
+use super::{Matrix3, Pose, Vector3};
+
+/// A pose, and how it moves.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion {
+    /// The pose.
+    pub pose: Pose,
+    /// C', in the axes of the pose's position, in a second.
+    pub velocity: Vector3,
+    /// w, about the axes of the photo, in radians in a second: A' = A [w]x.
+    pub rate: Vector3,
+}
+
+/// A trajectory without the values of its coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    /// What is known beforehand of positions.
+    pub positions: Positions,
+    /// The same of attitudes, photo to the axes of the positions.
+    pub attitudes: Attitudes,
+    /// What the corrections of positions are made of.
+    pub position: Basis,
+    /// The same of attitudes.
+    pub rotation: Basis,
+    /// Where the table is inertial, and the object space a body that turns: inertial to body.
+    pub body: Option<Attitudes>,
+}
+
+/// A trajectory at a time, with what its pose is made of.
+#[derive(Debug, Clone)]
+pub struct Flight {
+    /// Pose, velocity and rate.
+    pub motion: Motion,
+    position: Active,
+    rotation: Active,
+    /// The axes of the coefficients of positions, as columns: the identity, or those of the table in the body's.
+    axes: Matrix3,
+    /// How these turn.
+    turning: Vector3,
+    jacobian: Matrix3,
+    jacobian_rate: Matrix3,
+    /// w without the turning of the body.
+    own_rate: Vector3,
+}
+
+impl Trajectory {
+    /// At a time, the coefficients given.
+    pub fn at(&self, time: f64, c: &dyn Fn(usize) -> Vector3, r: &dyn Fn(usize) -> Vector3) -> Flight {
+        let (position, rotation) = (self.position.at(time), self.rotation.at(time));
+        let (shift, drift) = position.sums(c);
+        let (turn, turn_rate) = rotation.sums(r);
+        let (place, speed) = self.positions.at(time);
+        let (attitude, rate) = self.attitudes.at(time);
+        let (exp, jacobian) = (angle_axis_rotation(&turn), right_jacobian(&turn));
+        let mut pose = Pose { position: place + shift, attitude: attitude * exp };
+        let mut velocity = speed + drift;
+        let own_rate = exp.tr_mul(&rate) + jacobian * turn_rate;
+        let (mut rate, mut axes, mut turning) = (own_rate, Matrix3::identity(), Vector3::zeros());
+        if let Some(body) = &self.body {
+            (axes, turning) = body.at(time);
+            velocity = axes * (velocity + turning.cross(&pose.position));
+            rate += pose.attitude.tr_mul(&turning);
+            pose = Pose { position: axes * pose.position, attitude: axes * pose.attitude };
+        }
+        Flight {
+            motion: Motion { pose, velocity, rate },
+            position,
+            rotation,
+            axes,
+            turning,
+            jacobian,
+            jacobian_rate: right_jacobian_rate(&turn, &turn_rate),
+            own_rate,
+        }
+    }
+
+    /// The same with its coordinates counted from an origin.
+    #[must_use]
+    pub fn counted_from(&self, origin: [f64; 3]) -> Self {
+        Self { positions: self.positions.counted_from(origin), ..self.clone() }
+    }
+
+    /// The times that it may be asked for: those of the table and half a record beyond, within the knots of splines.
+    pub fn span(&self) -> (f64, f64) {
+        let all = [self.positions.span(), self.attitudes.span(), self.position.span(), self.rotation.span()];
+        all.into_iter()
+            .chain(self.body.as_ref().map(Attitudes::span))
+            .fold((f64::NEG_INFINITY, f64::INFINITY), |(first, last), own| {
+                (first.max(own.0), last.min(own.1))
+            })
+    }
+}
+
+impl Flight {
+    /// How the pose steps with time, dC and rho in a second.
+    pub fn by_time(&self) -> (Vector3, Vector3) {
+        (self.motion.velocity, self.motion.rate)
+    }
+
+    /// B_k and the partials of C by c_k.
+    pub fn by_position(&self, k: usize) -> Matrix3 {
+        self.position.value(k) * self.axes
+    }
+
+    /// The partials of rho by r_k: `B_k Jr(r)`.
+    pub fn by_rotation(&self, k: usize) -> Matrix3 {
+        self.rotation.value(k) * self.jacobian
+    }
+
+    /// The partials of C' by c_k.
+    pub fn velocity_by_position(&self, k: usize) -> Matrix3 {
+        let still = Matrix3::from_diagonal_element(self.position.rate(k));
+        self.axes * (still + self.position.value(k) * self.turning.cross_matrix())
+    }
+
+    /// The partials of w by r_k: `W_k = B_k' Jr + B_k (Jr' + [w]x Jr)`.
+    pub fn rate_by_rotation(&self, k: usize) -> Matrix3 {
+        let (value, rate) = (self.rotation.value(k), self.rotation.rate(k));
+        // The turning of the body, seen in the photo's axes, steps by itself: [A' turning]x Jr.
+        let turning = self.motion.rate - self.own_rate;
+        rate * self.jacobian
+            + value * (self.jacobian_rate + (self.own_rate + turning).cross_matrix() * self.jacobian)
+    }
+}
+
+#[cfg(test)]
+mod tests;

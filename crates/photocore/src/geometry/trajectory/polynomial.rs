@@ -1,0 +1,37 @@
+//! Corrections that are polynomials in time.
+
+use super::{Active, BasisModel};
+
+/// Powers of scaled time: `B_k = ((t - reference) / scale)^k`, k from 0 to the degree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Polynomial {
+    /// The highest power.
+    pub degree: usize,
+    /// The time that counts as zero.
+    pub reference: f64,
+    /// The seconds that count as one.
+    pub scale: f64,
+}
+
+impl BasisModel for Polynomial {
+    fn count(&self) -> usize {
+        self.degree + 1
+    }
+
+    fn is_sound(&self) -> bool {
+        self.reference.is_finite() && self.scale.is_finite() && self.scale > 0.0
+    }
+
+    fn at(&self, time: f64) -> Active {
+        let s = (time - self.reference) / self.scale;
+        let mut all = Active::default();
+        let (mut power, mut rate) = (1.0, 0.0);
+        for k in 0..=self.degree {
+            all.values.push(power);
+            all.rates.push(rate);
+            rate = (k + 1) as f64 * power / self.scale;
+            power *= s;
+        }
+        all
+    }
+}

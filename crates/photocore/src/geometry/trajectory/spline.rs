@@ -1,0 +1,82 @@
+//! Corrections that are splines in time.
+
+use smallvec::{SmallVec, smallvec};
+
+use super::{Active, BasisModel};
+
+/// The B-splines of a degree over knots, which do not decrease (Cox and de Boor): B_k is not zero from knot k to knot k + degree + 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spline {
+    /// 1 to 5.
+    pub degree: usize,
+    /// In seconds; more than twice the degree.
+    pub knots: Vec<f64>,
+}
+
+impl Spline {
+    /// The interval between knots that a time is in, of those where as many functions as there can be are not zero.
+    fn interval(&self, time: f64) -> usize {
+        let after = self.knots.partition_point(|&knot| knot <= time);
+        after.saturating_sub(1).clamp(self.degree, self.count() - 1)
+    }
+
+    /// The functions of a lower degree in an interval: so many as the degree and one more.
+    fn lower(&self, interval: usize, degree: usize, time: f64) -> SmallVec<[f64; 6]> {
+        let knot = |k: usize| self.knots[k];
+        let mut all: SmallVec<[f64; 6]> = smallvec![1.0];
+        for p in 1..=degree {
+            let mut next: SmallVec<[f64; 6]> = smallvec![0.0; p + 1];
+            for (j, value) in all.iter().enumerate() {
+                // B of degree p - 1 that begins at this knot; part of it goes to the one that begins a knot before.
+                let k = interval + 1 + j - p;
+                let length = knot(k + p) - knot(k);
+                let share = if length > 0.0 { (time - knot(k)) / length } else { 0.0 };
+                next[j + 1] += share * value;
+                next[j] += if length > 0.0 { (1.0 - share) * value } else { 0.0 };
+            }
+            all = next;
+        }
+        all
+    }
+}
+
+impl BasisModel for Spline {
+    fn count(&self) -> usize {
+        self.knots.len().saturating_sub(self.degree + 1)
+    }
+
+    fn is_sound(&self) -> bool {
+        let knots = &self.knots;
+        (1..=5).contains(&self.degree)
+            && knots.len() > 2 * self.degree + 1
+            && knots.iter().all(|knot| knot.is_finite())
+            && knots.windows(2).all(|pair| pair[0] <= pair[1])
+            && knots[self.degree] < knots[self.count()]
+    }
+
+    fn at(&self, time: f64) -> Active {
+        let (p, interval) = (self.degree, self.interval(time));
+        let before = self.lower(interval, p - 1, time);
+        let mut rates: SmallVec<[f64; 6]> = smallvec![0.0; p + 1];
+        for (j, value) in before.iter().enumerate() {
+            let k = interval + 1 + j - p;
+            let length = self.knots[k + p] - self.knots[k];
+            if length > 0.0 {
+                rates[j] -= p as f64 * value / length;
+                rates[j + 1] += p as f64 * value / length;
+            }
+        }
+        Active { first: interval - p, values: self.lower(interval, p, time), rates }
+    }
+
+    fn span(&self) -> (f64, f64) {
+        let last = self.count().min(self.knots.len().saturating_sub(1));
+        (self.knots[self.degree.min(last)], self.knots[last])
+    }
+
+    /// A tenth of the mean distance between knots.
+    fn reach(&self) -> f64 {
+        let (first, last) = self.span();
+        0.1 * (last - first) / (self.count() - self.degree).max(1) as f64
+    }
+}

@@ -1,0 +1,210 @@
+//! Images and records whose pose is that of a trajectory at their time: rolling shutters, line scanners, satellite positions between
+//! exposures.
+
+use nalgebra::Matrix3xX;
+
+use super::{Chain, Grounds, MountModel, Mounts, Moving, Trajectory};
+use crate::geometry::trajectory::{Basis, Flight, Motion};
+use crate::geometry::{Matrix3, Steps, Vector3, steps};
+use crate::network::commons::CommonKind;
+
+/// That a photo is on a trajectory: an image has the pose of its time
+///
+/// ```text
+/// t = time + rate a + offset
+/// ```
+///
+/// a being its own number (`Network::image_times`) and the photo itself at a = 0. With a rolling shutter a is the row over all
+/// rows and the rate the readout time of all; with a line scanner a is the time of the line from that of the photo and the rate a factor
+/// of all line rates, about 1; the offset is that of a clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OnTrajectory {
+    /// The photo. Of its own pose nothing counts but where it is about.
+    pub photo: usize,
+    /// The trajectory.
+    pub trajectory: usize,
+    /// The time of the photo, in seconds.
+    pub time: f64,
+    /// The common unknown that is the rate; 1 without.
+    pub rate: Option<usize>,
+    /// The common unknown that is the offset; 0 without.
+    pub offset: Option<usize>,
+}
+
+impl OnTrajectory {
+    /// The time of an image, given the values of common unknowns.
+    fn time_of(&self, at: f64, value: impl Fn(usize) -> f64) -> f64 {
+        self.time + at * self.rate.map_or(1.0, &value) + self.offset.map_or(0.0, &value)
+    }
+
+    /// The coefficients that a pose is made of: of positions, of rotations. Where the time has unknowns, those about it as well.
+    fn active(&self, at: f64, known: &Mounts) -> [std::ops::Range<usize>; 2] {
+        let time = self.time_of(at, |common| known.given(common).0);
+        let exactly = self.scalars().all(|common| known.given(common).1);
+        let course = &known.trajectory(self.trajectory).course;
+        [course.position.near(time, exactly), course.rotation.near(time, exactly)]
+    }
+
+    /// The trajectory at the time of an image, and that time.
+    fn flown(&self, at: f64, grounds: &Grounds<'_>) -> (f64, Flight) {
+        let time = self.time_of(at, |common| grounds.common(common).0.vector().x);
+        (time, self.flown_at(time, grounds))
+    }
+
+    fn flown_at(&self, time: f64, grounds: &Grounds<'_>) -> Flight {
+        let Trajectory { course, position, rotation } = grounds.known().trajectory(self.trajectory);
+        let value = |all: &[usize], k: usize| grounds.common(all[k]).0.vector();
+        course.at(time, &|k| value(position, k), &|k| value(rotation, k))
+    }
+
+    /// The common unknowns that its time has, each with what a unit of it makes of that.
+    fn scaled(&self, at: f64) -> impl Iterator<Item = (usize, f64)> {
+        self.rate.map(|own| (own, at)).into_iter().chain(self.offset.map(|own| (own, 1.0)))
+    }
+
+    fn scalars(&self) -> impl Iterator<Item = usize> {
+        self.rate.into_iter().chain(self.offset)
+    }
+}
+
+impl MountModel for OnTrajectory {
+    fn photo(&self) -> usize {
+        self.photo
+    }
+
+    fn unknowns(&self) -> Vec<(usize, CommonKind)> {
+        let rate = self.rate.map(|common| (common, CommonKind::Readout));
+        rate.into_iter().chain(self.offset.map(|common| (common, CommonKind::Clock))).collect()
+    }
+
+    fn trajectory(&self) -> Option<usize> {
+        Some(self.trajectory)
+    }
+
+    fn flight(&self, at: f64, known: &Mounts) -> Option<(usize, f64)> {
+        Some((self.trajectory, self.time_of(at, |common| known.given(common).0)))
+    }
+
+    fn commons(&self, at: Option<f64>, known: &Mounts) -> Vec<usize> {
+        let Trajectory { position, rotation, .. } = known.trajectory(self.trajectory);
+        let [p, r] = at.map_or([0..position.len(), 0..rotation.len()], |at| self.active(at, known));
+        position[p].iter().chain(&rotation[r]).copied().chain(self.scalars()).collect()
+    }
+
+    fn replaces(&self) -> bool {
+        true
+    }
+
+    /// The constant of a polynomial. Splines have none.
+    fn main(&self, known: &Mounts) -> Option<usize> {
+        let Trajectory { course, position, rotation } = known.trajectory(self.trajectory);
+        match (&course.position, &course.rotation) {
+            (Basis::Polynomial(_), _) => position.first().copied(),
+            (Basis::None, Basis::Polynomial(_)) => rotation.first().copied(),
+            _ => None,
+        }
+    }
+
+    fn is_timed(&self) -> bool {
+        true
+    }
+
+    /// By the offset of a clock: the difference of what is half a millisecond later and earlier.
+    fn moving(&self, at: f64, grounds: &Grounds<'_>) -> Option<Moving> {
+        const HALF: f64 = 5e-4;
+        let known = grounds.known();
+        let Trajectory { position, rotation, .. } = known.trajectory(self.trajectory);
+        let (time, flight) = self.flown(at, grounds);
+        let mut found = Moving {
+            velocity: flight.motion.velocity,
+            rate: flight.motion.rate,
+            velocity_by: vec![],
+            rate_by: vec![],
+        };
+        let block = |common: usize| grounds.common(common).1;
+        let whole = |partials: &Matrix3| Matrix3xX::from_column_slice(partials.as_slice());
+        let [p, r] = self.active(at, known);
+        let by = p.filter_map(|k| Some((block(position[k])?, whole(&flight.velocity_by_position(k)))));
+        found.velocity_by.extend(by);
+        let by = r.filter_map(|k| Some((block(rotation[k])?, whole(&flight.rate_by_rotation(k)))));
+        found.rate_by.extend(by);
+        let [before, after] = [-HALF, HALF].map(|step| self.flown_at(time + step, grounds).motion);
+        for (common, times) in self.scaled(at) {
+            let Some(block) = block(common) else { continue };
+            let slope = |of: &dyn Fn(&Motion) -> Vector3| {
+                Matrix3xX::from_columns(&[times * (of(&after) - of(&before)) / (2.0 * HALF)])
+            };
+            found.velocity_by.push((block, slope(&|motion| motion.velocity)));
+            found.rate_by.push((block, slope(&|motion| motion.rate)));
+        }
+        Some(found)
+    }
+
+    fn compose(&self, at: f64, grounds: &Grounds<'_>, pose: &mut Chain) {
+        let known = grounds.known();
+        let Trajectory { position, rotation, .. } = known.trajectory(self.trajectory);
+        let (_, flight) = self.flown(at, grounds);
+        pose.stand(flight.motion.pose);
+        let mut add = |common: usize, own: &dyn Fn() -> Steps| {
+            if let Some(block) = grounds.common(common).1 {
+                pose.add(block, own());
+            }
+        };
+        let [p, r] = self.active(at, known);
+        for k in p {
+            add(position[k], &|| columns(&flight.by_position(k), &Matrix3::zeros()));
+        }
+        for k in r {
+            add(rotation[k], &|| columns(&Matrix3::zeros(), &flight.by_rotation(k)));
+        }
+        let (velocity, turning) = flight.by_time();
+        for (common, times) in self.scaled(at) {
+            add(common, &|| steps([(times * velocity, times * turning)]));
+        }
+    }
+}
+
+fn columns(shifts: &Matrix3, turns: &Matrix3) -> Steps {
+    steps((0..3).map(|k| -> (Vector3, Vector3) { (shifts.column(k).into(), turns.column(k).into()) }))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::super::tests::agrees;
+    use super::{CommonKind, OnTrajectory, Trajectory, Vector3};
+    use crate::geometry::rotation;
+    use crate::geometry::trajectory::{self, Attitudes, Basis, Interpolation, Polynomial, Positions, Spline};
+
+    /// A curve, corrected by a straight line and a spline; body and table apart where they are asked to be.
+    fn trajectory(turning: bool) -> Trajectory {
+        let times: Vec<f64> = (0..6).map(|k| -4.0 + 1.6 * f64::from(k)).collect();
+        let places = times.iter().map(|t| Vector3::new(150.0 + t.cos(), 200.0 + 0.3 * t, 170.0)).collect();
+        let turned = times.iter().map(|t| rotation([0.3 * t.sin(), 0.1, 0.2 * t])).collect();
+        let attitudes = Attitudes::new(times.clone(), turned, Interpolation::Linear).unwrap();
+        let positions = Positions::new(times, places, vec![], Interpolation::Lagrange).unwrap();
+        let position = Basis::Polynomial(Polynomial { degree: 1, reference: 0.3, scale: 2.0 });
+        let knots = (0..9).map(|k| -7.0 + 1.9 * f64::from(k)).collect();
+        let rotation = Basis::Spline(Spline { degree: 3, knots });
+        let body = turning.then(|| attitudes.clone());
+        let course = trajectory::Trajectory { positions, attitudes, position, rotation, body };
+        Trajectory { course, position: vec![0, 1], rotation: vec![2, 3, 4, 5, 6] }
+    }
+
+    #[test]
+    fn steps_agree_with_differences() {
+        let kinds = [
+            vec![CommonKind::PositionCoefficient; 2],
+            vec![CommonKind::RotationCoefficient; 5],
+            vec![CommonKind::Readout, CommonKind::Clock],
+        ]
+        .concat();
+        for turning in [false, true] {
+            for (rate, offset) in [(None, None), (Some(7), None), (Some(7), Some(8))] {
+                let mount = OnTrajectory { photo: 0, trajectory: 0, time: 0.1, rate, offset };
+                agrees(mount.into(), &kinds, &[trajectory(turning)]);
+            }
+        }
+    }
+}

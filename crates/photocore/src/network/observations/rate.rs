@@ -1,0 +1,81 @@
+//! Rates of rotation from gyroscopes.
+
+use nalgebra::DMatrix;
+
+use super::{
+    CommonKind, Fault, Named, ObservationModel, Precision, Quantity, Rows, Sites, Touches, nine, rotates,
+    three,
+};
+use crate::geometry::{Matrix3, Vector3};
+
+/// The rate of the body that carries a camera, about its own axes, at a photo or record on a trajectory.
+///
+/// `B^T w + b`, with the partials `B^T` by w, `[B^T w]x` by a turn of B about the axes of the body, and `I` by the bias b.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rate {
+    /// The photo, which is on a trajectory.
+    pub photo: usize,
+    /// Radians in a second.
+    pub rate: [f64; 3],
+    /// B, body to photo.
+    pub boresight: Quantity<Matrix3>,
+    /// b, where there is one.
+    pub bias: Option<usize>,
+    /// Of the three axes of the body.
+    pub precision: Precision,
+}
+
+impl ObservationModel for Rate {
+    const NAME: &'static str = "rate";
+
+    /// The rate, then B where it is known, row by row; the boresight, the bias.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[photo], &[boresight, bias]) = (of.photos, of.commons) else { return None };
+        let boresight = Quantity::new(boresight, nine(values, 3)?);
+        let precision = Precision::Covariance(covariance);
+        Some(Self { photo, rate: three(values, 0)?, boresight, bias, precision })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::photos(&[self.photo])
+            .and(self.boresight.common(), CommonKind::Boresight)
+            .and(self.bias, CommonKind::GyroBias)
+    }
+
+    fn moves(&self) -> bool {
+        true
+    }
+
+    fn rows(&self) -> usize {
+        3
+    }
+
+    fn precision(&self) -> Precision {
+        self.precision.clone()
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let Some(moving) = sites.moving(0) else { return };
+        let (boresight, bias) = match self.boresight {
+            Quantity::Known(boresight) => (boresight, 0),
+            Quantity::Common(_) => (*sites.common(0).attitude(), 1),
+        };
+        let mut computed = boresight.tr_mul(&moving.rate);
+        rows.by_rate(0, 0, &boresight.transpose());
+        if self.boresight.common().is_some() {
+            rows.by_turn(0, 0, &computed.cross_matrix());
+        }
+        if self.bias.is_some() {
+            computed += sites.common(bias).vector();
+            rows.by_offset(0, bias, &Matrix3::identity());
+        }
+        rows.residual(0, (Vector3::from(self.rate) - computed).as_slice());
+    }
+
+    fn check(&self) -> Result<(), Fault> {
+        match &self.boresight {
+            Quantity::Known(boresight) => rotates(boresight),
+            Quantity::Common(_) => Ok(()),
+        }
+    }
+}

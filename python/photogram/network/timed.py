@@ -1,0 +1,266 @@
+"""Photos on trajectories: frames, rolling shutters, line scanners; records of GNSS and inertial units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import names, number, one_of, shaped, shown
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.network.attitudes import Attitudes, Representation
+from photogram.network.trajectories import Clock, Polynomial, Readout, Table, Trajectory
+from photogram.network.unknowns import Sensor, Unknown
+
+if TYPE_CHECKING:
+    from photogram.network.block import Block
+
+__all__ = ["LineSensor", "Lines", "Moment", "Shutter", "Timed", "checked_timed", "own_trajectories"]
+
+Direction = Literal["down", "up", "right", "left"]
+
+
+@dataclass(frozen=True)
+class Shutter:
+    """A rolling shutter: row r of h is exposed at t_e + (r / h) T.
+
+    Parameters
+    ----------
+    readout
+        T, one object for all photos of a camera; or its value in seconds, known.
+    edges
+        Image coordinates of the edges where reading begins and ends (r = 0 and r = h): 0 and the height, in
+        pixels from the upper edge; in millimetres of a photo with y up the larger comes first.
+    direction
+        `down` and `up` read rows, `right` and `left` columns: which coordinate counts. `edges` say where it
+        begins; of `up` and `left` T is positive as well.
+    """
+
+    readout: Readout | float
+    edges: tuple[float, float]
+    direction: Direction = "down"
+
+    def __post_init__(self) -> None:
+        one_of("direction", self.direction, get_args(Direction))
+        first, last = (number("edge of a shutter", each) for each in self.edges)
+        if not np.isfinite([first, last]).all() or first == last:
+            raise InputError(f"the edges of a shutter are two coordinates: {shown(self.edges)}")
+        if not isinstance(self.readout, Readout):
+            sd = 0.0
+            object.__setattr__(self, "readout", Readout("readout", number("readout", self.readout), sd))
+
+    def times(self, xy: Floats) -> Floats:
+        """Return (n,) r / h of (n, 2) images."""
+        first, last = self.edges
+        along = xy[:, 1] if self.direction in ("down", "up") else xy[:, 0]
+        return np.asarray((along - first) / (last - first))
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """The times of the lines of a scanner: t = t_j + (line - l_j) dt_j from line l_j on.
+
+    Parameters
+    ----------
+    table
+        (k, 3) first line, time in seconds and seconds per line; lines from the upper edge (0), the middle of
+        line number k (from 0) being k + 0.5. The first and the last row go on beyond.
+    """
+
+    table: ArrayLike
+
+    def __post_init__(self) -> None:
+        rows = np.atleast_2d(np.asarray(self.table, dtype=float))
+        sound = rows.ndim == 2 and rows.shape[1] == 3 and len(rows) and np.isfinite(rows).all()
+        if not sound or not (np.diff(rows[:, 0]) > 0).all() or not (rows[:, 2] != 0).all():
+            raise InputError(f"lines are first line, time, seconds per line, ascending: {shown(self.table)}")
+        object.__setattr__(self, "table", rows)
+
+    def times(self, lines: ArrayLike) -> Floats:
+        """Return the times of lines, in seconds."""
+        rows, lines = np.asarray(self.table), np.asarray(lines, dtype=float)
+        own = rows[np.maximum(np.searchsorted(rows[:, 0], lines, side="right") - 1, 0)]
+        return np.asarray(own[..., 1] + (lines - own[..., 0]) * own[..., 2])
+
+
+@dataclass(frozen=True)
+class LineSensor:
+    """Where a sample is in the focal plane: (x0, y0) + (sample - s0) (pitch_x, pitch_y).
+
+    Parameters
+    ----------
+    pitch
+        Millimetres from sample to sample, along x and y.
+    s0
+        The sample at (x0, y0): half of all samples, from the edge of the first, where that is the middle.
+    x0, y0
+        Millimetres.
+    """
+
+    pitch: tuple[float, float]
+    s0: float
+    x0: float = 0.0
+    y0: float = 0.0
+
+    def places(self, samples: Floats) -> Floats:
+        """Return (n, 2) places of samples in the focal plane, in millimetres."""
+        return np.asarray([self.x0, self.y0] + (samples[:, np.newaxis] - self.s0) * np.array(self.pitch))
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A time on a trajectory that an observation beside images is of."""
+
+    trajectory: Trajectory
+    time: float
+    clock: Clock | None = None
+
+    @property
+    def name(self) -> str:
+        """What reports call it."""
+        clock = "" if self.clock is None else f", {self.clock.name}"
+        return f"{self.trajectory.name} at {self.time!r} s{clock}"
+
+    @property
+    def unknowns(self) -> list[Unknown]:
+        """What its pose is made of."""
+        position, rotation = self.trajectory.coefficients
+        return [*position, *rotation, *([] if self.clock is None else [self.clock])]
+
+
+@dataclass(frozen=True, eq=False)
+class Timed:
+    """That a photo is on a trajectory: each of its images has the pose of its own time.
+
+    Parameters
+    ----------
+    photo
+        Its name. Of its own pose nothing counts but where it is about.
+    trajectory
+        None: its own, uniform motion from its pose on, in which position and attitude of the block, and their
+        standard deviations, are those at `time`.
+    time
+        t_e in seconds: of a frame, or of the edge where a shutter begins. Of a scanner the time that factors
+        of its line rates count from; None: the middle of its images.
+    shutter, lines
+        Of a camera with a rolling shutter; of a scanner, whose images have samples and lines as coordinates.
+    line_sensor
+        Of a scanner: where its samples are.
+    sensor
+        The pose of the camera on what moves on the trajectory; None: the same.
+    offset
+        Of its clock, unknown.
+    rate
+        The factor of its line rates, unknown.
+    velocity, rotation_rate
+        (3,) of its own trajectory: what is given of its velocity, in the linear unit a second along X, Y, Z,
+        and of its rate about its own axes in radians a second.
+    sd_velocity, sd_rate
+        (3,) standard deviations of the same; infinite: free.
+    """
+
+    photo: str
+    trajectory: Trajectory | None = None
+    time: float | None = None
+    shutter: Shutter | None = None
+    lines: Lines | None = None
+    line_sensor: LineSensor | None = None
+    sensor: Sensor | None = None
+    offset: Clock | None = None
+    rate: Readout | None = None
+    velocity: ArrayLike = 0.0
+    rotation_rate: ArrayLike = 0.0
+    sd_velocity: ArrayLike = np.inf
+    sd_rate: ArrayLike = np.inf
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "photo", names("photo of a trajectory", [self.photo])[0])
+        if (self.lines is None) != (self.line_sensor is None):
+            raise InputError(f"the scanner {self.photo} needs both lines and line_sensor")
+        if self.shutter is not None and (self.lines is not None or self.rate is not None):
+            raise InputError(f"the photo {self.photo} has a shutter or lines, not both")
+        if self.rate is not None and self.lines is None:
+            raise InputError(f"the photo {self.photo} has a factor of line rates, but no lines")
+
+    @property
+    def readout(self) -> Readout | None:
+        """What the times of images are multiplied by."""
+        shutter = self.shutter.readout if self.shutter is not None else None
+        return shutter if isinstance(shutter, Readout) else self.rate
+
+    @property
+    def scalars(self) -> list[Unknown]:
+        """The unknowns of its times."""
+        return [each for each in (self.readout, self.offset) if each is not None]
+
+    def images(self, xy: Floats) -> tuple[float, Floats, Floats]:
+        """Return its time, and of (n, 2) images their times on its scale and coordinates for the core."""
+        if self.lines is not None and self.line_sensor is not None:
+            times = self.lines.times(xy[:, 1])
+            time = float(times.mean()) if self.time is None and len(times) else self.time or 0.0
+            return time, times - time, self.line_sensor.places(xy[:, 0])
+        time = self.time or 0.0
+        return time, np.zeros(len(xy)) if self.shutter is None else self.shutter.times(xy), xy
+
+
+def checked_timed(timed: object, photos: Sequence[str]) -> tuple[Timed, ...]:
+    """Return what says which photos are on trajectories, checked against the photos of a block.
+
+    Raises
+    ------
+    InputError
+        What is no Timed, a photo that is not there or twice, trajectories of one name.
+    """
+    if not isinstance(timed, Sequence):
+        raise InputError(f"timed is no list: {shown(timed)}")
+    known, seen = set(photos), set()
+    for row, each in enumerate(timed):
+        if not isinstance(each, Timed):
+            raise InputError(f"timed[{row}] is no Timed: {shown(each)}")
+        if each.photo not in known:
+            raise InputError(f"the block has no photo {each.photo}, which timed[{row}] names")
+        if each.photo in seen:
+            raise InputError(f"the photo {each.photo} is on two trajectories")
+        seen.add(each.photo)
+    return tuple(timed)
+
+
+def own_trajectories(block: Block) -> list[Trajectory]:
+    """Return the trajectory of each timed photo: that which it is given, or uniform motion from its pose."""
+    places = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
+    return [each.trajectory or _uniform(block, each, places[each.photo]) for each in block.timed]
+
+
+def _uniform(block: Block, own: Timed, row: int) -> Trajectory:
+    """Return c_0 + (t - t_e) v and r_0 + (t - t_e) w about the pose of a photo."""
+    if block.geographic:
+        raise InputError(f"the photo {own.photo} needs a trajectory: its space is geographic")
+    sd_position, sd_attitude = block.photo_position_sd[row], block.photo_attitude_sd[row]
+    if np.isfinite(sd_attitude).any() and not (sd_attitude == 0).all():
+        raise InputError(
+            f"the attitude of the photo {own.photo}, which moves, is weighted: give it as an Attitude"
+        )
+    observed = block.photo_positions_observed
+    weighted = np.isfinite(sd_position)
+    place = block.photo_positions[row]
+    if observed is not None:
+        place = np.where(weighted, observed[row], place)
+    time = own.time or 0.0
+    told: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+    attitude = Attitudes.of(told, block.photo_attitudes[[row]]).matrices
+    table = Table(np.array([time]), place[np.newaxis], np.array([time]), attitude)
+    shape = (3,)
+    values = [np.zeros(3), shaped("velocity", own.velocity, shape)]
+    turns = [np.zeros(3), shaped("rotation_rate", own.rotation_rate, shape)]
+    sd = [sd_position, shaped("sd_velocity", own.sd_velocity, shape)]
+    sd_turn = [sd_attitude, shaped("sd_rate", own.sd_rate, shape)]
+    return Trajectory(
+        own.photo,
+        table,
+        position=Polynomial(1, time, 1.0, np.array(values), np.array(sd)),
+        rotation=Polynomial(1, time, 1.0, np.array(turns), np.array(sd_turn)),
+    )

@@ -1,0 +1,476 @@
+"""Poses as functions of time: trajectories, rolling shutters, line scanners, clocks.
+
+The pose of an image is that of its trajectory at its time (docs/moving.md)::
+
+    C(t) = C0(t) + sum B_k(t) c_k        A(t) = A0(t) Exp(r(t)),  r(t) = sum B_k(t) r_k
+
+C0 and A0 are a table of what is known beforehand, c_k and r_k coefficients of a polynomial or a spline: free,
+weighted or known. Times are seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import names, number, one_of, shaped, shown
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.network.unknowns import Unknown
+
+if TYPE_CHECKING:
+    from photogram import _photocore
+
+__all__ = [
+    "Clock",
+    "Coefficient",
+    "GyroBias",
+    "Polynomial",
+    "Readout",
+    "Spline",
+    "Table",
+    "Trajectory",
+]
+
+Interpolation = Literal["linear", "hermite", "lagrange"]
+BasisRow = tuple[str, int, list[float]]
+"""Name, degree, and reference and scale of a polynomial, or the knots of a spline."""
+
+DEGREES = {"polynomial": (0, 8), "spline": (1, 5)}
+
+
+@dataclass(frozen=True, eq=False)
+class Coefficient(Unknown):
+    """A coefficient c_k or r_k of a trajectory."""
+
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class PositionCoefficient(Coefficient):
+    """A coefficient of the positions of a trajectory, in its axes and the linear unit."""
+
+    KIND = "position coefficient"
+
+
+@dataclass(frozen=True, eq=False)
+class RotationCoefficient(Coefficient):
+    """A coefficient of the rotation vectors of a trajectory, about the axes of the photo, in radians."""
+
+    KIND = "rotation coefficient"
+
+
+@dataclass(frozen=True, eq=False)
+class GyroBias(Unknown):
+    """What a gyroscope says of a body at rest: b, about the axes of the body.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    value, sd
+        (3,) radians a second.
+    """
+
+    KIND = "gyro bias"
+
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class _Scalar(Unknown):
+    def _position(self) -> Floats:
+        return np.array([number(f"value of {self.title}", getattr(self, "value")), 0.0, 0.0])  # noqa: B009
+
+
+@dataclass(frozen=True, eq=False)
+class Clock(_Scalar):
+    """The offset d of a clock: what it dates t was at t + d of the trajectory.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    value, sd
+        Seconds.
+    """
+
+    KIND = "clock"
+
+    value: float = 0.0
+    sd: ArrayLike = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Readout(_Scalar):
+    """The readout time of all rows of a rolling shutter, or a factor of the line rates of a scanner.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    value, sd
+        Seconds, or a number about 1.
+    """
+
+    KIND = "readout"
+
+    value: float = 1.0
+    sd: ArrayLike = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """What is known of a trajectory beforehand.
+
+    Parameters
+    ----------
+    times, positions
+        (k,) seconds, increasing, and (k, 3) projection centres in the object space: X, Y, Z, geocentric where
+        the object space is geographic; where there is a `body`, inertial.
+    attitude_times, attitudes
+        (m,) and (m, 3, 3) rotation matrices whose columns are the axes of the photo (x right, y up, z back)
+        in those of the positions.
+    velocities
+        (k, 3) in a second, for `hermite`.
+    interpolation, attitude_interpolation
+        Between records: `linear` (attitudes turn uniformly), `hermite` (positions alone), `lagrange` (eight
+        neighbours; attitudes by their quaternions).
+
+    Raises
+    ------
+    InputError
+        Times that do not increase, arrays of other lengths, matrices that are no rotations.
+    """
+
+    times: Floats
+    positions: Floats
+    attitude_times: Floats
+    attitudes: Floats
+    velocities: Floats | None = None
+    interpolation: Interpolation = "linear"
+    attitude_interpolation: Interpolation = "linear"
+
+    def __post_init__(self) -> None:
+        one_of("interpolation", self.interpolation, get_args(Interpolation))
+        one_of("attitude_interpolation", self.attitude_interpolation, ("linear", "lagrange"))
+        if (self.velocities is None) == (self.interpolation == "hermite"):
+            raise InputError("velocities are given for the interpolation hermite, and for no other")
+        times, turned = increasing("times", self.times), increasing("attitude_times", self.attitude_times)
+        self._set("times", times)
+        self._set("attitude_times", turned)
+        self._set("positions", shaped("positions", self.positions, (len(times), 3)))
+        self._set("attitudes", rotations("attitudes", self.attitudes, len(turned)))
+        if self.velocities is not None:
+            self._set("velocities", shaped("velocities", self.velocities, (len(times), 3)))
+
+    def _set(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The first and the last time of its records."""
+        both = (self.times, self.attitude_times)
+        return max(float(each[0]) for each in both), min(float(each[-1]) for each in both)
+
+
+def increasing(name: str, values: ArrayLike) -> Floats:
+    """Return (k,) finite times that increase."""
+    times = np.atleast_1d(np.asarray(values, dtype=float))
+    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
+        raise InputError(f"{name} do not increase, or are no times: {shown(values)}")
+    return times
+
+
+def rotations(name: str, values: ArrayLike, count: int) -> Floats:
+    """Return (count, 3, 3) rotation matrices."""
+    matrices = shaped(name, values, (count, 3, 3))
+    apart = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    bad = (apart > 1e-6) | (np.linalg.det(matrices) < 0)
+    if bad.any():
+        raise InputError(f"{name}[{int(np.argmax(bad))}] is no rotation matrix")
+    return matrices
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """Corrections that are polynomials: B_k = ((t - reference) / scale)^k.
+
+    Parameters
+    ----------
+    degree
+        0 to 8.
+    reference, scale
+        Seconds. None: the middle and half of the table's span; 0 and 1 where that has one record.
+    value, sd
+        (3,), (K, 3) or one number: what is given of the K = degree + 1 coefficients, and its standard
+        deviations, infinite (free), 0 (known) or between.
+    """
+
+    degree: int = 0
+    reference: float | None = None
+    scale: float | None = None
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+
+    @property
+    def count(self) -> int:
+        """How many coefficients there are."""
+        return self.degree + 1
+
+    @property
+    def _placed(self) -> tuple[float, float]:
+        if self.reference is None or self.scale is None:
+            raise InputError("a polynomial without reference and scale is of no trajectory")
+        return self.reference, self.scale
+
+    def over(self, first: float, last: float) -> Polynomial:
+        """Return it with reference and scale for a span of time."""
+        least, most = DEGREES["polynomial"]
+        if not least <= self.degree <= most:
+            raise InputError(f"the degree of a polynomial is from {least} to {most}, not {self.degree}")
+        alone = not last > first
+        reference = self.reference if self.reference is not None else 0.0 if alone else (first + last) / 2
+        scale = self.scale if self.scale is not None else 1.0 if alone else (last - first) / 2
+        return replace(self, reference=reference, scale=scale)
+
+    def row(self, origin: float) -> BasisRow:
+        """Return what the core takes, times counted from an origin."""
+        reference, scale = self._placed
+        return "polynomial", self.degree, [reference - origin, scale]
+
+    def at(self, times: ArrayLike) -> Floats:
+        """Return (n, K) values of its functions."""
+        reference, scale = self._placed
+        s = (np.asarray(times, dtype=float) - reference) / scale
+        return np.asarray(s[..., np.newaxis] ** np.arange(self.count))
+
+    @property
+    def smoothed(self) -> list[tuple[list[int], list[float], float]]:
+        """Nothing is observed of its coefficients together."""
+        return []
+
+
+@dataclass(frozen=True)
+class Spline:
+    """Corrections that are splines in time, B-splines over knots.
+
+    Parameters
+    ----------
+    every
+        Seconds from knot to knot over the table's span, which is divided evenly; or `knots`.
+    knots
+        (n,) all of them, not decreasing; n - degree - 1 coefficients.
+    degree
+        1 to 5.
+    value, sd
+        As for :class:`Polynomial`.
+    smooth
+        q and s: differences of order q = 1, 2 or 3 of neighbours are 0 with the standard deviation s. With
+        knots h apart that is white noise of the q-th derivative of the density s^2 / h^(2q - 1).
+    correlation
+        T and s: a process of Gauss and Markov with the correlation time T in seconds and the standard
+        deviation s.
+    """
+
+    every: float | None = None
+    knots: ArrayLike | None = None
+    degree: int = 3
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+    smooth: tuple[int, float] | None = None
+    correlation: tuple[float, float] | None = None
+
+    @property
+    def count(self) -> int:
+        """How many coefficients there are."""
+        return len(self._knots) - self.degree - 1
+
+    @property
+    def _knots(self) -> Floats:
+        if self.knots is None:
+            raise InputError("a spline without knots is of no trajectory")
+        return np.asarray(self.knots, dtype=float)
+
+    def over(self, first: float, last: float) -> Spline:
+        """Return it with knots for a span of time: even over it, as many beyond each end as the degree."""
+        least, most = DEGREES["spline"]
+        p = self.degree
+        if not least <= p <= most:
+            raise InputError(f"the degree of a spline is from {least} to {most}, not {p}")
+        if (self.every is None) == (self.knots is None):
+            raise InputError("a spline needs either every or knots")
+        if self.every is not None:
+            if not (self.every > 0 and last > first):
+                raise InputError(f"every is a positive number of seconds of a table, not {self.every}")
+            parts = max(1, round((last - first) / self.every))
+            h = (last - first) / parts
+            return replace(self, every=None, knots=first + h * np.arange(-p, parts + p + 1))
+        knots = self._knots
+        ascend = knots.ndim == 1 and np.isfinite(knots).all() and (np.diff(knots) >= 0).all()
+        if not ascend or len(knots) < 2 * p + 2 or not knots[p] < knots[-p - 1]:
+            raise InputError(f"knots of a spline of degree {p} decrease, or are too few: {shown(self.knots)}")
+        return self
+
+    def row(self, origin: float) -> BasisRow:
+        """Return what the core takes, times counted from an origin."""
+        return "spline", self.degree, (self._knots - origin).tolist()
+
+    def at(self, times: ArrayLike) -> Floats:
+        """Return (n, K) values of its functions (Cox and de Boor)."""
+        knots, p = self._knots, self.degree
+        t = np.asarray(times, dtype=float)[..., np.newaxis]
+        inside = np.clip(np.searchsorted(knots, t[..., 0], side="right") - 1, p, len(knots) - p - 2)
+        found = np.asarray(np.arange(len(knots) - 1) == inside[..., np.newaxis], dtype=float)
+        for degree in range(1, p + 1):
+            n = len(knots) - 1 - degree
+            begin, end = knots[:n], knots[degree : degree + n]
+            length = np.where(end > begin, end - begin, np.inf)
+            after = knots[degree + 1 :]
+            later = np.where(after > knots[1 : n + 1], after - knots[1 : n + 1], np.inf)
+            found = (t - begin) / length * found[..., :n] + (after - t) / later * found[..., 1 : n + 1]
+        return found
+
+    @property
+    def smoothed(self) -> list[tuple[list[int], list[float], float]]:
+        """What is observed of coefficients together: which, their factors, the standard deviation of 0."""
+        found: list[tuple[list[int], list[float], float]] = []
+        if self.smooth is not None:
+            found += self._differences(*self.smooth)
+        if self.correlation is not None:
+            found += self._markov(*self.correlation)
+        return found
+
+    def _differences(self, order: int, sd: float) -> list[tuple[list[int], list[float], float]]:
+        """Return divided differences at the Greville points, those of even knots times h^q."""
+        if order not in (1, 2, 3) or not 0 < sd < np.inf:
+            raise InputError(f"smooth is an order of 1, 2 or 3 and a standard deviation: {self.smooth}")
+        knots, p = self._knots, self.degree
+        places = np.array([knots[k + 1 : k + p + 1].mean() for k in range(self.count)])
+        h = float(np.median(np.diff(places)))
+        found = []
+        for k in range(self.count - order):
+            own = places[k : k + order + 1]
+            gaps = own[:, np.newaxis] - own
+            np.fill_diagonal(gaps, 1.0)
+            factors = h**order * _factorial(order) / gaps.prod(axis=1)
+            step = (own[-1] - own[0]) / order
+            found.append((list(range(k, k + order + 1)), factors.tolist(), sd * float(np.sqrt(h / step))))
+        return found
+
+    def _markov(self, time: float, sd: float) -> list[tuple[list[int], list[float], float]]:
+        if not (0 < time < np.inf and 0 < sd < np.inf):
+            raise InputError(f"correlation is a time and a standard deviation: {self.correlation}")
+        knots, p = self._knots, self.degree
+        places = np.array([knots[k + 1 : k + p + 1].mean() for k in range(self.count)])
+        found = [([0], [1.0], sd)]
+        for k, step in enumerate(np.diff(places).tolist()):
+            kept = float(np.exp(-step / time))
+            found.append(([k, k + 1], [-kept, 1.0], sd * float(np.sqrt(1 - kept**2))))
+        return found
+
+
+def _factorial(n: int) -> float:
+    return float(np.prod(np.arange(1, n + 1)))
+
+
+Basis = Polynomial | Spline
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A pose as a function of time, shared by the images and records that are on it.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    table
+        What is known of it beforehand.
+    position, rotation
+        What its corrections are made of; None for none.
+    body
+        (m,) times and (m, 3, 3) matrices, inertial to body, of a body that turns under an inertial table.
+
+    Attributes
+    ----------
+    coefficients
+        Those of positions, and those of rotations: common unknowns of the block.
+
+    Raises
+    ------
+    InputError
+        Bases that are none, a table that is none.
+    """
+
+    name: str
+    table: Table
+    position: Basis | None = None
+    rotation: Basis | None = None
+    body: tuple[ArrayLike, ArrayLike] | None = None
+    coefficients: tuple[tuple[Coefficient, ...], tuple[Coefficient, ...]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._set("name", names("name of a trajectory", [self.name])[0])
+        if not isinstance(self.table, Table):
+            raise InputError(f"the table of the trajectory {self.name} is no Table: {shown(self.table)}")
+        kinds = (("position", PositionCoefficient), ("rotation", RotationCoefficient))
+        self._set("coefficients", tuple(self._coefficients(name, kind) for name, kind in kinds))
+        if self.body is not None:
+            times, matrices = self.body
+            times = increasing("times of a body", times)
+            self._set("body", (times, rotations("matrices of a body", matrices, len(times))))
+
+    def _set(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
+
+    def _coefficients(self, what: str, kind: type[Coefficient]) -> tuple[Coefficient, ...]:
+        basis: Basis | None = getattr(self, what)
+        if basis is None:
+            return ()
+        if not isinstance(basis, Polynomial | Spline):
+            raise InputError(f"{what} of the trajectory {self.name} is no basis: {shown(basis)}")
+        basis = basis.over(*self.table.span)
+        self._set(what, basis)
+        shape = (basis.count, 3)
+        value = shaped(f"value of the {what} of {self.name}", basis.value, shape)
+        sd = shaped(f"sd of the {what} of {self.name}", basis.sd, shape)
+        return tuple(kind(f"{self.name} {what} {k}", value=value[k], sd=sd[k]) for k in range(basis.count))
+
+    @property
+    def origin(self) -> float:
+        """A whole second at its beginning: times are counted from there, so that no digits are lost."""
+        return float(np.floor(self.table.times[0]))
+
+    def row(self, places: dict[int, int]) -> _photocore.TrajectoryRow:
+        """Return what the core takes; `places` are those of common unknowns by their identity."""
+        table, origin = self.table, self.origin
+
+        def attitudes(times: Floats, matrices: Floats, joined: str) -> tuple[list[float], Floats, str]:
+            return (times - origin).tolist(), matrices.reshape(-1, 9), joined
+
+        position, rotation = ([places[id(each)] for each in own] for own in self.coefficients)
+        none: BasisRow = ("none", 0, [])
+        return {
+            "times": (table.times - origin).tolist(),
+            "positions": table.positions,
+            "velocities": table.velocities,
+            "interpolation": table.interpolation,
+            "attitudes": attitudes(table.attitude_times, table.attitudes, table.attitude_interpolation),
+            "position_basis": none if self.position is None else self.position.row(origin),
+            "rotation_basis": none if self.rotation is None else self.rotation.row(origin),
+            "position": position,
+            "rotation": rotation,
+            "body": None if self.body is None else attitudes(*_arrays(self.body), "linear"),
+        }
+
+
+def _arrays(body: Sequence[Any]) -> tuple[Floats, Floats]:
+    times, matrices = body
+    return np.asarray(times), np.asarray(matrices)

@@ -1,0 +1,374 @@
+"""Golden data of poses as functions of time: an independent dense program, partials by complex step.
+
+Tolerances are those of its README unless a comment says why not.
+"""
+
+import json
+
+import numpy as np
+import pytest
+
+from photogram import Block, Camera, adjust
+from photogram.network.geometry import Spheroid
+from photogram.network.observations import Attitude, Control, Position, Smoothness
+from photogram.network.timed import Lines, LineSensor, Shutter, Timed
+from photogram.network.trajectories import Clock, Polynomial, Readout, Spline, Table, Trajectory
+from photogram.network.unknowns import Boresight, Sensor
+from shared_data import SHARED
+
+MOVING = SHARED / "moving"
+
+
+def golden(name):
+    """Return inputs and solution of a golden network, or skip."""
+    path = MOVING / f"{name}.json"
+    if not path.exists():
+        pytest.skip(f"no {path}")
+    data = json.loads(path.read_text())
+    return data["inputs"], data["solution"]
+
+
+def covariances(kind):
+    """Return (n, r, r) of a kind of observation."""
+    each = kind["covariance"].get("each")
+    own = np.array(kind["covariance"]["all"] if each is None else each)
+    return own if own.ndim == 3 else np.broadcast_to(own, (len(kind["observed"]), *own.shape))
+
+
+def deviations(kind, shape):
+    """Return standard deviations of priors, as coefficients have them."""
+    return np.sqrt(covariances(kind)[:, 0, 0]).reshape(shape)
+
+
+def exponential(r):
+    """Return the rotation by a vector."""
+    angle = np.linalg.norm(r)
+    x, y, z = r
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    if angle < 1e-12:
+        return np.eye(3) + k
+    return np.eye(3) + np.sin(angle) / angle * k + (1 - np.cos(angle)) / angle**2 * k @ k
+
+
+def basis(given, prior):
+    """Return a basis with its priors."""
+    own = {"value": np.reshape(prior["observed"], (-1, 3)), "sd": deviations(prior, (-1, 3))}
+    if given["kind"] == "polynomial":
+        return Polynomial(given["degree"], given["reference"], given["scale"], **own)
+    return Spline(knots=given["knots"], degree=given["degree"], **own)
+
+
+def trajectory(name, given, position, rotation, body=None):
+    """Return a trajectory of a golden network with the priors of its coefficients."""
+    table = Table(
+        given["times"],
+        given["positions"],
+        given["attitude_times"],
+        given["matrices_photo_to_object"],
+        velocities=given["velocities"],
+        interpolation=given["position_interpolation"],
+    )
+    position, rotation = basis(given["position_basis"], position), basis(given["attitude_basis"], rotation)
+    return Trajectory(name, table, position=position, rotation=rotation, body=body)
+
+
+def lines(given):
+    """Return the times of the lines of an image."""
+    return Lines(given["rows"])
+
+
+def scanners(kinds, points, cameras, **more):
+    """Return the block of the images of scanners, a photo for each kind of observation."""
+    photos = len(kinds)
+    own = {
+        "photo_positions": np.zeros((photos, 3)),
+        "photo_attitudes": np.zeros((photos, 3)),
+        "point_positions": points,
+        "image_photos": np.repeat(np.arange(photos), [len(each["point"]) for each in kinds]),
+        "image_points": np.concatenate([each["point"] for each in kinds]),
+        "image_xy": np.concatenate([each["observed"] for each in kinds]),
+        "image_sd": np.sqrt(covariances(kinds[0])[0, 0, 0]),
+        "cameras": cameras,
+        "photo_cameras": np.zeros(photos, dtype=int),
+    }
+    return Block(**own | more)
+
+
+def controls(kind):
+    """Return control points with full covariances."""
+    together = zip(kind["point"], kind["observed"], covariances(kind), strict=True)
+    return [Control(str(point), xyz, covariance=q) for point, xyz, q in together]
+
+
+def agree(result, solution, images, *, sums=1e-8, redundancy=1e-8, residuals=1e-8):
+    """Assert degrees of freedom, sums of squares, redundancy numbers and residuals of images."""
+    assert result.degrees_of_freedom == solution["degrees_of_freedom"]
+    assert result.sums_of_squares.total == pytest.approx(solution["sum_of_squares"], rel=sums)
+    truth = [solution["kinds"][name] for name in images]
+    expected = np.concatenate([each["redundancy"] for each in truth])
+    np.testing.assert_allclose(result.redundancy, expected, rtol=0, atol=redundancy)
+    expected = np.concatenate([each["residuals"] for each in truth])
+    np.testing.assert_allclose(
+        result.residuals, expected, rtol=0, atol=residuals * result.block.image_sd.max()
+    )
+    parts = result.redundancy.sum() + sum(each.redundancy.sum() for each in result.unknowns)
+    parts += sum(each.redundancy.sum() for each in result.kinds.values()) + np.nansum(result.point_redundancy)
+    assert parts == pytest.approx(solution["degrees_of_freedom"], abs=1e-6)
+
+
+def coefficients(result, trajectory, which):
+    """Return (K, 3) adjusted coefficients, and their (3 K, 3 K) cofactors."""
+    own = trajectory.coefficients[which]
+    found = {id(each.given): each for each in result.unknowns}
+    values = np.array([found[id(each)].position for each in own])
+    q = result.covariance([("unknown", each.name) for each in own]) / result.covariance_scale
+    return values, q
+
+
+def solved(result, solution, name, trajectory, which, *, unknowns=1e-6, cofactors=1e-8):
+    """Assert the coefficients of a trajectory, and their cofactors among each other."""
+    truth, q = solution["unknowns_solved"][name], np.array(solution["cofactors"][name])
+    value, sd = np.array(truth["value"]), np.array(truth["sd"])
+    ours, own = coefficients(result, trajectory, which)
+    assert (np.abs(ours - value) < unknowns * sd).all(), np.abs((ours - value) / sd).max()
+    scale = np.sqrt(np.outer(np.diag(q), np.diag(q)))
+    np.testing.assert_allclose(own / scale, q / scale, rtol=0, atol=cofactors)
+
+
+def solved_points(result, solution, *, unknowns=1e-6, cofactors=1e-8):
+    """Assert points and their standard deviations."""
+    truth = solution["unknowns_solved"]["points"]
+    value, sd = np.array(truth["value"]), np.array(truth["sd"])
+    assert (np.abs(result.point_positions - value) < unknowns * sd).all()
+    own = np.sqrt(np.einsum("nkk->nk", result.point_cofactors))
+    np.testing.assert_allclose(own, sd, rtol=cofactors)
+
+
+def test_rolling_shutter():
+    inputs, solution = golden("rolling_shutter")
+    camera, given, initial = inputs["camera"], inputs["observations"], inputs["initial"]
+    images, gnss, velocity, rate = (given[k] for k in ("image", "gnss", "gnss_velocity", "rate_given"))
+    shutter = Shutter(Readout("readout", initial["readout"]["value"][0]), (0.0, camera["height"]))
+    free = [np.inf] * 3
+
+    def uniform(known, k):
+        own = np.sqrt(np.diag(covariances(known)[k]))
+        return {"sd": [free, own]}, known["observed"][k]
+
+    def moving(k):
+        (sd, v), (turning, w) = uniform(velocity, k), uniform(rate, k)
+        matrix = inputs["photos"]["matrix_photo_to_object"][k]
+        position = Polynomial(1, value=[initial["position"]["value"][k], v], **sd)
+        rotation = Polynomial(1, value=[[0.0] * 3, w], **turning)
+        return Trajectory(
+            f"photo {k}", Table([0.0], [np.zeros(3)], [0.0], [matrix]), position=position, rotation=rotation
+        )
+
+    own = [moving(k) for k in range(len(initial["position"]["value"]))]
+    together = enumerate(zip(gnss["observed"], covariances(gnss), strict=True))
+    arm, after = gnss["lever_arm"], gnss["seconds_after_first_row"]
+    block = Block(
+        photo_positions=np.array(initial["position"]["value"]),
+        photo_attitudes=np.zeros((len(own), 3)),
+        cameras=[
+            Camera("pinhole", {"fx": camera["f"], "fy": camera["f"], "cx": camera["cx"], "cy": camera["cy"]})
+        ],
+        point_positions=np.array(initial["points"]["value"]),
+        image_photos=images["photo"],
+        image_points=images["point"],
+        image_xy=images["observed"],
+        image_sd=0.5,
+        timed=[Timed(str(k), each, shutter=shutter) for k, each in enumerate(own)],
+        observations=[
+            *(
+                Position(None, xyz, covariance=q, lever_arm=arm, trajectory=own[k], time=after)
+                for k, (xyz, q) in together
+            ),
+            *controls(given["control"]),
+        ],
+    )
+    result = adjust(block, tolerance=1e-10)
+    agree(result, solution, ["image"])
+    solved_points(result, solution)
+    truth = solution["unknowns_solved"]
+    for k, each in enumerate(own):
+        for which, names in enumerate((("position", "velocity"), ("rotation", "rate"))):
+            values, q = coefficients(result, each, which)
+            for row, name in enumerate(names):
+                expected, sd = (np.array(truth[name][what][k]) for what in ("value", "sd"))
+                assert (np.abs(values[row] - expected) < 1e-6 * sd).all()
+                np.testing.assert_allclose(np.sqrt(np.diag(q))[3 * row : 3 * row + 3], sd, rtol=1e-8)
+    found = next(each for each in result.unknowns if each.kind == "readout")
+    assert found.position[0] == pytest.approx(
+        truth["readout"]["value"][0], abs=1e-6 * truth["readout"]["sd"][0]
+    )
+    assert found.cofactors[0, 0] == pytest.approx(solution["cofactors"]["readout"][0][0], rel=1e-8)
+
+
+def test_pushbroom_strips():
+    inputs, solution = golden("pushbroom_strips")
+    given, initial = inputs["observations"], inputs["initial"]
+    clock = Clock("receiver", given["clock_given"]["observed"][0][0], sd=deviations(given["clock_given"], ()))
+    boresight, arm = Boresight("imu"), initial["lever_arm"]["value"]
+    own, observations = [], controls(given["control"])
+    for k in (1, 2):
+        strip = trajectory(
+            f"strip {k}",
+            inputs["trajectories"][k - 1],
+            given[f"position{k}_given"],
+            given[f"rotation{k}_given"],
+        )
+        own.append(strip)
+        at = {"trajectory": strip, "clock": clock}
+        gnss, imu = given[f"gnss{k}"], given[f"imu{k}"]
+        for time, xyz, q in zip(gnss["time"], gnss["observed"], covariances(gnss), strict=True):
+            observations.append(Position(None, xyz, covariance=q, lever_arm=arm, time=time, **at))
+        together = (imu["time"], imu["reference_matrices"], imu["observed"], covariances(imu))
+        for time, reference, turn, q in zip(*together, strict=True):
+            attitude = np.array(reference) @ exponential(turn)
+            observations.append(Attitude(None, attitude, covariance=q, boresight=boresight, time=time, **at))
+    kinds = [given["image1"], given["image2"]]
+    sensor = LineSensor((inputs["camera"]["pitch_mm"], 0.0), inputs["camera"]["samples"] / 2)
+    timed = [Timed(str(k), own[k], lines=lines(inputs["line_rates"][k]), line_sensor=sensor) for k in (0, 1)]
+    camera = Camera("perspective", {"c": inputs["camera"]["c_mm"]})
+    block = scanners(kinds, initial["points"]["value"], [camera], timed=timed, observations=observations)
+    result = adjust(block, tolerance=1e-10)
+    agree(result, solution, ["image1", "image2"])
+    solved_points(result, solution)
+    for k in (0, 1):
+        solved(result, solution, f"position{k + 1}", own[k], 0)
+        solved(result, solution, f"rotation{k + 1}", own[k], 1)
+    found = next(each for each in result.unknowns if each.kind == "clock")
+    truth = solution["unknowns_solved"]["clock"]
+    assert found.position[0] == pytest.approx(truth["value"][0], abs=1e-6 * truth["sd"][0])
+    assert found.cofactors[0, 0] == pytest.approx(solution["cofactors"]["clock"][0][0], rel=1e-8)
+
+
+def test_jitter():
+    inputs, solution = golden("jitter")
+    given, initial = inputs["observations"], inputs["initial"]
+    strip = trajectory("orbit", inputs["trajectories"][0], given["position_given"], given["rotation_given"])
+    smooth, turns = given["smoothness"], strip.coefficients[1]
+    observations = [
+        Smoothness(turns[k : k + 3], [1.0, -2.0, 1.0], observed, covariance=q)
+        for k, (observed, q) in enumerate(zip(smooth["observed"], covariances(smooth), strict=True))
+    ]
+    points, sd = np.array(initial["points"]["value"]), np.full((150, 3), np.inf)
+    control, plan, heights = (given[name] for name in ("control", "given_points", "heights"))
+    for kind, columns in ((control, slice(0, 3)), (plan, slice(0, 2)), (heights, slice(2, 3))):
+        points[kind["point"], columns] = kind["observed"]
+        sd[kind["point"], columns] = np.sqrt(np.diagonal(covariances(kind), axis1=1, axis2=2))
+    sensor = LineSensor((inputs["camera"]["pitch_mm"], 0.0), inputs["camera"]["samples"] / 2)
+    mounts = [None, Sensor("forward", np.zeros(3), inputs["mounts"]["forward"], sd=0.0)]
+    names = ["image_nadir", "image_forward"]
+    timed = [
+        Timed(str(k), strip, lines=lines(inputs["line_rates"][0]), line_sensor=sensor, sensor=mounts[k])
+        for k in (0, 1)
+    ]
+    camera = Camera("perspective", {"c": inputs["camera"]["c_mm"]})
+    kinds = [given[name] for name in names]
+    block = scanners(kinds, points, [camera], timed=timed, observations=observations, point_sd=sd)
+    result = adjust(block, tolerance=1e-10)
+    agree(result, solution, names)
+    solved_points(result, solution)
+    solved(result, solution, "position", strip, 0)
+    solved(result, solution, "rotation", strip, 1)
+
+
+def test_three_line():
+    inputs, solution = golden("three_line")
+    given, initial = inputs["observations"], inputs["initial"]
+    strip = trajectory("strip", inputs["trajectories"][0], given["position_given"], given["rotation_given"])
+    names = ["image_forward", "image_nadir", "image_backward"]
+    mounts = {}
+    for name in ("forward", "backward"):
+        prior = given[f"mount_{name}_given"]
+        matrix = np.array(inputs["mounts"][name]) @ exponential(np.ravel(prior["observed"]))
+        sd = [0.0] * 3 + deviations(prior, (3,)).tolist()
+        mounts[name] = Sensor(name, np.zeros(3), matrix, sd=sd)
+    gnss = given["gnss"]
+    together = zip(gnss["time"], gnss["observed"], covariances(gnss), strict=True)
+    observations = [
+        Position(None, xyz, covariance=q, trajectory=strip, time=time) for time, xyz, q in together
+    ] + controls(given["control"])
+    camera = inputs["camera"]
+    sensor = LineSensor((camera["pitch_mm"], 0.0), camera["samples"] / 2)
+    timed = [
+        Timed(
+            str(k),
+            strip,
+            lines=lines(inputs["line_rates"][0]),
+            line_sensor=sensor,
+            sensor=mounts.get(name.removeprefix("image_")),
+        )
+        for k, name in enumerate(names)
+    ]
+    lens = Camera("brown", {"c": camera["c_mm"], "K1": camera["k1"]})
+    kinds = [given[name] for name in names]
+    block = scanners(kinds, initial["points"]["value"], [lens], timed=timed, observations=observations)
+    result = adjust(block, tolerance=1e-10)
+    # A weighted mount is a rotation from the given one on; the golden program weighs the components of its
+    # rotation vector from the nominal mount, which is the same to the size of that vector, 2e-3.
+    agree(result, solution, names, sums=1e-6, redundancy=1e-6, residuals=1e-5)
+    solved_points(result, solution, unknowns=1e-4, cofactors=1e-6)
+    solved(result, solution, "position", strip, 0, unknowns=1e-4, cofactors=1e-6)
+    solved(result, solution, "rotation", strip, 1, unknowns=1e-4, cofactors=1e-6)
+
+
+def test_planetary_pair():
+    inputs, solution = golden("planetary_pair")
+    given, initial = inputs["observations"], inputs["initial"]
+    w = inputs["body"]["w"]
+
+    def body(time):
+        c, s = np.cos(w * time), np.sin(w * time)
+        return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    orbits = []
+    for k, own in enumerate(inputs["trajectories"], 1):
+        ends = [own["times"][0], own["times"][-1]]
+        priors = given[f"position{k}_given"], given[f"rotation{k}_given"]
+        orbits.append(trajectory(f"orbit {k}", own, *priors, body=(ends, [body(t) for t in ends])))
+    # Latitude, longitude, radius to longitude, latitude, height above a sphere.
+    radius = 3390.0
+
+    def placed(places):
+        latitude, longitude, r = np.asarray(places).T
+        return np.column_stack([longitude, latitude, r - radius])
+
+    points = placed(initial["points"]["value"])
+    sd = np.full(points.shape, np.inf)
+    known, control = given["points_given"], given["control"]
+    points[known["point"]] = placed(known["observed"])
+    variances = np.diagonal(covariances(known), axis1=1, axis2=2)
+    sd[known["point"]] = np.sqrt(variances)[:, [1, 0, 2]]
+    observations = []
+    for point, (latitude, longitude, r), q in zip(
+        control["point"], control["observed"], covariances(control), strict=True
+    ):
+        turn = np.array([[0, r * np.cos(latitude), 0], [r, 0, 0], [0, 0, 1.0]])
+        place = placed([[latitude, longitude, r]])[0]
+        observations.append(Control(str(point), place, covariance=turn @ q @ turn.T))
+    camera = inputs["camera"]
+    sensor = LineSensor((camera["pitch_mm"], 0.0), camera["samples"] / 2, y0=camera["detector_y_mm"])
+    timed = [
+        Timed(str(k), orbits[k], lines=lines(inputs["line_rates"][k]), line_sensor=sensor) for k in (0, 1)
+    ]
+    lens = Camera("brown", {"c": camera["c_mm"], "K1": -camera["k0"]})
+    names = ["image1", "image2"]
+    block = scanners(
+        [given[name] for name in names],
+        points,
+        [lens],
+        timed=timed,
+        observations=observations,
+        point_sd=sd,
+        spheroid=Spheroid(radius, radius),
+        linear_unit="km",
+    )
+    result = adjust(block, tolerance=1e-10)
+    # Errors of control are told here along east, north and up, there in latitude and longitude.
+    agree(result, solution, names, sums=1e-6, redundancy=1e-6, residuals=2e-5)
+    for k in (0, 1):
+        solved(result, solution, f"position{k + 1}", orbits[k], 0, unknowns=1e-4, cofactors=5e-6)
+        solved(result, solution, f"rotation{k + 1}", orbits[k], 1, unknowns=1e-4, cofactors=5e-6)
