@@ -155,6 +155,7 @@ def test_every_option_can_be_given(folder):
         ),
         ("max_iterations = 8", "max_iterations = -1", "cannot be negative"),
         ("interval = 0.01", "interval = 0.0", "must be positive"),
+        ("interval = 0.01", "interval = 1e-12", "more than 10,000 steps"),
         ('minimum_stars = [1, "2"]', "minimum_stars = []", "option 7 .pre-run. needs option 6"),
         ("first_post", "post", r"\[images\] has no post"),
         ("latitude_deg = 30.0", "", "latitude_deg is missing"),

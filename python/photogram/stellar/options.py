@@ -13,6 +13,8 @@ __all__ = ["Options"]
 
 _DAYS = 20 * math.pi
 """A time of ten days, in radians."""
+_STEPS = 10_000
+"""Of a curve: a table and a page have a row for each."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +115,12 @@ class Options:
         for name in limits:
             if not getattr(self, name) >= 0:
                 raise InputError(f"{name} is {getattr(self, name)}; it cannot be negative")
+
+        if self.curves and self.extent > _STEPS * self.interval:
+            raise InputError(
+                f"the curves to extent = {self.extent:g} m by interval = {self.interval:g} m have more than"
+                f" {_STEPS:,} steps"
+            )
 
     @property
     def camera_kind(self) -> tuple[float | None, bool, bool]:
