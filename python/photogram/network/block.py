@@ -155,8 +155,6 @@ class Block(Valued, Brief):
     timed: Sequence[Timed] = ()
     frame: Frame = field(default_factory=Frame)
     point_check_sd: Floats | None = None
-    trajectories: list[Trajectory] = field(init=False, repr=False, compare=False)
-
     if TYPE_CHECKING:
         # What checkers of types are told: more can be given than what the fields then hold.
         def __init__(
@@ -329,11 +327,29 @@ class Block(Valued, Brief):
 
     def _check_timed(self) -> None:
         self._set("timed", checked_timed(self.timed, self.photo_ids))
-        self._set("trajectories", own_trajectories(self))
+        self._set("_trajectories", own_trajectories(self))
         on_frames = {each.photo for each in self.mounts} | {each.frame for each in self.mounts}
         both = [each.photo for each in self.timed if each.photo in on_frames]
         if both:
             raise InputError(f"the photo {both[0]} is on a trajectory and on a frame: say so by its sensor")
+        shared = [each.photo for each in self.timed if each.trajectory is not None]
+        if shared:
+            on_shared = np.isin(self.photo_ids, shared)[:, np.newaxis]
+            why = "is weighted or fixed, but the photo is on a trajectory, whose coefficients may be"
+            for name in ("photo_position_sd", "photo_attitude_sd"):
+                self._refuse(name, on_shared & np.isfinite(getattr(self, name)), why, self.photo_ids)
+        scanned = [each.photo for each in self.timed if each.lines is not None]
+        if scanned and self.image_unit != "mm":
+            raise InputError(
+                f"the photo {scanned[0]} is a scanner's: its camera is in mm, not {self.image_unit}"
+            )
+        of_records = (each.moment.trajectory for each in self.observations if each.moment is not None)
+        every = {id(each): each for each in (*self.trajectories, *of_records)}.values()
+        twice = [name for name, count in Counter(each.name for each in every).items() if count > 1]
+        if twice:
+            raise InputError(
+                f"two trajectories are called {twice[0]}: photos and records that are on one take one object"
+            )
 
     def _check_observations(self) -> None:
         if not isinstance(self.observations, Sequence):
@@ -388,6 +404,12 @@ class Block(Valued, Brief):
     def geographic(self) -> bool:
         """Whether positions are longitude, latitude and height."""
         return self.spheroid is not None
+
+    @property
+    def trajectories(self) -> list[Trajectory]:
+        """The trajectory of each of `timed`: what it is given, or its own."""
+        own: list[Trajectory] = vars(self)["_trajectories"]
+        return own
 
     @property
     def unknowns(self) -> list[Unknown]:
@@ -509,7 +531,7 @@ class Block(Valued, Brief):
         InputError
             A name that is no field, or whatever the class refuses.
         """
-        values = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
         if unknown := changes.keys() - values.keys():
             raise InputError(f"a block has no {', '.join(sorted(unknown))}")
         points = changes.get("point_ids")
@@ -543,14 +565,15 @@ def of_images_alone(block: Block, what: str) -> Block:
     Raises
     ------
     InputError
-        Observations beside images, photos on frames.
+        Observations beside images, photos on frames or trajectories.
     """
+    if block.timed:
+        photo = block.timed[0].photo
+        raise InputError(f"{what}: the photo {photo} is on a trajectory, which is not taken there")
     if block.observations:
         raise InputError(f"{what}: the block has observations beside images, which are not taken there")
     if block.mounts:
         raise InputError(f"{what}: the block has photos on frames, which are not taken there")
-    if block.timed:
-        raise InputError(f"{what}: the block has photos on trajectories, which are not taken there")
     return block
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Indices
 from photogram.network.block import Block
+from photogram.network.observations import Observation, Smoothness
 
 __all__ = ["IMAGES", "PHOTOS", "kept_images", "of_photos"]
 
@@ -31,8 +32,27 @@ def of_photos(block: Block, kept: Bools) -> Block:
     there = set(names)
     return fewer.replace(
         photo_ids=names,
-        observations=[each for each in block.observations if there.issuperset(each.photos)],
+        observations=_observations(block, there),
         mounts=[each for each in block.mounts if each.photo in there],
+        timed=[each for each in block.timed if each.photo in there],
         image_photos=number[fewer.image_photos],
         **{name: values[kept] for name in PHOTOS if (values := getattr(block, name)) is not None},
     )
+
+
+def _observations(block: Block, there: set[str]) -> list[Observation]:
+    """Return those of the photos that are there, and of trajectories but for those of other photos."""
+    own = [(each.photo in there, one) for each, one in zip(block.timed, block.trajectories, strict=True)]
+    flown = {id(one) for kept, one in own if kept}
+    left = [one for kept, one in own if not kept and id(one) not in flown]
+    trajectories = {id(each) for each in left}
+    coefficients = {id(each) for one in left for all_ in one.coefficients for each in all_}
+
+    def stays(each: Observation) -> bool:
+        if each.moment is not None:
+            return id(each.moment.trajectory) not in trajectories
+        if isinstance(each, Smoothness):
+            return not any(id(one) in coefficients for one in each.unknowns)
+        return there.issuperset(each.photos)
+
+    return [each for each in block.observations if stays(each)]

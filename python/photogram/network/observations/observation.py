@@ -9,10 +9,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arguments.arrays import is_covariance, names, shaped, shown
+from photogram.arguments.arrays import is_covariance, names, number, shaped, shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.timed import Moment
+from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Unknown, rotation
 
 __all__ = ["AXES", "ROTATIONS", "Group", "Observation", "moments", "observation_rows"]
@@ -70,11 +71,12 @@ class Observation:
     precision: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        self._check_moment()
         moment = self.moment
         self._set("points", tuple(names(self.KIND, [getattr(self, name) for name in self.POINTS])))
         of = [getattr(self, name) for name in self.PHOTOS]
         if moment is not None and any(each is not None for each in of):
-            raise InputError(f"the {self.KIND} of {of[0]} is of a trajectory, and so of no photo")
+            raise InputError(f"the {self.KIND} of {shown(of[0])} is of a trajectory, and so of no photo")
         self._set("photos", tuple(names(self.KIND, of if moment is None else [moment.name])))
         self._set("unknowns", tuple(self._unknown(name, kind) for name, kind in self.UNKNOWNS))
         for what, own in (("point", self.points), ("photo", self.photos)):
@@ -94,6 +96,20 @@ class Observation:
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
+
+    def _check_moment(self) -> None:
+        """Refuse what is no trajectory, no time or no clock, and a clock without a trajectory."""
+        given = {name: getattr(self, name, None) for name in ("trajectory", "clock")}
+        for (name, value), kind in zip(given.items(), (Trajectory, Clock), strict=True):
+            if value is not None and not isinstance(value, kind):
+                raise InputError(f"the {name} of the {self.KIND} is no {kind.__name__}: {shown(value)}")
+        if given["clock"] is not None and given["trajectory"] is None:
+            raise InputError(f"the {self.KIND} has a clock, {given['clock'].name}, but is of no trajectory")
+        if hasattr(self, "time"):
+            time = number(f"time of the {self.KIND}", self.time)
+            if not np.isfinite(time):
+                raise InputError(f"time of the {self.KIND} is not finite: {time}")
+            self._set("time", time)
 
     @property
     def moment(self) -> Moment | None:

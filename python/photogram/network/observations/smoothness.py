@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import shaped
+from photogram.arguments.arrays import shaped, shown
 from photogram.errors import InputError
 from photogram.network.observations.observation import Observation
 from photogram.network.trajectories import Coefficient, Trajectory
@@ -51,15 +51,22 @@ class Smoothness(Observation):
     covariance: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        own = tuple(self.coefficients)
+        own = tuple(self.coefficients) if isinstance(self.coefficients, Sequence) else ()
         if not all(isinstance(each, Coefficient) for each in own) or len({each.KIND for each in own}) != 1:
-            raise InputError("a smoothness is of coefficients of one kind")
+            raise InputError(
+                f"a smoothness is of coefficients of one kind, not of {shown(self.coefficients)}"
+            )
+        if len({id(each) for each in own}) < len(own):
+            raise InputError("a smoothness has each of its coefficients once")
         self._set("coefficients", own)
         super().__post_init__()
         self._set("unknowns", own)
         factors = shaped("factors of a smoothness", self.factors, (len(own),))
         self._set("factors", factors)
-        self._set("observed", np.concatenate([shaped("observed_sum", self.observed_sum, (3,)), factors]))
+        observed = np.concatenate([shaped("observed_sum", self.observed_sum, (3,)), factors])
+        if not np.isfinite(observed).all():
+            raise InputError(f"{self.name} has values that are not finite: {observed.tolist()}")
+        self._set("observed", observed)
 
     @property
     def label(self) -> str:

@@ -1,0 +1,91 @@
+"""What is asked of blocks with photos on trajectories: which these are, where images are in the focal plane.
+
+A frame, and a photo with a rolling shutter, has nearly the pose that is its own at all of its images. A
+scanner has another at each line, and samples and lines for coordinates: of what takes photos for pictures
+with one pose nothing holds for it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats
+from photogram.errors import InputError
+from photogram.network.block import Block
+from photogram.network.chosen import kept_images, of_photos
+from photogram.network.observations import Smoothness, moments
+
+__all__ = [
+    "at_rest",
+    "flown_by",
+    "focal_images",
+    "of_pictures",
+    "refuse_trajectories",
+    "scanners",
+    "timed_photos",
+]
+
+
+def flown_by(block: Block) -> str:
+    """Return what of a block is on a trajectory, by name; nothing where nothing is."""
+    if block.timed:
+        return f"the photo {block.timed[0].photo} is on a trajectory"
+    records = moments(block.observations)
+    return f"observations are of the trajectory {records[0].trajectory.name}" if records else ""
+
+
+def refuse_trajectories(block: Block, what: str) -> None:
+    """Refuse a block with photos or observations on trajectories.
+
+    Raises
+    ------
+    InputError
+        `what` does not take the photo, or the trajectory, that is named.
+    """
+    if flown := flown_by(block):
+        raise InputError(f"{what}: {flown}, which is not taken there")
+
+
+def timed_photos(block: Block) -> Bools:
+    """(P,) which photos are on trajectories."""
+    return _named(block, {each.photo for each in block.timed})
+
+
+def scanners(block: Block) -> Bools:
+    """(P,) which photos are strips of a scanner, line by line."""
+    return _named(block, {each.photo for each in block.timed if each.lines is not None})
+
+
+def _named(block: Block, names: set[str]) -> Bools:
+    if not names:
+        return np.zeros(len(block.photo_ids), dtype=bool)
+    return np.array([name in names for name in block.photo_ids], dtype=bool)
+
+
+def focal_images(block: Block) -> Floats:
+    """(m, 2) image coordinates in the focal plane, where residuals are: of scanners those of samples."""
+    found = block.image_xy
+    rows = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
+    for each in block.timed:
+        if each.lines is not None:
+            found = found.copy() if found is block.image_xy else found
+            own = np.flatnonzero(block.image_photos == rows[each.photo])
+            found[own] = each.images(block.image_xy[own])[2]
+    return found
+
+
+def of_pictures(block: Block) -> Block:
+    """Return a block without the images of scanners: its photos are pictures, each with about one pose."""
+    scanned = scanners(block)
+    return kept_images(block, ~scanned[block.image_photos]) if scanned.any() else block
+
+
+def at_rest(block: Block) -> Block:
+    """Return what of a block is on no trajectory: photos with poses of their own, and what is of these."""
+    if not flown_by(block):
+        return block
+    observations = [
+        each for each in block.observations if each.moment is None and not isinstance(each, Smoothness)
+    ]
+    timed = timed_photos(block)
+    return of_photos(block.replace(timed=(), observations=observations), ~timed)

@@ -1,0 +1,146 @@
+"""What blocks with photos on trajectories refuse, and what is asked of them."""
+
+import numpy as np
+import pytest
+
+from moving_blocks import rolling, scanned
+from photogram import Camera, InputError
+from photogram.network.chosen import of_photos
+from photogram.network.motion import at_rest, flown_by, focal_images, of_pictures, scanners, timed_photos
+from photogram.network.observations import Attitude, Position, Rate, Smoothness, Velocity
+from photogram.network.timed import Timed
+from photogram.network.trajectories import Clock, Polynomial, Table, Trajectory
+
+
+def table():
+    return Table([0.0, 1.0], np.zeros((2, 3)), [0.0, 1.0], [np.eye(3)] * 2)
+
+
+def known(name="pass"):
+    """Return a trajectory without coefficients."""
+    return Trajectory(name, table())
+
+
+RECORDS = {
+    Position: {"position": [0.0, 0.0, 0.0]},
+    Attitude: {"attitude": np.eye(3)},
+    Velocity: {"velocity": [0.0, 0.0, 0.0]},
+    Rate: {"rate": [0.0, 0.0, 0.0]},
+}
+
+
+@pytest.mark.parametrize("kind", RECORDS)
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"trajectory": "strip"}, "trajectory of the .* is no Trajectory"),
+        ({"clock": "receiver"}, "clock of the .* is no Clock"),
+        ({"time": None}, "time of the"),
+        ({"time": "noon"}, "time of the"),
+        ({"time": np.nan}, "is not finite"),
+        ({"photo": "A"}, "and so of no photo"),
+        ({"photo": "A", "trajectory": None, "clock": Clock("receiver")}, "is of no trajectory"),
+        ({"trajectory": None}, "None"),
+    ],
+)
+def test_records_of_nothing_are_refused(kind, changes, said):
+    good = {"photo": None, "sd": 1.0, "trajectory": known(), "time": 0.5, **RECORDS[kind]}
+    kind(**good)
+    with pytest.raises(InputError, match=said):
+        kind(**good | changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"coefficients": None}, "of one kind"),
+        ({"coefficients": 3}, "of one kind"),
+        ({"coefficients": ()}, "of one kind"),
+        ({"factors": [1.0]}, "factors"),
+        ({"factors": [np.nan, 1.0]}, "not finite"),
+        ({"observed_sum": np.inf}, "not finite"),
+    ],
+)
+def test_smoothness_of_nothing_is_refused(changes, said):
+    own = Trajectory("pass", table(), position=Polynomial(1)).coefficients[0]
+    good = {"coefficients": own, "factors": [1.0, -1.0], "sd": 1.0}
+    Smoothness(**good)
+    with pytest.raises(InputError, match=said):
+        Smoothness(**good | changes)
+    with pytest.raises(InputError, match="once"):
+        Smoothness([own[0], own[0]], [1.0, -1.0], sd=1.0)
+
+
+def test_two_trajectories_of_one_name():
+    """Records of two known trajectories of one name, at one time, were taken for records of the first."""
+    at = {"sd": 1.0, "time": 0.5}
+    both = [Position(None, [0.0, 0.0, float(k)], trajectory=known(), **at) for k in range(2)]
+    with pytest.raises(InputError, match="two trajectories are called pass"):
+        rolling().replace(observations=both)
+
+
+def test_a_weighted_pose_on_a_shared_trajectory():
+    block = scanned()
+    with pytest.raises(InputError, match="photo_position_sd of S2 is weighted or fixed"):
+        block.replace(photo_position_sd=[[np.inf] * 3, [0.1] * 3])
+    with pytest.raises(InputError, match="photo_attitude_sd of S1 is weighted or fixed"):
+        block.replace(photo_attitude_sd=0.0)
+    rolling().replace(photo_position_sd=0.1)
+
+
+def test_a_scanner_with_pixels():
+    camera = Camera("pinhole", {"fx": 6000.0, "fy": 6000.0, "cx": 0.0, "cy": 0.0})
+    with pytest.raises(InputError, match="the photo S1 is a scanner's"):
+        scanned().replace(cameras=[camera])
+
+
+def test_what_is_on_trajectories():
+    block = scanned(photos=True)
+    assert flown_by(block) == "the photo S1 is on a trajectory"
+    assert flown_by(block.replace(timed=())) == "observations are of the trajectory strip 1"
+    assert timed_photos(block).all()
+    assert scanners(block).tolist() == [True, True, False, False, False]
+    assert not timed_photos(at_rest(block)).any()
+    plain = focal_images(block)
+    of_lines = scanners(block)[block.image_photos]
+    assert (plain[of_lines, 1] == 0).all()
+    np.testing.assert_allclose(plain[of_lines, 0], (block.image_xy[of_lines, 0] - 3000) * 0.01)
+    np.testing.assert_array_equal(plain[~of_lines], block.image_xy[~of_lines])
+    assert len(of_pictures(block).image_xy) == (~of_lines).sum()
+    assert of_pictures(rolling()).image_photos.size == rolling().image_photos.size
+
+
+def test_what_is_at_rest():
+    """Photos without a trajectory are left as they were, with what was observed of them."""
+    block = rolling()
+    own = [Timed(each.photo, shutter=each.shutter) for each in block.timed[:3]]
+    mixed = block.replace(
+        timed=own,
+        observations=[
+            Position("IMG_1", [0.0, 0.0, 0.0], sd=1.0),
+            Position("IMG_8", [0.0, 0.0, 0.0], sd=1.0),
+            Velocity(None, [0.0, 0.0, 0.0], sd=1.0, trajectory=known(), time=0.5),
+        ],
+    )
+    left = at_rest(mixed)
+    assert left.photo_ids == block.photo_ids[3:]
+    assert [each.photo for each in left.observations] == ["IMG_8"]
+    assert not flown_by(left)
+    assert at_rest(left) is left
+
+
+def test_some_of_the_photos():
+    """Records and smoothness stay with the trajectories of photos that do."""
+    block = scanned(photos=True, smooth=True)
+    fewer = of_photos(block, np.array([True, False, True, True, True]))
+    assert [each.photo for each in fewer.timed] == ["S1", "F0", "F1", "F2"]
+    assert {each.moment.trajectory.name for each in fewer.observations if each.moment} == {"strip 1"}
+    kinds = [each for each in block.observations if each.KIND == "position"]
+    assert sum(each.KIND == "position" for each in fewer.observations) == len(kinds) / 2
+    assert sum(each.KIND == "smoothness" for each in fewer.observations) == 6
+    assert {each.name.split(" position")[0] for each in fewer.unknowns if "position" in each.name} == {
+        "strip 1"
+    }
+    apart = Position(None, [0.0, 0.0, 0.0], sd=1.0, trajectory=known(), time=0.5)
+    left = of_photos(block.replace(observations=[*block.observations, apart]), np.arange(5) == 1)
+    assert {each.moment.trajectory.name for each in left.observations if each.moment} == {"strip 2", "pass"}
