@@ -33,7 +33,7 @@ from photogram.network.tables import (
     numbered,
     table_arguments,
 )
-from photogram.network.timed import Timed, checked_timed, own_trajectories
+from photogram.network.timed import Poses, Timed, checked_timed, own_trajectories
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
 from photogram.show.brief import Brief, Rows, few
@@ -327,7 +327,17 @@ class Block(Valued, Brief):
 
     def _check_timed(self) -> None:
         self._set("timed", checked_timed(self.timed, self.photo_ids))
-        self._set("_trajectories", own_trajectories(self))
+        poses = Poses(
+            self.photo_ids,
+            self.photo_positions,
+            self.photo_attitudes,
+            self.photo_position_sd,
+            self.photo_attitude_sd,
+            self.photo_positions_observed,
+            self.photo_to_ground,
+            self.geographic,
+        )
+        self._set("_trajectories", own_trajectories(self.timed, poses))
         on_frames = {each.photo for each in self.mounts} | {each.frame for each in self.mounts}
         both = [each.photo for each in self.timed if each.photo in on_frames]
         if both:

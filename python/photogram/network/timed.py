@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +16,7 @@ from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.trajectories import Clock, Polynomial, Readout, Table, Trajectory
 from photogram.network.unknowns import Sensor, Unknown
 
-if TYPE_CHECKING:
-    from photogram.network.block import Block
-
-__all__ = ["LineSensor", "Lines", "Moment", "Shutter", "Timed", "checked_timed", "own_trajectories"]
+__all__ = ["LineSensor", "Lines", "Moment", "Poses", "Shutter", "Timed", "checked_timed", "own_trajectories"]
 
 Direction = Literal["down", "up", "right", "left"]
 
@@ -229,29 +226,43 @@ def checked_timed(timed: object, photos: Sequence[str]) -> tuple[Timed, ...]:
     return tuple(timed)
 
 
-def own_trajectories(block: Block) -> list[Trajectory]:
+@dataclass(frozen=True)
+class Poses:
+    """The poses of the photos of a block, as it has them."""
+
+    photo_ids: Sequence[str]
+    positions: Floats
+    attitudes: Floats
+    position_sd: Floats
+    attitude_sd: Floats
+    observed: Floats | None
+    photo_to_ground: bool
+    geographic: bool
+
+
+def own_trajectories(timed: Sequence[Timed], poses: Poses) -> list[Trajectory]:
     """Return the trajectory of each timed photo: that which it is given, or uniform motion from its pose."""
-    places = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
-    return [each.trajectory or _uniform(block, each, places[each.photo]) for each in block.timed]
+    places = {name: row for row, name in enumerate(poses.photo_ids)} if timed else {}
+    return [each.trajectory or _uniform(poses, each, places[each.photo]) for each in timed]
 
 
-def _uniform(block: Block, own: Timed, row: int) -> Trajectory:
+def _uniform(poses: Poses, own: Timed, row: int) -> Trajectory:
     """Return c_0 + (t - t_e) v and r_0 + (t - t_e) w about the pose of a photo."""
-    if block.geographic:
+    if poses.geographic:
         raise InputError(f"the photo {own.photo} needs a trajectory: its space is geographic")
-    sd_position, sd_attitude = block.photo_position_sd[row], block.photo_attitude_sd[row]
+    sd_position, sd_attitude = poses.position_sd[row], poses.attitude_sd[row]
     if np.isfinite(sd_attitude).any() and not (sd_attitude == 0).all():
         raise InputError(
             f"the attitude of the photo {own.photo}, which moves, is weighted: give it as an Attitude"
         )
-    observed = block.photo_positions_observed
+    observed = poses.observed
     weighted = np.isfinite(sd_position)
-    place = block.photo_positions[row]
+    place = poses.positions[row]
     if observed is not None:
         place = np.where(weighted, observed[row], place)
     time = own.time or 0.0
-    told: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
-    attitude = Attitudes.of(told, block.photo_attitudes[[row]]).matrices
+    told: Representation = "omega_phi_kappa_photo_to_ground" if poses.photo_to_ground else "omega_phi_kappa"
+    attitude = Attitudes.of(told, poses.attitudes[[row]]).matrices
     table = Table(np.array([time]), place[np.newaxis], np.array([time]), attitude)
     shape = (3,)
     values = [np.zeros(3), shaped("velocity", own.velocity, shape)]

@@ -1,34 +1,7 @@
-//! What corrections are made of: functions of time.
+//! What corrections are made of: functions of time of any kind.
 
-use smallvec::SmallVec;
-
+use super::functions::{ALWAYS, Active, BasisModel};
 use super::{Polynomial, Spline};
-use crate::geometry::Vector3;
-
-/// All times.
-const ALWAYS: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
-
-/// Functions of time, of which few are not zero at any time.
-pub trait BasisModel {
-    /// How many functions there are.
-    fn count(&self) -> usize;
-
-    /// Those that are not zero at a time, and how they change.
-    fn at(&self, time: f64) -> Active;
-
-    /// Whether it is a basis at all: numbers that can be taken, knots that do not decrease.
-    fn is_sound(&self) -> bool;
-
-    /// The times that it may be asked for.
-    fn span(&self) -> (f64, f64) {
-        ALWAYS
-    }
-
-    /// How far a time may be from another whose functions are at hand as well; zero where they are the same at all times.
-    fn reach(&self) -> f64 {
-        0.0
-    }
-}
 
 /// Corrections in a basis of any kind; none at all.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -79,39 +52,5 @@ impl Basis {
         };
         let reach = if exactly { 0.0 } else { self.model().map_or(0.0, BasisModel::reach) };
         of(time - reach).start..of(time + reach).end
-    }
-}
-
-/// The functions that are not zero at a time: from the first on, their values and their rates in a second.
-#[derive(Debug, Clone, Default)]
-pub struct Active {
-    /// The number of the first.
-    pub first: usize,
-    /// B_k.
-    pub values: SmallVec<[f64; 6]>,
-    /// B_k'.
-    pub rates: SmallVec<[f64; 6]>,
-}
-
-impl Active {
-    /// B_k.
-    pub fn value(&self, k: usize) -> f64 {
-        k.checked_sub(self.first).and_then(|k| self.values.get(k)).copied().unwrap_or(0.0)
-    }
-
-    /// B_k'.
-    pub fn rate(&self, k: usize) -> f64 {
-        k.checked_sub(self.first).and_then(|k| self.rates.get(k)).copied().unwrap_or(0.0)
-    }
-
-    /// Sums of B_k and of B_k' times coefficients.
-    pub fn sums(&self, coefficient: &dyn Fn(usize) -> Vector3) -> (Vector3, Vector3) {
-        let (mut value, mut rate) = (Vector3::zeros(), Vector3::zeros());
-        for (k, (b, d)) in self.values.iter().zip(&self.rates).enumerate() {
-            let own = coefficient(self.first + k);
-            value += *b * own;
-            rate += *d * own;
-        }
-        (value, rate)
     }
 }

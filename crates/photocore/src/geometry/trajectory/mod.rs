@@ -8,12 +8,14 @@
 //! the case of one record and degree 0. Continuous-time splines: Furgale and others 2012; line scanners: Poli 2007.
 
 mod basis;
+mod functions;
 mod lagrange;
 mod polynomial;
 mod spline;
 mod table;
 
-pub use basis::{Active, Basis, BasisModel};
+pub use basis::Basis;
+pub use functions::{Active, BasisModel};
 pub use polynomial::Polynomial;
 pub use spline::Spline;
 pub use table::{Attitudes, Interpolation, Positions};

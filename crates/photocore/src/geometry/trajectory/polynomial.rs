@@ -1,6 +1,6 @@
 //! Corrections that are polynomials in time.
 
-use super::{Active, BasisModel};
+use super::functions::{Active, BasisModel};
 
 /// Powers of scaled time: `B_k = ((t - reference) / scale)^k`, k from 0 to the degree.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,7 @@
 
 use smallvec::{SmallVec, smallvec};
 
-use super::{Active, BasisModel};
+use super::functions::{Active, BasisModel};
 
 /// The B-splines of a degree over knots, which do not decrease (Cox and de Boor): B_k is not zero from knot k to knot k + degree + 1.
 #[derive(Debug, Clone, PartialEq)]
