@@ -115,12 +115,14 @@ def place(strip: int, time: float) -> tuple[Floats, Floats]:
     return centre, forward @ exponential(turns)
 
 
-def scanned(*, photos: bool = False, records: bool = True, noise: float = 1.0, smooth: bool = False) -> Block:
+def scanned(
+    *, photos: bool = False, records: bool = True, noise: float = 1.0, smooth: bool = False, seed: int = 2
+) -> Block:
     """Return two opposite strips of a line scanner, with records of GNSS and an inertial unit; 5 points held.
 
     `photos` adds frames of a second camera on the first strip, whose names are F0, F1, F2.
     """
-    random = np.random.default_rng(4)
+    random = np.random.default_rng(seed)
     half = 4.0
     x, y = (each.ravel() for each in np.meshgrid(np.linspace(-150, 150, 7), np.linspace(-150, 150, 6)))
     points = np.column_stack([x, y, random.uniform(0, 30, len(x))])

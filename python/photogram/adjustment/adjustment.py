@@ -28,6 +28,7 @@ from photogram.network.datum import (
     datum_row,
     minimum_row,
 )
+from photogram.network.motion import refuse_datum, refuse_trajectories
 from photogram.network.refracted import check_cameras, remarks
 from photogram.network.unknowns import Unknown
 from photogram.results.datum import datum_messages, datum_of, refused
@@ -170,8 +171,8 @@ def adjust(
     OutOfMemoryError
         The adjustment would take more memory than there is.
     InputError
-        An option that cannot be, a datum of points and photos that do not carry it, or a photo that is not
-        above the water of the block.
+        An option that cannot be, a datum of points and photos that do not carry it, a photo that is not above
+        the water of the block; a datum or fixed poses of photos on trajectories.
     KeyboardInterrupt
         Ctrl-C.
     """
@@ -199,12 +200,15 @@ def adjust(
         raise InputError("the 1987 program has no robust loss: as_published or loss")
     check_cameras(block)
     if fix_photos:
+        refuse_trajectories(block, "fix_photos", "whose pose is not its own")
         block = block.replace(
             photo_position_sd=0.0,
             photo_attitude_sd=0.0,
             photo_positions_observed=None,
             photo_attitudes_observed=None,
         )
+    if datum is not None:
+        refuse_datum(block, "datum")
     block = started(block)
     inner = datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
     options = CoreOptions(

@@ -20,9 +20,10 @@ def started_by_consensus(block: Block) -> tuple[Block, Aside] | None:
     """Return a block with first values of its images alone, and what does not fit them.
 
     The given poses of photos that are not held are not used: they may be of a block that errors have bent.
-    None where there is no consensus in the datum of the block, or nothing against it.
+    None where there is no consensus in the datum of the block, or nothing against it, and where photos are on
+    frames or trajectories: each is no picture with a pose of its own.
     """
-    found = None if block.mounts else _consensus(block)
+    found = None if block.mounts or block.timed else _consensus(block)
     if found is None:
         return None
     wrong = {

@@ -19,6 +19,7 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
 from photogram.network.block import Block, checked
 from photogram.network.core import CoreOptions, block_network
+from photogram.network.motion import timed_photos
 from photogram.network.observations import observation_rows
 from photogram.network.refracted import check_cameras
 from photogram.results.exchanged import Exchange, exchanged_names
@@ -341,8 +342,8 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     position_sd, attitude_sd = block.photo_position_sd.copy(), block.photo_attitude_sd.copy()
     position_sd[gone(trial, out, POSITION)] = np.inf
     attitude_sd[gone(trial, out, ATTITUDE)] = np.inf
-    # Nothing is left that determines them: they stay where they are.
-    alone = sorted(out.photos)
+    # Nothing is left that determines them: they stay where they are. Coefficients of trajectories do anyway.
+    alone = sorted(out.photos - set(np.flatnonzero(timed_photos(block)).tolist()))
     position_sd[alone], attitude_sd[alone] = 0.0, 0.0
     rows = [
         row

@@ -59,6 +59,8 @@ def started(block: Block) -> Block:
 
 def _with(observation: Observation, found: Mapping[int, Unknown]) -> Observation:
     """Return an observation with unknowns that have their values."""
+    if not observation.UNKNOWNS:
+        return observation
     changes: dict[str, Any] = {
         name: found[id(each)]
         for (name, _), each in zip(observation.UNKNOWNS, observation.unknowns, strict=True)
@@ -205,6 +207,12 @@ def _sensor(sites: _Sites, sensor: Unknown, own: Sequence[Observation]) -> Unkno
         if np.isfinite(place).all() and np.isfinite(turn).all():
             places.append(place)
             turns.append(turn)
+    flown = [each.photo for each in sites.block.timed if each.sensor is sensor]
+    if not places and flown:
+        raise InputError(
+            f"{sensor.title} has no value to start from: the photo {flown[0]}, which has it, is on a"
+            " trajectory; give value and matrix"
+        )
     if not places:
         raise InputError(f"{sensor.title} has no value to start from: on no frame have both photos a pose")
     return sensor.replace(value=np.median(places, axis=0), matrix=_mean_rotation(turns))

@@ -12,6 +12,7 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shaped, shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.network.motion import focal_images
 from photogram.results.group_sums import Probing, factored, group_sums, observables
 from photogram.results.grouping import Grouping
 from photogram.results.network import AdjustedNetwork
@@ -127,7 +128,7 @@ def _values(own: Weighing, of: ArrayLike, center: Sequence[float], images: int) 
         if of != "radius":
             raise InputError(f"variances are a function of the radius or of values, not of {shown(of)}")
         middle = shaped("center", center, (2,))
-        return np.asarray(np.linalg.norm(own.network.image_xy - middle, axis=1))
+        return np.asarray(np.linalg.norm(focal_images(own.network) - middle, axis=1))
     values = shaped("of", of, (images,))
     if not ((values >= 0) & np.isfinite(values)).all():
         raise InputError("values that a variance is a function of are finite and not negative")

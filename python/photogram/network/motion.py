@@ -13,6 +13,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos
+from photogram.network.given import Given
 from photogram.network.observations import Smoothness, moments
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "flown_by",
     "focal_images",
     "of_pictures",
+    "refuse_datum",
     "refuse_trajectories",
     "scanners",
     "timed_photos",
@@ -34,7 +36,7 @@ def flown_by(block: Block) -> str:
     return f"observations are of the trajectory {records[0].trajectory.name}" if records else ""
 
 
-def refuse_trajectories(block: Block, what: str) -> None:
+def refuse_trajectories(block: Block, what: str, why: str = "which is not taken there") -> None:
     """Refuse a block with photos or observations on trajectories.
 
     Raises
@@ -43,7 +45,18 @@ def refuse_trajectories(block: Block, what: str) -> None:
         `what` does not take the photo, or the trajectory, that is named.
     """
     if flown := flown_by(block):
-        raise InputError(f"{what}: {flown}, which is not taken there")
+        raise InputError(f"{what}: {flown}, {why}")
+
+
+def refuse_datum(block: Block, what: str) -> None:
+    """Refuse to choose a datum for trajectories: what moves one as a whole is not worked out.
+
+    Raises
+    ------
+    InputError
+        A photo, or observations, on a trajectory, named.
+    """
+    refuse_trajectories(block, what, "and the datum of trajectories is that of the observations")
 
 
 def timed_photos(block: Block) -> Bools:
@@ -62,9 +75,12 @@ def _named(block: Block, names: set[str]) -> Bools:
     return np.array([name in names for name in block.photo_ids], dtype=bool)
 
 
-def focal_images(block: Block) -> Floats:
+def focal_images(network: Given) -> Floats:
     """(m, 2) image coordinates in the focal plane, where residuals are: of scanners those of samples."""
-    found = block.image_xy
+    found = network.image_xy
+    if not isinstance(network, Block):
+        return found
+    block = network
     rows = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
     for each in block.timed:
         if each.lines is not None:

@@ -70,6 +70,9 @@ class Images:
         What the cameras are called.
     down
         Whether y counts downwards, as rows of pixels do.
+    scanned
+        (m,) whether the coordinates are sample and line of a scanner: residuals are in its focal plane all
+        the same. Such images have cameras of their own.
     """
 
     unit: str
@@ -81,6 +84,11 @@ class Images:
     cameras: Indices
     names: Sequence[str]
     down: bool
+    scanned: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def of_scanner(self, camera: int) -> bool:
+        """Whether the images of a camera are samples and lines."""
+        return bool(self.scanned.any() and self.scanned[self.cameras == camera].any())
 
     @property
     def shown_as(self) -> tuple[float, str]:

@@ -77,15 +77,20 @@ def redundancy(result: object, ax: Where = None) -> Any:
 
 
 def _over_frame(axes: Axes, images: Images, values: Floats) -> None:
-    grid = cells(images.xy, CELLS)
-    frame(axes, images, grid.edges)
-    axes.set_title(f"Over the frame: mean {np.nanmean(values):.2f}, least {np.nanmin(values):.2f}")
-    if len(values) <= SINGLE:
-        axes.scatter(
-            images.xy[:, 0], images.xy[:, 1], c=values, s=14.0, cmap=ORDERED, vmin=0.0, vmax=1.0, linewidths=0
-        )
+    """Draw the images of frames; those of scanners, samples and lines, where there are no others."""
+    scanned = bool(images.scanned.any() and images.scanned.all())
+    kept = ~images.scanned if images.scanned.any() and not scanned else np.ones(len(values), dtype=bool)
+    xy, shown = images.xy[kept], values[kept]
+    said = "" if kept.all() else f"{np.count_nonzero(~kept):,} images of scanners are left out"
+    grid = cells(xy, CELLS)
+    frame(axes, images, grid.edges, scanned=scanned)
+    over = "samples and lines" if scanned else "the frame"
+    axes.set_title(f"Over {over}: mean {np.nanmean(shown):.2f}, least {np.nanmin(shown):.2f}")
+    if len(shown) <= SINGLE:
+        axes.scatter(xy[:, 0], xy[:, 1], c=shown, s=14.0, cmap=ORDERED, vmin=0.0, vmax=1.0, linewidths=0)
+        note(axes, [said])
     else:
-        note(axes, [_mesh(axes, grid, values, "images")])
+        note(axes, [_mesh(axes, grid, shown, "images"), said])
 
 
 def _over_network(axes: Axes, drawn: Pictured, values: Floats) -> None:

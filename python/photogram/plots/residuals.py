@@ -66,7 +66,8 @@ def residuals(result: object, ax: Where = None) -> Any:
     columns = min(3, len(cameras))
     rows = -(-len(cameras) // columns)
     width = 6.4 if columns == 1 else 4.2 * columns
-    extent = np.ptp(images.xy, axis=0) if len(images.xy) else np.ones(2)
+    shown = images.cameras == cameras[0]
+    extent = np.ptp(images.xy[shown], axis=0) if shown.any() else np.ones(2)
     across, up = np.maximum(extent + 2 * ROOM * extent.max(), 1e-12)
     many = np.bincount(images.cameras[np.isin(images.cameras, cameras)]).max(initial=0) > SINGLE
     # Title, scale and labels; where means are drawn, also what they are.
@@ -89,16 +90,19 @@ def largest_cameras(images: Images, most: int = CAMERAS) -> tuple[list[int], str
     return chosen or [0], said
 
 
-def frame(axes: Axes, images: Images, edges: Floats) -> None:
-    """Give axes the frame of a camera: equal scales, room around it, y as the camera counts it."""
+def frame(axes: Axes, images: Images, edges: Floats, *, scanned: bool = False) -> None:
+    """Give axes the frame of a camera: equal scales, room around it, y as the camera counts it.
+
+    Of a scanner they are samples and lines, upwards: so residuals point as they do in its focal plane.
+    """
     low, high = edges
     margin = ROOM * float((high - low).max())
     axes.set_aspect("equal", anchor="NW")
     axes.set_xlim(low[0] - margin, high[0] + margin)
     up = (low[1] - margin, high[1] + margin)
-    axes.set_ylim(*(up[::-1] if images.down else up))
-    axes.set_xlabel(f"x, {images.unit}")
-    axes.set_ylabel(f"y, {images.unit}")
+    axes.set_ylim(*(up[::-1] if images.down and not scanned else up))
+    axes.set_xlabel("sample" if scanned else f"x, {images.unit}")
+    axes.set_ylabel("line" if scanned else f"y, {images.unit}")
 
 
 def _field(axes: Axes, images: Images, camera: int, left_out: str) -> None:
@@ -110,7 +114,8 @@ def _field(axes: Axes, images: Images, camera: int, left_out: str) -> None:
         return
     longer = int(np.clip(np.sqrt(len(xy) / IN_CELL), 6, CELLS))
     grid = cells(xy, longer)
-    frame(axes, images, grid.edges)
+    scanned = images.of_scanner(camera)
+    frame(axes, images, grid.edges, scanned=scanned)
     remark: list[str] = []
     if len(xy) <= SINGLE:
         places, shown, colours = xy, vectors, np.full(len(xy), INK)
@@ -144,7 +149,8 @@ def _field(axes: Axes, images: Images, camera: int, left_out: str) -> None:
     rms = np.sqrt((vectors**2).mean(axis=0)) * factor
     name = images.names[camera]
     scale_bars(axes, bars, f"{name}: {len(xy):,} images, rms {rms[0]:.3g}, {rms[1]:.3g} {unit}")
-    note(axes, [*remark, f"vectors that are longer and cut short: {cut}" if cut else "", left_out])
+    in_plane = "vectors: x to the right and y up, in the focal plane" if scanned else ""
+    note(axes, [*remark, in_plane, f"vectors that are longer and cut short: {cut}" if cut else "", left_out])
 
 
 def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, Any, list[str]]:

@@ -177,7 +177,8 @@ def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> 
     held = np.isfinite(block.point_sd) & (point_rays > 0)[:, np.newaxis]
     if held.any() or block.observations or (block.photo_position_sd == 0).all():
         return []
-    return [Message("there is no control: the datum of the block rests on the weights of its photos")]
+    of = "trajectories" if block.timed else "photos"
+    return [Message(f"there is no control: the datum of the block rests on the weights of its {of}")]
 
 
 def _levelled(block: Block, held: int) -> str:

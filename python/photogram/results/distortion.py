@@ -19,6 +19,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
+from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
 
@@ -88,11 +89,11 @@ class DistortionCurve:
 
 
 def own_images(result: Result, camera: AdjustedCamera) -> Floats:
-    """Return (k, 2) the images of a camera that took part."""
+    """Return (k, 2) the images of a camera that took part, in the focal plane."""
     block = result.block
     cameras = np.asarray(block.photo_cameras)[block.image_photos]
     row = [each.name for each in result.cameras].index(camera.name)
-    return np.asarray(block.image_xy[result.used_images & (cameras == row)])
+    return np.asarray(focal_images(block)[result.used_images & (cameras == row)])
 
 
 def largest_radius(result: Result, camera: AdjustedCamera) -> float:

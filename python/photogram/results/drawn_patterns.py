@@ -21,6 +21,7 @@ import numpy as np
 from photogram.arguments.arrays import whole_number
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.network.motion import focal_images
 from photogram.results.group_sums import factored
 from photogram.results.result import Result
 from photogram.statistics.evidence import MEDIAN
@@ -154,7 +155,7 @@ def _patterns(result: Result, redundancy: Floats) -> list[_Pattern]:
     found = []
     for name, own_photos in cameras:
         own = np.flatnonzero(own_photos[block.image_photos] & tested)
-        xy, on, r = block.image_xy[own], block.image_photos[own], redundancy[own]
+        xy, on, r = focal_images(block)[own], block.image_photos[own], redundancy[own]
 
         def bins(v: Floats, own: Indices = own, xy: Floats = xy, r: Floats = r) -> float:
             pattern = frame_pattern(xy, v[own], r)

@@ -81,7 +81,7 @@ def network_findings(
 def block_findings(result: Result) -> Findings:
     """Return the tests of a block: standard deviations are given, so the unit weight is known."""
     # Held to look for blunders before the photos are adjusted: nobody takes these places for true.
-    intersected = not (result.block.photo_position_sd.any() or result.block.photo_attitude_sd.any())
+    intersected = not result.photo_given_sd.any()
     labels = [each.label for each in observations_of_core(result.block)]
     found = network_findings(
         result,

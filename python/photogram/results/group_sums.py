@@ -22,6 +22,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.core import core_network
+from photogram.network.observations import moments
 from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
@@ -282,7 +283,8 @@ def block_observables(block: Block) -> Observables:
     known = np.isfinite(block.point_positions).any(axis=1)
     sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
     observed = (sd > 0) & np.isfinite(sd)
-    mounted = {mount.photo for mount in block.mounts}
+    # What is given of a photo with a trajectory of its own is given of common unknowns.
+    mounted = {each.photo for each in (*block.mounts, *block.timed)}
     observed[[row for row, name in enumerate(block.photo_ids) if name in mounted]] = False
     cameras, photo_cameras = block.core_cameras()
     names = block.camera_names if block.cameras else [str(number) for number in range(len(cameras))]
@@ -295,6 +297,7 @@ def block_observables(block: Block) -> Observables:
         photo_observed=observed,
         stations=("positions",) * 3 + ("attitudes",) * 3,
         commons=len(block.unknowns),
+        records=len(moments(block.observations)),
     )
 
 

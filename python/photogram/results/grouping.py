@@ -50,6 +50,9 @@ class Observables:
         (k,) what the unknowns of a photo are called as observations.
     commons
         How many common unknowns there are.
+    records
+        How many times on trajectories the observations are of: the core has them behind the photos, with a
+        camera.
     """
 
     given: Given
@@ -60,6 +63,7 @@ class Observables:
     photo_observed: Bools
     stations: tuple[str, ...]
     commons: int
+    records: int = 0
 
     @property
     def point_observed(self) -> Bools:
@@ -79,7 +83,7 @@ class Grouping:
         (m, 2), (n, 3), (P, k).
     observations
         (o,) of those beside images.
-    commons, cameras
+    commons, cameras, records
         How many there are: they are in no group.
     """
 
@@ -90,6 +94,7 @@ class Grouping:
     observations: Indices
     commons: int = 0
     cameras: int = 0
+    records: int = 0
 
     @property
     def count(self) -> int:
@@ -98,8 +103,8 @@ class Grouping:
 
     def core(self) -> tuple[int, Indices, Indices, Indices, list[int], list[int], list[int]]:
         """Return the groups as the core takes them."""
-        photos = self.photos[:, :6]
-        none = [-1] * self.cameras
+        photos = np.vstack([self.photos[:, :6], np.full((self.records, 6), -1)])
+        none = [-1] * (self.cameras + (self.records > 0))
         return (
             self.count,
             self.images,
@@ -268,4 +273,5 @@ def _numbered(of: Observables, labels: _Labelled) -> Grouping:
         tuple(labels.parents.get(name, "") for name in names),
         tuple(number < of_images for number in range(len(names))),
     )
-    return Grouping(groups, images, points, photos, observations, of.commons, len(of.camera_names))
+    counts = of.commons, len(of.camera_names), of.records
+    return Grouping(groups, images, points, photos, observations, *counts)

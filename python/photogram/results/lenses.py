@@ -7,6 +7,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.network.motion import focal_images
 from photogram.results.group_sums import factored
 from photogram.results.held import is_suspected
 from photogram.results.result import Result
@@ -35,7 +36,7 @@ def fall_by_lens(result: Result, images: Bools) -> float:
     if result.loss or not result.WHOLE or not is_suspected(result):
         return 0.0
     block, own = result.block, images & result.used_images
-    xy = block.image_xy[own]
+    xy = focal_images(block)[own]
     low, high = xy.min(axis=0), xy.max(axis=0)
     x, y = ((xy - (low + high) / 2) / max(float((high - low).max()) / 2, 1e-300)).T
     r2, zero, one = x * x + y * y, np.zeros_like(x), np.ones_like(x)

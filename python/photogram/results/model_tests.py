@@ -27,6 +27,7 @@ from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
+from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import INTERIOR
 from photogram.results.group_sums import factored
@@ -315,9 +316,10 @@ def _largest_effect(result: Result, camera: AdjustedCamera, rows: Sequence[int])
         return math.nan
     own = own[np.unique(np.linspace(0, own.size - 1, SEEN).round().astype(np.int64))]
     without = {**camera.camera.parameters, **dict.fromkeys((camera.names[row] for row in rows), 0.0)}
-    rays = camera.camera.rays(block.image_xy[own])
+    measured = focal_images(block)[own]
+    rays = camera.camera.rays(measured)
     other = camera.camera.replace(parameters=without, sd=0.0, covariance=None).project(rays)
-    moved = np.abs(other - block.image_xy[own]) / block.image_sd[own]
+    moved = np.abs(other - measured) / block.image_sd[own]
     return float(np.nanmax(moved)) if np.isfinite(moved).any() else math.nan
 
 
@@ -348,7 +350,7 @@ def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Fl
     own = _images_of(result, camera)
     columns = np.zeros((len(rows), len(block.image_xy), 2))
     plain = camera.camera.replace(sd=0.0, covariance=None)
-    measured, residuals = block.image_xy[own], result.residuals[own]
+    measured, residuals = focal_images(block)[own], result.residuals[own]
     backward = plain.direction == "backward"
     rays = None if backward else plain.rays(measured - residuals)
     reach = float(np.abs(measured).max(initial=1.0))

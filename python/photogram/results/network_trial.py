@@ -109,8 +109,7 @@ class NetworkTrial:
             raise LostSupportError(collapsed, [])
         return Standing(status, omega, freedom)
 
-    @staticmethod
-    def _asked(ask: Callable[..., T], *arguments: Any, **options: Any) -> T:
+    def _asked(self, ask: Callable[..., T], *arguments: Any, **options: Any) -> T:
         """Ask the core; what is undetermined is a LostSupportError."""
         try:
             return ask(*arguments, **options)
@@ -122,7 +121,9 @@ class NetworkTrial:
                 raise LostSupportError([], []) from error
             if kind == "undetermined photos":
                 photos = {photo for combination in combinations for photo in combination[0]}
-                raise LostSupportError([], sorted(photos)) from error
+                # Behind the photos the core has times on trajectories.
+                own = sorted(photo for photo in photos if photo < len(self._supported))
+                raise LostSupportError([], own) from error
             raise
 
     def stand(self) -> Standing:

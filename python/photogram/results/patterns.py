@@ -14,6 +14,7 @@ import numpy as np
 
 from photogram.arguments.arrays import chosen, finite_rows
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.network.motion import focal_images
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import terms_of
 from photogram.statistics.distributions import LEVEL, bonferroni
@@ -92,7 +93,8 @@ def patterns(
     redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
     residuals = np.nan_to_num(np.clip(w / factor, -CLIPPED, CLIPPED)) * np.sqrt(redundancy)
     given, (axis, _) = result.given, terms_of(result).image_axes
-    image_photos, xy = given.image_photos, given.image_xy
+    # By photo the coordinates are those that were measured: of a scanner, samples and lines.
+    image_photos, xy, measured = given.image_photos, focal_images(given), given.image_xy
     scale = factor * given.image_sd[used].mean(axis=0) * axis.factor
     found: list[Systematic | None] = [
         _of_camera(each, image_photos[used], xy[used], residuals, redundancy, scale, axis.small)
@@ -101,7 +103,7 @@ def patterns(
     for row, (each, camera) in enumerate(zip(found, cameras, strict=True)):
         if each is not None and each.significant and each.large:
             found[row] = replace(each, fall=fall(camera.photos[image_photos]))
-    found.append(_of_photos(image_photos[used], given.photo_ids, xy[used], residuals, redundancy))
+    found.append(_of_photos(image_photos[used], given.photo_ids, measured[used], residuals, redundancy))
     found.append(_distribution(result, used))
     if axes:
         found += [*_of_stations(result, axes), _of_heights(result)]

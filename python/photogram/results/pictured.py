@@ -8,8 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network import geometry
+from photogram.network.motion import scanners
 from photogram.network.rays import LocalAxes, local_axes
 from photogram.plots.pictured import Correlated, Curve, Curves, Deviations, Images, Pictured, Plan, pictured
 from photogram.results.cameras import AdjustedCamera
@@ -50,7 +51,13 @@ class PicturedNetwork(Pictured):
             cameras=cameras[given.image_photos[used]],
             names=names,
             down=down,
+            scanned=self.scanned[given.image_photos[used]],
         )
+
+    @property
+    def scanned(self) -> Bools:
+        """(P,) which photos are strips of a scanner, whose images are samples and lines."""
+        return np.zeros(len(self.result.given.photo_ids), dtype=bool)
 
     @property
     def tested(self) -> list[Observations]:
@@ -127,7 +134,17 @@ class PicturedBlock(PicturedNetwork):
         if not names:
             distances = dict.fromkeys(block.known_distances("pictures").tolist())
             names = [f"c = {distance:g} {block.image_unit}" for distance in distances]
-        return cameras, names, bool(block.cameras) and block.cameras[0].image_y == "down"
+        down = bool(block.cameras) and block.cameras[0].image_y == "down"
+        if not self.scanned.any():
+            return cameras, names, down
+        # Samples and lines are no places of a frame: they have a picture of their own.
+        cameras = np.where(self.scanned, cameras + len(names), cameras)
+        return cameras, [*names, *(f"{name}, scanned" for name in names)], down
+
+    @cached_property
+    def scanned(self) -> Bools:
+        """(P,) which photos are strips of a scanner."""
+        return scanners(self.result.block)
 
     @property
     def correlations(self) -> list[Correlated]:

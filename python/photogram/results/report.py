@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.network.geometry import lengths_of_units
+from photogram.network.observations import Observation, Smoothness
 from photogram.network.structuring import structure
 from photogram.results.axes import image_axes, point_axes
 from photogram.results.calibration_report import calibration_sections
+from photogram.results.courses import POSES, courses_table, notable, notable_courses
 from photogram.results.features_report import features_sections
 from photogram.results.iteration import iteration_lines
 from photogram.results.kinds import ObservedKind
@@ -37,7 +39,7 @@ from photogram.results.tables import (
 )
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, stacked, table_lines
-from photogram.show.quantity import Axis, Quantity, labelled
+from photogram.show.quantity import Axis, Quantity, chosen, labelled
 from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
 from photogram.show.ways import report_of
 from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
@@ -45,6 +47,9 @@ from photogram.statistics.outliers import outliers
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
+
+FLOWN, WORST = 100, 20
+"""Observations of trajectories up to which all are listed, and components that are where they are more."""
 
 __all__ = [
     "ORDERINGS",
@@ -92,11 +97,12 @@ def report(result: Result) -> str:
         ),
         (
             "Observations beside images: observed minus adjusted, redundancy, standardized residual",
-            [line for each in result.kinds.values() for line in _kind(each)],
+            [line for each in result.kinds.values() for line in _kind(result, each)],
         ),
         *calibration_sections(result),
         ("Cameras that are held", _held_cameras(result)),
         ("Unknowns that observations have in common", _unknowns(result)),
+        ("Trajectories: their corrections, in the span of their tables", _courses(result)),
         ("Photos", _photos(result)),
         ("Points", _points(result)),
         ("Weakest points and photos", weakest_lines(result)),
@@ -268,28 +274,75 @@ def _check_points(result: Result) -> list[str]:
     return stacked(names, "point", [(each, ".5f") for each in table if each.label], first, "d {name} {unit}")
 
 
-def _kind(kind: ObservedKind) -> list[str]:
-    """Write a line for each component of every observation of a kind."""
-    _, of, names, _, *numbers = observed_components([kind])
-    fields = [field(each, 14, form, str(each.label)) for each, form in zip(numbers, _FORMS, strict=True)]
-    return table_lines([*field(of, 28, head=kind.kind), *field(names, 22, head="component"), *chain(*fields)])
+def _kind(result: Result, kind: ObservedKind) -> list[str]:
+    """Write a line for each component of every observation; of many of trajectories, of the worst."""
+    table, note = observed_components([kind]), list[str]()
+    if len(kind.rows) > FLOWN and any(
+        _is_flown(result.block.observations[row]) for row in kind.rows.tolist()
+    ):
+        tests = np.nan_to_num(np.abs(labelled(table, "standardized").values))
+        worst = np.sort(np.argsort(-tests, kind="stable")[:WORST])
+        note = [f"{len(worst)} of {len(tests)} components, with the largest test values; the table has all"]
+        table = chosen(table, worst)
+    _, of, names, _, *numbers = table
+    forms = [_decimals_of(labelled(numbers, "sd"), 5)] * 2 + [".3f", ".2f"]
+    fields = [field(each, 14, form, str(each.label)) for each, form in zip(numbers, forms, strict=True)]
+    first = field(of, _width(of.values, 28), head=kind.kind)
+    return [*table_lines([*first, *field(names, 22, head="component"), *chain(*fields)]), *note]
 
 
-_FORMS = (".5f", ".5f", ".3f", ".2f")
-"""Of standard deviations, residuals, redundancy numbers and test values."""
+def _is_flown(observation: Observation) -> bool:
+    """Whether an observation is of a trajectory: there may be thousands in a minute."""
+    return observation.moment is not None or isinstance(observation, Smoothness)
+
+
+def _width(names: Iterable[str], least: int) -> int:
+    """Return how wide a column of names is: one more than the longest."""
+    return max([least, *(len(name) + 1 for name in names)])
 
 
 def _unknowns(result: Result) -> list[str]:
-    """Write a line for each component of common unknowns."""
-    kinds, own, names, _, *numbers = unknowns(result.unknowns)
+    """Write a line for each component of common unknowns; of many coefficients, of the notable ones."""
+    shown, note = notable(result.unknowns)
+    kinds, own, names, _, *numbers = unknowns(shown)
     titles = replace(
         own, values=[f"{kind} {name}" for kind, name in zip(kinds.values, own.values, strict=True)]
     )
-    order = {"value": ".6f", "change": ".6f", "sd given": ".6f", "sd": ".6f", "redundancy": ".3f"}
-    fields = [field(labelled(numbers, label), 15, form, label) for label, form in order.items()]
-    return table_lines(
-        [*field(titles, 28, head="unknown"), *field(names, 22, head="component"), *chain(*fields)]
-    )
+    forms = _decimals_of(labelled(numbers, "sd"), 6)
+    fields = [
+        field(replace(labelled(numbers, label), of=np.arange(len(forms))), 15, forms, label)
+        for label in ("value", "change", "sd given", "sd")
+    ]
+    fields.append(field(labelled(numbers, "redundancy"), 15, ".3f", "redundancy"))
+    first = field(titles, _width(titles.values, 28), head="unknown")
+    lines = table_lines([*first, *field(names, 22, head="component"), *chain(*fields)])
+    return [*lines, *([note] if note else [])]
+
+
+def _decimals_of(sd: Quantity, least: int) -> list[str]:
+    """Return a form for each row: so many decimals, or more where the standard deviation needs them."""
+    own = sd.outward()
+    sizes = np.where((own > 0) & np.isfinite(own), own, 1.0)
+    return [f".{int(each)}f" for each in np.clip(1 - np.floor(np.log10(sizes)), least, 12).tolist()]
+
+
+def _courses(result: Result) -> list[str]:
+    """Write a line for the positions and one for the rotations of each trajectory."""
+    every, note = notable_courses(result)
+    names, of, basis, *numbers = courses_table(every, result.block.linear_unit)
+    widths = {"count": (14, ".0f"), "first": (14, ".3f"), "last": (14, ".3f"), "largest": (20, ".6f")}
+    widths |= {"at": (14, ".3f"), "tested": (14, ".2f")}
+    fields = [
+        *field(names, _width(names.values, 20), head="trajectory"),
+        *field(of, 18, head="correction"),
+        *field(basis, _width(basis.values, 24), head="basis"),
+        *(
+            each
+            for label, (width, form) in widths.items()
+            for each in field(labelled(numbers, label), width, form, labelled(numbers, label).head.lower())
+        ),
+    ]
+    return [*table_lines(fields), *([note] if note and every else [])]
 
 
 def _datum(result: Result) -> list[str]:
@@ -304,7 +357,7 @@ def _photos(result: Result) -> list[str]:
     first = [*field(part(values, place), 20, ".4f"), *field(part(values, turn), 15, ".7f")]
     second = [*field(part(sd, place), 20, ".5f", unit), *field(part(sd, turn), 15, ".3f", unit)]
     table = table_lines([*field(names, 10, head="photo"), *first], [blank, *second, *_long(result, sd)])
-    return [*_datum(result), *table]
+    return [*_datum(result), *([POSES] if result.block.timed else []), *table]
 
 
 def _held_cameras(result: Result) -> list[str]:

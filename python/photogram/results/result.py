@@ -17,6 +17,7 @@ from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
+from photogram.network.motion import refuse_datum, timed_photos
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
 from photogram.results.check_points import CheckPoints, check_points
 from photogram.results.covariance import Failure
@@ -245,12 +246,13 @@ class Result(AdjustedNetwork):
         Raises
         ------
         InputError
-            Points or photos that are not there, or that do not carry the datum.
+            Points or photos that are not there, or that do not carry the datum; photos on trajectories.
         AdjustmentError
             The block is not free: the message says what gives its datum.
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
+        refuse_datum(self.block, "in_datum")
         return self._in(datum_row(self.block, inner_datum(datum)))
 
     def relative_to(self, *, photo: str | None = None, points: Sequence[str] | None = None) -> Self:
@@ -262,10 +264,11 @@ class Result(AdjustedNetwork):
         Raises
         ------
         InputError
-            Neither or both, names that are not there, points on one line.
+            Neither or both, names that are not there, points on one line; photos on trajectories.
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
+        refuse_datum(self.block, "relative_to")
         return self._in(relative_datum(self.block, photo, points))
 
     def _in(self, row: DatumRow) -> Self:
@@ -337,8 +340,12 @@ class Result(AdjustedNetwork):
 
     @property
     def photo_given_sd(self) -> Floats:
-        """(P, 6) standard deviations of observed positions and attitudes: infinite free, zero fixed."""
-        return np.hstack([self.block.photo_position_sd, self.block.photo_attitude_sd])
+        """(P, 6) standard deviations of observed positions and attitudes: infinite free, zero fixed.
+
+        What is given of a photo with a trajectory of its own is given of the coefficients of that.
+        """
+        given = np.hstack([self.block.photo_position_sd, self.block.photo_attitude_sd])
+        return np.where(timed_photos(self.block)[:, np.newaxis], np.inf, given)
 
     @property
     def point_residuals(self) -> Floats:
@@ -367,7 +374,7 @@ class Result(AdjustedNetwork):
     def check_points(self) -> CheckPoints:
         """Check points with their differences and standard deviations, tested one by one and together."""
         untested = "" if self.converged else "the adjustment has not converged"
-        if not self.block.photo_position_sd.any() and not self.block.photo_attitude_sd.any():
+        if not self.photo_given_sd.any():
             untested = "all photos are fixed, and no standard deviation has their errors"
         if self.datum.is_chosen:
             untested = "the datum of the network is chosen, and theirs is another"

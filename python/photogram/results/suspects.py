@@ -10,7 +10,8 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Indices
 from photogram.network.block import Block
-from photogram.network.observations import Observation, observation_rows
+from photogram.network.observations import Observation, Smoothness, observation_rows
+from photogram.network.trajectories import Trajectory
 from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,
@@ -48,10 +49,13 @@ EXACT = 1e-7
 def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = True) -> NetworkTrial:
     """Return a block as tests ask it."""
     deviations = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
+    # What others are on as well does not need the images of one photo.
+    shared = {each.photo for each in block.timed if each.trajectory is not None}
+    on_shared = np.array([name in shared for name in block.photo_ids], dtype=bool)
     return NetworkTrial(
         core=core,
         suspects=block_suspects(block, core.suspects, parts=parts),
-        supported=np.asarray(np.isfinite(deviations).all(axis=1)),
+        supported=np.asarray(np.isfinite(deviations).all(axis=1) | on_shared),
         rough=ROUGH,
         exact=EXACT,
     )
@@ -104,9 +108,34 @@ class _Named(NamedSuspects):
         if kind != OBSERVATION:
             return np.arange(len(self.block.photo_ids))
         observation = self.observations[subject]
+        if observation.moment is not None:
+            return self._flown(observation.moment.trajectory)
+        if isinstance(observation, Smoothness):
+            return self._flown_with(observation)
         seen = [self.photos_of_point(self.point_row[name]) for name in observation.points]
         own = np.array([self.photo_row[name] for name in observation.photos], dtype=np.int64)
         return np.unique(np.concatenate([own, *seen]))
+
+    def _flown(self, trajectory: Trajectory) -> Indices:
+        """Return the photos on a trajectory."""
+        return self._on_trajectories.get(id(trajectory), np.zeros(0, dtype=np.int64))
+
+    def _flown_with(self, observation: Observation) -> Indices:
+        """Return the photos on the trajectory whose coefficients an observation is of."""
+        own = self._of_coefficients.get(id(observation.unknowns[0]))
+        return np.zeros(0, dtype=np.int64) if own is None else self._flown(own)
+
+    @cached_property
+    def _on_trajectories(self) -> dict[int, Indices]:
+        found: dict[int, list[int]] = {}
+        for each, own in zip(self.block.timed, self.block.trajectories, strict=True):
+            found.setdefault(id(own), []).append(self.photo_row[each.photo])
+        return {key: np.array(sorted(rows), dtype=np.int64) for key, rows in found.items()}
+
+    @cached_property
+    def _of_coefficients(self) -> dict[int, Trajectory]:
+        every = {id(each): each for each in self.block.trajectories}.values()
+        return {id(one): each for each in every for all_ in each.coefficients for one in all_}
 
     def other_name(self, kind: int, subject: int) -> str:
         """Return what an observation beside images, a camera or a common unknown is called."""

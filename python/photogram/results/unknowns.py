@@ -18,6 +18,15 @@ if TYPE_CHECKING:
 __all__ = ["AdjustedUnknown", "adjusted_unknowns"]
 
 
+_PLACED = frozenset(
+    (
+        *("lever arm", "shift", "drift", "instrument", "level", "sensor"),
+        *("position coefficient", "rotation coefficient", "gyro bias", "clock", "readout"),
+    )
+)
+"""Types with components of `position` for values."""
+
+
 @dataclass(frozen=True, eq=False)
 class AdjustedUnknown:
     """An unknown of several observations after the adjustment, with k components. Arrays cannot be written.
@@ -27,13 +36,15 @@ class AdjustedUnknown:
     given
         The unknown as it was given.
     components, units
-        (k,) names and units: the linear unit, the linear unit a second, radians, or nothing.
+        (k,) names and units: the linear unit, the linear unit a second, radians, radians a second, seconds,
+        or nothing.
     change
         (k,) adjusted minus given; of rotations the rotation vector r about the axes that are given,
         R = R0 Exp(r).
     position
-        (3,) adjusted: l, s, d, (m, k, 0) of an instrument, c of a sensor; of levels, planes and lines a place
-        on them.
+        (3,) adjusted: l, s, d, (m, k, 0) of an instrument, c of a sensor, a coefficient of a trajectory, a
+        gyroscope's bias, (d, 0, 0) of a clock, (T, 0, 0) of a readout time or a factor of line rates; of
+        levels, planes and lines a place on them.
     attitude
         (3, 3) adjusted: the axes of a boresight, sensor, line or plane (the third along it, or its normal).
     cofactors
@@ -44,7 +55,7 @@ class AdjustedUnknown:
     redundancy
         (k,) redundancy numbers of weighted components as observations; 0 unless weighted.
     observations
-        How many observations, and images of photos on frames, are of it.
+        How many observations, and images of photos on frames or trajectories, are of it.
     """
 
     given: Unknown
@@ -80,8 +91,8 @@ class AdjustedUnknown:
     def values(self) -> Floats:
         """(k,) components of `position` where they are its own, else `change`."""
         own = {"x": 0, "y": 1, "z": 2, "scale": 0, "constant": 1, "height": 2}
-        vectors = ("lever arm", "shift", "drift", "instrument", "level", "sensor")
-        if self.kind not in vectors:
+        own |= {"offset": 0, "time": 0, "factor": 0}
+        if self.kind not in _PLACED:
             return self.change
         found = [
             self.position[own[name]] if name in own else self.change[k]
@@ -104,6 +115,8 @@ def adjusted_unknowns(
 ) -> tuple[AdjustedUnknown, ...]:
     """Return the adjusted unknowns of a block, covariances scaled."""
     found = []
+    # What line rates are multiplied by is of the type of readout times, but a plain number.
+    factors = {id(each.rate) for each in block.timed if each.rate is not None}
     for given, row in zip(block.unknowns, solution.adjusted_unknowns, strict=True):
         change, position, attitude, cofactors, redundancy, observations = row
         k = len(change)
@@ -111,8 +124,8 @@ def adjusted_unknowns(
         found.append(
             AdjustedUnknown(
                 given=given,
-                components=given.components,
-                units=given.units(block.linear_unit),
+                components=("factor",) if id(given) in factors else given.components,
+                units=("",) if id(given) in factors else given.units(block.linear_unit),
                 change=np.array(change),
                 position=np.array(position),
                 attitude=np.array(attitude).reshape(3, 3),

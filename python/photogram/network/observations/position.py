@@ -107,6 +107,6 @@ def with_epochs(observations: Sequence[Observation]) -> list[Observation]:
 
 def _exchanged(observation: Observation, dated: Mapping[int, Unknown]) -> Observation:
     """Return an observation of other common unknowns in place of some."""
-    fields = zip(observation.UNKNOWNS, observation.unknowns, strict=True)
+    fields = zip(observation.UNKNOWNS, observation.unknowns if observation.UNKNOWNS else (), strict=True)
     changes: dict[str, Any] = {name: dated[id(own)] for (name, _), own in fields if id(own) in dated}
     return replace(observation, **changes) if changes else observation

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from photogram.results.axes import point_axes
+from photogram.results.courses import POSES, courses_table, notable, notable_courses
 from photogram.results.page.cameras import cameras_section
 from photogram.results.page.features import features_section
 from photogram.results.page.parts import network_page, size_section
@@ -46,6 +47,7 @@ def block_page(result: Result) -> Page:
         redundancy=_redundancy_tables(result),
         beside=[features_section(result.features, pictures["features"])],
         datum=_datum(result),
+        poses=POSES if result.block.timed else "",
     )
 
 
@@ -115,10 +117,21 @@ def _unknowns_section(result: Result) -> Section:
     if not result.unknowns:
         return Section("unknowns", "Common unknowns", [])
     intro = (
-        "Lever arms, boresights, sensors, levels, planes and lines that several observations have in common."
+        "Lever arms, boresights, sensors, levels, planes and lines that several observations have in common;"
+        " clocks, readout times and coefficients of trajectories."
     )
-    table = page_table("Common unknowns", unknowns(result.unknowns))
-    return Section("unknowns", "Common unknowns", [table], intro)
+    (shown, note), (every, said) = notable(result.unknowns), notable_courses(result)
+    tables = [page_table("Common unknowns", unknowns(shown), _sentence(note))] if shown else []
+    if every:
+        said = said or "The largest correction in the span of the table, and its time."
+        tables.append(
+            page_table("Trajectories", courses_table(every, result.block.linear_unit), _sentence(said))
+        )
+    return Section("unknowns", "Common unknowns", tables, intro)
+
+
+def _sentence(said: str) -> str:
+    return f"{said[:1].upper()}{said[1:].removesuffix('.')}." if said else ""
 
 
 def _datum(result: Result) -> str:

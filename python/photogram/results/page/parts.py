@@ -39,6 +39,7 @@ def network_page(
     redundancy: Sequence[Table] = (),
     beside: Sequence[Section] = (),
     datum: str = "",
+    poses: str = "",
 ) -> Page:
     """Return the page of a network.
 
@@ -54,8 +55,8 @@ def network_page(
         Beside the picture of redundancy numbers.
     beside
         What stands beside the plan.
-    datum
-        What coordinates refer to.
+    datum, poses
+        What coordinates refer to, and what the poses of photos are where that is not plain.
     """
     return Page(
         what=what,
@@ -63,7 +64,7 @@ def network_page(
         judgements=[judged(result.verdict)],
         advice=result.verdict.next,
         highlights=[*highlights(result, photos), *more],
-        sections=_sections(result, size, given, redundancy, beside, datum),
+        sections=_sections(result, size, given, redundancy, beside, (datum, poses)),
         phases=result.seconds,
     )
 
@@ -74,9 +75,10 @@ def _sections(
     given: Sequence[Section],
     redundancy: Sequence[Table],
     beside: Sequence[Section],
-    datum: str,
+    intro_of: tuple[str, str],
 ) -> list[Section]:
     pictures, groups = drawings(result), tested_singly(result)
+    datum, poses = intro_of
     found = worst_of(groups)
     photos, points = worst_images(result, found)
     intro = (
@@ -93,7 +95,7 @@ def _sections(
         tests_section(result, pictures["tests"]),
         worst_section(result, groups, found),
         *given,
-        photos_section(result, photos, datum),
+        photos_section(result, photos, f"{datum} {poses}".strip()),
         points_section(result, points, datum),
         iterations_section(result),
         remarks_section(problems_of(result)),

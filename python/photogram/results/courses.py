@@ -1,0 +1,180 @@
+"""Trajectories of an adjusted block: what they are made of, and how far the adjustment has moved them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
+from photogram.results.result import Result
+from photogram.results.unknowns import AdjustedUnknown
+from photogram.show.quantity import Axis, Quantity
+
+__all__ = ["POSES", "Course", "courses", "courses_table", "notable", "notable_courses"]
+
+POSES = (
+    "Of photos on trajectories these are the poses at their own times; of scanners without one, in the middle"
+    " of their images."
+)
+
+STEPS = 8
+"""Places in each interval of knots, or in each of as many parts as a polynomial has coefficients."""
+COEFFICIENTS = 24
+"""Up to which all are listed with the other common unknowns."""
+NOTABLE = 3.0
+"""Test values of coefficients above are listed where they are more."""
+LISTED = 20
+"""Coefficients and trajectories that are listed at most, where they are more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Positions or rotations of a trajectory after the adjustment.
+
+    Attributes
+    ----------
+    trajectory, what
+        Its name; `position` or `rotation`.
+    basis, count
+        What its corrections are made of, and of how many coefficients.
+    first, last
+        The span of its table, in seconds.
+    largest, at
+        The length of the largest correction in it, in the linear unit or in radians, and its time.
+    tested
+        The largest of the test values of its coefficients; NaN where none is weighted.
+    """
+
+    trajectory: str
+    what: str
+    basis: str
+    count: int
+    first: float
+    last: float
+    largest: float
+    at: float
+    tested: float
+
+
+def courses(result: Result) -> list[Course]:
+    """Return positions and rotations of all trajectories that have corrections, in the order of the block."""
+    block = result.block
+    records = (each.moment.trajectory for each in block.observations if each.moment is not None)
+    every = {id(each): each for each in (*block.trajectories, *records)}.values()
+    # By names: those of photos of their own are made anew with their block.
+    adjusted = {(each.kind, each.name): each for each in result.unknowns}
+    found = []
+    for each in every:
+        for what, basis, own in zip(
+            ("position", "rotation"), (each.position, each.rotation), each.coefficients, strict=True
+        ):
+            if basis is not None:
+                of = [adjusted[one.KIND, one.name] for one in own]
+                found.append(_course(each, what, basis, of))
+    return found
+
+
+def _course(trajectory: Trajectory, what: str, basis: Basis, own: Sequence[AdjustedUnknown]) -> Course:
+    first, last = trajectory.table.span
+    times, corrections = _corrections(basis, np.array([each.position for each in own]), first, last)
+    sizes = np.linalg.norm(corrections, axis=1)
+    worst = int(np.argmax(np.nan_to_num(sizes, nan=-1.0)))
+    tests = np.abs(np.concatenate([each.standardized for each in own]))
+    return Course(
+        trajectory=trajectory.name,
+        what=what,
+        basis=f"{type(basis).__name__.lower()} of degree {basis.degree}",
+        count=len(own),
+        first=first,
+        last=last,
+        largest=float(sizes[worst]),
+        at=float(times[worst]),
+        tested=float(np.nanmax(tests)) if np.isfinite(tests).any() else float("nan"),
+    )
+
+
+def _corrections(basis: Basis, values: Floats, first: float, last: float) -> tuple[Floats, Floats]:
+    """Return times over a span, and (n, 3) the corrections there."""
+    if isinstance(basis, Polynomial):
+        times = np.linspace(first, last, STEPS * basis.count + 1) if last > first else np.array([first])
+        return times, basis.at(times) @ values
+    knots, p = np.asarray(basis.knots, dtype=float), basis.degree
+    inner = np.clip(np.unique(knots[p : len(knots) - p]), first, last)
+    parts = (np.arange(STEPS) / STEPS)[:, np.newaxis]
+    times = np.unique(np.append(((1 - parts) * inner[:-1] + parts * inner[1:]).ravel(), inner[-1]))
+    return times, _spline(knots, p, values, times)
+
+
+def _spline(knots: Floats, p: int, values: Floats, times: Floats) -> Floats:
+    """Return (n, 3) sums of B-splines, of each time only those that are not zero there (de Boor)."""
+    interval = np.clip(np.searchsorted(knots, times, side="right") - 1, p, len(knots) - p - 2)
+    rows = interval[:, np.newaxis] + np.arange(-p, 1)
+    found = values[rows]
+    for level in range(1, p + 1):
+        begin = knots[rows[:, level:]]
+        length = knots[rows[:, level:] + p + 1 - level] - begin
+        share = ((times[:, np.newaxis] - begin) / np.where(length > 0, length, np.inf))[..., np.newaxis]
+        found = (1 - share) * found[:, :-1] + share * found[:, 1:]
+    return np.asarray(found[:, 0])
+
+
+def notable_courses(result: Result) -> tuple[list[Course], str]:
+    """Return those that reports list, and what they say of the others: the largest test values come first."""
+    every = courses(result)
+    if len(every) <= LISTED:
+        return every, ""
+    order = sorted(range(len(every)), key=lambda row: -np.nan_to_num(every[row].tested))[:LISTED]
+    shown = [every[row] for row in sorted(order)]
+    return shown, f"{LISTED} of {len(every)}, with the largest test values; the table of unknowns has all"
+
+
+def courses_table(every: Sequence[Course], linear_unit: str) -> list[Quantity]:
+    """Return trajectories, quantity by quantity."""
+    axes = (Axis.of("position", linear_unit), Axis.turned("rotation"))
+    of = np.array([("position", "rotation").index(each.what) for each in every], dtype=np.int64)
+
+    def names(attribute: str, head: str) -> Quantity:
+        return Quantity(
+            np.array([getattr(each, attribute) for each in every], object), kind="name", head=head
+        )
+
+    def numbers(attribute: str, head: str, decimals: int) -> Quantity:
+        values = np.array([getattr(each, attribute) for each in every], dtype=float)
+        return Quantity(values, head=head, decimals=decimals, label=attribute)
+
+    largest = np.array([each.largest for each in every], dtype=float)
+    components = np.array([axes[k].name for k in of], dtype=object)
+    return [
+        names("trajectory", "Trajectory"),
+        Quantity(components, axes, "name", head="Of", of=of),
+        names("basis", "Basis"),
+        numbers("count", "Coefficients", 0),
+        numbers("first", "From s", 3),
+        numbers("last", "To s", 3),
+        Quantity(largest, axes, "deviation", head="Largest correction", figures=4, of=of, label="largest"),
+        numbers("at", "At s", 3),
+        numbers("tested", "Largest |w|", 2),
+    ]
+
+
+def notable(every: Sequence[AdjustedUnknown]) -> tuple[list[AdjustedUnknown], str]:
+    """Return the common unknowns that reports list, and what they say of the others.
+
+    All but coefficients of trajectories, and these where they are few, or have large test values.
+    """
+    own = [each for each in every if isinstance(each.given, Coefficient)]
+    if len(own) <= COEFFICIENTS:
+        return list(every), ""
+    sizes = np.array([np.nan_to_num(np.abs(each.standardized)).max(initial=0.0) for each in own])
+    order = np.argsort(-sizes, kind="stable")[:LISTED]
+    kept = {id(own[row]) for row in order.tolist() if sizes[row] > NOTABLE}
+    shown = [each for each in every if not isinstance(each.given, Coefficient) or id(each) in kept]
+    which = f"{len(kept)} of " if kept else ""
+    what = f"with |test value| > {NOTABLE:g}, " if kept else ""
+    return shown, (
+        f"{which}{len(own)} coefficients of trajectories {what}{'are listed' if kept else 'are not listed'}:"
+        " the table of unknowns has all"
+    )
