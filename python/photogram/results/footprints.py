@@ -11,6 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.network.block import Block
+from photogram.network.motion import of_pictures, scanners
 from photogram.network.rays import LocalAxes, local_axes
 from photogram.results.result import Result
 
@@ -30,7 +31,8 @@ class Footprints:
     ----------
     outlines
         (P, 17, 3) closed outlines in metric axes, counter-clockwise as the corners of the picture are from
-        the lower left; NaN for photos at or below the ground, and where the lens has no ray.
+        the lower left; NaN for photos at or below the ground, where the lens has no ray, and for scanners,
+        which show no picture with one pose.
     axes
         The metric axes: those of a rectangular block, else east, north and up amid the stations.
     grounds
@@ -93,9 +95,9 @@ def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ())
         outlines[..., :2] = centres[:, np.newaxis, :2] + along * reach[..., np.newaxis]
         outlines[..., 2] = np.where(np.isnan(reach), np.nan, levels[:, np.newaxis])
         slant = heights / turns[:, 2, 2]
-    known = np.isfinite(directions[..., 2])
+    known = np.isfinite(directions[..., 2]) & ~scanners(block)[:, np.newaxis]
     outlines[~known] = np.nan
-    size = np.where(slant > 0, slant, np.nan) / block.camera_scales()
+    size = np.where((slant > 0) & ~scanners(block), slant, np.nan) / block.camera_scales()
     return Footprints(outlines, axes, levels, size, (far & known).any(axis=1))
 
 
@@ -127,9 +129,11 @@ def grounds(result: Result, heights: Floats) -> Floats:
 def picture_frames(block: Block, sizes: Sequence[tuple[float, float] | None] = ()) -> Floats:
     """Return (k, 4) least x and y, largest x and y of the pictures of the cameras of a block, as its images.
 
-    Pixels of cameras whose y counts down count from the corner, all other coordinates from the middle.
+    Pixels of cameras whose y counts down count from the corner, all other coordinates from the middle. Strips
+    of scanners are no pictures.
     """
     cameras, photo_cameras = block.core_cameras()
+    block = of_pictures(block)
     of_images = photo_cameras[block.image_photos]
     found = np.full((len(cameras), 4), np.nan)
     for row in range(len(cameras)):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network.geometry import geographic_to_geocentric, lengths_of_units
+from photogram.network.motion import scanners
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.show.ways import Way
@@ -40,7 +42,7 @@ class WeakestPoint:
         the eigenvalues of its covariance matrix. Rays that meet at right angles give about 1, nearly
         parallel ones 10,000 and more. 1 where a component is held.
     distance
-        From the nearest station that sees it, in the median of these distances.
+        From the nearest station that sees it, in the median of these distances; NaN where scanners alone do.
     rays
         Number of its images.
     """
@@ -85,6 +87,9 @@ class Determined:
         (P,) how many unknowns of a pose are not fixed.
     point_cofactors
         (n, 3, 3) with axes of equal units.
+    moving
+        (P,) which photos are no stations: scanners, of which each line is taken from another place; None for
+        none.
     """
 
     stations: Floats
@@ -92,6 +97,7 @@ class Determined:
     poses: Floats
     ranks: Indices
     point_cofactors: Floats
+    moving: Bools | None = None
 
 
 @Way
@@ -112,7 +118,7 @@ def _(result: Result) -> Determined:
         )
     poses = result.photo_cofactors[:, :6, :6]
     ranks = (np.diagonal(poses, axis1=1, axis2=2) > 0).sum(axis=1)
-    return Determined(stations, points, poses, ranks, cofactors)
+    return Determined(stations, points, poses, ranks, cofactors, scanners(block))
 
 
 @np.errstate(all="ignore")
@@ -176,7 +182,9 @@ def weakest_lines(result: AdjustedNetwork) -> list[str]:
             f"{'point':<16}{'ratio':>12}{'distance':>12}{'rays':>6}",
         ]
         lines += [
-            f"{each.point:<16}{each.ratio:>12.4g}{each.distance:>12.4g}{each.rays:>6}" for each in points
+            f"{each.point:<16}{each.ratio:>12.4g}"
+            f"{f'{each.distance:.4g}' if math.isfinite(each.distance) else '-':>12}{each.rays:>6}"
+            for each in points
         ]
     if photos:
         lines += [
@@ -203,6 +211,8 @@ def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
 def _distances(result: AdjustedNetwork, network: Determined) -> Floats:
     """Return the distances of all points from the nearest station that sees them, in their median."""
     used = result.used_images
+    if network.moving is not None:
+        used = used & ~network.moving[result.given.image_photos]
     own = result.image_points[used]
     of_images = network.points[own] - network.stations[result.given.image_photos[used]]
     nearest = np.full(len(network.points), np.inf)
