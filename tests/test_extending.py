@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "extending.md").read_text()
 CAMERAS = Path("crates/photocore/src/geometry/camera")
 KINDS = Path("crates/photocore/src/network/observations")
-MOUNTS = Path("crates/photocore/src/network/mounts")
+BASES = Path("crates/photocore/src/geometry/trajectory")
 FORMATS = Path("python/photogram/collection/formats")
 PACKAGE = [
     path
@@ -41,12 +41,16 @@ EXTENSIONS = {
         r"EqualHeight|equal.height",
         [*CRATE, *BINDING],
     ),
+    # What Python can say of a basis is another matter, too; five points have polynomials of another sort.
     "motion": (
-        MOUNTS / "rolling.rs",
-        MOUNTS / "mod.rs",
-        "rolling::Rolling;",
-        r"\b[Rr]olling\b",
-        [*CRATE, *BINDING, *PACKAGE],
+        BASES / "polynomial.rs",
+        BASES / "mod.rs",
+        "polynomial::Polynomial;",
+        r"\bPolynomial\b|\"polynomial\"",
+        [
+            *(path for path in CRATE if path.name not in ("tests.rs", "on_trajectory.rs", "five_points.rs")),
+            *BINDING,
+        ],
     ),
 }
 """Its file, the file that registers it, the line there, its name, and the sources that do not know it."""

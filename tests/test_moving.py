@@ -10,9 +10,10 @@ import pytest
 
 from photogram import Block, Camera, adjust
 from photogram.network.geometry import Spheroid
-from photogram.network.observations import Attitude, Control, Position, Smoothness
+from photogram.network.observations import Attitude, Control, Position, Rate, Smoothness, Velocity
+from photogram.network.projecting import projected
 from photogram.network.timed import Lines, LineSensor, Shutter, Timed
-from photogram.network.trajectories import Clock, Polynomial, Readout, Spline, Table, Trajectory
+from photogram.network.trajectories import Clock, GyroBias, Polynomial, Readout, Spline, Table, Trajectory
 from photogram.network.unknowns import Boresight, Sensor
 from shared_data import SHARED
 
@@ -372,3 +373,168 @@ def test_planetary_pair():
     for k in (0, 1):
         solved(result, solution, f"position{k + 1}", orbits[k], 0, unknowns=1e-4, cofactors=5e-6)
         solved(result, solution, f"rotation{k + 1}", orbits[k], 1, unknowns=1e-4, cofactors=5e-6)
+
+
+@pytest.mark.parametrize("case", ["pushbroom_strips", "rolling_shutter"])
+def test_residuals_are_measured_less_projected(case, monkeypatch):
+    found = {}
+
+    def keep(result, *_, **__):
+        found["result"] = result
+        raise InterruptedError
+
+    monkeypatch.setattr(f"{__name__}.agree", keep)
+    with pytest.raises(InterruptedError):
+        globals()[f"test_{case}"]()
+    result = found["result"]
+    for row, own in enumerate(result.block.timed):
+        images = np.flatnonzero(result.block.image_photos == row)
+        places = result.point_positions[result.block.image_points[images]]
+        apart = result.block.image_xy[images] - result.project(own.photo, places)
+        if own.lines is None:
+            # v = (I - df/dt T/h e_row') apart: half a percent of a pixel.
+            np.testing.assert_allclose(apart, result.residuals[images], rtol=0, atol=0.02)
+        else:
+            # Across the flight, but for what a line is turned against it.
+            np.testing.assert_allclose(apart[:, 0] * 0.01, result.residuals[images, 0], rtol=0, atol=5e-4)
+
+
+def flight(**bases):
+    """Return a strip along X, 500 m above the ground, that bends and turns."""
+    times = np.arange(0.0, 21.0)
+    positions = np.column_stack([40.0 * times, 3.0 * np.sin(0.3 * times), 500.0 + np.cos(0.2 * times)])
+    # Samples across the flight, lines along it.
+    turned = [exponential([0.004 * np.sin(t), 0.003 * np.cos(t), -np.pi / 2 + 0.002 * t]) for t in times]
+    return Trajectory("strip", Table(times, positions, times, turned), **bases)
+
+
+SENSOR = LineSensor((0.01, 0.0), 3000.0, y0=0.2)
+LENS = Camera("brown", {"c": -60.0, "K1": 1e-6, "xp": 0.02})
+GROUND = np.array(
+    [[x, y, 10.0 * np.sin(x)] for x in np.arange(200.0, 600.0, 60.0) for y in (-150.0, 0.0, 140.0)]
+)
+
+
+def test_points_project_to_where_they_are_measured():
+    two = [flight(), flight()]
+    object.__setattr__(two[1], "name", "back")
+    forward = Sensor("forward", [0.1, 0.2, -0.3], exponential([0.3, 0.0, 0.01]), sd=0.0)
+    clock = Clock("clock", 0.02, sd=0.0)
+    rows = Lines([[0.0, 0.5, 0.004], [2000.0, 8.5, 0.0041]])
+    timed = [
+        Timed("0", two[0], lines=rows, line_sensor=SENSOR, offset=clock),
+        Timed("1", two[1], lines=rows, line_sensor=SENSOR, sensor=forward),
+    ]
+    images = [projected(own, each, LENS, GROUND) for own, each in zip(timed, two, strict=True)]
+    assert np.isfinite(images).all()
+    own = {
+        "photo_positions": np.zeros((2, 3)),
+        "photo_attitudes": np.zeros((2, 3)),
+        "point_positions": GROUND + 3.0,
+        "point_sd": np.full(GROUND.shape, np.inf),
+        "image_photos": np.repeat([0, 1], len(GROUND)),
+        "image_points": np.tile(np.arange(len(GROUND)), 2),
+        "image_xy": np.concatenate(images),
+        "image_sd": 0.003,
+        "cameras": [LENS],
+        "photo_cameras": [0, 0],
+        "timed": timed,
+    }
+    result = adjust(Block(**own))
+    np.testing.assert_allclose(result.residuals, 0.0, atol=1e-8)
+    np.testing.assert_allclose(result.point_positions, GROUND, atol=1e-6)
+    again = [result.project(str(k), result.point_positions) for k in (0, 1)]
+    np.testing.assert_allclose(again, images, rtol=0, atol=1e-5)
+
+
+def test_a_pose_at_any_time_has_the_covariance_of_the_photo_there():
+    strip = flight(position=Spline(every=5.0, sd=1.0), rotation=Spline(every=4.0, sd=1e-3, smooth=(2, 1e-4)))
+    timed = Timed("0", strip, time=7.3)
+    observations = [
+        Position(None, strip.table.positions[k] + 0.1, sd=0.05, trajectory=strip, time=float(k))
+        for k in range(2, 18)
+    ]
+    observations += [
+        Velocity(None, [40.0, 0.5, 0.0], sd=0.1, trajectory=strip, time=9.25, lever_arm=[0.1, 1.0, -0.4]),
+        Rate(None, [0.001, 0.002, 0.003], sd=1e-3, trajectory=strip, time=9.25),
+    ]
+    u = np.array([[0.1, 0.2, -1.0], [-0.3, 0.1, -1.0], [0.2, -0.2, -1.0], [-0.1, -0.25, -1.0]])
+    camera = Camera("perspective", {"c": -60.0})
+    block = Block(
+        photo_positions=np.zeros((1, 3)),
+        photo_attitudes=np.zeros((1, 3)),
+        point_positions=GROUND[:4],
+        point_sd=0.05,
+        image_photos=np.zeros(4, dtype=int),
+        image_points=np.arange(4),
+        image_xy=projected(timed, strip, camera, GROUND[:4]) + 0.01 * u[:, :2],
+        image_sd=0.01,
+        cameras=[camera],
+        photo_cameras=[0],
+        timed=[timed],
+        observations=observations,
+    )
+    result = adjust(block)
+    pose = result.trajectories["strip"].poses([7.3])
+    np.testing.assert_allclose(pose.positions, result.photo_positions, atol=1e-9)
+    np.testing.assert_allclose(pose.sd[0, :3], result.photo_sd[0, :3], rtol=1e-9)
+    total = result.redundancy.sum() + sum(each.redundancy.sum() for each in result.kinds.values())
+    total += sum(each.redundancy.sum() for each in result.unknowns) + np.nansum(result.point_redundancy)
+    assert total == pytest.approx(result.degrees_of_freedom, abs=1e-8)
+
+
+@pytest.mark.parametrize("kind", ["velocity", "rate"])
+def test_motions_that_were_observed_exactly_are_found(kind):
+    # A coefficient that only the motion shows, at a time between records, with a clock that is behind.
+    truth = np.array([0.3, -0.2, 0.1]) * (1.0 if kind == "velocity" else 1e-3)
+    known = {"value": [[0.0] * 3, truth], "sd": 0.0}
+    line = {"degree": 1, "reference": 10.0, "scale": 10.0}
+    free = {"sd": [[0.0] * 3, [np.inf] * 3]}
+    clock = Clock("clock", 0.3, sd=0.0)
+    names = ("position", "rotation") if kind == "velocity" else ("rotation", "position")
+    given = {names[0]: Polynomial(**line, **known), names[1]: Polynomial(**line, sd=0.0)}
+    moved, unknown = flight(**given), flight(**given | {names[0]: Polynomial(**line, **free)})
+    arm = np.array([0.5, -1.0, 2.0])
+    bias = GyroBias("gyro", [1e-3, 2e-3, -1e-3], sd=0.0)
+
+    def at(time):
+        c = [np.array([each.position for each in part]) for part in moved.coefficients]
+        places, turned, *_ = moved.flown(np.array([time + 0.3]), *c)
+        return places[0], turned[0].reshape(3, 3)
+
+    def observed(time):
+        # Differences of the fourth order: of antennas, of attitudes.
+        h = 1e-3
+        after, before, far, back = (at(time + k * h) for k in (1, -1, 2, -2))
+        place = lambda pose: pose[0] + pose[1] @ arm  # noqa: E731
+        speed = (8 * (place(after) - place(before)) - (place(far) - place(back))) / (12 * h)
+        a = at(time)[1].T @ ((8 * (after[1] - before[1]) - (far[1] - back[1])) / (12 * h))
+        return speed, np.array([a[2, 1], a[0, 2], a[1, 0]])
+
+    of = {"trajectory": unknown, "clock": clock}
+    observations = []
+    for time in (3.4, 9.1, 14.6):
+        speed, rate = observed(time)
+        if kind == "velocity":
+            observations.append(Velocity(None, speed, sd=0.01, lever_arm=arm, time=time, **of))
+        else:
+            observations.append(Rate(None, rate + bias.position, sd=1e-4, bias=bias, time=time, **of))
+    camera = Camera("perspective", {"c": -60.0})
+    timed = Timed("0", unknown, time=5.0)
+    block = Block(
+        photo_positions=np.zeros((1, 3)),
+        photo_attitudes=np.zeros((1, 3)),
+        point_positions=GROUND[:3],
+        point_sd=0.0,
+        image_photos=[0, 0, 0],
+        image_points=[0, 1, 2],
+        image_xy=projected(timed, moved, camera, GROUND[:3]),
+        image_sd=1e3,
+        cameras=[camera],
+        photo_cameras=[0],
+        timed=[timed],
+        observations=observations,
+    )
+    result = adjust(block, tolerance=1e-10)
+    found = getattr(result.trajectories["strip"], names[0])[1]
+    np.testing.assert_allclose(found, truth, rtol=0, atol=1e-7 * np.abs(truth).max() + 1e-10)

@@ -41,6 +41,11 @@ RefractionRow = tuple[str | None, str | None, float, float, float]
 """Model of the air (`giant`, `standard` or None), model of the water (`giant`, `snell` or None), water level
 (linear unit), refractive index of the water, metres in the linear unit."""
 
+FlownRow = tuple[
+    _Floats, _Floats, _Floats, _Floats, list[tuple[int, list[float]]], list[tuple[int, list[float]]]
+]
+"""What `flown` returns."""
+
 class TrajectoryRow(TypedDict):
     """A trajectory as the core takes it; coefficients are indices among the common unknowns."""
 
@@ -572,6 +577,30 @@ def find_first_values(
     ------
     ValueError
         An argument of another shape or length, an index out of range; the message names it.
+    """
+
+def flown(trajectory: TrajectoryRow, position: _Floats, rotation: _Floats, times: list[float]) -> FlownRow:
+    """Return a trajectory at n times (docs/moving.md).
+
+    Parameters
+    ----------
+    trajectory
+        As of :func:`block_network`; which unknowns its coefficients are does not matter.
+    position, rotation
+        (K, 3) coefficients of positions, and of rotations in radians.
+    times
+        Seconds, counted as those of the trajectory.
+
+    Returns
+    -------
+    (n, 3) positions; (n, 9) attitudes, axes of the coefficients of positions, and right Jacobians of the
+    corrections r, row by row; for each time the number of the first function of positions that is not zero
+    and the values from there on, and the same of rotations.
+
+    Raises
+    ------
+    InputError
+        Times that do not increase, more or fewer coefficients than functions.
     """
 
 def block_network(

@@ -44,5 +44,6 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     similarity::register(module)?;
     matching::register(module)?;
     stellar::register(module)?;
-    text::register(module)
+    text::register(module)?;
+    trajectories::register(module)
 }

@@ -1,15 +1,15 @@
 //! Trajectories, and photos on them.
 
-use numpy::PyReadonlyArrayDyn;
+use numpy::{PyArray2, PyReadonlyArrayDyn};
 use photocore::geometry::trajectory::{
-    Attitudes, Basis, Interpolation, Polynomial, Positions, Spline, Trajectory as Course,
+    Attitudes, Basis, Flight, Interpolation, Positions, Trajectory as Course,
 };
 use photocore::geometry::{Matrix3, Vector3};
 use photocore::network::Trajectory;
 use photocore::network::mounts::OnTrajectory;
 use pyo3::prelude::*;
 
-use crate::arrays::{InputError, rows};
+use crate::arrays::{InputError, rows, table};
 use crate::options::unknown;
 
 type Numbers<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -65,6 +65,61 @@ pub fn trajectory(row: TrajectoryRow<'_>) -> PyResult<Trajectory> {
     Ok(Trajectory { course, position: row.position, rotation: row.rotation })
 }
 
+/// Adds the function to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(flown, module)?)
+}
+
+/// For each time what the functions of a basis are that are not zero: the number of the first, and their values.
+type Active = Vec<(usize, Vec<f64>)>;
+
+/// Positions, attitudes row by row, axes of coefficients row by row, right Jacobians row by row; functions of positions, of rotations.
+type FlownRow<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Active,
+    Active,
+);
+
+#[pyfunction]
+fn flown<'py>(
+    py: Python<'py>,
+    trajectory: TrajectoryRow<'py>,
+    position: Numbers<'py>,
+    rotation: Numbers<'py>,
+    times: Vec<f64>,
+) -> PyResult<FlownRow<'py>> {
+    let course = self::trajectory(trajectory)?.course;
+    let c = rows::<3>("position", &position)?;
+    let r = rows::<3>("rotation", &rotation)?;
+    if (c.len(), r.len()) != (course.position.count(), course.rotation.count()) {
+        return Err(InputError::new_err("a trajectory has not as many coefficients as functions"));
+    }
+    let own = |all: &[[f64; 3]], k: usize| all.get(k).map_or_else(Vector3::zeros, |&own| own.into());
+    let flights: Vec<_> =
+        times.iter().map(|&time| course.at(time, &|k| own(&c, k), &|k| own(&r, k))).collect();
+    let matrix = |of: &dyn Fn(&Flight) -> Matrix3| -> Vec<[f64; 9]> {
+        flights.iter().map(|own| std::array::from_fn(|k| of(own)[(k / 3, k % 3)])).collect()
+    };
+    let active = |basis: &Basis| -> Active {
+        let of = |&time: &f64| {
+            let found = basis.at(time);
+            (found.first, found.values.to_vec())
+        };
+        times.iter().map(of).collect()
+    };
+    Ok((
+        table(py, flights.iter().map(|own| <[f64; 3]>::from(own.motion.pose.position)).collect())?,
+        table(py, matrix(&|own| own.motion.pose.attitude))?,
+        table(py, matrix(&|own| own.axes))?,
+        table(py, matrix(&|own| own.jacobian))?,
+        active(&course.position),
+        active(&course.rotation),
+    ))
+}
+
 fn attitudes((times, matrices, joined): AttitudesRow<'_>) -> PyResult<Option<Attitudes>> {
     let all = rows::<9>("attitudes", &matrices)?;
     let all = all.iter().map(|row| Matrix3::from_row_slice(row)).collect();
@@ -81,10 +136,5 @@ fn interpolation(name: &str) -> PyResult<Interpolation> {
 }
 
 fn basis((kind, degree, numbers): BasisRow) -> PyResult<Basis> {
-    Ok(match (kind.as_str(), &numbers[..]) {
-        ("none", _) => Basis::None,
-        ("polynomial", &[reference, scale]) => Basis::Polynomial(Polynomial { degree, reference, scale }),
-        ("spline", _) => Basis::Spline(Spline { degree, knots: numbers }),
-        (other, _) => return Err(unknown("basis", other)),
-    })
+    Basis::from_numbers(&kind, degree, &numbers).ok_or_else(|| unknown("basis", &kind))
 }

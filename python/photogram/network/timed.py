@@ -83,6 +83,14 @@ class Lines:
         own = rows[np.maximum(np.searchsorted(rows[:, 0], lines, side="right") - 1, 0)]
         return np.asarray(own[..., 1] + (lines - own[..., 0]) * own[..., 2])
 
+    def at(self, times: ArrayLike) -> Floats:
+        """Return the lines at times in seconds: what :meth:`times` makes of them."""
+        rows, times = np.asarray(self.table), np.asarray(times, dtype=float)
+        # Rows follow each other in time as in the image, or all of them the other way.
+        sense = np.sign(rows[0, 2])
+        own = rows[np.maximum(np.searchsorted(sense * rows[:, 1], sense * times, side="right") - 1, 0)]
+        return np.asarray(own[..., 0] + (times - own[..., 1]) / own[..., 2])
+
 
 @dataclass(frozen=True)
 class LineSensor:

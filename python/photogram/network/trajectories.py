@@ -12,18 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram import _photocore
 from photogram.arguments.arrays import names, number, one_of, shaped, shown
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.unknowns import Unknown
-
-if TYPE_CHECKING:
-    from photogram import _photocore
 
 __all__ = [
     "Clock",
@@ -245,12 +243,6 @@ class Polynomial:
         reference, scale = self._placed
         return "polynomial", self.degree, [reference - origin, scale]
 
-    def at(self, times: ArrayLike) -> Floats:
-        """Return (n, K) values of its functions."""
-        reference, scale = self._placed
-        s = (np.asarray(times, dtype=float) - reference) / scale
-        return np.asarray(s[..., np.newaxis] ** np.arange(self.count))
-
     @property
     def smoothed(self) -> list[tuple[list[int], list[float], float]]:
         """Nothing is observed of its coefficients together."""
@@ -321,21 +313,6 @@ class Spline:
     def row(self, origin: float) -> BasisRow:
         """Return what the core takes, times counted from an origin."""
         return "spline", self.degree, (self._knots - origin).tolist()
-
-    def at(self, times: ArrayLike) -> Floats:
-        """Return (n, K) values of its functions (Cox and de Boor)."""
-        knots, p = self._knots, self.degree
-        t = np.asarray(times, dtype=float)[..., np.newaxis]
-        inside = np.clip(np.searchsorted(knots, t[..., 0], side="right") - 1, p, len(knots) - p - 2)
-        found = np.asarray(np.arange(len(knots) - 1) == inside[..., np.newaxis], dtype=float)
-        for degree in range(1, p + 1):
-            n = len(knots) - 1 - degree
-            begin, end = knots[:n], knots[degree : degree + n]
-            length = np.where(end > begin, end - begin, np.inf)
-            after = knots[degree + 1 :]
-            later = np.where(after > knots[1 : n + 1], after - knots[1 : n + 1], np.inf)
-            found = (t - begin) / length * found[..., :n] + (after - t) / later * found[..., 1 : n + 1]
-        return found
 
     @property
     def smoothed(self) -> list[tuple[list[int], list[float], float]]:
@@ -469,6 +446,13 @@ class Trajectory:
             "rotation": rotation,
             "body": None if self.body is None else attitudes(*_arrays(self.body), "linear"),
         }
+
+    def flown(self, times: Floats, position: Floats, rotation: Floats) -> _photocore.FlownRow:
+        """Return what the core makes of (n,) times, (K, 3) coefficients of positions and of rotations."""
+        # Which unknowns these are does not matter here.
+        row = self.row({id(each): 0 for own in self.coefficients for each in own})
+        c, r = np.reshape(position, (-1, 3)), np.reshape(rotation, (-1, 3))
+        return _photocore.flown(row, c, r, (times - self.origin).tolist())
 
 
 def _arrays(body: Sequence[Any]) -> tuple[Floats, Floats]:

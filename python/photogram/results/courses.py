@@ -10,6 +10,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
 from photogram.results.result import Result
+from photogram.results.trajectories import corrections
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.quantity import Axis, Quantity
 
@@ -79,8 +80,12 @@ def courses(result: Result) -> list[Course]:
 
 def _course(trajectory: Trajectory, what: str, basis: Basis, own: Sequence[AdjustedUnknown]) -> Course:
     first, last = trajectory.table.span
-    times, corrections = _corrections(basis, np.array([each.position for each in own]), first, last)
-    sizes = np.linalg.norm(corrections, axis=1)
+    times, values = _times(basis, first, last), np.array([each.position for each in own])
+    # The others count for nothing.
+    none = [np.zeros((len(each), 3)) for each in trajectory.coefficients]
+    part = ("position", "rotation").index(what)
+    none[part] = values
+    sizes = np.linalg.norm(corrections(trajectory, times, *none)[part], axis=1)
     worst = int(np.argmax(np.nan_to_num(sizes, nan=-1.0)))
     tests = np.abs(np.concatenate([each.standardized for each in own]))
     return Course(
@@ -96,29 +101,14 @@ def _course(trajectory: Trajectory, what: str, basis: Basis, own: Sequence[Adjus
     )
 
 
-def _corrections(basis: Basis, values: Floats, first: float, last: float) -> tuple[Floats, Floats]:
-    """Return times over a span, and (n, 3) the corrections there."""
+def _times(basis: Basis, first: float, last: float) -> Floats:
+    """Return times over a span: some in each interval of knots, or for each coefficient of a polynomial."""
     if isinstance(basis, Polynomial):
-        times = np.linspace(first, last, STEPS * basis.count + 1) if last > first else np.array([first])
-        return times, basis.at(times) @ values
+        return np.linspace(first, last, STEPS * basis.count + 1) if last > first else np.array([first])
     knots, p = np.asarray(basis.knots, dtype=float), basis.degree
     inner = np.clip(np.unique(knots[p : len(knots) - p]), first, last)
     parts = (np.arange(STEPS) / STEPS)[:, np.newaxis]
-    times = np.unique(np.append(((1 - parts) * inner[:-1] + parts * inner[1:]).ravel(), inner[-1]))
-    return times, _spline(knots, p, values, times)
-
-
-def _spline(knots: Floats, p: int, values: Floats, times: Floats) -> Floats:
-    """Return (n, 3) sums of B-splines, of each time only those that are not zero there (de Boor)."""
-    interval = np.clip(np.searchsorted(knots, times, side="right") - 1, p, len(knots) - p - 2)
-    rows = interval[:, np.newaxis] + np.arange(-p, 1)
-    found = values[rows]
-    for level in range(1, p + 1):
-        begin = knots[rows[:, level:]]
-        length = knots[rows[:, level:] + p + 1 - level] - begin
-        share = ((times[:, np.newaxis] - begin) / np.where(length > 0, length, np.inf))[..., np.newaxis]
-        found = (1 - share) * found[:, :-1] + share * found[:, 1:]
-    return np.asarray(found[:, 0])
+    return np.unique(np.append(((1 - parts) * inner[:-1] + parts * inner[1:]).ravel(), inner[-1]))
 
 
 def notable_courses(result: Result) -> tuple[list[Course], str]:

@@ -5,10 +5,16 @@ use smallvec::SmallVec;
 use crate::geometry::Vector3;
 
 /// All times.
-pub(super) const ALWAYS: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+pub const ALWAYS: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 /// Functions of time, of which few are not zero at any time.
-pub trait BasisModel {
+pub trait BasisModel: Sized {
+    /// The name under which callers know the basis.
+    const NAME: &'static str;
+
+    /// From a degree and numbers, as callers have them that know a basis by its name; None where there are more or fewer than it has.
+    fn from_numbers(degree: usize, numbers: &[f64]) -> Option<Self>;
+
     /// How many functions there are.
     fn count(&self) -> usize;
 
@@ -23,9 +29,9 @@ pub trait BasisModel {
         ALWAYS
     }
 
-    /// How far a time may be from another whose functions are at hand as well; zero where they are the same at all times.
-    fn reach(&self) -> f64 {
-        0.0
+    /// How far a time may be from another whose functions are at hand as well; None where they are the same at all times.
+    fn reach(&self) -> Option<f64> {
+        None
     }
 }
 

@@ -7,21 +7,107 @@
 //! C0, A0 are the table. c_k, in the axes of the table, and the rotation vectors r_k, in those of the photo, are the coefficients. A frame is
 //! the case of one record and degree 0. Continuous-time splines: Furgale and others 2012; line scanners: Poli 2007.
 
-mod basis;
 mod functions;
 mod lagrange;
-mod polynomial;
-mod spline;
 mod table;
 
-pub use basis::Basis;
+use std::ops::Range;
+
+use self::functions::ALWAYS;
+
 pub use functions::{Active, BasisModel};
-pub use polynomial::Polynomial;
-pub use spline::Spline;
 pub use table::{Attitudes, Interpolation, Positions};
 
 use super::angle_axis::{angle_axis_rotation, right_jacobian, right_jacobian_rate};
 use super::{Matrix3, Pose, Vector3};
+
+macro_rules! bases {
+    ($($module:ident::$name:ident;)*) => {
+        $(mod $module;
+        pub use $module::$name;)*
+
+        /// What corrections are made of: functions of time of any kind, or nothing.
+        #[derive(Debug, Clone, PartialEq, Default)]
+        pub enum Basis {
+            /// No corrections.
+            #[default]
+            None,
+            $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
+        }
+
+        impl Basis {
+            /// A basis of that name (see [`BasisModel::from_numbers`]); None where there is no such.
+            pub fn from_numbers(name: &str, degree: usize, numbers: &[f64]) -> Option<Self> {
+                match name {
+                    "none" => Some(Self::None),
+                    $($name::NAME => $name::from_numbers(degree, numbers).map(Self::$name),)*
+                    _ => None,
+                }
+            }
+
+            /// How many functions there are.
+            pub fn count(&self) -> usize {
+                match self {
+                    Self::None => 0,
+                    $(Self::$name(own) => own.count(),)*
+                }
+            }
+
+            /// See [`BasisModel::at`].
+            pub fn at(&self, time: f64) -> Active {
+                match self {
+                    Self::None => Active::default(),
+                    $(Self::$name(own) => own.at(time),)*
+                }
+            }
+
+            /// See [`BasisModel::is_sound`].
+            pub fn is_sound(&self) -> bool {
+                match self {
+                    Self::None => true,
+                    $(Self::$name(own) => own.is_sound(),)*
+                }
+            }
+
+            /// See [`BasisModel::span`].
+            pub fn span(&self) -> (f64, f64) {
+                match self {
+                    Self::None => ALWAYS,
+                    $(Self::$name(own) => own.span(),)*
+                }
+            }
+
+            fn reach(&self) -> Option<f64> {
+                match self {
+                    Self::None => None,
+                    $(Self::$name(own) => own.reach(),)*
+                }
+            }
+        }
+    };
+}
+
+bases! {
+    polynomial::Polynomial;
+    spline::Spline;
+}
+
+impl Basis {
+    /// Whether some functions are zero at some times: others then are not.
+    pub fn is_local(&self) -> bool {
+        self.reach().is_some()
+    }
+
+    /// The numbers of the functions that are not zero at a time or, where that is not known exactly, near it.
+    pub fn near(&self, time: f64, exactly: bool) -> Range<usize> {
+        let of = |time: f64| {
+            let found = self.at(time);
+            found.first..found.first + found.values.len()
+        };
+        let reach = if exactly { 0.0 } else { self.reach().unwrap_or(0.0) };
+        of(time - reach).start..of(time + reach).end
+    }
+}
 
 /// A pose, and how it moves.
 #[derive(Debug, Clone, Copy)]
@@ -57,10 +143,11 @@ pub struct Flight {
     position: Active,
     rotation: Active,
     /// The axes of the coefficients of positions, as columns: the identity, or those of the table in the body's.
-    axes: Matrix3,
+    pub axes: Matrix3,
     /// How these turn.
     turning: Vector3,
-    jacobian: Matrix3,
+    /// Jr(r).
+    pub jacobian: Matrix3,
     jacobian_rate: Matrix3,
     /// w without the turning of the body.
     own_rate: Vector3,

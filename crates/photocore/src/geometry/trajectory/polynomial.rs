@@ -14,6 +14,14 @@ pub struct Polynomial {
 }
 
 impl BasisModel for Polynomial {
+    const NAME: &'static str = "polynomial";
+
+    /// The reference and the scale.
+    fn from_numbers(degree: usize, numbers: &[f64]) -> Option<Self> {
+        let &[reference, scale] = numbers else { return None };
+        Some(Self { degree, reference, scale })
+    }
+
     fn count(&self) -> usize {
         self.degree + 1
     }

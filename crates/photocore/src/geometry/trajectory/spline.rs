@@ -41,6 +41,13 @@ impl Spline {
 }
 
 impl BasisModel for Spline {
+    const NAME: &'static str = "spline";
+
+    /// The knots.
+    fn from_numbers(degree: usize, numbers: &[f64]) -> Option<Self> {
+        Some(Self { degree, knots: numbers.to_vec() })
+    }
+
     fn count(&self) -> usize {
         self.knots.len().saturating_sub(self.degree + 1)
     }
@@ -75,8 +82,8 @@ impl BasisModel for Spline {
     }
 
     /// A tenth of the mean distance between knots.
-    fn reach(&self) -> f64 {
+    fn reach(&self) -> Option<f64> {
         let (first, last) = self.span();
-        0.1 * (last - first) / (self.count() - self.degree).max(1) as f64
+        Some(0.1 * (last - first) / (self.count() - self.degree).max(1) as f64)
     }
 }

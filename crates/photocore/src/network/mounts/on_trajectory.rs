@@ -95,13 +95,13 @@ impl MountModel for OnTrajectory {
         true
     }
 
-    /// The constant of a polynomial. Splines have none.
+    /// The first of functions that are never zero.
     fn main(&self, known: &Mounts) -> Option<usize> {
         let Trajectory { course, position, rotation } = known.trajectory(self.trajectory);
-        match (&course.position, &course.rotation) {
-            (Basis::Polynomial(_), _) => position.first().copied(),
-            (Basis::None, Basis::Polynomial(_)) => rotation.first().copied(),
-            _ => None,
+        let first = |basis: &Basis, all: &[usize]| if basis.is_local() { None } else { all.first().copied() };
+        match position.len() {
+            0 => first(&course.rotation, rotation),
+            _ => first(&course.position, position),
         }
     }
 

@@ -1,0 +1,218 @@
+"""Trajectories after the adjustment: poses at any time with their covariance, corrections, images."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import freeze_fields, shaped, standard_deviations
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.network.cameras import Camera
+from photogram.network.geometry import geographic_to_geocentric
+from photogram.network.projecting import projected
+from photogram.network.trajectories import Trajectory
+from photogram.network.whereabouts import reach
+from photogram.results.covariance import Covariances
+from photogram.results.unknowns import AdjustedUnknown
+
+if TYPE_CHECKING:
+    from photogram.results.result import Result
+
+__all__ = ["AdjustedTrajectory", "TrajectoryPoses", "adjusted_trajectories", "corrections", "project"]
+
+Joint = Callable[[list[str]], Floats]
+"""Covariances of common unknowns, by their names, all with all."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryPoses:
+    """Poses of a trajectory at n times. Arrays cannot be written.
+
+    Attributes
+    ----------
+    times
+        (n,) seconds.
+    positions, attitudes
+        (n, 3) projection centres in the object space (X, Y, Z; geocentric where that is geographic), and
+        (n, 3, 3) matrices whose columns are the axes of the photo there.
+    covariances
+        (n, 6, 6) of the step of a pose: its position in the same axes, then the rotation rho about the
+        photo's own axes, A Exp(rho), in radians.
+    """
+
+    times: Floats
+    positions: Floats
+    attitudes: Floats
+    covariances: Floats
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)
+
+    @property
+    def sd(self) -> Floats:
+        """(n, 6) standard deviations of the same."""
+        return standard_deviations(self.covariances)
+
+
+@dataclass(frozen=True, eq=False)
+class AdjustedTrajectory:
+    """A trajectory after the adjustment. Arrays cannot be written.
+
+    Attributes
+    ----------
+    given
+        The trajectory as it was given.
+    position, rotation
+        (K, 3) adjusted coefficients c_k in the linear unit, and r_k in radians.
+    position_sd, rotation_sd
+        (K, 3) their standard deviations; 0 for known ones.
+    position_redundancy, rotation_redundancy
+        (K, 3) redundancy numbers of what was given of them; 0 unless weighted.
+    """
+
+    given: Trajectory
+    position: Floats
+    rotation: Floats
+    position_sd: Floats
+    rotation_sd: Floats
+    position_redundancy: Floats
+    rotation_redundancy: Floats
+    joint: Joint
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.given.name
+
+    def poses(self, times: ArrayLike) -> TrajectoryPoses:
+        """Return poses at (n,) times in seconds: Q_pose = T Q T', T = diag(B I, Jr B I) (docs/moving.md).
+
+        Raises
+        ------
+        InputError
+            Times that are not finite, or outside what the table and the knots reach.
+        AdjustmentError, OutOfMemoryError
+            As :meth:`photogram.Result.covariance`.
+        """
+        times = self._inside(times)
+        positions, attitudes, axes, jacobians, of_position, of_rotation = self.given.flown(
+            times, self.position, self.rotation
+        )
+        covariances = np.empty((len(times), 6, 6))
+        shapes = axes.reshape(-1, 3, 3), jacobians.reshape(-1, 3, 3)
+        for row in range(len(times)):
+            names, partials = [], []
+            for part, (active, own) in enumerate(
+                zip((of_position[row], of_rotation[row]), shapes, strict=True)
+            ):
+                first, values = active
+                for k, value in enumerate(values):
+                    by = np.zeros((6, 3))
+                    by[3 * part : 3 * part + 3] = value * own[row]
+                    names.append(self.given.coefficients[part][first + k].name)
+                    partials.append(by)
+            t = np.hstack(partials) if partials else np.zeros((6, 0))
+            covariances[row] = t @ self.joint(names) @ t.T if names else 0.0
+        return TrajectoryPoses(times, positions, attitudes.reshape(-1, 3, 3), covariances)
+
+    def corrections(self, times: ArrayLike) -> tuple[Floats, Floats]:
+        """Return (n, 3) corrections of positions, and (n, 3) rotation vectors r(t), at times in seconds.
+
+        Raises
+        ------
+        InputError
+            As :meth:`poses`.
+        """
+        times = self._inside(times)
+        return corrections(self.given, times, self.position, self.rotation)
+
+    def _inside(self, times: ArrayLike) -> Floats:
+        own = np.atleast_1d(np.asarray(times, dtype=float))
+        first, last = reach(self.given)
+        outside = ~((own >= first) & (own <= last))
+        if own.ndim != 1 or outside.any():
+            bad = own.ravel()[np.argmax(outside)] if outside.any() else times
+            raise InputError(f"the trajectory {self.name} reaches from {first} to {last} s, not to {bad}")
+        return own
+
+
+def corrections(
+    trajectory: Trajectory, times: Floats, position: Floats, rotation: Floats
+) -> tuple[Floats, Floats]:
+    """Return (n, 3) sums of coefficients (K, 3) of positions, and of rotations, at times that are inside."""
+    *_, of_position, of_rotation = trajectory.flown(times, position, rotation)
+
+    def sums(active: list[tuple[int, list[float]]], own: Floats) -> Floats:
+        found = np.zeros((len(times), 3))
+        for row, (first, values) in enumerate(active):
+            found[row] = np.asarray(values) @ own[first : first + len(values)] if values else 0.0
+        return found
+
+    return sums(of_position, position), sums(of_rotation, rotation)
+
+
+def project(result: Result, photo: str, points: ArrayLike) -> Floats:
+    """Return where a photo on a trajectory sees (n, 3) points of the object space, as adjusted.
+
+    See :meth:`photogram.Result.project`.
+    """
+    block = result.block
+    timed = {each.photo: row for row, each in enumerate(block.timed)}
+    if photo not in timed:
+        raise InputError(f"the photo {photo} is on no trajectory, or is not there")
+    row = timed[photo]
+    adjusted = {id(each.given): (each.position, each.attitude) for each in result.unknowns}
+    index = block.photo_ids.index(photo)
+    if result.cameras and block.photo_cameras is not None:
+        camera = result.cameras[int(block.photo_cameras[index])].camera
+    else:
+        camera = Camera("perspective", {"c": float(block.known_distances("project")[index])})
+    places = shaped("points", points, (len(np.asarray(points)), 3))
+    if block.spheroid is not None:
+        places = geographic_to_geocentric(places, block.spheroid)
+    return projected(
+        block.timed[row], block.trajectories[row], camera, places, lambda each: adjusted[id(each)]
+    )
+
+
+def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
+    """Return the trajectories of photos and records of a block, by their names."""
+    found = {id(each.given): each for each in result.unknowns}
+    of_records = (each.moment.trajectory for each in result.block.observations if each.moment is not None)
+    covariances: list[Covariances] = []
+
+    def joint(names: list[str]) -> Floats:
+        # One factor serves all questions.
+        if not covariances:
+            covariances.append(result.covariances())
+        return covariances[0].covariance([("unknown", name) for name in names])
+
+    def adjusted(own: Trajectory) -> AdjustedTrajectory:
+        def arrays(of: Callable[[AdjustedUnknown], Floats]) -> list[Floats]:
+            return [
+                np.array([of(found[id(each)]) for each in part]).reshape(-1, 3) for part in own.coefficients
+            ]
+
+        values, sd = arrays(lambda each: each.position), arrays(lambda each: each.sd)
+        redundancy = arrays(lambda each: each.redundancy)
+        return AdjustedTrajectory(
+            given=own,
+            position=values[0],
+            rotation=values[1],
+            position_sd=sd[0],
+            rotation_sd=sd[1],
+            position_redundancy=redundancy[0],
+            rotation_redundancy=redundancy[1],
+            joint=joint,
+        )
+
+    every = {id(each): each for each in (*result.block.trajectories, *of_records)}.values()
+    return {each.name: adjusted(each) for each in every}
