@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
@@ -33,6 +33,7 @@ from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.selection import Adjusted, Things, photo_components, point_components
 from photogram.results.suspects import network_trial
+from photogram.results.trajectories import AdjustedTrajectory, adjusted_trajectories, project
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.show.ways import statement_of
 from photogram.statistics.limits import GlobalTest, global_test
@@ -399,6 +400,32 @@ class Result(AdjustedNetwork):
     def check_table(self) -> pd.DataFrame:
         """Return check points as a data frame: adjusted minus supplied coordinates, standard deviations."""
         return self._table("check")
+
+    @property
+    def trajectories(self) -> dict[str, AdjustedTrajectory]:
+        """The trajectories that photos and records are on, by name: coefficients, poses at any time."""
+        return adjusted_trajectories(self)
+
+    def project(self, photo: str, points: ArrayLike) -> Floats:
+        """Return where a photo on a trajectory sees points: the row or line at whose time it sees them there.
+
+        Parameters
+        ----------
+        photo
+            Its name.
+        points
+            (n, 3) in the object space of the block.
+
+        Returns
+        -------
+        (n, 2) image coordinates, of scanners samples and lines; NaN for points that are never seen.
+
+        Raises
+        ------
+        InputError
+            A photo that is on no trajectory; a scanner on a trajectory that has one record.
+        """
+        return project(self, photo, points)
 
     def camera_table(self) -> pd.DataFrame:
         """Return adjusted cameras as a data frame: a row for each parameter, with its unit."""
