@@ -8,7 +8,8 @@ import json
 import numpy as np
 import pytest
 
-from photogram import Block, Camera, adjust
+from example_scripts import load
+from photogram import Block, Camera, InputError, adjust
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Attitude, Control, Position, Rate, Smoothness, Velocity
 from photogram.network.projecting import projected
@@ -538,3 +539,28 @@ def test_motions_that_were_observed_exactly_are_found(kind):
     result = adjust(block, tolerance=1e-10)
     found = getattr(result.trajectories["strip"], names[0])[1]
     np.testing.assert_allclose(found, truth, rtol=0, atol=1e-7 * np.abs(truth).max() + 1e-10)
+
+
+def test_the_example_of_a_rolling_shutter(capsys):
+    result = load("rolling_shutter").main()
+    readout = next(each for each in result.unknowns if each.kind == "readout")
+    assert abs(readout.position[0] - 0.031) < 3 * readout.sd[0]
+    told = capsys.readouterr().out
+    assert told.startswith("readout time 3")
+    assert "as if taken at once: sigma0" in told
+
+
+def test_the_example_of_a_line_scanner(capsys):
+    result = load("line_scanner").main()
+    clock = next(each for each in result.unknowns if each.kind == "clock")
+    assert abs(clock.position[0] - 0.012) < 3 * clock.sd[0]
+    assert capsys.readouterr().out.count("\n") == 4
+    pytest.importorskip("matplotlib")
+    axes = result.plot.trajectory()
+    assert [each.get_ylabel() for each in axes] == ["position, m", "rotation, rad"]
+    with pytest.raises(InputError, match="no trajectory nowhere"):
+        result.plot.trajectory(name="nowhere")
+    with pytest.raises(InputError, match="reaches from"):
+        result.trajectories["strip"].poses([1e3])
+    with pytest.raises(InputError, match="on no trajectory"):
+        result.project("none", [[0.0, 0.0, 0.0]])

@@ -16,6 +16,7 @@ from photogram.plots.panels import Where, figure_of
 from photogram.plots.redundancy import redundancy
 from photogram.plots.residuals import residuals
 from photogram.plots.tests import tests
+from photogram.plots.trajectories import trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,6 +78,10 @@ class Plots:
     def features(self, ax: Where = None) -> Any:
         """Draw deviations of points from their features; see :func:`photogram.plots.features`."""
         return features(self._result, ax)
+
+    def trajectory(self, ax: Where = None, *, name: str | None = None) -> Any:
+        """Draw the corrections of a trajectory over time; see :func:`photogram.plots.trajectories`."""
+        return trajectory(self._result, ax, name=name)
 
     def save(self, folder: Path | str, ending: str = "png") -> list[Path]:
         """Write all pictures that there are, `network.png` ..., and return their places.
