@@ -20,7 +20,7 @@ fn ratios(square: f64) -> (f64, f64, f64) {
     (sine, versine, rest)
 }
 
-/// a I + b [w]x + c w w^T
+/// a I + b `[w]x` + c w w^T
 fn combined(w: &Vector3, a: f64, b: f64, c: f64) -> Matrix3 {
     Matrix3::from_diagonal_element(a) + b * w.cross_matrix() + c * w * w.transpose()
 }

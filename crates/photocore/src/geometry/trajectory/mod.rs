@@ -116,7 +116,7 @@ pub struct Motion {
     pub pose: Pose,
     /// C', in the axes of the pose's position, in a second.
     pub velocity: Vector3,
-    /// w, about the axes of the photo, in radians in a second: A' = A [w]x.
+    /// w, about the axes of the photo, in radians in a second: `A' = A [w]x`.
     pub rate: Vector3,
 }
 
