@@ -24,6 +24,7 @@ from photogram.messages import Message, counted
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images
 from photogram.network.directions import direction_deviations, image_directions
+from photogram.network.motion import timed_photos
 from photogram.results.result import Result
 
 __all__ = ["adjust_started"]
@@ -108,6 +109,8 @@ def _fitting(block: Block, aside: Bools, result: Result) -> Bools:
     rays = np.einsum("mij,mj->mi", known.attitudes[photos], image_directions(block))
     missed = np.linalg.norm(to / np.linalg.norm(to, axis=1, keepdims=True) - rays, axis=1)
     missed /= direction_deviations(block)
+    # Of photos that move nothing was set aside, and their rays have no one pose.
+    missed[timed_photos(block)[photos]] = np.nan
     usual = np.nanmedian(missed[~aside]) / MEDIAN_LENGTH
     return np.asarray(missed <= FITS * max(float(usual), 1.0))
 

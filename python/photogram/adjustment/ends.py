@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram import _photocore
+from photogram.adjustment.coefficients import named_unknowns
 from photogram.adjustment.undetermined import weak_in_words
 from photogram.errors import AdjustmentError, RankError
 from photogram.messages import Message, Undetermined, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
+from photogram.network.trajectories import Coefficient
 
 __all__ = [
     "behind",
@@ -140,8 +142,13 @@ def _unknowns(
             for camera, k in [*own, *of_cameras]
         ]
     common = block.unknowns if of_others else []
-    parts += [f"{common[row].components[k]} of {common[row].title}" for row, k in of_others]
-    return "; ".join(parts)
+    parts += [
+        f"{common[row].components[k]} of {common[row].title}"
+        for row, k in of_others
+        if not isinstance(common[row], Coefficient)
+    ]
+    moved = [common[row] for row, _ in of_others if isinstance(common[row], Coefficient)]
+    return "; ".join([*parts, *named_unknowns(block, moved)])
 
 
 def rounded(excess: float | None) -> list[Message]:

@@ -6,24 +6,29 @@ in which order.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.adjustment.known import Cartesian, Known
 from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
-from photogram.messages import Message, listed
+from photogram.messages import Message, counted, listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos
 from photogram.network.directions import direction_deviations, image_directions
+from photogram.network.motion import at_rest, flown_by, timed_photos
 from photogram.network.observations import Distance
 from photogram.show.brief import Brief
 
 __all__ = ["FirstValues", "first_values"]
+
+_Array = TypeVar("_Array", bound=NDArray[np.generic])
 
 NEEDED = 4
 """Known points of a photo that is resected."""
@@ -98,7 +103,8 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
     (:class:`photogram.network.observations.Position`, `Attitude`) give poses, and photos of which nothing but
     images is known are oriented relative to each other, chained, and carried onto control, given poses or
     observed positions by a similarity. Every step is a consensus, so that wrong points are borne; a robust
-    adjustment ends it. Refraction and unknowns of cameras are left out.
+    adjustment ends it. Refraction and unknowns of cameras are left out. Photos on trajectories stay where
+    they are given, and help no others: they are no pictures with one pose.
 
     Parameters
     ----------
@@ -118,7 +124,7 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
     InputError
         What is no block.
     AdjustmentError
-        No photo could be started; the message says why.
+        No photo could be started, or none in the datum of photos on trajectories; the message says why.
 
     Examples
     --------
@@ -135,6 +141,8 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
     """
     if not isinstance(block, Block):
         raise InputError(f"block is not a Block but of the type {type(block).__name__}")
+    if flown_by(block):
+        return _beside_trajectories(block, keep_all=keep_all)
     axes = Cartesian.of(block)
     known = Known.of(block, axes)
     directions = image_directions(block)
@@ -166,6 +174,60 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
             *_messages(block, sources, missing, aside, None if first is None else names[first], kept=kept),
         ],
     )
+
+
+def _beside_trajectories(block: Block, *, keep_all: bool) -> FirstValues:
+    """Find first values of photos that are on no trajectory; the others stay where they are given."""
+    timed = timed_photos(block)
+    poses = np.hstack([block.photo_positions, block.photo_attitudes])
+    stay = timed | np.isfinite(poses).all(axis=1)
+    names = np.array(block.photo_ids, dtype=object)
+    sources = dict.fromkeys(names[stay].tolist(), "given")
+    moving = Message(f"{counted(int(timed.sum()), 'photo')} on trajectories stay where they are given")
+    found = FirstValues(
+        block=block,
+        sources=sources,
+        missing={},
+        contradicted=(),
+        point_positions=np.full(block.point_positions.shape, np.nan),
+        set_aside=np.zeros(len(block.image_xy), dtype=bool),
+        misfit=np.nan,
+        first_photo=None,
+        messages=[moving],
+    )
+    if stay.all():
+        return found
+    own = first_values(at_rest(block), keep_all=keep_all)
+    if own.first_photo is not None:
+        raise AdjustmentError(
+            f"nothing gives a datum to {listed(names[~stay].tolist())}: photos on trajectories have theirs"
+        )
+    changes: dict[str, Floats] = {}
+    for name in ("photo_positions", "photo_attitudes"):
+        changes[name] = _with(getattr(block, name), ~timed, getattr(own.block, name))
+        observed = getattr(own.block, f"{name}_observed")
+        if observed is not None:
+            given = getattr(block, f"{name}_observed")
+            given = getattr(block, name) if given is None else given
+            changes[f"{name}_observed"] = _with(given, ~timed, observed)
+    return replace(
+        found,
+        block=block.replace(**changes),
+        sources={name: sources.get(name) or own.sources[name] for name in names if name not in own.missing},
+        missing=own.missing,
+        contradicted=own.contradicted,
+        point_positions=own.point_positions,
+        set_aside=_with(found.set_aside, ~timed[block.image_photos], own.set_aside),
+        misfit=own.misfit,
+        messages=[*own.messages, moving],
+    )
+
+
+def _with(values: _Array, rows: Bools, others: _Array) -> _Array:
+    """Return an array with others in some rows."""
+    found = values.copy()
+    found[rows] = others
+    return found
 
 
 def _found(block: Block, known: Known, directions: Floats) -> _photocore.FoundRow:

@@ -10,6 +10,7 @@ from photogram.arguments.types import Floats
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.geometry import Spheroid
+from photogram.network.motion import on_shared, scanners
 from photogram.network.observations import Attitude, Control, Position
 from photogram.network.unknowns import Boresight, LeverArm
 
@@ -87,6 +88,8 @@ class Known:
         positions = axes.positions(block.photo_positions)
         attitudes = axes.from_local(_matrices(block, block.photo_attitudes), block.photo_positions)
         given = np.asarray(np.isfinite(np.column_stack([positions, attitudes.reshape(-1, 9)])).all(axis=1))
+        # No picture has the pose of a photo that is on a trajectory with others, or line by line.
+        given &= ~(on_shared(block) | scanners(block))
         observed = block.photo_positions_observed
         centres = positions.copy()
         if observed is not None:

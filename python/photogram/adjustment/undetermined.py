@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.adjustment.coefficients import named_unknowns, of_motion
 from photogram.errors import RankError
 from photogram.messages import listed
 from photogram.network.block import Block
 from photogram.network.geometry import rotation_matrix, viewing_directions
+from photogram.network.motion import flown_by, on_shared, scanners
 from photogram.network.unknowns import Unknown
 
 if TYPE_CHECKING:
@@ -44,6 +46,8 @@ _PARALLEL = 0.99
 """Cosine of the angle between views that are about parallel."""
 _UPRIGHT = 0.05
 """Photos whose x axes are across one direction to this sine are not turned about their axes."""
+MOST = 40
+"""Lines of a message."""
 _ONE_PLACE = 1e-9
 """Stations that differ by less than this part of their coordinates are one."""
 _ON_LINE = 1e-3
@@ -82,7 +86,8 @@ def setting_of(block: Block) -> Setting:
     """Return how the photos of a block stand at their initial values."""
     photos = len(block.photo_ids)
     control = bool(np.isfinite(block.point_sd).any())
-    if photos < 2 or block.geographic or not np.isfinite(block.photo_attitudes).all():
+    moving = on_shared(block) | scanners(block)
+    if photos < 2 or block.geographic or moving.any() or not np.isfinite(block.photo_attitudes).all():
         return Setting(photos, control=control)
     axes = rotation_matrix(block.photo_attitudes)
     axes = axes.transpose(0, 2, 1) if block.photo_to_ground else axes
@@ -109,6 +114,8 @@ def setting_of(block: Block) -> Setting:
 def one_place(block: Block, photos: Sequence[int]) -> str:
     """Return what it means that photos were all taken from one place; nothing where they were not."""
     stations = block.photo_positions[list(photos)]
+    if (on_shared(block) | scanners(block))[list(photos)].any():
+        return ""
     if len(stations) < 2 or np.ptp(stations, axis=0).max() > _ONE_PLACE * max(1.0, np.abs(stations).max()):
         return ""
     return (
@@ -143,22 +150,25 @@ def undetermined_combinations(
     at = setting_of(block)
     words = [_said(block, each, at, common) for each in sorted(set(rows))]
     moving = [
-        _moved(block, of, by, [common[row].title for row in others])
+        _moved(block, of, by, named_unknowns(block, [common[row] for row in others]))
         for of, by, others, *_ in sorted(set(rows))
     ]
     for each, said, moved in zip(sorted(set(rows)), words, moving, strict=True):
-        lines.append(f"  {rows.count(each)} moving {moved}")
-        if said:
-            lines.append(f"    {said}")
+        line = f"  {rows.count(each)} moving {moved}"
+        lines += [line, f"    {said}"] if said else [line]
+    if len(lines) > MOST:
+        lines = [*lines[:MOST], f"  and {len(lines) - MOST} lines more"]
     if not np.isfinite(block.point_sd).any() and not any(words):
         weighted = np.isfinite(block.photo_position_sd).any()
         remedy = (
             "the standard deviations of the photos are too large to give a datum in double precision"
             if weighted
             else "standard deviations for the positions and attitudes of photos would give a datum"
+            if not flown_by(block)
+            else "records of GNSS, or standard deviations of coefficients, would give a datum"
         )
         lines.append(f"  there is no control; {remedy}")
-    what = "; ".join(said or moved for said, moved in zip(words, moving, strict=True))
+    what = "; ".join(dict.fromkeys(said or moved for said, moved in zip(words, moving, strict=True)))
     return RankError("\n".join(lines), names, point_names, camera_names, what)
 
 
@@ -187,7 +197,7 @@ def _said(block: Block, combination: _Combination, at: Setting, common: Sequence
     """Name parameters and parts of poses, then what that is; nothing where it has no name."""
     photos, cameras, others, moved, poses = combination
     if not moved:
-        return "" if cameras else _of_unknowns({common[row].KIND for row in others}, len(photos), at)
+        return "" if cameras else _of_unknowns(block, {common[row].KIND for row in others}, len(photos), at)
     by_camera: dict[int, list[str]] = {}
     for camera, k in moved:
         by_camera.setdefault(camera, []).append(block.cameras[camera].names[k])
@@ -197,8 +207,10 @@ def _said(block: Block, combination: _Combination, at: Setting, common: Sequence
     return " with ".join(parts) + (f": {words}" if words else "")
 
 
-def _of_unknowns(kinds: set[str], photos: int, at: Setting) -> str:
-    """Say what positions with shifts and drifts, or control on a line, leave open."""
+def _of_unknowns(block: Block, kinds: set[str], photos: int, at: Setting) -> str:
+    """Say what positions with shifts and drifts, motions, or control on a line, leave open."""
+    if said := of_motion(kinds, placed=at.control or bool(block.observations)):
+        return said
     if kinds == {"lever arm", "shift"}:
         return (
             "lever arm and shift move together, all photos having the same attitude: the lever arm measured"
@@ -233,7 +245,7 @@ def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
     at = setting_of(block)
     if not names:
         kinds = {block.unknowns[row].KIND for row, _ in solution.weak_unknowns}
-        return _of_unknowns(kinds, len({photo for photo, _ in solution.weak}), at)
+        return _of_unknowns(block, kinds, len({photo for photo, _ in solution.weak}), at)
     views = viewing_directions(
         solution.photo_positions, solution.photo_attitudes, photo_to_ground=block.photo_to_ground
     )

@@ -36,6 +36,7 @@ from photogram.errors import AdjustmentError
 from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
 from photogram.network.geometry import rotation_matrix
+from photogram.network.motion import at_rest
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
 
@@ -107,15 +108,19 @@ def hints(block: Block) -> list[Message]:
     Returns
     -------
     Sentences that each name a mistake that would explain why images do not fit; none where they do, or where
-    no single mistake explains it. Nothing is corrected.
+    no single mistake explains it. Nothing is corrected. Photos on trajectories, which are no pictures with
+    one pose, are left out.
 
     Raises
     ------
     InputError
         What is no block, or has photos without a pose.
     """
+    rest = at_rest(block) if isinstance(block, Block) else block
+    if rest is not block and not len(rest.image_xy):
+        return []
     with np.errstate(all="ignore"):
-        block = View.of(checked(block)).seen
+        block = View.of(checked(rest)).seen
         found = [Message(verdict.text) for verdict in verdicts(block)]
         bar = distances_in_millimetres(block)
         bars = [] if bar is None else [Message(bar.text)]

@@ -24,6 +24,7 @@ from photogram.diagnosis.control_sets import doubtful, explain, free_model
 from photogram.diagnosis.conventions import conventions, further
 from photogram.diagnosis.editing import _BESIDE, HOPELESS, Edited, blunder_section, edit
 from photogram.diagnosis.findings import Diagnosis, Explained, Finding, Level, Section, Words
+from photogram.diagnosis.flown import flown_checked
 from photogram.diagnosis.gross import Suspects, disproved, gross, without
 from photogram.diagnosis.heights import two_ray_heights
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
@@ -37,6 +38,7 @@ from photogram.diagnosis.views import View
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos
+from photogram.network.motion import flown_by
 from photogram.network.observations import Position
 from photogram.network.rays import Rays
 from photogram.results.result import Result
@@ -85,7 +87,8 @@ def diagnose(
     ----------
     network
         A block with any observations, a project of GIANT files, or a collection of photos. Photos of a block
-        may be without poses: they are given first values then.
+        may be without poses: they are given first values then. A block with photos on trajectories is
+        adjusted and snooped: nothing is tried on photos that move.
     result
         An adjustment of the block that is to be explained, or what snooping has made of it. Nothing is
         adjusted then: where it has not converged, or fits badly, mistakes in conventions and exchanged names
@@ -141,6 +144,8 @@ def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
         raise InputError("the block has no images: there is nothing to check")
     # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        if flown_by(block):
+            return flown_checked(block, manner.words, Adjuster(manner.options))
         if np.isfinite(block.photo_positions).all() and np.isfinite(block.photo_attitudes).all():
             return _checked(block, manner)
         started, section = _started(block)

@@ -37,7 +37,8 @@ MEDIAN_OF_LARGER = 1.05
 
 def with_exchanges(result: Result) -> Result:
     """Return a result, with probable exchanges of names where it shows gross errors and no other mistake."""
-    doubtful = result.loss is None and not result.hints and not result.block.mounts
+    block = result.block
+    doubtful = result.loss is None and not result.hints and not block.mounts and not block.timed
     if not doubtful:
         return result
     found: dict[tuple[str, str], Exchange] = {}

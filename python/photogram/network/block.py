@@ -327,6 +327,7 @@ class Block(Valued, Brief):
 
     def _check_timed(self) -> None:
         self._set("timed", checked_timed(self.timed, self.photo_ids))
+        self._check_own_poses()
         poses = Poses(
             self.photo_ids,
             self.photo_positions,
@@ -359,6 +360,17 @@ class Block(Valued, Brief):
         if twice:
             raise InputError(
                 f"two trajectories are called {twice[0]}: photos and records that are on one take one object"
+            )
+
+    def _check_own_poses(self) -> None:
+        """Refuse photos with a trajectory of their own, which goes from their pose, without that."""
+        if not (own := [each.photo for each in self.timed if each.trajectory is None]):
+            return
+        unknown = np.isnan(self.photo_positions).any(axis=1) | np.isnan(self.photo_attitudes).any(axis=1)
+        for row in np.flatnonzero(unknown & np.isin(self.photo_ids, own)).tolist():
+            raise InputError(
+                f"the pose of the photo {self.photo_ids[row]}, from which it moves, is not known:"
+                " photogram.first_values finds it of the block without what is timed"
             )
 
     def _check_observations(self) -> None:

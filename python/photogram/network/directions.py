@@ -8,6 +8,8 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.network.block import Block
+from photogram.network.chosen import kept_images
+from photogram.network.motion import focal_images, scanners
 
 __all__ = ["direction_deviations", "image_directions", "seen_without_lenses", "without_lenses"]
 
@@ -20,15 +22,16 @@ _SMALL = 1e-6
 def image_directions(block: Block) -> Floats:
     """(m, 3) unit directions of the images of a block in the axes of their photos; NaN where there is none.
 
-    x to the right, y up, z back: the camera looks along -z. Refraction is left out.
+    Of photos that move these are the axes at the time of the image. x to the right, y up, z back: the camera
+    looks along -z. Refraction is left out.
     """
     cameras, photo_cameras = block.core_cameras()
     of_images = photo_cameras[block.image_photos]
     order = np.argsort(of_images, kind="stable")
     ends = np.searchsorted(of_images[order], np.arange(len(cameras)), side="right")
-    directions = np.full((len(order), 3), np.nan)
+    directions, places = np.full((len(order), 3), np.nan), focal_images(block)
     for (model, parameters, *_), own in zip(cameras, np.split(order, ends[:-1]), strict=True):
-        directions[own] = _photocore.camera_rays(model, np.array(parameters), block.image_xy[own])
+        directions[own] = _photocore.camera_rays(model, np.array(parameters), places[own])
     return directions
 
 
@@ -37,23 +40,27 @@ def without_lenses(block: Block) -> Block:
 
     A block that has principal distances is returned as it is. Where most images have no direction (they may
     be in another unit) lenses are left out, and cameras are everywhere what they are near the axis; else
-    images without a direction in front of the camera are left out.
+    images without a direction in front of the camera are left out. So are those of scanners, which are no
+    pictures with one pose, and nothing moves.
     """
     return seen_without_lenses(block)[0]
 
 
 def seen_without_lenses(block: Block) -> tuple[Block, Bools]:
     """Return the block of :func:`without_lenses`, and (m,) which of the images it has."""
+    pictured: Bools = ~scanners(block)[block.image_photos]
     if not block.cameras or block.photo_cameras is None:
-        return block, np.ones(len(block.image_xy), dtype=bool)
+        plain = block.replace(timed=()) if block.timed else block
+        return kept_images(plain, pictured) if not pictured.all() else plain, pictured
     directions = image_directions(block)
-    seen = directions[:, 2] < _SIDE
-    if 2 * np.count_nonzero(seen) < len(seen):
-        tangents, seen = _near_axis(block), np.ones(len(seen), dtype=bool)
+    seen = (directions[:, 2] < _SIDE) & pictured
+    if 2 * np.count_nonzero(seen) < np.count_nonzero(pictured):
+        tangents, seen = _near_axis(block), pictured
     else:
         tangents = -directions[:, :2] / directions[:, 2:]
     scales = block.camera_scales()
     plain = block.replace(
+        timed=(),
         cameras=(),
         photo_cameras=None,
         principal_distances=-scales,

@@ -21,6 +21,7 @@ __all__ = [
     "flown_by",
     "focal_images",
     "of_pictures",
+    "on_shared",
     "refuse_datum",
     "refuse_trajectories",
     "scanners",
@@ -62,6 +63,11 @@ def refuse_datum(block: Block, what: str) -> None:
 def timed_photos(block: Block) -> Bools:
     """(P,) which photos are on trajectories."""
     return _named(block, {each.photo for each in block.timed})
+
+
+def on_shared(block: Block) -> Bools:
+    """(P,) which photos are on a trajectory that is given: their poses only tell where they are about."""
+    return _named(block, {each.photo for each in block.timed if each.trajectory is not None})
 
 
 def scanners(block: Block) -> Bools:

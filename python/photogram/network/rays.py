@@ -9,6 +9,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network import geometry
 from photogram.network.block import Block
+from photogram.network.motion import on_shared
 
 __all__ = ["Intersection", "LocalAxes", "Rays", "frame_radius", "local_axes", "meet"]
 
@@ -58,11 +59,19 @@ class LocalAxes:
 
 def local_axes(block: Block) -> LocalAxes:
     """Return the metric axes of a block."""
+    stations = _stations(block)
     if block.spheroid is None:
-        return LocalAxes(block, np.median(block.photo_positions, axis=0) * [1.0, 1.0, 0.0], np.eye(3))
-    middle = np.median(block.photo_positions, axis=0)[np.newaxis] * [1.0, 1.0, 0.0]
+        return LocalAxes(block, np.median(stations, axis=0) * [1.0, 1.0, 0.0], np.eye(3))
+    middle = np.median(stations, axis=0)[np.newaxis] * [1.0, 1.0, 0.0]
     origin = geometry.geographic_to_geocentric(middle, block.spheroid)[0]
     return LocalAxes(block, origin, geometry.local_frames(middle)[0])
+
+
+def _stations(block: Block) -> Floats:
+    """Return (k, 3) places amid which a block is: stations, or points where these are on trajectories."""
+    own = ~on_shared(block) if block.timed else np.ones(len(block.photo_ids), dtype=bool)
+    known = np.isfinite(block.point_positions).all(axis=1)
+    return block.photo_positions[own] if own.any() or not known.any() else block.point_positions[known]
 
 
 def frame_radius(block: Block) -> float:

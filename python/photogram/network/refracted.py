@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from photogram.errors import InputError
 from photogram.messages import Message, listed
 from photogram.network.block import Block
+from photogram.network.motion import on_shared
 from photogram.network.refraction import metres_per_unit
 
 __all__ = ["check_cameras", "remarks"]
@@ -27,7 +28,7 @@ def check_cameras(block: Block) -> None:
     refraction = block.refraction
     if refraction is None or refraction.water is None:
         return
-    sunk = np.flatnonzero(block.photo_positions[:, 2] <= refraction.water_level)
+    sunk = np.flatnonzero((block.photo_positions[:, 2] <= refraction.water_level) & ~on_shared(block))
     if sunk.size:
         photo = int(sunk[0])
         height, unit = block.photo_positions[photo, 2], block.linear_unit

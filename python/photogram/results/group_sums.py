@@ -22,6 +22,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.core import core_network
+from photogram.network.motion import on_shared
 from photogram.network.observations import moments
 from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
@@ -284,7 +285,7 @@ def block_observables(block: Block) -> Observables:
     sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
     observed = (sd > 0) & np.isfinite(sd)
     # What is given of a photo with a trajectory of its own is given of common unknowns.
-    mounted = {each.photo for each in (*block.mounts, *block.timed)}
+    mounted = {each.photo for each in block.mounts} | {each.photo for each in block.timed}
     observed[[row for row, name in enumerate(block.photo_ids) if name in mounted]] = False
     cameras, photo_cameras = block.core_cameras()
     names = block.camera_names if block.cameras else [str(number) for number in range(len(cameras))]
@@ -292,13 +293,25 @@ def block_observables(block: Block) -> Observables:
         given=block,
         photo_cameras=photo_cameras,
         camera_names=names,
-        strips=lambda: strips_of(local_axes(block).positions(block.photo_positions)),
+        strips=lambda: _strips(block),
         point_classes=np.where(held, "control", np.where(known, "check", "pass")),
         photo_observed=observed,
         stations=("positions",) * 3 + ("attitudes",) * 3,
         commons=len(block.unknowns),
         records=len(moments(block.observations)),
     )
+
+
+def _strips(block: Block) -> list[Indices]:
+    """Return the photos of each strip: those on one trajectory, and others by where they were taken."""
+    own = {each.photo: each.trajectory for each in block.timed if each.trajectory is not None}
+    flown: dict[int, list[int]] = {}
+    for row, name in enumerate(block.photo_ids):
+        if name in own:
+            flown.setdefault(id(own[name]), []).append(row)
+    others = np.flatnonzero(~on_shared(block))
+    found = strips_of(local_axes(block).positions(block.photo_positions)[others]) if len(others) else []
+    return [*(others[strip] for strip in found), *(np.array(rows, dtype=np.int64) for rows in flown.values())]
 
 
 @observables.register

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
 from photogram.network.rays import Rays
 from photogram.results.group_sums import factored
@@ -134,6 +136,7 @@ def held_remark(found: Sequence[Tested], largest: float) -> list[str]:
 def _suspected(result: Result, of_images: Floats) -> list[Held]:
     """Return what is held and has the worst images, the worst first."""
     block, used = result.block, result.used_images
+    given = result.photo_given_sd
     photos, points = len(block.photo_ids), len(block.point_ids)
     counts = np.bincount(block.image_photos[used], minlength=photos)
     of_photos = np.bincount(block.image_photos, of_images, photos) / np.maximum(counts, 1)
@@ -141,8 +144,8 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
     mounted = {each.photo for each in block.mounts} | {each.frame for each in block.mounts}
     rows: list[tuple[float, Held]] = []
     for what, sd, shift in (
-        ("position", block.photo_position_sd, 0),
-        ("attitude", block.photo_attitude_sd, 3),
+        ("position", given[:, :3], 0),
+        ("attitude", given[:, 3:], 3),
     ):
         held = np.asarray(sd == 0)
         if shift or block.geographic:  # Partials are by other axes than those of the components.
@@ -168,11 +171,13 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
 def _partials(result: Result) -> Floats:
     """(6, m, 2) partials of the images by three coordinates and three small turns of their stations.
 
-    Those by the coordinates of a point are the same with the other sign.
+    Those by the coordinates of a point are the same with the other sign. NaN of scanners, which have no one
+    station; photos with a rolling shutter are taken where they began.
     """
+    plain, seen = seen_without_lenses(_adjusted(result))
     block = result.block
-    adjusted = block.replace(photo_positions=result.photo_positions, photo_attitudes=result.photo_attitudes)
-    plain, seen = seen_without_lenses(adjusted)
+    if not seen.any():
+        return np.full((6, len(block.image_xy), 2), np.nan)
     rays = Rays.of(plain)
     places = rays.axes.positions(result.point_positions)[plain.image_points]
     apart = np.linalg.norm(places - rays.centres[plain.image_photos], axis=1)
@@ -188,7 +193,25 @@ def _partials(result: Result) -> Floats:
             for sign in (1, -1)
         ]
         found[3 + k, seen] = (turned[0] - turned[1]) / (2 * STEP)
+    # Without lenses y counts upwards.
+    down = np.array([each.image_y == "down" for each in block.cameras], dtype=bool)
+    if down.any():
+        found[:, down[np.asarray(block.photo_cameras)[block.image_photos]], 1] *= -1.0
     return found
+
+
+def _adjusted(result: Result) -> Block:
+    """Return a block whose photos are where its adjustment has put them."""
+    changes: dict[str, Any] = {
+        "photo_positions": result.photo_positions,
+        "photo_attitudes": result.photo_attitudes,
+    }
+    if result.block.timed:
+        # What is held of their poses is held of coefficients.
+        free = np.full((len(result.block.photo_ids), 3), np.inf)
+        changes |= {"photo_positions_observed": None, "photo_attitudes_observed": None}
+        changes |= {"photo_position_sd": free, "photo_attitude_sd": free}
+    return result.block.replace(**changes)
 
 
 def _turn(axis: int, angle: float) -> Floats:
