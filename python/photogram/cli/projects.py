@@ -269,6 +269,7 @@ def described(project: Project) -> list[Section]:
     """Return what was read, as titled sections."""
     import numpy as np
 
+    from photogram.formats.moving import motions
     from photogram.formats.plain.writing import known_cameras
     from photogram.formats.self_check import agreement, doubts
 
@@ -318,6 +319,7 @@ def described(project: Project) -> list[Section]:
             ("Read", [f"{project.path}: {project.title}"]),
             ("Size", size),
             ("Cameras", cameras),
+            ("Trajectories", motions(project)),
             ("Units and axes", conventions),
             ("Lacking", list(project.lacks)),
             ("Remarks", remarks),

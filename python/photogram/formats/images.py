@@ -11,7 +11,7 @@ from photogram.errors import InputError
 from photogram.formats.project import Project, Size
 from photogram.network.cameras import Camera
 
-__all__ = ["from_corner", "sizes_of", "to_corner"]
+__all__ = ["from_corner", "in_corner", "known_size", "sizes_of", "to_corner"]
 
 
 def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
@@ -26,9 +26,23 @@ def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
     """
     if camera.image_y == "down":
         return corner
-    width, height = _size(camera, size)
+    width, height = known_size(camera, size)
     found: Floats = np.column_stack([corner[:, 0] - width / 2, height / 2 - corner[:, 1]])
     return found
+
+
+def in_corner(camera: Camera, size: Size | None, xy: Floats) -> Floats:
+    """Return (m, 2) columns and rows from the upper-left corner, of image coordinates of a camera in pixels.
+
+    Raises
+    ------
+    InputError
+        A camera that counts from the middle of its pictures, whose size is not known.
+    """
+    if camera.image_y == "down":
+        return xy
+    width, height = known_size(camera, size)
+    return np.column_stack([xy[:, 0] + width / 2, height / 2 - xy[:, 1]])
 
 
 def to_corner(project: Project) -> Floats:
@@ -46,13 +60,18 @@ def to_corner(project: Project) -> Floats:
     cameras = block.photo_cameras[block.image_photos]
     for row, camera in enumerate(block.cameras):
         own = cameras == row
-        if camera.image_y == "up":
-            width, height = _size(camera, project.sizes[row])
-            found[own] = np.column_stack([found[own, 0] + width / 2, height / 2 - found[own, 1]])
+        found[own] = in_corner(camera, project.sizes[row], found[own])
     return found
 
 
-def _size(camera: Camera, size: Size | None) -> Size:
+def known_size(camera: Camera, size: Size | None) -> Size:
+    """Return the size of the pictures of a camera.
+
+    Raises
+    ------
+    InputError
+        It is not known.
+    """
     if size is None:
         raise InputError(f"the size of the pictures of the camera {camera.title} is not known")
     return size
@@ -66,4 +85,4 @@ def sizes_of(project: Project) -> Sequence[Size]:
     InputError
         One that is not known.
     """
-    return [_size(each, size) for each, size in zip(project.block.cameras, project.sizes, strict=True)]
+    return [known_size(each, size) for each, size in zip(project.block.cameras, project.sizes, strict=True)]

@@ -8,6 +8,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.plain.writing import attitude_matrices
 from photogram.formats.project import Project
 from photogram.network.directions import image_directions
+from photogram.network.motion import on_shared
 
 __all__ = ["complete_positions", "intersected"]
 
@@ -23,7 +24,9 @@ def intersected(project: Project, points: Indices) -> Floats:
         return found
     places = np.full(len(block.point_ids), -1, dtype=np.int64)
     places[points] = np.arange(len(points))
-    rows = np.flatnonzero(places[block.image_points] >= 0)
+    # On a trajectory the pose of a photo only tells where it is about.
+    placed = ~on_shared(block)[block.image_photos]
+    rows = np.flatnonzero((places[block.image_points] >= 0) & placed)
     own = block.replace(
         image_photos=block.image_photos[rows],
         image_points=block.image_points[rows],

@@ -22,6 +22,7 @@ from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation
 from photogram.network.rigs import Mount
+from photogram.network.timed import Timed
 from photogram.results.features import Definition
 from photogram.show.brief import Brief
 
@@ -175,6 +176,7 @@ def assembled(
     photo_attitude_sd: ArrayLike = np.inf,
     observations: Sequence[Observation] = (),
     mounts: Sequence[Mount] = (),
+    timed: Sequence[Timed] = (),
     frame: Frame | None = None,
     options: Options | None = None,
     lacks: Sequence[str] = (),
@@ -197,7 +199,8 @@ def assembled(
         None where the file says nothing: it is assumed, and so said.
     name
         Of the project.
-    cameras, photo_ids, photo_cameras, point_ids, image_photos, image_points, image_xy, observations, mounts
+    cameras, photo_ids, photo_cameras, point_ids, image_photos, image_points, image_xy, observations, mounts,
+    timed
         As in :class:`photogram.Block`.
     point_positions, point_sd, point_check_sd, photo_position_sd, photo_attitude_sd, linear_unit, spheroid,
     photo_to_ground
@@ -259,6 +262,7 @@ def assembled(
             image_sd=sd,
             observations=observations,
             mounts=mounts,
+            timed=timed,
             linear_unit=linear_unit,
             title=name,
             spheroid=spheroid,

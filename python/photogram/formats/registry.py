@@ -11,6 +11,7 @@ from photogram.errors import InputError, PhotogramError
 from photogram.formats.format import Format, Wishes
 from photogram.formats.metadata.adding import with_wished_photos
 from photogram.formats.millimetres import in_pixels, nominal_pixels
+from photogram.formats.moving import check_held, lost_motions
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
 from photogram.formats.stated import parts_of_asked
@@ -142,6 +143,8 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
     if chosen.write is None:
         writable = ", ".join(name for name, each in FORMATS.items() if each.write)
         raise InputError(f"{chosen.title} is only read; what can be written: {writable}")
+    if chosen.name != "plain":
+        check_held(project.block, chosen.title)
     return chosen.write(_fitting(project, chosen))
 
 
@@ -236,7 +239,7 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
     """Return what of a project a format has no place for, in sentences."""
     chosen = _named(file_format)
     beside = [counted(len(project.features), "feature")] if project.features else []
-    beside += parts_of_asked(project.statement)
+    beside += parts_of_asked(project.statement) + lost_motions(project.block)
     return [
         *([] if chosen.geographic else topocentric_remarks(project)),
         *chosen.cannot_hold(_fitting(project, chosen)),

@@ -12,6 +12,7 @@ from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project
 from photogram.messages import Message
 from photogram.network.cameras import Camera, images_of
+from photogram.network.motion import on_shared
 
 __all__ = ["Agreement", "agreement", "doubts"]
 
@@ -70,6 +71,8 @@ def _sample(project: Project) -> _Sample:
     posed: Bools = np.asarray(np.isfinite(poses).all(axis=1))
     placed: Bools = np.asarray(np.isfinite(points).all(axis=1))
     good = posed[block.image_photos] & placed[block.image_points]
+    # On a trajectory the pose of a photo only tells where it is about.
+    good &= ~on_shared(block)[block.image_photos]
     if block.geographic:
         good = np.zeros_like(good)
     rows = np.flatnonzero(good)

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import cast, get_args
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.plain.covariances import read_covariances
+from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
 from photogram.messages import quoted
 from photogram.network.cameras import Camera, Weights
+from photogram.network.timed import LineSensor, Shutter
 
 __all__ = ["Cameras", "read_cameras", "spread_over_photos"]
 
@@ -25,12 +27,17 @@ _EACH = ("all", "photo", "group")
 
 @dataclass(frozen=True)
 class Cameras:
-    """The cameras of a project: with the size of their pictures, and whether photos have their own."""
+    """The cameras of a project: with the size of their pictures, and whether photos have their own.
 
-    cameras: list[Camera]
-    sizes: list[Size | None]
-    pixel_mm: list[float | None]
-    for_each: list[str]
+    Cameras of photos that move have a rolling shutter, or a line of sensors in the place of a frame.
+    """
+
+    cameras: list[Camera] = field(default_factory=list)
+    sizes: list[Size | None] = field(default_factory=list)
+    pixel_mm: list[float | None] = field(default_factory=list)
+    for_each: list[str] = field(default_factory=list)
+    shutters: list[Shutter | None] = field(default_factory=list)
+    lines: list[LineSensor | None] = field(default_factory=list)
 
 
 def read_cameras(tables: Tables) -> Cameras:
@@ -46,8 +53,10 @@ def read_cameras(tables: Tables) -> Cameras:
         raise InputError("has no table of cameras (cameras.csv)", file=tables.settings.path)
     if not table.count:
         raise table.head.error("the table names no cameras")
-    found = Cameras([], [], [], [])
+    found = Cameras(lines=line_sensors(tables, table))
     for row, own in enumerate(_rows(table)):
+        if found.lines[row] is not None:
+            own = own.behind_a_lens(table, row)
         if own.each not in _EACH:
             raise table.error(row, f"column for_each: {quoted(own.each)} is none of {', '.join(_EACH)}")
         size = _size(table, row, own)
@@ -58,7 +67,11 @@ def read_cameras(tables: Tables) -> Cameras:
         found.sizes.append(size)
         found.pixel_mm.append(own.pixel_mm)
         found.for_each.append(own.each)
-    return replace(found, cameras=read_covariances(tables).cameras(found.cameras))
+    return replace(
+        found,
+        cameras=read_covariances(tables).cameras(found.cameras),
+        shutters=shutters(tables, table, found.cameras, found.sizes),
+    )
 
 
 @dataclass(frozen=True)
@@ -74,6 +87,26 @@ class _Row:
     pixel_mm: float | None
     values: dict[str, float]
     deviations: dict[str, float]
+
+    def behind_a_lens(self, table: ColumnTable, row: int) -> _Row:
+        """Return the row without what places a line of sensors: the camera that the line is behind.
+
+        Raises
+        ------
+        InputError
+            A model that has parameters of the same names.
+        """
+        model = "brown" if self.model == LINE else self.model
+        own = {name.lower() for name, _ in _MODELS[model][1]} if model in _MODELS else set()
+        if both := own.intersection(OF_LINES):
+            raise table.error(row, f"column {min(both)}: is of the model {model} and of a line of sensors")
+        if unknown := [name for name in OF_LINES if self.deviations.get(name)]:
+            raise table.error(
+                row,
+                f"column sd_{unknown[0]}: lines of sensors are known; sd_xp, sd_yp of the lens are unknown",
+            )
+        values = {name: value for name, value in self.values.items() if name not in OF_LINES}
+        return replace(self, model=model, values=values)
 
 
 def _rows(table: ColumnTable) -> Iterator[_Row]:
@@ -174,7 +207,7 @@ def spread_over_photos(
     """Give photos, or groups of them, cameras of their own where the table says so."""
     if set(cameras.for_each) == {"all"}:
         return cameras, list(photo_cameras)
-    found = Cameras([], [], [], [])
+    found = Cameras()
     places: dict[tuple[int, str], int] = {}
     of_photos = []
     for row, photo, group in zip(photo_cameras, photos, groups, strict=True):
@@ -187,5 +220,7 @@ def spread_over_photos(
             found.sizes.append(cameras.sizes[row])
             found.pixel_mm.append(cameras.pixel_mm[row])
             found.for_each.append("all")
+            found.shutters.append(cameras.shutters[row])
+            found.lines.append(cameras.lines[row])
         of_photos.append(places[row, own])
     return found, of_photos

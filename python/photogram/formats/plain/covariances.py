@@ -10,15 +10,17 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.rigs import Rigs
-from photogram.formats.plain.tables import DEGREE, Tables, made
-from photogram.io.delimited import FALSE, TRUE, ColumnTable
+from photogram.formats.plain.shared import made, word_of
+from photogram.formats.plain.tables import DEGREE, Tables
+from photogram.io.delimited import ColumnTable
 from photogram.messages import listed, quoted
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Observation, Prior
+from photogram.network.trajectories import GyroBias
 from photogram.network.unknowns import Drift, Sensor, Shift, Unknown
 
-__all__ = ["Covariances", "covariance_tables", "read_covariances", "word_of"]
+__all__ = ["Covariances", "covariance_tables", "read_covariances"]
 
 CAMERA = "camera"
 
@@ -113,10 +115,7 @@ class Covariances:
                         raise table.error(
                             row, f"a {kind} has {', '.join(unknown.components)}, not {quoted(word)}"
                         )
-            units = {
-                each: self.tables.radians if each.startswith("rotation") else 1.0
-                for each in unknown.components
-            }
+            units = _units(unknown, self.tables.radians)
             covariance = matrix.over(unknown.components, units)
             found.append(
                 made(
@@ -166,7 +165,7 @@ def covariance_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs) -> di
             rows += _pairs(CAMERA, each.name, names, np.asarray(matrix) * signs * signs[:, np.newaxis])
     for prior in (each for each in block.observations if isinstance(each, Prior)):
         unknown = prior.unknown
-        units = np.array([DEGREE if name.startswith("rotation") else 1.0 for name in unknown.components])
+        units = np.array(list(_units(unknown, DEGREE).values()))
         matrix = prior.precision * units * units[:, np.newaxis]
         rows += _pairs(unknown.KIND, _name(unknown, rigs), unknown.components, matrix)
     if not rows:
@@ -175,11 +174,19 @@ def covariance_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs) -> di
     return {"covariances": {name: [row[k] for row in rows] for k, name in enumerate(columns)}}
 
 
+def _units(unknown: Unknown, angle: float) -> dict[str, float]:
+    """Return a factor for each component of an unknown: that of angles for angles."""
+    units = unknown.units("")
+    return {
+        name: angle if unit == "rad" else 1.0 for name, unit in zip(unknown.components, units, strict=True)
+    }
+
+
 def _name(unknown: Unknown, rigs: Rigs) -> str:
     """Return what reading the tables calls an unknown."""
     if isinstance(unknown, Sensor):
         return rigs.title(unknown)
-    return word_of(unknown) if isinstance(unknown, Shift | Drift) else unknown.name
+    return word_of(unknown) if isinstance(unknown, Shift | Drift | GyroBias) else unknown.name
 
 
 def _pairs(
@@ -191,10 +198,3 @@ def _pairs(
         for j in range(i + 1)
         if i == j or matrix[i, j]
     ]
-
-
-def word_of(unknown: Shift | Drift | None) -> str:
-    """Return what the column of a shift or drift says: its name, where that is no word for true or false."""
-    if unknown is None:
-        return "false"
-    return unknown.title if unknown.name.lower() in TRUE | FALSE else unknown.name

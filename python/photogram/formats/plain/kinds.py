@@ -12,6 +12,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.schema import AXES, TABLES, deviation_columns
+from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,
@@ -19,7 +20,6 @@ from photogram.formats.plain.tables import (
     covariances_of,
     different,
     indices_of,
-    made,
     places_written,
     vectors_of,
 )

@@ -1,51 +1,139 @@
-"""Tables of positions, attitudes and relative poses of photos, with what they have in common."""
+"""Tables of positions, velocities, attitudes, rates and relative poses of photos and of trajectories."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.covariances import covariance_tables, word_of
+from photogram.formats.plain.covariances import covariance_tables
+from photogram.formats.plain.groups import (
+    Antenna,
+    Inertial,
+    antenna_columns,
+    antenna_of,
+    antennas,
+    grouped,
+    inertial_columns,
+    inertial_groups,
+    inertials,
+)
 from photogram.formats.plain.kinds import kind_tables, read_kinds
-from photogram.formats.plain.rigs import Rigs, angles_of, read_bases
-from photogram.formats.plain.schema import ANGLES, AXES, POSE, ROTATIONS, deviation_columns
+from photogram.formats.plain.rigs import Rigs, read_bases
+from photogram.formats.plain.schema import (
+    ANGLES,
+    AXES,
+    POSE,
+    RATE,
+    ROTATIONS,
+    VELOCITY,
+    deviation_columns,
+)
+from photogram.formats.plain.shared import made
+from photogram.formats.plain.smoothness import read_smoothness
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,
+    angles_of,
     correlations,
     covariances_of,
     indices_of,
-    made,
     places_written,
 )
 from photogram.formats.plain.transform import Transform
 from photogram.formats.rigging import Rig
-from photogram.io.delimited import FALSE, TRUE
+from photogram.io.delimited import ColumnTable
+from photogram.messages import Message, counted, quoted
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.network.observations import Attitude, Observation, Position, Relative
-from photogram.network.unknowns import Boresight, Drift, LeverArm, Shift, Unknown
+from photogram.network.observations import Attitude, Observation, Position, Rate, Relative, Velocity
+from photogram.network.trajectories import Trajectory
+from photogram.network.whereabouts import reach
 
-__all__ = ["observed_tables", "read_observations"]
+__all__ = ["Subjects", "observed_tables", "read_observations"]
 
-_Shared = TypeVar("_Shared", LeverArm, Shift, Drift)
 _ROTATIONS = deviation_columns(ROTATIONS)
 _ANGLES = ANGLES["omega_phi_kappa"]
 _Columns = dict[str, dict[str, Any]]
 _Kind = TypeVar("_Kind", bound=Observation)
 
 
+@dataclass(frozen=True)
+class Subjects:
+    """What observations may be of.
+
+    Attributes
+    ----------
+    photos, times
+        Photos by their names, and the times of each in seconds; NaN without.
+    trajectories
+        By their names.
+    """
+
+    photos: Mapping[str, int]
+    times: Sequence[float]
+    trajectories: Mapping[str, Trajectory]
+
+    def of(self, tables: Tables, table: ColumnTable) -> list[dict[str, Any] | None]:
+        """Return what each row is of, as arguments of its observation; None of those that are left out.
+
+        These are at times that their trajectory does not reach; a remark has their number.
+
+        Raises
+        ------
+        InputError
+            Names that are not there, both or none of a photo and a trajectory, a trajectory without a time.
+        """
+        if "trajectory" not in table:
+            names, rows = list(self.photos), indices_of(table, "photo", self.photos, "photo").tolist()
+            return [{"photo": names[row]} for row in rows]
+        times = table.numbers("time")
+        spans = {name: reach(each) for name, each in self.trajectories.items()}
+        found: list[dict[str, Any] | None] = []
+        words = table.texts("photo"), table.texts("trajectory")
+        for row, (photo, name, time) in enumerate(zip(*words, times.tolist(), strict=True)):
+            if bool(photo) == bool(name):
+                raise table.error(row, "columns photo, trajectory: one of both says what the row is of")
+            for word, what, known in ((photo, "photo", self.photos), (name, "trajectory", self.trajectories)):
+                if word and word not in known:
+                    raise table.error(row, f"column {what}: there is no {what} {quoted(word)}")
+            if photo:
+                found.append({"photo": photo})
+                continue
+            if math.isnan(time):
+                raise table.error(row, "column time: is empty, and the row is of a trajectory")
+            first, last = spans[name]
+            inside = first <= time <= last
+            own = {"photo": None, "trajectory": self.trajectories[name], "time": time}
+            found.append(own if inside else None)
+        if out := sum(each is None for each in found):
+            text = f"{counted(out, 'record')} at times that their trajectory does not reach are left out"
+            tables.messages.append(Message(text, table.path))
+        return found
+
+
+def _clocked(
+    table: ColumnTable, row: int, of: Mapping[str, Any], group: Antenna | Inertial | None
+) -> dict[str, Any]:
+    """Return what an observation is of, with the clock of its group."""
+    if group is None or group.clock is None:
+        return dict(of)
+    if "trajectory" not in of:
+        raise table.error(
+            row, "its group has a clock, which dates records of trajectories, and it is of a photo"
+        )
+    return {**of, "clock": group.clock}
+
+
 def read_observations(
     tables: Tables,
     transform: Transform,
-    photos: Mapping[str, int],
-    times: Sequence[float],
+    subjects: Subjects,
     points: Mapping[str, int],
     rigs: Mapping[str, Rig],
 ) -> list[Observation]:
@@ -57,170 +145,116 @@ def read_observations(
         Names that are not there, values that give no observation.
     """
     return [
-        *_gnss(tables, transform, photos, times),
-        *_attitudes(tables, photos),
+        *_gnss(tables, transform, subjects),
+        *_velocities(tables, subjects),
+        *_attitudes(tables, subjects),
+        *_rates(tables, subjects),
+        *read_smoothness(tables, subjects.trajectories),
         *read_kinds(tables, transform, points),
-        *_relative_poses(tables, photos),
+        *_relative_poses(tables, subjects.photos),
         *read_bases(tables, rigs),
     ]
 
 
-@dataclass
-class _Group:
-    """What the observations of a group of GNSS positions have in common."""
-
-    lever: Floats | LeverArm = field(default_factory=lambda: np.zeros(3))
-    shift: Shift | None = None
-    drift: Drift | None = None
-
-
-def _gnss(
-    tables: Tables, transform: Transform, photos: Mapping[str, int], times: Sequence[float]
-) -> list[Observation]:
+def _gnss(tables: Tables, transform: Transform, subjects: Subjects) -> list[Observation]:
     table = tables.read("gnss")
     if table is None:
         return []
-    rows = indices_of(table, "photo", photos, "photo")
+    of = subjects.of(tables, table)
     positions = table.vectors(AXES)
     table.check_given(positions, AXES)
     sd = tables.deviations(table, "gnss", [f"sd_{axis}" for axis in AXES])
     table.check_given(sd, [f"sd_{axis}" for axis in AXES], "is empty: give it, or gnss under [sd]")
-    covariances = covariances_of(sd, table)
-    positions, covariances = transform.positions("gnss", positions, covariances, table)
-    groups = _gnss_groups(tables)
-    names = table.texts("group")
-    own_times = table.numbers("time")
-    names_of = list(photos)
+    positions, covariances = transform.positions("gnss", positions, covariances_of(sd, table), table)
+    groups, times = antennas(tables), table.numbers("time")
     found: list[Observation] = []
-    for row, photo in enumerate(rows.tolist()):
-        if names[row] and names[row] not in groups and tables.settings.tables.get("gnss_groups"):
-            raise table.error(row, f"column group: there is no group {names[row]} in the table gnss_groups")
-        group = groups.get(names[row], _Group())
-        time = own_times[row] if not math.isnan(own_times[row]) else times[photo]
-        if group.drift is not None and math.isnan(time):
-            raise table.error(row, "the group has a drift, and the photo no time")
-        found.append(
-            made(
-                table,
-                row,
-                lambda photo=photo, row=row, group=group, time=time: Position(  # type: ignore[misc]
-                    names_of[photo],
-                    positions[row],
-                    covariance=covariances[row],
-                    lever_arm=group.lever,
-                    shift=group.shift,
-                    drift=group.drift,
-                    time=0.0 if math.isnan(time) else float(time),
-                ),
-            )
-        )
+    for row, (own, group) in enumerate(zip(of, grouped(tables, table, groups, "gnss_groups"), strict=True)):
+        if own is None:
+            continue
+        group = group or Antenna()
+        given = _clocked(table, row, own, group)
+        if own["photo"] is not None:
+            time = times[row] if not math.isnan(times[row]) else subjects.times[subjects.photos[own["photo"]]]
+            if group.drift is not None and math.isnan(time):
+                raise table.error(row, "the group has a drift, and the photo no time")
+            given["time"] = 0.0 if math.isnan(time) else float(time)
+        given |= {"position": positions[row], "covariance": covariances[row], "lever_arm": group.lever}
+        given |= {"shift": group.shift, "drift": group.drift}
+        found.append(made(table, row, partial(Position, **given)))
     return found
 
 
-def _gnss_groups(tables: Tables) -> dict[str, _Group]:
-    table = tables.read("gnss_groups")
+def _velocities(tables: Tables, subjects: Subjects) -> list[Observation]:
+    table = tables.read("velocities")
     if table is None:
-        return {}
-    zeros = {"lever": tables.vectors(table, [f"lever_{axis}" for axis in AXES], 0.0)}
-    zeros |= {kind: table.vectors([f"{kind}_{axis}" for axis in AXES], 0.0) for kind in ("shift", "drift")}
-    sd = {
-        kind: table.vectors([f"sd_{kind}_{axis}" for axis in AXES], default, infinite=True)
-        for kind, default in (("lever", 0.0), ("shift", math.inf), ("drift", math.inf))
-    }
-    epochs = [None if math.isnan(each) else float(each) for each in table.numbers("drift_epoch")]
-    shared: dict[tuple[type[Unknown], str], Unknown] = {}
-
-    where = table
-
-    def one(kind: type[_Shared], what: str, row: int, name: str) -> _Shared:
-        """Return what a group has, the same object for all groups that name it."""
-        value, deviations = zeros[what][row], sd[what][row]
-        further = {"epoch": epochs[row]} if kind is Drift else {}
-        make = partial(kind, name, value, deviations, **further)
-        own = shared.setdefault((kind, name), made(where, row, make))
-        same = not further or getattr(own, "epoch", None) == epochs[row]
-        if not (same and np.array_equal(own.position, value) and np.array_equal(own.deviations, deviations)):
-            raise where.error(row, f"column {what}: {name} has other values in a row before")
-        assert isinstance(own, kind)
-        return own
-
-    found: dict[str, _Group] = {}
-    for row, (name, lever, shift, drift) in enumerate(
-        zip(*(table.texts(column) for column in ("group", "lever", "shift", "drift")), strict=True)
-    ):
-        if name in found:
-            raise table.error(row, f"the group {name} is there twice")
-        title = name or "GNSS"
-        own = _Group(zeros["lever"][row])
-        if sd["lever"][row].any():
-            own.lever = one(LeverArm, "lever", row, lever or title)
-        if called := _called(shift, title):
-            own.shift = one(Shift, "shift", row, called)
-        if called := _called(drift, title):
-            own.drift = one(Drift, "drift", row, called)
-        found[name] = own
+        return []
+    of = subjects.of(tables, table)
+    values, covariances = _motions(tables, table, "velocities", VELOCITY)
+    groups = grouped(tables, table, antennas(tables), "gnss_groups")
+    found: list[Observation] = []
+    for row, (own, group) in enumerate(zip(of, groups, strict=True)):
+        if own is not None:
+            given = _clocked(table, row, own, group)
+            given |= {"velocity": values[row], "covariance": covariances[row]}
+            given |= {"lever_arm": 0.0 if group is None else group.lever}
+            found.append(made(table, row, partial(Velocity, **given)))
     return found
 
 
-def _called(cell: str, title: str) -> str:
-    """Return the name of a shift or drift: that of the group for `true`, none for `false`, else its own."""
-    word = cell.lower()
-    return title if word in TRUE else "" if word in FALSE else cell
+def _motions(tables: Tables, table: ColumnTable, name: str, columns: Sequence[str]) -> tuple[Floats, Floats]:
+    """Return (rows, 3) velocities or rates, and (rows, 3, 3) covariances."""
+    values = table.vectors(columns)
+    table.check_given(values, columns)
+    names = deviation_columns(columns)
+    sd = tables.deviations(table, name, names)
+    table.check_given(sd, names, f"is empty: give it, or {name} under [sd]")
+    return values, covariances_of(sd, table, columns)
 
 
-def _attitudes(tables: Tables, photos: Mapping[str, int]) -> list[Observation]:
+def _rates(tables: Tables, subjects: Subjects) -> list[Observation]:
+    table = tables.read("rates")
+    if table is None:
+        return []
+    of = subjects.of(tables, table)
+    values, covariances = _motions(tables, table, "rates", RATE)
+    # About axes that point as those of photos do.
+    values, covariances = values @ tables.flip, tables.flip @ covariances @ tables.flip
+    groups = grouped(tables, table, inertials(tables), "attitude_groups")
+    found: list[Observation] = []
+    for row, (own, group) in enumerate(zip(of, groups, strict=True)):
+        if own is not None:
+            given = _clocked(table, row, own, group)
+            given |= {"rate": values[row], "covariance": covariances[row]}
+            if group is not None:
+                given |= {"boresight": group.boresight, "bias": group.bias}
+            found.append(made(table, row, partial(Rate, **given)))
+    return found
+
+
+def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
     table = tables.read("attitudes")
     if table is None:
         return []
-    rows = indices_of(table, "photo", photos, "photo")
+    of = subjects.of(tables, table)
     matrices = tables.matrices(table)
-    given = tables.settings.sd.get("attitudes")
+    given_sd = tables.settings.sd.get("attitudes")
     sd = table.vectors(_ROTATIONS, read=tables.angle)
-    if given is not None:
-        defaults = np.broadcast_to([tables.angle(repr(each)) for each in given], 3)
+    if given_sd is not None:
+        defaults = np.broadcast_to([tables.angle(repr(each)) for each in given_sd], 3)
         sd = np.where(np.isnan(sd), defaults, sd)
     table.check_given(sd, _ROTATIONS, "is empty: give it, or attitudes under [sd]")
-    boresights = _attitude_groups(tables)
-    groups, names = table.texts("group"), list(photos)
-    for row in range(table.count):
-        if np.isnan(matrices[row]).any():
-            raise table.error(row, "there is no attitude")
-        if groups[row] and groups[row] not in boresights:
-            raise table.error(
-                row, f"column group: there is no group {groups[row]} in the table attitude_groups"
-            )
+    unknown = np.isnan(matrices).any(axis=(1, 2))
+    if unknown.any():
+        raise table.error(int(np.argmax(unknown)), "there is no attitude")
     covariances = covariances_of(sd, table, ROTATIONS, (tables.radians,) * 3)
-    return [
-        made(
-            table,
-            row,
-            lambda row=row, photo=photo: Attitude(  # type: ignore[misc]
-                names[photo],
-                matrices[row],
-                covariance=covariances[row],
-                boresight=boresights.get(groups[row]),
-            ),
-        )
-        for row, photo in enumerate(rows.tolist())
-    ]
-
-
-def _attitude_groups(tables: Tables) -> dict[str, Boresight]:
-    table = tables.read("attitude_groups")
-    if table is None:
-        return {}
-    matrices = tables.matrices(table)
-    sd = table.vectors(_ROTATIONS, math.inf, infinite=True, read=tables.angle)
-    found: dict[str, Boresight] = {}
-    for row, name in enumerate(table.texts("group")):
-        if name in found:
-            raise table.error(row, f"the group {name} is there twice")
-        matrix = None if np.isnan(matrices[row]).any() else matrices[row].T
-        found[name] = made(
-            table,
-            row,
-            lambda name=name, matrix=matrix, row=row: Boresight(name or "IMU", matrix, sd[row]),  # type: ignore[misc]
-        )
+    groups = grouped(tables, table, inertials(tables), "attitude_groups")
+    found: list[Observation] = []
+    for row, (own, group) in enumerate(zip(of, groups, strict=True)):
+        if own is not None:
+            given = _clocked(table, row, own, group)
+            given |= {"attitude": matrices[row], "covariance": covariances[row]}
+            given |= {"boresight": None if group is None else group.boresight}
+            found.append(made(table, row, partial(Attitude, **given)))
     return found
 
 
@@ -256,12 +290,11 @@ def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observati
     ]
 
 
-def observed_tables(block: Block, cameras: Sequence[Camera], photo_cameras: Sequence[int]) -> _Columns:
+def observed_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs) -> _Columns:
     """Return the tables of all observations beside images, of what they have in common, and of rigs."""
-    rigs = Rigs(block, [cameras[row].name for row in photo_cameras])
     return {
-        **_gnss_tables(block),
-        **_attitude_tables(block),
+        **_antenna_tables(block),
+        **_inertial_tables(block),
         **kind_tables(block),
         **_pose_tables(block),
         **rigs.tables(block),
@@ -283,86 +316,81 @@ def _deviations(observations: Sequence[Observation]) -> Floats:
     return found
 
 
-def _gnss_tables(block: Block) -> _Columns:
-    positions = _all(block, Position)
-    if not positions:
+def _of(observations: Sequence[Position | Velocity | Attitude | Rate], block: Block) -> dict[str, Any]:
+    """Return the columns that say what observations are of."""
+    moments = [each.moment for each in observations]
+    if not any(moments):
+        # Where photos have times of their own, those of drifts are said beside.
+        times = [each.time for each in observations] if block.timed else []
+        dated = any(isinstance(each, Position) for each in observations)
+        return {
+            "photo": [each.photo for each in observations],
+            **({"time": times} if times and dated else {}),
+        }
+    photos = [each.photo for each in observations]
+    return {
+        **({"photo": photos} if any(photos) else {}),
+        "trajectory": [None if each is None else each.trajectory.name for each in moments],
+        "time": [each.time for each in observations],
+    }
+
+
+def _measured(observations: Sequence[Observation], columns: Sequence[str], values: Floats) -> dict[str, Any]:
+    """Return the columns of what was observed, with deviations and covariances of components."""
+    precisions = np.array([each.precision for each in observations])
+    return {
+        **_columns(columns, values),
+        **_columns(deviation_columns(columns), _deviations(observations)),
+        **correlations(precisions, columns),
+    }
+
+
+def _antenna_tables(block: Block) -> _Columns:
+    """Return the tables of positions and velocities, and of their groups."""
+    positions, velocities = _all(block, Position), _all(block, Velocity)
+    if not positions and not velocities:
         return {}
-    keys = [(_lever(each), each.shift, each.drift) for each in positions]
+    keys = [*map(antenna_of, positions), *map(antenna_of, velocities)]
     groups = {key: str(row) for row, key in enumerate(dict.fromkeys(keys), 1)}
-    covariances = np.array([each.precision for each in positions])
-    table: dict[str, Any] = {
-        "photo": [each.photo for each in positions],
-        **_columns(AXES, places_written(block, np.array([each.observed[:3] for each in positions]))),
-        **_columns([f"sd_{axis}" for axis in AXES], _deviations(positions)),
-        **correlations(covariances, AXES),
-    }
-    if list(groups) == [((0.0, 0.0, 0.0), None, None)]:
-        return {"gnss": table}
-    table["group"] = [groups[key] for key in keys]
-    levers = [key[0] if isinstance(key[0], LeverArm) else None for key in groups]
-    own: dict[str, Any] = {
-        "group": list(groups.values()),
-        "lever": ["" if each is None else each.name for each in levers],
-        "shift": [word_of(key[1]) for key in groups],
-        "drift": [word_of(key[2]) for key in groups],
-    }
-    known = np.array(
-        [(0.0,) * 3 if each is not None else key[0] for each, key in zip(levers, groups, strict=True)]
-    )
-    given = [each.position if each is not None else row for each, row in zip(levers, known, strict=True)]
-    own |= _columns([f"lever_{axis}" for axis in AXES], np.array(given))
-    own |= _columns([f"sd_lever_{axis}" for axis in AXES], _of(levers, "deviations", 0.0))
-    for what, column in (("shift", 1), ("drift", 2)):
-        unknowns = [key[column] for key in groups]
-        own |= _columns([f"{what}_{axis}" for axis in AXES], _of(unknowns, "position", np.nan))
-        own |= _columns([f"sd_{what}_{axis}" for axis in AXES], _of(unknowns, "deviations", np.nan))
-    epochs = [None if drift is None else drift.epoch for _, _, drift in groups]
-    if any(each is not None for each in epochs):
-        own["drift_epoch"] = np.array([np.nan if each is None else each for each in epochs])
-    return {"gnss": table, "gnss_groups": own}
+    found: _Columns = {}
+    if positions:
+        places = places_written(block, np.array([each.observed[:3] for each in positions]))
+        found["gnss"] = _of(positions, block) | _measured(positions, AXES, places)
+    if velocities:
+        values = np.array([each.observed[:3] for each in velocities])
+        found["velocities"] = _of(velocities, block) | _measured(velocities, VELOCITY, values)
+    if list(groups) == [Antenna()]:
+        return found
+    names = [groups[key] for key in keys]
+    for table, own in (("gnss", names[: len(positions)]), ("velocities", names[len(positions) :])):
+        if own:
+            found[table]["group"] = own
+    return found | {"gnss_groups": antenna_columns(groups)}
 
 
-def _of(unknowns: Sequence[Unknown | None], what: str, missing: float) -> Floats:
-    """Return (n, 3) numbers of unknowns."""
-    return np.array([(missing,) * 3 if each is None else getattr(each, what) for each in unknowns])
-
-
-def _lever(each: Position) -> Any:
-    if isinstance(each.lever_arm, LeverArm):
-        return each.lever_arm
-    return tuple(np.broadcast_to(np.asarray(each.lever_arm, dtype=float), 3).tolist())
-
-
-def _attitude_tables(block: Block) -> _Columns:
-    attitudes = _all(block, Attitude)
-    if not attitudes:
-        return {}
-    groups = {id(each.boresight): each.boresight for each in attitudes if each.boresight is not None}
-    names = {
-        key: each.name if isinstance(each, Boresight) else f"known {row}"
-        for row, (key, each) in enumerate(groups.items(), 1)
-    }
-    covariances = np.array([each.precision for each in attitudes])
-    table: dict[str, Any] = {
-        "photo": [each.photo for each in attitudes],
-        **_columns(_ANGLES, angles_of(np.array([np.asarray(each.attitude) for each in attitudes]), block)),
-        **_columns([f"sd_{name}" for name in ROTATIONS], np.degrees(_deviations(attitudes))),
-        **correlations(covariances, ROTATIONS, (DEGREE,) * 3),
-    }
+def _inertial_tables(block: Block) -> _Columns:
+    """Return the tables of attitudes and rates, and of their groups."""
+    attitudes, rates = _all(block, Attitude), _all(block, Rate)
+    names, groups = inertial_groups([*attitudes, *rates])
+    found: _Columns = {}
+    if attitudes:
+        angles = angles_of(np.array([np.asarray(each.attitude) for each in attitudes]), block)
+        covariances = np.array([each.precision for each in attitudes])
+        found["attitudes"] = {
+            **_of(attitudes, block),
+            **_columns(_ANGLES, angles),
+            **_columns(_ROTATIONS, np.degrees(_deviations(attitudes))),
+            **correlations(covariances, ROTATIONS, (DEGREE,) * 3),
+        }
+    if rates:
+        values = np.array([each.observed[:3] for each in rates])
+        found["rates"] = _of(rates, block) | _measured(rates, RATE, values)
     if not groups:
-        return {"attitudes": table}
-    table["group"] = [names.get(id(each.boresight), "") for each in attitudes]
-    given = list(groups.values())
-    # The boresight is body to photo; the tables have attitudes of the photo in the axes of what carries it.
-    matrices = np.array(
-        [each.attitude if isinstance(each, Boresight) else np.asarray(each, dtype=float) for each in given]
-    ).transpose(0, 2, 1)
-    angles = angles_of(matrices, block)
-    angles[[isinstance(each, Boresight) and each.is_open for each in given]] = np.nan
-    sd = np.array([each.deviations if isinstance(each, Boresight) else np.zeros(3) for each in given])
-    own: dict[str, Any] = {"group": list(names.values()), **_columns(_ANGLES, angles)}
-    own |= _columns([f"sd_{name}" for name in ROTATIONS], np.degrees(sd))
-    return {"attitudes": table, "attitude_groups": own}
+        return found
+    for table, own in (("attitudes", names[: len(attitudes)]), ("rates", names[len(attitudes) :])):
+        if own:
+            found[table]["group"] = own
+    return found | {"attitude_groups": inertial_columns(groups, block)}
 
 
 def _pose_tables(block: Block) -> _Columns:

@@ -3,45 +3,42 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.arrays import is_covariance
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN
 from photogram.formats.format import Wishes
-from photogram.formats.images import from_corner
-from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
+from photogram.formats.plain.cameras import read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
-from photogram.formats.plain.observed import read_observations
+from photogram.formats.plain.images import Images, image_coordinates, read_images
+from photogram.formats.plain.moving import placed, read_timed
+from photogram.formats.plain.observed import Subjects, read_observations
+from photogram.formats.plain.photos import read_photos
 from photogram.formats.plain.rigs import read_frames, read_rigs
-from photogram.formats.plain.schema import ANGLES, AXES
-from photogram.formats.plain.settings import Settings, read_settings, unread_tables
+from photogram.formats.plain.schema import AXES
+from photogram.formats.plain.settings import read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
-from photogram.formats.plain.tables import Tables, covariances_of, indices_of
+from photogram.formats.plain.tables import Tables, covariances_of
+from photogram.formats.plain.trajectories import read_trajectories
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project, assembled
 from photogram.formats.rigging import mounted
 from photogram.io.delimited import ColumnTable
-from photogram.messages import Message, listed, quoted
+from photogram.messages import quoted
 from photogram.network.geometry import Spheroid
-from photogram.network.observations import Attitude, Control, Observation
+from photogram.network.observations import Control, Observation
+from photogram.network.rigs import Mount
+from photogram.network.timed import Timed
+from photogram.network.unknowns import Unknown
 from photogram.results.features import named_points
 
-__all__ = [
-    "SETTINGS",
-    "Images",
-    "Photos",
-    "image_coordinates",
-    "read",
-    "read_control",
-    "read_images",
-    "read_photos",
-    "read_tables",
-]
+__all__ = ["SETTINGS", "read", "read_control", "read_tables"]
 
 SETTINGS = "project.toml"
 DIFFER = 1e-6
@@ -78,13 +75,18 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         raise InputError("has no table of images (images.csv)", file=settings.path)
     transform = Transform(settings, tables.messages)
     cameras = read_cameras(tables if wishes.cameras is None else _with_cameras(tables, wishes.cameras))
+    trajectories = read_trajectories(tables)
     control = _control_table(tables)
     # The frame is settled by control where it has no origin: it is the first that is carried over.
     given = None if control is None else read_control(tables, control, transform)
     photos = read_photos(tables, transform, cameras)
+    rigs = read_rigs(tables, [each.name for each in cameras.cameras])
+    timed = read_timed(tables, photos, cameras, trajectories, rigs)
+    geographic = transform.frame.kind == "geographic"
+    spheroid = Spheroid(*transform.frame.ellipsoid) if geographic else None
+    photos = placed(photos, timed, spheroid)
     images = read_images(tables, photos)
     points = _points(tables, transform, images, given)
-    rigs = read_rigs(tables, [each.name for each in cameras.cameras])
     cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
     xy, sd = image_coordinates(settings, images, cameras, np.asarray(photo_cameras))
     mounts, stands = mounted(
@@ -94,13 +96,11 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     observations: list[Observation] = read_observations(
         tables,
         transform,
-        places,
-        photos.times.tolist(),
+        Subjects(places, photos.times.tolist(), trajectories),
         {name: row for row, name in enumerate(points.names)},
         rigs,
     )
-    unknowns = [unknown for each in observations for unknown in each.unknowns if unknown is not None]
-    observations += read_covariances(tables).priors([*unknowns, *(each.sensor for each in mounts)])
+    observations += read_covariances(tables).priors(_unknowns(observations, mounts, timed))
     extra = len(stands)
     owners = {each.name: row for row, each in enumerate(cameras.cameras)} | dict(
         zip(photos.taken, photo_cameras, strict=True)
@@ -132,11 +132,12 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         image_sd=sd,
         observations=[*observations, *photos.observed, *points.observed],
         mounts=mounts,
+        timed=timed,
         frame=transform.frame,
         options=settings.options,
         messages=tables.messages,
         linear_unit=settings.length,
-        spheroid=Spheroid(*transform.frame.ellipsoid) if transform.frame.kind == "geographic" else None,
+        spheroid=spheroid,
         photo_to_ground=settings.attitude == "omega_phi_kappa" and settings.rotation == "photo_to_object",
         details={"settings": settings},
     ).replace(
@@ -164,221 +165,23 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
 
 
 def _with_cameras(tables: Tables, path: Path) -> Tables:
-    settings = replace(tables.settings, tables={**tables.settings.tables, "cameras": path})
-    return Tables(settings, tables.messages)
-
-
-@dataclass(frozen=True)
-class Photos:
-    """The table of photos, in the frame of the project; those that are not used are named apart."""
-
-    names: list[str]
-    cameras: list[int]
-    taken: list[str]
-    centres: Floats
-    matrices: Floats
-    position_sd: Floats
-    attitude_sd: Floats
-    groups: list[str]
-    times: Floats
-    unused: frozenset[str]
-    observed: list[Observation]
-
-
-def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photos:
-    """Read the table of photos; errors as of :func:`read`."""
-    table = tables.read("photos")
-    if table is None:
-        raise InputError("has no table of photos (photos.csv)", file=tables.settings.path)
-    texts = table.names_once("photo")
-    use = table.flags("use")
-    centres = table.vectors(AXES)
-    sd = tables.deviations(table, "photos", _SD, math.inf)
-    weighted = np.isfinite(sd) & np.isnan(centres)
-    if weighted.any():
-        row, axis = np.argwhere(weighted)[0].tolist()
-        raise table.error(row, f"column sd_{AXES[axis]}: there is a standard deviation, but no {AXES[axis]}")
-    if "photos" in tables.settings.crs and np.isfinite(sd).any():
-        raise table.head.error(
-            "photos with a crs of their own have no standard deviations: give a table gnss"
-        )
-    centres, _ = transform.positions("photos", centres, None, table)
-    matrices = tables.matrices(table)
-    attitude_sd, observed = _attitude_weights(tables, table, matrices)
-    kept = np.flatnonzero(use)
-    if len(kept) < table.count:
-        tables.messages.append(Message(f"{table.count - len(kept)} photos are not used", table.path))
-    which, groups = _camera_of(table, cameras), table.texts("group")
-    unused = frozenset(name for name, used in zip(texts, use.tolist(), strict=True) if not used)
-    return Photos(
-        [texts[row] for row in kept],
-        [which[row] for row in kept],
-        [cameras.cameras[which[row]].name for row in kept],
-        centres[kept],
-        matrices[kept],
-        sd[kept],
-        attitude_sd[kept],
-        [groups[row] for row in kept],
-        table.numbers("time")[kept],
-        unused,
-        [each for each in observed if each.photos[0] not in unused],
+    return replace(
+        tables, settings=replace(tables.settings, tables={**tables.settings.tables, "cameras": path})
     )
 
 
-def _camera_of(table: ColumnTable, cameras: Cameras) -> list[int]:
-    places = {each.name: row for row, each in enumerate(cameras.cameras)}
-    if "camera" not in table:
-        if len(places) > 1:
-            raise table.head.error(f"the column camera is missing, and there are {len(places)} cameras")
-        return [0] * table.count
-    found = []
-    for row, name in enumerate(table.texts("camera")):
-        if not name and len(places) == 1:
-            found.append(0)
-        elif name not in places:
-            raise table.error(
-                row, f"column camera: there is no camera {quoted(name)}, but {listed(list(places))}"
-            )
-        else:
-            found.append(places[name])
+def _unknowns(
+    observations: Sequence[Observation], mounts: Sequence[Mount], timed: Sequence[Timed]
+) -> list[Unknown]:
+    """Return the common unknowns of which covariances may be known."""
+    found = [unknown for each in observations for unknown in each.unknowns if unknown is not None]
+    found += [unknown for each in observations if each.moment for unknown in each.moment.unknowns]
+    found += [each.sensor for each in mounts]
+    for each in timed:
+        found += [*([] if each.sensor is None else [each.sensor]), *each.scalars]
+        if each.trajectory is not None:
+            found += [one for own in each.trajectory.coefficients for one in own]
     return found
-
-
-def _attitude_weights(
-    tables: Tables, table: ColumnTable, matrices: Floats
-) -> tuple[Floats, list[Observation]]:
-    """Return standard deviations of omega, phi, kappa, and observations of attitudes given otherwise."""
-    settings = tables.settings
-    own = f"sd_{ANGLES[settings.attitude][0]}", *(f"sd_{name}" for name in ANGLES[settings.attitude][1:])
-    steps = ("sd_rotation_x", "sd_rotation_y", "sd_rotation_z")
-    free = np.full((table.count, 3), np.inf)
-    columns = steps if any(each in table for each in steps) else own
-    if not any(each in table for each in columns):
-        return free, []
-    sd = table.vectors(columns, math.inf, infinite=True, read=tables.angle)
-    if (sd < 0).any():
-        row = int(np.argwhere(sd < 0)[0][0])
-        raise table.error(row, "a standard deviation of an angle is negative")
-    unknown = np.isfinite(sd).any(axis=1) & np.isnan(matrices).any(axis=(1, 2))
-    if unknown.any():
-        raise table.error(int(np.flatnonzero(unknown)[0]), "angles have standard deviations, but no values")
-    plain = settings.attitude == "omega_phi_kappa" and settings.photo == "y_up"
-    if plain and columns is own:
-        return sd, []
-    observed: list[Observation] = []
-    fixed = free.copy()
-    names = table.texts("photo")
-    for row in np.flatnonzero(np.isfinite(sd).any(axis=1)).tolist():
-        if not sd[row].any():
-            fixed[row] = 0.0
-        elif columns is steps and np.isfinite(sd[row]).all():
-            try:
-                observed.append(Attitude(names[row], matrices[row], sd=sd[row]))
-            except InputError as error:
-                raise table.error(row, error.message) from None
-        else:
-            raise table.error(
-                row,
-                f"attitudes as {settings.attitude} are weighted by {', '.join(steps)}, rotations about the"
-                " axes of the photo, or in a table attitudes",
-            )
-    return fixed, observed
-
-
-@dataclass(frozen=True)
-class Images:
-    """The table of images, as it is written."""
-
-    table: ColumnTable
-    photos: Indices
-    points: Indices
-    point_names: list[str]
-    xy: Floats
-    sd: Floats | None
-
-
-def read_images(tables: Tables, photos: Photos) -> Images:
-    """Read the table of images; errors as of :func:`read`."""
-    table = tables.read("images")
-    assert table is not None
-    xs, ys = ("column", "row") if "column" in table else ("x", "y")
-    table.require(xs, ys)
-    places = {name: row for row, name in enumerate(photos.names)}
-    rows = indices_of(table, "photo", places | dict.fromkeys(photos.unused, len(places)), "photo")
-    names = table.names("point")
-    xy = table.vectors((xs, ys))
-    table.check_given(xy, (xs, ys))
-    _check_twice(table, rows, names.rows, len(names.names))
-    keep = table.flags("use") & (rows < len(places)) if "use" in table or photos.unused else None
-    sd = _image_sd(tables, table)
-    if keep is None:
-        return Images(table, rows, names.rows, names.names, xy, sd)
-    left = int(np.count_nonzero(~keep))
-    if left:
-        tables.messages.append(Message(f"{left} images are not used", table.path))
-    seen, points = np.unique(names.rows[keep], return_inverse=True)
-    kept_sd = sd if sd is None or np.ndim(sd) == 0 else sd[keep]
-    return Images(
-        table, rows[keep], points.reshape(-1), [names.names[row] for row in seen], xy[keep], kept_sd
-    )
-
-
-def _check_twice(table: ColumnTable, photos: Indices, points: Indices, count: int) -> None:
-    pairs = photos * count + points
-    if (np.diff(pairs) > 0).all():
-        return
-    order = np.argsort(pairs, kind="stable")
-    again = np.flatnonzero(np.diff(pairs[order]) == 0)
-    if again.size:
-        first, second = sorted(order[again[0] : again[0] + 2].tolist())
-        raise table.error(
-            second, f"the point has an image on this photo already, in record {table.records[first]}"
-        )
-
-
-def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
-    own = [
-        name
-        for pair in (("sd_column", "sd_row"), ("sd_x", "sd_y"))
-        if pair[0] in table or pair[1] in table
-        for name in pair
-    ]
-    if "correlation" in table and table.numbers("correlation", 0.0).any():
-        raise table.head.error("column correlation: images with correlated coordinates cannot be adjusted")
-    if not own and "sd" not in table and "images" not in tables.settings.sd:
-        return None
-    found = tables.deviations(table, "images", own[:2] or ["sd_x", "sd_y"])
-    bad = np.argwhere(~((found > 0) & np.isfinite(found)))
-    if len(bad):
-        row = int(bad[0][0])
-        why = "is empty" if np.isnan(found[row]).any() else f"{found[row].min():g} is not positive and finite"
-        raise table.error(row, f"standard deviation {why}")
-    return found
-
-
-def image_coordinates(
-    settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices
-) -> tuple[Floats, Floats | None]:
-    """Return image coordinates and standard deviations in the unit and along the axes of the cameras."""
-    xy, sd = images.xy, images.sd
-    if settings.image == "um":
-        xy, sd = xy * 1e-3, None if sd is None else sd * 1e-3
-    if settings.pixel_origin == "center" and settings.image == "px" and settings.image_y == "down":
-        xy = xy + 0.5
-    found = np.array(xy)
-    of_images = photo_cameras[images.photos]
-    for row, camera in enumerate(cameras.cameras):
-        own = of_images == row
-        if settings.image == "px" and settings.image_y == "down":
-            found[own] = from_corner(camera, cameras.sizes[row], xy[own])
-        elif settings.image == "px" and camera.image_y == "down":
-            size = cameras.sizes[row]
-            if size is None:
-                raise InputError(f"the camera {camera.name} has no width and height", file=settings.path)
-            found[own] = np.column_stack([size[0] / 2 + xy[own, 0], size[1] / 2 - xy[own, 1]])
-        elif camera.image_y != settings.image_y:
-            found[own] = xy[own] * [1.0, -1.0]
-    return found, sd
 
 
 @dataclass(frozen=True)

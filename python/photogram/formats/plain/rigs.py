@@ -9,18 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
 from photogram.formats.plain.schema import ANGLES, AXES, POSE, ROTATIONS, deviation_columns
-from photogram.formats.plain.tables import Tables, indices_of, made
+from photogram.formats.plain.shared import made
+from photogram.formats.plain.tables import Tables, angles_of, indices_of
 from photogram.formats.rigging import FrameOf, Rig
 from photogram.messages import quoted
-from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 from photogram.network.observations import Base, Observation
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Sensor
 
-__all__ = ["Rigs", "angles_of", "read_bases", "read_frames", "read_rigs"]
+__all__ = ["Rigs", "read_bases", "read_frames", "read_rigs"]
 
 _ANGLES = ANGLES["omega_phi_kappa"]
 FRAME = "frame itself"
@@ -152,13 +151,6 @@ def read_bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
     return found
 
 
-def angles_of(matrices: Floats, block: Block) -> Floats:
-    """Return (n, 3) omega, phi, kappa in degrees of attitudes, axes of a photo as columns."""
-    kind: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
-    found: Floats = np.degrees(Attitudes(matrices).values(kind))
-    return found
-
-
 class Rigs:
     """The rigs of a block, whose sensors are called by the cameras of their photos where these tell them.
 
@@ -178,6 +170,7 @@ class Rigs:
     def __init__(self, block: Block, cameras: Sequence[str]) -> None:
         self._cameras = dict(zip(block.photo_ids, cameras, strict=True))
         self._mounts = block.mounts
+        self._flown = [each.sensor for each in block.timed if each.sensor is not None]
         self._by_camera = self._told_by_cameras()
         self._sensors: dict[str, dict[str, Sensor]] = {}
         self._references: dict[str, str] = {}
@@ -185,12 +178,20 @@ class Rigs:
             rig = self._rig(each.frame)
             self._references[rig] = self._cameras[each.frame] if self._by_camera else FRAME
             self._sensors.setdefault(rig, {})[self._name(each)] = each.sensor
+        for sensor in self._flown:
+            self._references["rig"] = FRAME
+            self._sensors.setdefault("rig", {})[sensor.name] = sensor
         bases = [each for each in block.observations if isinstance(each, Base)]
         self._bases = [(each, row) for each in bases if (row := self._row(each)) is not None]
         self.lost = len(bases) - len(self._bases)
 
     def _told_by_cameras(self) -> bool:
-        """Return whether a camera and that of the frame say which sensor took a photo, and a sensor these."""
+        """Return whether a camera and that of the frame say which sensor took a photo, and a sensor these.
+
+        On trajectories no photo stands for a frame, which would tell the rig.
+        """
+        if self._flown:
+            return False
         of_pair: dict[tuple[str, str], Sensor] = {}
         pairs: dict[int, tuple[str, str]] = {}
         for each in self._mounts:
@@ -236,7 +237,7 @@ class Rigs:
 
     def tables(self, block: Block) -> dict[str, dict[str, Any]]:
         """Return the tables of rigs, frames and bases; none where there are no rigs."""
-        if not self._mounts:
+        if not self._sensors:
             return {}
         rows: list[tuple[str, str, Sensor | None]] = []
         for rig, sensors in self._sensors.items():
@@ -256,8 +257,9 @@ class Rigs:
                 what: [row[1] for row in rows],
                 **_poses([row[2] for row in rows], block),
             },
-            "frames": {name: [row[k] for row in frames] for k, name in enumerate(columns)},
         }
+        if frames:
+            found["frames"] = {name: [row[k] for row in frames] for k, name in enumerate(columns)}
         if self._bases:
             names = ("rig", "from", "to")
             found["bases"] = {

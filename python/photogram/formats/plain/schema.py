@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from photogram import _photocore
 
@@ -14,9 +14,14 @@ __all__ = [
     "ALL_ANGLES",
     "ANGLES",
     "AXES",
+    "BASES",
+    "BIAS",
+    "FACTORS",
     "POSE",
+    "RATE",
     "ROTATIONS",
     "TABLES",
+    "VELOCITY",
     "Schema",
     "covariance_columns",
     "deviation_columns",
@@ -26,6 +31,12 @@ AXES = ("x", "y", "z")
 ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")
 POSE = (*AXES, *ROTATIONS)
 """Components of poses: small rotations are about the axes of the photo."""
+VELOCITY, RATE = ("vx", "vy", "vz"), ("rate_x", "rate_y", "rate_z")
+BIAS = ("bias_x", "bias_y", "bias_z")
+BASES = ("position", "rotation")
+"""What a trajectory has coefficients of."""
+FACTORS = ("factor_0", "factor_1", "factor_2", "factor_3")
+"""Of neighbouring coefficients, whose sum was observed."""
 ANGLES: Mapping[str, tuple[str, ...]] = {
     "omega_phi_kappa": ("omega", "phi", "kappa"),
     "phi_omega_kappa": ("phi", "omega", "kappa"),
@@ -69,6 +80,8 @@ class Schema:
         How many standard deviations `[sd]` may have for it; none: it has no place there.
     has_system
         Whether its coordinates may be in another system than the frame, and its headings be those of others.
+    stands_in
+        The column that may be there in the place of a required one.
     """
 
     required: tuple[str, ...]
@@ -77,11 +90,16 @@ class Schema:
     about: str
     deviations: tuple[int, ...] = ()
     has_system: bool = False
+    stands_in: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def columns(self) -> tuple[str, ...]:
         """All columns that the table may have."""
         return self.texts + self.numbers
+
+    def needed(self, there: Collection[str]) -> tuple[str, ...]:
+        """Return the columns that a table with some columns must have."""
+        return tuple(each for each in self.required if self.stands_in.get(each) not in there)
 
 
 _SD_AXES, _SD_ROTATIONS = deviation_columns(AXES), deviation_columns(ROTATIONS)
@@ -90,6 +108,16 @@ _SD_ANGLES = deviation_columns(ALL_ANGLES[:9])
 _PARAMETERS = tuple(sorted({name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}))
 _ENDS, _DIFFERENCE = ("from", "to"), ("dx", "dy", "dz")
 _ACROSS = ("sd", "sd_x", "sd_y", "cov_xy")
+_CLOCK = ("time_offset", "sd_time_offset")
+_OF_BASES = tuple(
+    name
+    for of in BASES
+    for name in (
+        *(f"{of}_{what}" for what in ("degree", "every", "reference", "scale")),
+        *(f"{sd}{of}{what}" for sd in ("", "sd_") for what in ("_smooth", "_correlation")),
+        f"sd_{of}",
+    )
+)
 _COMMON = tuple(
     f"{sd}{kind}_{axis}" for kind in ("lever", "shift", "drift") for sd in ("", "sd_") for axis in AXES
 )
@@ -97,19 +125,39 @@ _COMMON = tuple(
 TABLES: Mapping[str, Schema] = {
     "cameras": Schema(
         ("camera",),
-        ("camera", "model", "for_each", "weights"),
-        ("width", "height", "pixel_mm", *_PARAMETERS, *deviation_columns(_PARAMETERS)),
+        ("camera", "model", "for_each", "weights", "shutter", "readout_direction"),
+        (
+            *("width", "height", "pixel_mm", *_PARAMETERS, *deviation_columns(_PARAMETERS)),
+            *("readout", "sd_readout", "readout_begin", "readout_end", "pitch_x", "pitch_y"),
+        ),
         "`camera`; `model` (default `brown` with `c`, else `pinhole`), `width`, `height`, `pixel_mm`, `f` or"
         " `fx`, `fy` or `c` (positive for the positive plane), all other parameters by the names of the"
         " model, `sd_NAME` (0 held, `inf` unknown), `for_each` (`all`, `photo`, `group`), `weights`"
-        " (`corrected`, `measured`) of backward models",
+        " (`corrected`, `measured`) of backward models; of a [rolling shutter](#what-moves) `readout` (s),"
+        " `sd_readout` (s; 0: known), `readout_direction` (`down`, `up`, `right`, `left`), `readout_begin`,"
+        " `readout_end` (image coordinates; default: the edges of the picture), `shutter` (a name that"
+        " cameras share; default: the camera's); of a [line of sensors](#what-moves) `pitch_x`, `pitch_y` (0;"
+        " unit of images a sample), `x0`, `y0` (0; unit of images), `s0` (samples; default: half of `width`);"
+        " the model `line` is `brown` with a line of sensors",
     ),
     "photos": Schema(
         ("photo",),
-        ("photo", "camera", "group", "strip", "frame", "use"),
-        (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ANGLES, *_SD_ROTATIONS, "time"),
+        (
+            *("photo", "camera", "group", "strip", "frame", "use"),
+            *("trajectory", "rig", "sensor", "clock", "scan"),
+        ),
+        (
+            *(*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ANGLES, *_SD_ROTATIONS, "time"),
+            *(*VELOCITY, *RATE, *deviation_columns((*VELOCITY, *RATE))),
+            *(*_CLOCK, "line_rate", "sd_line_rate"),
+        ),
         "`photo`; `camera` (if there are several), `x`, `y`, `z`, angles by `[axes] attitude`, `sd_x` ..,"
-        " `sd_omega` .. or `sd_rotation_x` .., `group`, `time`, `use`",
+        " `sd_omega` .. or `sd_rotation_x` .., `group`, `time` (s), `use`;"
+        " of [what moves](#what-moves) `trajectory`; `rig` (if there are several), `sensor`; without a"
+        " trajectory `vx` .. (0; unit of length a second), `rate_x` .. (0; rad/s), `sd_vx` .., `sd_rate_x`"
+        " .. (empty: free); `time_offset` (0; s), `sd_time_offset` (s; 0: known), `clock` (a name that"
+        " photos and groups share; default: the photo's), `line_rate` (a factor; 1), `sd_line_rate` (0:"
+        " known), `scan` (a name that photos share; default: the photo's)",
         deviations=(1, 3),
         has_system=True,
     ),
@@ -117,7 +165,8 @@ TABLES: Mapping[str, Schema] = {
         ("photo", "point"),
         ("photo", "point", "use"),
         ("column", "row", "x", "y", "sd", "sd_x", "sd_y", "sd_column", "sd_row", "correlation"),
-        "`photo`, `point`, `column`, `row` (or `x`, `y`); `sd`, or `sd_column`, `sd_row`; `use`",
+        "`photo`, `point`, `column`, `row` (or `x`, `y`); `sd`, or `sd_column`, `sd_row`; `use`; of a line"
+        " scanner sample and line",
         deviations=(1, 2),
     ),
     "points": Schema(
@@ -223,36 +272,124 @@ TABLES: Mapping[str, Schema] = {
         "`plumb_line`, `point`; `sd`, or `sd_x`, `sd_y`, `cov_xy`",
         deviations=(1,),
     ),
+    "trajectories": Schema(
+        ("trajectory",),
+        ("trajectory", *BASES, "interpolation", "attitude_interpolation"),
+        _OF_BASES,
+        "`trajectory`; `position`, `rotation`: what its corrections are (`polynomial`, `spline`, `none`);"
+        " `interpolation` of positions (`linear`, `hermite`, `lagrange`), `attitude_interpolation` (`linear`,"
+        " `lagrange`); and for each of both, as `position_degree`, `rotation_degree`: `_degree` (0, of"
+        " splines 3), `_every` (s between knots), `_reference`, `_scale` (s, of polynomials; default: middle"
+        " and half of the records), `_smooth` (1, 2, 3: differences of this order are 0), `_correlation` (s,"
+        " of a process of Gauss and Markov); `sd_position` (unit of length), `sd_rotation` (angle) of every"
+        " coefficient (0: known; empty: free, or `[sd] trajectories`), `sd_position_smooth`,"
+        " `sd_position_correlation`, `sd_rotation_smooth`, `sd_rotation_correlation` (the same units)",
+        deviations=(2,),
+    ),
+    "trajectory_positions": Schema(
+        ("trajectory", "time", *AXES),
+        ("trajectory",),
+        ("time", *AXES, *VELOCITY),
+        "`trajectory`, `time` (s), `x`, `y`, `z`: of projection centres; `vx`, `vy`, `vz` (unit of length a"
+        " second) for `hermite`",
+    ),
+    "trajectory_attitudes": Schema(
+        ("trajectory", "time"),
+        ("trajectory",),
+        ("time", *ALL_ANGLES),
+        "`trajectory`, `time` (s), angles by `[axes] attitude`",
+    ),
+    "trajectory_knots": Schema(
+        ("trajectory", "of", "knot"),
+        ("trajectory", "of"),
+        ("knot",),
+        "`trajectory`, `of` (`position`, `rotation`), `knot` (s): all knots, in the place of `_every`",
+    ),
+    "trajectory_coefficients": Schema(
+        ("trajectory", "of", "k"),
+        ("trajectory", "of"),
+        ("k", *AXES, *_SD_AXES),
+        "`trajectory`, `of` (`position`, `rotation`), `k` (from 0); `x`, `y`, `z` (0), `sd_x` .. (default:"
+        " as `trajectories` says): in the unit of length, or of angles",
+    ),
+    "smoothness": Schema(
+        ("trajectory", "of", "k", FACTORS[0]),
+        ("trajectory", "of"),
+        ("k", *FACTORS, *AXES, "sd", *_SD_AXES, *covariance_columns(AXES)),
+        "`trajectory`, `of`, `k` of the first of neighbouring coefficients, `factor_0` .. `factor_3`: their"
+        " sum was observed as `x`, `y`, `z` (0); `sd`, `sd_x` .., `cov_xy` .. in the units of coefficients;"
+        " beside `_smooth` and `_correlation`, in the place of these where it has all their coefficients",
+    ),
+    "body_rotations": Schema(
+        ("trajectory", "time"),
+        ("trajectory",),
+        ("time", *ALL_ANGLES),
+        "`trajectory`, `time` (s), angles of the body's axes in those of the positions, where these are"
+        " inertial and the body turns",
+    ),
+    "line_times": Schema(
+        ("photo", "line", "time", "seconds_per_line"),
+        ("photo",),
+        ("line", "time", "seconds_per_line"),
+        "`photo`, `line` (first of those that follow; 0: the upper edge), `time` (s), `seconds_per_line`:"
+        " the photo is a line scanner's",
+    ),
     "gnss": Schema(
         ("photo", *AXES),
-        ("photo", "group"),
+        ("photo", "trajectory", "group"),
         (*AXES, "sd", *_SD_AXES, *covariance_columns(AXES), "time"),
-        "`photo`, `x`, `y`, `z`; `sd`, `sd_x` .., `cov_xy` .., `group`, `time`",
+        "`photo`, or `trajectory` and `time` (s), `x`, `y`, `z`; `sd`, `sd_x` .., `cov_xy` .., `group`,"
+        " `time` of a photo, for drifts",
         deviations=(1, 3),
         has_system=True,
+        stands_in={"photo": "trajectory"},
+    ),
+    "velocities": Schema(
+        ("photo", *VELOCITY),
+        ("photo", "trajectory", "group"),
+        ("time", *VELOCITY, "sd", *deviation_columns(VELOCITY), *covariance_columns(VELOCITY)),
+        "`photo`, or `trajectory` and `time` (s), `vx`, `vy`, `vz` (unit of length a second); `sd`, `sd_vx`"
+        " .., `cov_vx_vy` .., `group` (of `gnss_groups`: its lever arm and clock)",
+        deviations=(1, 3),
+        stands_in={"photo": "trajectory"},
     ),
     "gnss_groups": Schema(
         ("group",),
-        ("group", "lever", "shift", "drift", "drift_epoch"),
-        _COMMON,
+        ("group", "lever", "shift", "drift", "drift_epoch", "clock"),
+        (*_COMMON, *_CLOCK),
         "`group`; `lever` (a name that groups share; default: the group's), `lever_x` .., `sd_lever_x` .. (0:"
         " known), `shift`, `drift` (true, false, or a name that groups share), `shift_x` .., `drift_x` ..,"
         " `sd_shift_x` .., `sd_drift_x` .. (empty: free), `drift_epoch` (the time that a drift counts from;"
-        " empty: the mean time of its observations)",
+        " empty: the mean time of its observations); of records of trajectories `time_offset` (0; s),"
+        " `sd_time_offset` (s; 0: known), `clock` (a name that groups and photos share; default: the"
+        " group's)",
     ),
     "attitudes": Schema(
         ("photo",),
-        ("photo", "group"),
-        (*ALL_ANGLES, *_SD_ANGLES, *_SD_ROTATIONS, *covariance_columns(ROTATIONS)),
-        "`photo`, angles; `sd_rotation_x` .., `cov_rotation_x_rotation_y` .., `group`",
+        ("photo", "trajectory", "group"),
+        ("time", *ALL_ANGLES, *_SD_ANGLES, *_SD_ROTATIONS, *covariance_columns(ROTATIONS)),
+        "`photo`, or `trajectory` and `time` (s), angles; `sd_rotation_x` .., `cov_rotation_x_rotation_y` ..,"
+        " `group`",
         deviations=(1, 3),
+        stands_in={"photo": "trajectory"},
+    ),
+    "rates": Schema(
+        ("photo", *RATE),
+        ("photo", "trajectory", "group"),
+        ("time", *RATE, "sd", *deviation_columns(RATE), *covariance_columns(RATE)),
+        "`photo`, or `trajectory` and `time` (s), `rate_x`, `rate_y`, `rate_z` (rad/s, axes of the body);"
+        " `sd`, `sd_rate_x` .., `cov_rate_x_rate_y` .., `group` (of `attitude_groups`)",
+        deviations=(1, 3),
+        stands_in={"photo": "trajectory"},
     ),
     "attitude_groups": Schema(
         ("group",),
-        ("group",),
-        (*ALL_ANGLES, *_SD_ROTATIONS),
+        ("group", "boresight", "clock", "bias"),
+        (*ALL_ANGLES, *_SD_ROTATIONS, *_CLOCK, *BIAS, *deviation_columns(BIAS)),
         "`group`; angles of the boresight (empty: from photos and attitudes), `sd_rotation_x` .. (empty:"
-        " free)",
+        " free), `boresight` (true, false, or a name that groups share); of records of trajectories"
+        " `time_offset`, `sd_time_offset`, `clock` as in `gnss_groups`; of rates `bias` (true, false, or a"
+        " name that groups share), `bias_x` .. (0; rad/s), `sd_bias_x` .. (empty: free)",
     ),
     "relative_poses": Schema(
         (*_ENDS, *AXES),
@@ -287,8 +424,9 @@ TABLES: Mapping[str, Schema] = {
         ("covariance",),
         "`kind`, `name`, `first`, `second`, `covariance`: what was determined together of a `camera`"
         " (parameters), or of a `lever arm`, `shift`, `drift`, `boresight`, `instrument`, `level`, `plane`,"
-        " `line`, `plumb line`, `sensor` (components as [observations](observations.md) call them); one"
-        " triangle with its diagonal, what is missing is 0",
+        " `line`, `plumb line`, `sensor`, `gyro bias`, `position coefficient`, `rotation coefficient`"
+        " (components as [observations](observations.md) call them); one triangle with its diagonal, what is"
+        " missing is 0",
     ),
 }
 """In the order in which they are read and written."""

@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import date, datetime
 from pathlib import Path
 from typing import Any, cast
 
@@ -21,7 +22,7 @@ from photogram.formats.project import DatumName, Frame, Options
 from photogram.messages import Message, listed, nearest
 from photogram.results.features import KINDS, Definition
 
-__all__ = ["Settings", "read_settings", "unread_tables"]
+__all__ = ["LENGTHS", "Settings", "read_settings", "unread_tables"]
 
 VERSION = 1
 WITH_CRS = tuple(name for name, each in TABLES.items() if each.has_system)
@@ -29,9 +30,10 @@ WITH_SD = {name: each.deviations for name, each in TABLES.items() if each.deviat
 """Of check points they are those of the table of control."""
 ENDINGS = (".csv", ".tsv", ".txt", ".parquet")
 
+LENGTHS = ("m", "km", "mm", "ft", "us-ft")
 _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("frame", "kind"): ("cartesian", "topocentric", "geocentric", "geographic"),
-    ("units", "length"): ("m", "mm", "ft", "us-ft"),
+    ("units", "length"): LENGTHS,
     ("units", "angle"): ("deg", "gon", "rad", "dms"),
     ("units", "image"): ("px", "mm", "um"),
     ("axes", "image_y"): ("down", "up"),
@@ -47,6 +49,7 @@ _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
     ),
     ("axes", "rotation"): ("object_to_photo", "photo_to_object"),
     ("axes", "photo"): ("y_up", "y_down"),
+    ("time", "scale"): ("none", "utc", "gps", "tai", "et"),
     ("adjust", "datum"): ("control", "minimum", "inner"),
     ("adjust", "loss"): ("none", "huber", "cauchy"),
     ("adjust", "unit_variance"): ("constrained", "unity", "redundancy", "free"),
@@ -57,6 +60,7 @@ _KEYS: Mapping[str, tuple[str, ...] | None] = {
     "frame": ("kind", "crs", "origin", "ellipsoid"),
     "units": ("length", "angle", "image"),
     "axes": ("image_y", "pixel_origin", "attitude", "rotation", "photo"),
+    "time": ("origin", "scale"),
     "sd": tuple(WITH_SD),
     "tables": tuple(TABLES),
     "adjust": ("datum", "loss", "unit_variance"),
@@ -83,6 +87,9 @@ class Settings:
         Units.
     image_y, pixel_origin, attitude, rotation, photo
         Axes.
+    time_origin, time_scale
+        What seconds of all tables count from, a number or a date, and of which scale: said, not calculated
+        with.
     sd
         Standard deviations of tables without columns for them: three numbers, of images two.
     tables
@@ -111,6 +118,8 @@ class Settings:
     attitude: str = "omega_phi_kappa"
     rotation: str = "object_to_photo"
     photo: str = "y_up"
+    time_origin: float | str = 0.0
+    time_scale: str = "none"
     sd: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     tables: Mapping[str, Path] = field(default_factory=dict)
     crs: Mapping[str, str] = field(default_factory=dict)
@@ -122,6 +131,15 @@ class Settings:
     def __post_init__(self) -> None:
         if not self.image_y:
             object.__setattr__(self, "image_y", "down" if self.image == "px" else "up")
+
+    @property
+    def times(self) -> str:
+        """What seconds count from, as people are told; nothing where it is not said."""
+        if self.time_origin == 0.0 and self.time_scale == "none":
+            return ""
+        return f"seconds from {self.time_origin}" + (
+            "" if self.time_scale == "none" else f", {self.time_scale}"
+        )
 
 
 def read_settings(path: Path) -> Settings:
@@ -158,6 +176,8 @@ def read_settings(path: Path) -> Settings:
         attitude=file.word("axes", "attitude"),
         rotation=file.word("axes", "rotation"),
         photo=file.word("axes", "photo"),
+        time_origin=file.time_origin(),
+        time_scale=file.word("time", "scale"),
         sd={name: file.deviations(name) for name in WITH_SD if file.has("sd", name)},
         tables=_tables(file),
         crs={name: file.text(name, "crs") for name in WITH_CRS if file.has(name, "crs")},
@@ -220,6 +240,19 @@ class _File(Sections):
             form = "origin is latitude and longitude in degrees, and the ellipsoidal height"
             self.fail("frame", "origin", form)
         return latitude, longitude, height
+
+    def time_origin(self) -> float | str:
+        """Return a number of seconds, or a date as text."""
+        value = self.value("time", "origin", 0.0)
+        if self.has("time", "origin") and isinstance(value, int | float):
+            (value,) = self.numbers("time", "origin", (1,))
+        if isinstance(value, float) and math.isfinite(value):
+            return value
+        try:
+            # TOML has dates of its own.
+            return value.isoformat() if isinstance(value, date) else datetime.fromisoformat(value).isoformat()
+        except (TypeError, ValueError):
+            self.fail("time", "origin", f"origin is a number of seconds, or a date, not {shown(value)}")
 
     def ellipsoid(self) -> tuple[float, float]:
         """Return the semi-axes."""

@@ -25,13 +25,9 @@ from photogram.distributed.run import Manifest, divided, places_of
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.plain.cameras import read_cameras
-from photogram.formats.plain.reading import (
-    SETTINGS,
-    image_coordinates,
-    read_images,
-    read_photos,
-    read_tables,
-)
+from photogram.formats.plain.images import image_coordinates, read_images
+from photogram.formats.plain.photos import read_photos
+from photogram.formats.plain.reading import SETTINGS, read_tables
 from photogram.formats.plain.settings import Settings, read_settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.transform import Transform
@@ -110,6 +106,11 @@ class Streamed:
         self._settings, self._wishes = settings, wishes
         held = self._without_images()
         self.project: Project = read_tables(Tables(held, []), wishes)
+        if self.project.block.timed:
+            raise InputError(
+                "photos with a rolling shutter, or on trajectories, are read whole: without parts",
+                file=settings.path,
+            )
         block = started(checked(self.project.block))
         # A node has some of the observations of a drift only.
         self.block = block.replace(observations=with_epochs(block.observations))

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.errors import InputError
 from photogram.formats.column_words import UNITS
 from photogram.formats.columns import PLAIN, check_unread, degrees, nameless, settled
 from photogram.formats.plain.schema import ALL_ANGLES, ANGLES, AXES, POSE, TABLES, covariance_columns
 from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.shared import Shared
 from photogram.formats.rotations import Y_DOWN, is_rotation
 from photogram.io.delimited import ColumnTable, read_columns, read_rows
 from photogram.messages import Message, listed, quoted
@@ -26,11 +26,11 @@ from photogram.network.unknowns import Unknown
 __all__ = [
     "DEGREE",
     "Tables",
+    "angles_of",
     "correlations",
     "covariances_of",
     "different",
     "indices_of",
-    "made",
     "matrices_of",
     "places_written",
     "vectors_of",
@@ -38,7 +38,6 @@ __all__ = [
 
 DEGREE = 180 / np.pi
 """Of a radian."""
-_Made = TypeVar("_Made")
 
 
 def _labelled(columns: Sequence[str]) -> list[str]:
@@ -57,11 +56,14 @@ class Tables:
         Remarks.
     names
         Points that have images, where they are known before the tables are read.
+    shared
+        Common unknowns that rows of all tables name.
     """
 
     settings: Settings
     messages: list[Message]
     names: Collection[str] = ()
+    shared: Shared = field(default_factory=Shared)
 
     def read(self, name: str) -> ColumnTable | None:
         """Return a table that is there.
@@ -79,7 +81,7 @@ class Tables:
             table = read_columns(
                 path, known=known, numbers=numbers, spelling=_labelled if name == "images" else tuple
             )
-            table.require(*schema.required)
+            table.require(*schema.needed(table.columns))
             check_unread(table, PLAIN, known, name, self.messages)
             return table
         given = self.settings.columns.get(name, PLAIN)
@@ -90,7 +92,8 @@ class Tables:
                 path, known=known, numbers=numbers, spelling=partial(given.spelled, known), hint=nameless
             )
         metre = 1.0 / UNITS[self.settings.length]
-        return settled(table, given, known, metre, schema.required, self.names, name, self.messages)
+        required = schema.needed(table.columns)
+        return settled(table, given, known, metre, required, self.names, name, self.messages)
 
     def angle(self, text: str) -> float:
         """Return an angle in radians from a cell in the unit of the project."""
@@ -276,14 +279,6 @@ def vectors_of(
     return values
 
 
-def made(table: ColumnTable, row: int, make: Callable[[], _Made]) -> _Made:
-    """Make something of a row; what it refuses is an error of the row."""
-    try:
-        return make()
-    except InputError as error:
-        raise (error if error.file else table.error(row, error.message)) from None
-
-
 def correlations(
     covariances: Floats, names: Sequence[str], units: Sequence[float] | None = None
 ) -> dict[str, Any]:
@@ -306,3 +301,10 @@ def places_written(block: Block, values: Floats) -> Floats:
 def different(unknowns: Sequence[Unknown | None]) -> list[Any]:
     """Return unknowns, each once."""
     return list({id(each): each for each in unknowns if each is not None}.values())
+
+
+def angles_of(matrices: Floats, block: Block) -> Floats:
+    """Return (n, 3) omega, phi, kappa in degrees of attitudes, axes of a photo as columns."""
+    kind: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+    found: Floats = np.degrees(Attitudes(matrices).values(kind))
+    return found

@@ -10,14 +10,18 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control
-from photogram.formats.images import to_corner
+from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
+from photogram.formats.plain.image_axes import to_tables
+from photogram.formats.plain.moving import line_times_table, moving_columns
 from photogram.formats.plain.observed import observed_tables
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import AXES
-from photogram.formats.plain.settings import VERSION
+from photogram.formats.plain.settings import LENGTHS, VERSION, Settings
+from photogram.formats.plain.smoothness import lost_smoothness, smoothness_table
 from photogram.formats.plain.statement_settings import asked_files, asked_lines
 from photogram.formats.plain.statement_tables import COVERS, lengths_table
 from photogram.formats.plain.tables import correlations
+from photogram.formats.plain.trajectories import trajectory_tables
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
 from photogram.io.toml import quoted_text
@@ -25,6 +29,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Control, Position
+from photogram.network.timed import LineSensor
 from photogram.results.features import Definition
 
 __all__ = ["attitude_matrices", "camera_table", "cannot_hold", "control_table", "known_cameras", "write"]
@@ -36,6 +41,8 @@ def cannot_hold(project: Project) -> list[str]:
     """Return what of a project the tables have no place for."""
     block = project.block
     found = [] if block.refraction is None else ["refraction"]
+    if sums := lost_smoothness(block):
+        found.append(f"{sums} sums of coefficients that are no neighbours, or too many")
     cameras, which = known_cameras(block)
     lost = Rigs(block, [cameras[row].name for row in which]).lost
     if lost:
@@ -89,32 +96,82 @@ def write(project: Project) -> Mapping[str, bytes]:
     """
     block = project.block
     cameras, photo_cameras = known_cameras(block)
-    names = ["x", "y"]
-    image_y, xy = "up", block.image_xy
-    if block.image_unit == "px":
-        ups = {each.image_y for each in cameras}
-        if ups == {"down"} or None not in project.sizes:
-            image_y, names, xy = "down", ["column", "row"], to_corner(project)
-        elif "down" in ups:
-            raise InputError(
-                "cameras that count from the corner and from the middle: their pictures have no size"
-            )
-    elif any(each.image_y == "down" for each in cameras):
-        of_images = np.array(photo_cameras)[block.image_photos]
-        down = np.array([each.image_y == "down" for each in cameras])[of_images]
-        xy = np.where(down[:, np.newaxis], xy * [1.0, -1.0], xy)
+    rigs = Rigs(block, [cameras[row].name for row in photo_cameras])
+    exposures = of_cameras(block, cameras, photo_cameras)
+    scanned = np.array([isinstance(each, LineSensor) for each in exposures])[photo_cameras]
+    image_y = _image_y(project, cameras, exposures)
+    lines_alone = block.image_unit != "px" and bool(scanned[block.image_photos].all())
+    names = ["column", "row"] if image_y == "down" or lines_alone else ["x", "y"]
+    pictures = _pictures(project, cameras)
     tables = {
-        "cameras": camera_table(project, cameras),
-        "photos": _photos(block, [cameras[row].name for row in photo_cameras]),
-        "images": _images(block, names, xy),
+        "cameras": _with_exposures(
+            camera_table(project, cameras), exposure_columns(cameras, exposures, *pictures, image_y)
+        ),
+        "photos": _photos(block, [cameras[row].name for row in photo_cameras], rigs),
+        "images": _images(block, names, _written_xy(project, cameras, photo_cameras, scanned, image_y)),
         "points": _points(project),
         "control": control_table(project),
-        **observed_tables(block, cameras, photo_cameras),
+        **trajectory_tables(block),
+        "smoothness": smoothness_table(block),
+        "line_times": line_times_table(block),
+        **observed_tables(block, cameras, rigs),
         "lengths": lengths_table(project.statement.get("lengths", ())),
     }
     files = {f"{name}.csv": csv_text(columns) for name, columns in tables.items() if columns}
     settings = _settings(project, image_y).encode()
     return {"project.toml": settings, **files, **asked_files(project.statement)}
+
+
+def _image_y(project: Project, cameras: Sequence[Camera], exposures: Sequence[Exposure]) -> str:
+    """Return where image coordinates of frames count to: down from the corner, or up from the middle."""
+    if project.block.image_unit != "px":
+        return "up"
+    sizes, _ = _pictures(project, cameras)
+    frames = [row for row, each in enumerate(exposures) if not isinstance(each, LineSensor)]
+    ups = {cameras[row].image_y for row in frames}
+    if ups == {"down"} or None not in [sizes[row] for row in frames]:
+        return "down"
+    if "down" in ups:
+        raise InputError(
+            "cameras that count from the corner and from the middle: their pictures have no size"
+        )
+    return "up"
+
+
+def _pictures(project: Project, cameras: Sequence[Camera]) -> tuple[list[Size | None], list[float | None]]:
+    """Return the size of the pictures of each camera, by the camera itself where it has it, and of pixels."""
+    if not project.block.cameras:
+        # Principal distances are no cameras of the project.
+        return [None] * len(cameras), [None] * len(cameras)
+    sizes: list[Size | None] = list(project.sizes)
+    for row, each in enumerate(cameras):
+        if "w" in each.names:
+            sizes[row] = round(each.parameters["w"]), round(each.parameters["h"])
+    return sizes, list(project.pixel_mm)
+
+
+def _with_exposures(table: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a table of cameras with what their photos have; models may have parameters of the same names."""
+    found = {**table, **more}
+    for name in OF_LINES:
+        if name in table and name in more:
+            pairs = zip(table[name], more[name], strict=True)
+            found[name] = [own if line is None else line for own, line in pairs]
+    return found
+
+
+def _written_xy(
+    project: Project, cameras: Sequence[Camera], photo_cameras: Sequence[int], scanned: Bools, image_y: str
+) -> Floats:
+    """Return image coordinates as the table has them: samples and lines of scanners as they are."""
+    block = project.block
+    found, of_images = block.image_xy.copy(), np.array(photo_cameras)[block.image_photos]
+    sizes, _ = _pictures(project, cameras)
+    for row, camera in enumerate(cameras):
+        own = (of_images == row) & ~scanned[block.image_photos]
+        if own.any():
+            found[own] = to_tables(image_y, camera, sizes[row], found[own])
+    return found
 
 
 def _settings(project: Project, image_y: str) -> str:
@@ -133,12 +190,12 @@ def _settings(project: Project, image_y: str) -> str:
         lines.append(f"origin = [{', '.join(map(repr, frame.origin))}]")
     if block.spheroid is not None:
         lines.append(f"ellipsoid = [{block.spheroid.a!r}, {block.spheroid.b!r}]")
-    unit = block.linear_unit if block.linear_unit in ("m", "mm", "ft", "us-ft") else "m"
+    unit = block.linear_unit if block.linear_unit in LENGTHS else "m"
     lines += ["", "[units]", f'length = "{unit}"', 'angle = "deg"', f'image = "{block.image_unit}"']
     lines += ["", "[axes]", f'image_y = "{image_y}"']
     if block.photo_to_ground:
         lines.append('rotation = "photo_to_object"')
-    lines += ["", "[adjust]"]
+    lines += [*_time(project), "", "[adjust]"]
     if options.datum is not None:
         lines.append(f'datum = "{options.datum}"')
     lines += [f'loss = "{options.loss or "none"}"', f'unit_variance = "{options.unit_variance}"', ""]
@@ -146,6 +203,16 @@ def _settings(project: Project, image_y: str) -> str:
         lines += ["[features]", *(_feature(*each) for each in project.features.items()), ""]
     lines += asked_lines(project.statement, unit)
     return "\n".join(lines)
+
+
+def _time(project: Project) -> list[str]:
+    """Return what seconds count from, where the tables that were read have said so."""
+    settings = project.details.get("settings")
+    if not isinstance(settings, Settings) or not settings.times:
+        return []
+    origin = settings.time_origin
+    told = _quoted(origin) if isinstance(origin, str) else repr(origin)
+    return ["", "[time]", f"origin = {told}", f'scale = "{settings.time_scale}"']
 
 
 def _feature(name: str, definition: Definition) -> str:
@@ -166,11 +233,7 @@ def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
         "camera": [each.name for each in cameras],
         "model": [each.model for each in cameras],
     }
-    sizes: list[Size | None] = list(project.sizes)
-    for row, each in enumerate(cameras):
-        if "w" in each.names:
-            sizes[row] = round(each.parameters["w"]), round(each.parameters["h"])
-    pixels = list(project.pixel_mm)
+    sizes, pixels = _pictures(project, cameras)
     if any(size is not None for size in sizes):
         columns["width"] = [None if size is None else size[0] for size in sizes]
         columns["height"] = [None if size is None else size[1] for size in sizes]
@@ -197,7 +260,7 @@ def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
     return columns
 
 
-def _photos(block: Block, cameras: list[str]) -> dict[str, Any]:
+def _photos(block: Block, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
     positions, sd = _given(block, "position")
     if block.geographic:
         positions = np.column_stack([np.degrees(positions[:, :2]), positions[:, 2]])
@@ -208,10 +271,11 @@ def _photos(block: Block, cameras: list[str]) -> dict[str, Any]:
     for names, values in ((AXES, sd), (_ANGLES, np.degrees(angle_sd))):
         if np.isfinite(values).any():
             columns |= {f"sd_{name}": column for name, column in zip(names, values.T, strict=True)}
-    if any(isinstance(each, Position) and each.drift is not None for each in block.observations):
+    drifts = any(isinstance(each, Position) and each.drift is not None for each in block.observations)
+    if drifts and not block.timed:
         times = {each.photo: each.time for each in block.observations if isinstance(each, Position)}
         columns["time"] = [times.get(photo) for photo in block.photo_ids]
-    return columns
+    return columns | moving_columns(block, rigs)
 
 
 def _given(block: Block, what: str) -> tuple[Floats, Floats]:
@@ -246,7 +310,8 @@ def control_table(project: Project) -> dict[str, Any]:
     )
     full = correlated_control(block)
     places = {name: row for row, name in enumerate(block.point_ids)}
-    order = sorted({*rows, *(places[name] for name in full)})
+    rows |= {places[name]: "control" for name in full}
+    order = sorted(rows)
     if not order:
         return {}
     positions, sd = block.point_positions[order].copy(), block.point_sd[order].copy()
@@ -270,9 +335,9 @@ def control_table(project: Project) -> dict[str, Any]:
     for k, axis in enumerate(AXES):
         unheld = np.isinf(sd[:, k]) & np.isfinite(positions[:, k])
         columns[f"sd_{axis}"] = np.where(unheld, np.inf, columns[f"sd_{axis}"])
-    columns["use"] = [rows.get(row, "control") for row in order]
+    columns["use"] = [rows[row] for row in order]
     if vegetated := project.statement.get("vegetated"):
-        there = [block.point_ids[row] in vegetated and rows.get(row) == "check" for row in order]
+        there = [block.point_ids[row] in vegetated and rows[row] == "check" for row in order]
         columns["cover"] = [COVERS[1] if each else None for each in there]
     return columns
 

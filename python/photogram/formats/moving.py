@@ -1,0 +1,103 @@
+"""What of a project moves, in sentences: photos on trajectories, rolling shutters, line scanners, records."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from photogram.errors import InputError
+from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.trajectories import shared_trajectories
+from photogram.formats.project import Project
+from photogram.messages import counted
+from photogram.network.block import Block
+from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
+
+__all__ = ["check_held", "lost_motions", "motions"]
+
+MOST = 12
+"""Trajectories that are told one by one."""
+
+
+def motions(project: Project) -> list[str]:
+    """Return what of a project is on trajectories, a line each; nothing where nothing is."""
+    block = project.block
+    shared = shared_trajectories(block)
+    if not block.timed and not shared:
+        return []
+    found = []
+    if block.timed:
+        kinds = {
+            "with a rolling shutter": sum(each.shutter is not None for each in block.timed),
+            "of a line scanner": sum(each.lines is not None for each in block.timed),
+            "with a motion of their own": sum(each.trajectory is None for each in block.timed),
+        }
+        told = ", ".join(f"{count} {what}" for what, count in kinds.items() if count)
+        found.append(
+            ": ".join([f"{counted(len(block.timed), 'photo')} on trajectories", *([told] if told else [])])
+        )
+    found += [_told(each, block) for each in shared[:MOST]]
+    if len(shared) > MOST:
+        found.append(f"and {len(shared) - MOST} more trajectories")
+    settings = project.details.get("settings")
+    if isinstance(settings, Settings) and settings.times:
+        found.append(f"times: {settings.times}")
+    return found
+
+
+def _told(trajectory: Trajectory, block: Block) -> str:
+    """Return what a trajectory is, and what is on it."""
+    table = trajectory.table
+    photos = sum(each.trajectory is trajectory for each in block.timed)
+    kinds = Counter(
+        each.label
+        for each in block.observations
+        if each.moment is not None and each.moment.trajectory is trajectory
+    )
+    on = [counted(photos, "photo")] if photos else []
+    on += [f"{counted(count, 'observation')} of the kind {kind}" for kind, count in kinds.items()]
+    first, last = table.span
+    bases = [
+        f"{what}: {_basis(basis, own)}"
+        for what, basis, own in zip(
+            ("position", "rotation"),
+            (trajectory.position, trajectory.rotation),
+            trajectory.coefficients,
+            strict=True,
+        )
+    ]
+    records = f"{counted(len(table.times), 'record')} of positions, {len(table.attitude_times)} of attitudes"
+    return f"{trajectory.name}: {records}, {first!r} to {last!r} s; {'; '.join(bases)}; {', '.join(on)}"
+
+
+def _basis(basis: Basis | None, coefficients: tuple[Coefficient, ...]) -> str:
+    """Return what corrections are, and what is known of their coefficients."""
+    if basis is None:
+        return "as given"
+    kind = "polynomial" if isinstance(basis, Polynomial) else "spline"
+    held = all(each.is_held for each in coefficients)
+    known = ", known" if held else ""
+    return f"{kind} of degree {basis.degree}, {counted(len(coefficients), 'coefficient')}{known}"
+
+
+def lost_motions(block: Block) -> list[str]:
+    """Return what a format without trajectories has no place for, in sentences."""
+    found = []
+    if block.timed:
+        found.append(f"trajectories: {counted(len(block.timed), 'photo')} with the poses that they are about")
+    records = sum(each.moment is not None for each in block.observations)
+    if records:
+        found.append(counted(records, "observation") + " of trajectories")
+    return found
+
+
+def check_held(block: Block, title: str) -> None:
+    """Refuse to write photos that a format without trajectories would take for others.
+
+    Raises
+    ------
+    InputError
+        Line scanners, whose images are samples and lines.
+    """
+    scanned = [each.photo for each in block.timed if each.lines is not None]
+    if scanned:
+        raise InputError(f"{title}: the photo {scanned[0]} is of a line scanner, and takes no pictures")

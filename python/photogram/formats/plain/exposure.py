@@ -1,0 +1,259 @@
+"""What cameras have where their photos move: rolling shutters, and lines of sensors in place of frames."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, cast, get_args
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.plain.image_axes import from_tables, in_unit, to_tables
+from photogram.formats.plain.shared import made
+from photogram.formats.plain.tables import Tables
+from photogram.formats.project import Size
+from photogram.io.delimited import ColumnTable
+from photogram.messages import quoted
+from photogram.network.block import Block
+from photogram.network.cameras import Camera
+from photogram.network.timed import Direction, LineSensor, Shutter, Timed
+from photogram.network.trajectories import Readout
+
+__all__ = ["LINE", "OF_LINES", "Exposure", "exposure_columns", "line_sensors", "of_cameras", "shutters"]
+
+LINE = "line"
+"""The model of a line of sensors behind the lens `brown`."""
+OF_LINES = ("x0", "y0", "s0")
+"""Columns of a line of sensors that some models have as parameters."""
+_DIRECTIONS = get_args(Direction)
+Exposure = Shutter | LineSensor | None
+
+
+def line_sensors(tables: Tables, table: ColumnTable) -> list[LineSensor | None]:
+    """Return the line of sensors of each row of a table of cameras; None of one that takes frames.
+
+    Raises
+    ------
+    InputError
+        A line without a pitch, or whose middle is not known.
+    """
+    unit = 1e-3 if tables.settings.image == "um" else 1.0
+    pitches = table.vectors(("pitch_x", "pitch_y")) * unit
+    places = table.vectors(("x0", "y0"), 0.0) * unit
+    middles = table.numbers("s0")
+    middles = np.where(np.isnan(middles), table.numbers("width") / 2, middles)
+    found: list[LineSensor | None] = []
+    for row, model in enumerate(table.texts("model")):
+        pitch = np.nan_to_num(pitches[row])
+        if np.isnan(pitches[row]).all():
+            if model.lower() == LINE:
+                raise table.error(row, "column pitch_x: is empty, and the camera is a line of sensors")
+            found.append(None)
+            continue
+        if not pitch.any():
+            raise table.error(row, "columns pitch_x, pitch_y: a line of sensors has a pitch that is not zero")
+        if math.isnan(middles[row]):
+            raise table.error(row, "column s0: is empty, and there is no width to take half of")
+        x0, y0 = places[row].tolist()
+        found.append(LineSensor((float(pitch[0]), float(pitch[1])), float(middles[row]), x0, y0))
+    return found
+
+
+def shutters(
+    tables: Tables, table: ColumnTable, cameras: Sequence[Camera], sizes: Sequence[Size | None]
+) -> list[Shutter | None]:
+    """Return the rolling shutter of each row of a table of cameras; None without.
+
+    Raises
+    ------
+    InputError
+        Words that say no direction, edges that are not known, a shutter of a line of sensors, columns of
+        shutters where there is no readout time.
+    """
+    edges = _edges(tables, table, cameras, sizes)
+    values, deviations = table.numbers("readout"), table.numbers("sd_readout", 0.0, infinite=True)
+    found: list[Shutter | None] = []
+    for row, (word, name) in enumerate(
+        zip(table.texts("readout_direction"), table.texts("shutter"), strict=True)
+    ):
+        if math.isnan(values[row]):
+            if word or name or deviations[row]:
+                raise table.error(row, "column readout: is empty, and there is more of a rolling shutter")
+            found.append(None)
+            continue
+        if np.isnan(edges[row]).any():
+            raise table.error(
+                row,
+                "nothing says where the picture ends that is read out: width and height, of pictures in"
+                " millimetres pixel_mm, too, or readout_begin and readout_end",
+            )
+        given = name or cameras[row].name, float(values[row]), float(deviations[row])
+        readout = tables.shared.one(table, row, "shutter", Readout, *given)
+        first, last = edges[row].tolist()
+        shutter = partial(Shutter, readout, (first, last), _direction(table, row, word))
+        found.append(made(table, row, shutter))
+    return found
+
+
+def _direction(table: ColumnTable, row: int, word: str) -> Direction:
+    found = word.lower() or _DIRECTIONS[0]
+    if found not in _DIRECTIONS:
+        raise table.error(
+            row, f"column readout_direction: {quoted(word)} is none of {', '.join(_DIRECTIONS)}"
+        )
+    return cast("Direction", found)
+
+
+def _edges(
+    tables: Tables, table: ColumnTable, cameras: Sequence[Camera], sizes: Sequence[Size | None]
+) -> Floats:
+    """Return (rows, 2) where reading begins and ends, in coordinates of the cameras; NaN if not known."""
+    settings = tables.settings
+    pixels = settings.image == "px"
+    given = table.vectors(("readout_begin", "readout_end"))
+    given = in_unit(settings, given, pixels=pixels and settings.image_y == "down")
+    extents = table.vectors(("width", "height"))
+    if not pixels:
+        extents *= table.numbers("pixel_mm")[:, np.newaxis]
+    found = np.full((table.count, 2), np.nan)
+    for row, (camera, word) in enumerate(zip(cameras, table.texts("readout_direction"), strict=True)):
+        direction = _direction(table, row, word)
+        if np.isnan(given[row]).all():
+            found[row] = picture_edges(camera, direction, extents[row])
+            continue
+        there = np.column_stack([given[row], given[row]])
+        placed = made(table, row, partial(from_tables, settings, camera, sizes[row], there))
+        found[row] = placed[:, _counted(direction)]
+    return found
+
+
+def _counted(direction: str) -> int:
+    """Return which image coordinate is read out one after the other."""
+    return 1 if direction in ("down", "up") else 0
+
+
+def picture_edges(camera: Camera, direction: str, extent: Floats) -> Floats:
+    """Return (2,) where a picture begins and ends in a direction, in image coordinates of a camera.
+
+    Parameters
+    ----------
+    camera
+        In pixels that count down: from the corner; all others from the middle of the picture.
+    direction
+        In which it is read.
+    extent
+        (2,) width and height in the unit of the camera; NaN where not known.
+    """
+    axis = _counted(direction)
+    length = float(extent[axis])
+    if camera.unit == "px" and camera.image_y == "down":
+        edges = [0.0, length]
+    else:
+        edges = [-length / 2, length / 2]
+        if axis == 1 and camera.image_y == "up":
+            edges.reverse()
+    return np.array(edges[::-1] if direction in ("up", "left") else edges)
+
+
+def of_cameras(block: Block, cameras: Sequence[Camera], which: Sequence[int]) -> list[Exposure]:
+    """Return what the photos of each camera of a block have: a shutter, a line of sensors, or neither.
+
+    Raises
+    ------
+    InputError
+        A camera whose photos have several.
+    """
+    of_photos = {each.photo: each for each in block.timed}
+    found: dict[int, Exposure] = {}
+    for photo, row in zip(block.photo_ids, which, strict=True):
+        own = _exposure(of_photos.get(photo))
+        if found.setdefault(row, own) != own:
+            raise InputError(
+                f"the photos of the camera {cameras[row].title} have several shutters or lines of sensors, or"
+                " some have none: in tables these are the camera's; give each a camera of its own"
+            )
+    return [found.get(row) for row in range(len(cameras))]
+
+
+def _exposure(timed: Timed | None) -> Exposure:
+    if timed is None:
+        return None
+    return timed.shutter if timed.line_sensor is None else timed.line_sensor
+
+
+def exposure_columns(
+    cameras: Sequence[Camera],
+    exposures: Sequence[Exposure],
+    sizes: Sequence[Size | None],
+    pixel_mm: Sequence[float | None],
+    image_y: str,
+) -> dict[str, Any]:
+    """Return the columns of a table of cameras that say what their photos have; none where they have nothing.
+
+    Raises
+    ------
+    InputError
+        A shutter whose edges are no image coordinates of tables.
+    """
+    lines = [each if isinstance(each, LineSensor) else None for each in exposures]
+    own = [each if isinstance(each, Shutter) else None for each in exposures]
+    found = _line_columns(lines) if any(lines) else {}
+    return found | _shutter_columns(cameras, own, sizes, pixel_mm, image_y) if any(own) else found
+
+
+def _line_columns(lines: Sequence[LineSensor | None]) -> dict[str, Any]:
+    """Return the columns of lines of sensors."""
+    found: dict[str, Any] = {
+        column: [None if each is None else float(getattr(each, column)) for each in lines]
+        for column in OF_LINES
+    }
+    for k, column in enumerate(("pitch_x", "pitch_y")):
+        found[column] = [None if each is None else float(each.pitch[k]) for each in lines]
+    return found
+
+
+def _shutter_columns(
+    cameras: Sequence[Camera],
+    own: Sequence[Shutter | None],
+    sizes: Sequence[Size | None],
+    pixel_mm: Sequence[float | None],
+    image_y: str,
+) -> dict[str, Any]:
+    """Return the columns of rolling shutters."""
+    found: dict[str, Any] = {}
+    readouts = [None if each is None else _readout(each) for each in own]
+    found["readout"] = [None if each is None else each.value for each in readouts]
+    found["sd_readout"] = [None if each is None else float(each.deviations[0]) for each in readouts]
+    found["readout_direction"] = ["" if each is None else each.direction for each in own]
+    edges = [
+        None if each is None else _edges_written(each, camera, size, pixel, image_y)
+        for each, camera, size, pixel in zip(own, cameras, sizes, pixel_mm, strict=True)
+    ]
+    if any(edges):
+        for k, column in enumerate(("readout_begin", "readout_end")):
+            found[column] = [None if each is None else each[k] for each in edges]
+    if any(each and each.name != camera.name for each, camera in zip(readouts, cameras, strict=True)):
+        found["shutter"] = ["" if each is None else each.name for each in readouts]
+    return found
+
+
+def _readout(shutter: Shutter) -> Readout:
+    assert isinstance(shutter.readout, Readout)
+    return shutter.readout
+
+
+def _edges_written(
+    shutter: Shutter, camera: Camera, size: Size | None, pixel_mm: float | None, image_y: str
+) -> tuple[float, float] | None:
+    """Return where reading begins and ends as tables have it; None where size and direction say it."""
+    if size is not None:
+        unit = 1.0 if camera.unit == "px" else pixel_mm or math.nan
+        usual = picture_edges(camera, shutter.direction, np.array(size) * unit)
+        if tuple(usual.tolist()) == tuple(shutter.edges):
+            return None
+    own = np.array(shutter.edges, dtype=float)
+    there = to_tables(image_y, camera, size, np.column_stack([own, own]))[:, _counted(shutter.direction)]
+    return float(there[0]), float(there[1])

@@ -1,0 +1,109 @@
+"""The table of images."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.formats.plain.cameras import Cameras
+from photogram.formats.plain.image_axes import from_tables, in_unit
+from photogram.formats.plain.photos import Photos
+from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.tables import Tables, indices_of
+from photogram.io.delimited import ColumnTable
+from photogram.messages import Message
+
+__all__ = ["Images", "image_coordinates", "read_images"]
+
+
+@dataclass(frozen=True)
+class Images:
+    """The table of images, as it is written."""
+
+    table: ColumnTable
+    photos: Indices
+    points: Indices
+    point_names: list[str]
+    xy: Floats
+    sd: Floats | None
+
+
+def read_images(tables: Tables, photos: Photos) -> Images:
+    """Read the table of images; errors as of :func:`read`."""
+    table = tables.read("images")
+    assert table is not None
+    xs, ys = ("column", "row") if "column" in table else ("x", "y")
+    table.require(xs, ys)
+    places = {name: row for row, name in enumerate(photos.names)}
+    rows = indices_of(table, "photo", places | dict.fromkeys(photos.unused, len(places)), "photo")
+    names = table.names("point")
+    xy = table.vectors((xs, ys))
+    table.check_given(xy, (xs, ys))
+    _check_twice(table, rows, names.rows, len(names.names))
+    keep = table.flags("use") & (rows < len(places)) if "use" in table or photos.unused else None
+    sd = _image_sd(tables, table)
+    if keep is None:
+        return Images(table, rows, names.rows, names.names, xy, sd)
+    left = int(np.count_nonzero(~keep))
+    if left:
+        tables.messages.append(Message(f"{left} images are not used", table.path))
+    seen, points = np.unique(names.rows[keep], return_inverse=True)
+    kept_sd = sd if sd is None or np.ndim(sd) == 0 else sd[keep]
+    return Images(
+        table, rows[keep], points.reshape(-1), [names.names[row] for row in seen], xy[keep], kept_sd
+    )
+
+
+def _check_twice(table: ColumnTable, photos: Indices, points: Indices, count: int) -> None:
+    pairs = photos * count + points
+    if (np.diff(pairs) > 0).all():
+        return
+    order = np.argsort(pairs, kind="stable")
+    again = np.flatnonzero(np.diff(pairs[order]) == 0)
+    if again.size:
+        first, second = sorted(order[again[0] : again[0] + 2].tolist())
+        raise table.error(
+            second, f"the point has an image on this photo already, in record {table.records[first]}"
+        )
+
+
+def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
+    own = [
+        name
+        for pair in (("sd_column", "sd_row"), ("sd_x", "sd_y"))
+        if pair[0] in table or pair[1] in table
+        for name in pair
+    ]
+    if "correlation" in table and table.numbers("correlation", 0.0).any():
+        raise table.head.error("column correlation: images with correlated coordinates cannot be adjusted")
+    if not own and "sd" not in table and "images" not in tables.settings.sd:
+        return None
+    found = tables.deviations(table, "images", own[:2] or ["sd_x", "sd_y"])
+    bad = np.argwhere(~((found > 0) & np.isfinite(found)))
+    if len(bad):
+        row = int(bad[0][0])
+        why = "is empty" if np.isnan(found[row]).any() else f"{found[row].min():g} is not positive and finite"
+        raise table.error(row, f"standard deviation {why}")
+    return found
+
+
+def image_coordinates(
+    settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices
+) -> tuple[Floats, Floats | None]:
+    """Return image coordinates and standard deviations in the unit and along the axes of the cameras.
+
+    Those of scanners are samples and lines, whatever the unit of images: their deviations are in this.
+    """
+    sd = images.sd if images.sd is None or settings.image != "um" else images.sd * 1e-3
+    pixels = settings.image == "px" and settings.image_y == "down"
+    found = in_unit(settings, images.xy, pixels=pixels)
+    of_images = photo_cameras[images.photos]
+    for row, camera in enumerate(cameras.cameras):
+        own = of_images == row
+        if cameras.lines[row] is not None:
+            found[own] = in_unit(settings, images.xy[own], pixels=True)
+        else:
+            found[own] = from_tables(settings, camera, cameras.sizes[row], found[own])
+    return found, sd

@@ -1,0 +1,152 @@
+"""The table of photos."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.formats.plain.cameras import Cameras
+from photogram.formats.plain.schema import ANGLES, AXES, deviation_columns
+from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.transform import Transform
+from photogram.io.delimited import ColumnTable
+from photogram.messages import Message, listed, quoted
+from photogram.network.observations import Attitude, Observation
+
+__all__ = ["Photos", "read_photos"]
+
+_SD = deviation_columns(AXES)
+
+
+@dataclass(frozen=True)
+class Photos:
+    """The table of photos, in the frame of the project; those that are not used are named apart.
+
+    `rows` are those of the table that are used.
+    """
+
+    table: ColumnTable
+    rows: Indices
+    names: list[str]
+    cameras: list[int]
+    taken: list[str]
+    centres: Floats
+    matrices: Floats
+    position_sd: Floats
+    attitude_sd: Floats
+    groups: list[str]
+    times: Floats
+    unused: frozenset[str]
+    observed: list[Observation]
+
+
+def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photos:
+    """Read the table of photos; errors as of :func:`read`."""
+    table = tables.read("photos")
+    if table is None:
+        raise InputError("has no table of photos (photos.csv)", file=tables.settings.path)
+    texts = table.names_once("photo")
+    use = table.flags("use")
+    centres = table.vectors(AXES)
+    flown = np.array([bool(each) for each in table.texts("trajectory")], dtype=bool)
+    sd = tables.deviations(table, "photos", _SD, math.inf)
+    sd[flown] = table.vectors(_SD, math.inf, infinite=True)[flown]
+    weighted = np.isfinite(sd) & np.isnan(centres)
+    if weighted.any():
+        row, axis = np.argwhere(weighted)[0].tolist()
+        raise table.error(row, f"column sd_{AXES[axis]}: there is a standard deviation, but no {AXES[axis]}")
+    if "photos" in tables.settings.crs and np.isfinite(sd).any():
+        raise table.head.error(
+            "photos with a crs of their own have no standard deviations: give a table gnss"
+        )
+    centres, _ = transform.positions("photos", centres, None, table)
+    matrices = tables.matrices(table)
+    attitude_sd, observed = _attitude_weights(tables, table, matrices)
+    turned = {each.photos[0] for each in observed}
+    for row in np.flatnonzero(flown).tolist():
+        if np.isfinite([*sd[row], *attitude_sd[row]]).any() or texts[row] in turned:
+            raise table.error(row, "the photo is on a trajectory, whose pose it has: it has no sd of its own")
+    kept = np.flatnonzero(use)
+    if len(kept) < table.count:
+        tables.messages.append(Message(f"{table.count - len(kept)} photos are not used", table.path))
+    which, groups = _camera_of(table, cameras), table.texts("group")
+    unused = frozenset(name for name, used in zip(texts, use.tolist(), strict=True) if not used)
+    return Photos(
+        table,
+        kept,
+        [texts[row] for row in kept],
+        [which[row] for row in kept],
+        [cameras.cameras[which[row]].name for row in kept],
+        centres[kept],
+        matrices[kept],
+        sd[kept],
+        attitude_sd[kept],
+        [groups[row] for row in kept],
+        table.numbers("time")[kept],
+        unused,
+        [each for each in observed if each.photos[0] not in unused],
+    )
+
+
+def _camera_of(table: ColumnTable, cameras: Cameras) -> list[int]:
+    places = {each.name: row for row, each in enumerate(cameras.cameras)}
+    if "camera" not in table:
+        if len(places) > 1:
+            raise table.head.error(f"the column camera is missing, and there are {len(places)} cameras")
+        return [0] * table.count
+    found = []
+    for row, name in enumerate(table.texts("camera")):
+        if not name and len(places) == 1:
+            found.append(0)
+        elif name not in places:
+            raise table.error(
+                row, f"column camera: there is no camera {quoted(name)}, but {listed(list(places))}"
+            )
+        else:
+            found.append(places[name])
+    return found
+
+
+def _attitude_weights(
+    tables: Tables, table: ColumnTable, matrices: Floats
+) -> tuple[Floats, list[Observation]]:
+    """Return standard deviations of omega, phi, kappa, and observations of attitudes given otherwise."""
+    settings = tables.settings
+    own = f"sd_{ANGLES[settings.attitude][0]}", *(f"sd_{name}" for name in ANGLES[settings.attitude][1:])
+    steps = ("sd_rotation_x", "sd_rotation_y", "sd_rotation_z")
+    free = np.full((table.count, 3), np.inf)
+    columns = steps if any(each in table for each in steps) else own
+    if not any(each in table for each in columns):
+        return free, []
+    sd = table.vectors(columns, math.inf, infinite=True, read=tables.angle)
+    if (sd < 0).any():
+        row = int(np.argwhere(sd < 0)[0][0])
+        raise table.error(row, "a standard deviation of an angle is negative")
+    unknown = np.isfinite(sd).any(axis=1) & np.isnan(matrices).any(axis=(1, 2))
+    if unknown.any():
+        raise table.error(int(np.flatnonzero(unknown)[0]), "angles have standard deviations, but no values")
+    plain = settings.attitude == "omega_phi_kappa" and settings.photo == "y_up"
+    if plain and columns is own:
+        return sd, []
+    observed: list[Observation] = []
+    fixed = free.copy()
+    names = table.texts("photo")
+    for row in np.flatnonzero(np.isfinite(sd).any(axis=1)).tolist():
+        if not sd[row].any():
+            fixed[row] = 0.0
+        elif columns is steps and np.isfinite(sd[row]).all():
+            try:
+                observed.append(Attitude(names[row], matrices[row], sd=sd[row]))
+            except InputError as error:
+                raise table.error(row, error.message) from None
+        else:
+            raise table.error(
+                row,
+                f"attitudes as {settings.attitude} are weighted by {', '.join(steps)}, rotations about the"
+                " axes of the photo, or in a table attitudes",
+            )
+    return fixed, observed

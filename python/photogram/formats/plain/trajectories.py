@@ -1,0 +1,486 @@
+"""The tables of trajectories: records, what corrections are made of, knots, coefficients."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, cast, get_args
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.formats.plain.schema import ANGLES, AXES, BASES, VELOCITY, deviation_columns
+from photogram.formats.plain.shared import made
+from photogram.formats.plain.tables import DEGREE, Tables, angles_of, indices_of, vectors_of
+from photogram.io.delimited import ColumnTable
+from photogram.messages import quoted
+from photogram.network.block import Block
+from photogram.network.trajectories import Basis, Interpolation, Polynomial, Spline, Table, Trajectory
+
+__all__ = ["read_trajectories", "shared_trajectories", "trajectory_rows", "trajectory_tables"]
+
+_ANGLES = ANGLES["omega_phi_kappa"]
+_SD = deviation_columns(AXES)
+_OTHERS = (
+    *("trajectory_positions", "trajectory_attitudes", "trajectory_knots", "trajectory_coefficients"),
+    "body_rotations",
+)
+Groups = Mapping[tuple[str, ...], Indices]
+"""Rows of a table by what they are of."""
+
+
+def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
+    """Read trajectories, by their names.
+
+    Raises
+    ------
+    InputError
+        Names that are not there, times that do not increase, trajectories without records, bases that are
+        none, coefficients that a basis does not have.
+    """
+    table = tables.read("trajectories")
+    if table is None:
+        if there := [each for each in _OTHERS if each in tables.settings.tables]:
+            path = tables.settings.tables[there[0]]
+            raise InputError("there is no table trajectories, which says what its rows are of", file=path)
+        return {}
+    names = table.names_once("trajectory")
+    places = {name: row for row, name in enumerate(names)}
+    records = _Records.read(tables, table, places)
+    bases = [_Bases.read(tables, table, of, places) for of in BASES]
+    bodies = _turned(tables, "body_rotations", places, tables.flip)
+    found: dict[str, Trajectory] = {}
+    for row, name in enumerate(names):
+        own = records.of(row, name)
+        position, rotation = (each.of(row, name, own) for each in bases)
+        body = bodies.get(name)
+        if body is not None:
+            # The matrix of a body leads from inertial axes to its own, that of an attitude the other way.
+            body = body[0], np.swapaxes(body[1], 1, 2)
+        found[name] = made(table, row, partial(Trajectory, name, own, position, rotation, body))
+    return found
+
+
+def trajectory_rows(table: ColumnTable, places: Mapping[str, int], *, bases: bool = False) -> Groups:
+    """Return the rows of each trajectory or, with `bases`, of each of its bases.
+
+    Raises
+    ------
+    InputError
+        Trajectories and bases that are not there.
+    """
+    indices_of(table, "trajectory", places, "trajectory")
+    words: Sequence[Sequence[str]] = [table.texts("trajectory")]
+    if bases:
+        of = [each.lower() for each in table.texts("of")]
+        for row, word in enumerate(of):
+            if word not in BASES:
+                raise table.error(row, f"column of: {quoted(word)} is none of {', '.join(BASES)}")
+        words = [*words, of]
+    found: dict[tuple[str, ...], list[int]] = {}
+    for row, key in enumerate(zip(*words, strict=True)):
+        found.setdefault(key, []).append(row)
+    return {key: np.array(rows, dtype=np.int64) for key, rows in found.items()}
+
+
+def _times(table: ColumnTable, groups: Groups, column: str = "time", *, multiple: bool = False) -> Floats:
+    """Return (rows,) times that increase in each group or, where there may be `multiple`, do not decrease."""
+    times = table.numbers(column)
+    table.check_given(times[:, np.newaxis], (column,))
+    for rows in groups.values():
+        steps = np.diff(times[rows])
+        back = steps < 0 if multiple else steps <= 0
+        if back.any():
+            row = int(rows[1 + int(np.argmax(back))])
+            raise table.error(row, f"column {column}: {'decreases' if multiple else 'does not increase'}")
+    return times
+
+
+def _turned(
+    tables: Tables, name: str, places: Mapping[str, int], flip: Floats | None = None
+) -> dict[str, tuple[Floats, Floats]]:
+    """Return (k,) times and (k, 3, 3) attitudes of each trajectory that a table has; `flip`: of no photo."""
+    table = tables.read(name)
+    if table is None:
+        return {}
+    groups = trajectory_rows(table, places)
+    times, matrices = _times(table, groups), tables.matrices(table)
+    unknown = np.isnan(matrices).any(axis=(1, 2))
+    if unknown.any():
+        raise table.error(int(np.argmax(unknown)), "there are no angles")
+    if flip is not None:
+        matrices = matrices @ flip
+    return {of: (times[rows], matrices[rows]) for (of,), rows in groups.items()}
+
+
+@dataclass(frozen=True)
+class _Records:
+    """What is known of each trajectory beforehand.
+
+    Attributes
+    ----------
+    table
+        Of trajectories.
+    positions, attitudes
+        (k,) times, and (k, 6) positions with velocities; (m,) times and (m, 3, 3) attitudes.
+    joined, turned
+        How positions and attitudes are interpolated, by the rows of the table.
+    """
+
+    table: ColumnTable
+    positions: Mapping[str, tuple[Floats, Floats]]
+    attitudes: Mapping[str, tuple[Floats, Floats]]
+    joined: Sequence[Interpolation]
+    turned: Sequence[Interpolation]
+
+    @classmethod
+    def read(cls, tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> _Records:
+        """Read the tables; errors as of :func:`read_trajectories`."""
+        found = {}
+        if (own := tables.read("trajectory_positions")) is not None:
+            groups = trajectory_rows(own, places)
+            times, values = _times(own, groups), own.vectors(AXES)
+            own.check_given(values, AXES)
+            values = np.column_stack([values, vectors_of(own, VELOCITY)])
+            found = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
+        joined, turned = (_words(table, f"{of}interpolation") for of in ("", "attitude_"))
+        return cls(table, found, _turned(tables, "trajectory_attitudes", places), joined, turned)
+
+    def of(self, row: int, name: str) -> Table:
+        """Return what is known of the trajectory of a row."""
+        for own, what in ((self.positions, "positions"), (self.attitudes, "attitudes")):
+            if name not in own:
+                raise self.table.error(row, f"{quoted(name)} has no rows in the table trajectory_{what}")
+        (times, values), (attitude_times, matrices) = self.positions[name], self.attitudes[name]
+        hermite = self.joined[row] == "hermite"
+        if hermite and np.isnan(values).any():
+            raise self.table.error(
+                row, "column interpolation: hermite needs vx, vy, vz of all its rows in trajectory_positions"
+            )
+        make = partial(
+            Table,
+            times,
+            values[:, :3],
+            attitude_times,
+            matrices,
+            values[:, 3:] if hermite else None,
+            self.joined[row],
+            self.turned[row],
+        )
+        return made(self.table, row, make)
+
+
+def _words(table: ColumnTable, column: str) -> list[Interpolation]:
+    words = get_args(Interpolation)
+    found = [each.lower() for each in table.texts(column, words[0])]
+    for row, word in enumerate(found):
+        if word not in words:
+            raise table.error(row, f"column {column}: {quoted(word)} is none of {', '.join(words)}")
+    return cast("list[Interpolation]", found)
+
+
+_COLUMNS = {
+    "none": (),
+    "polynomial": ("degree", "reference", "scale"),
+    "spline": ("degree", "every", "smooth", "correlation"),
+}
+"""What is said of each basis."""
+_ALL = tuple(dict.fromkeys(name for names in _COLUMNS.values() for name in names))
+_WITH_SD = ("smooth", "correlation")
+
+
+@dataclass(frozen=True)
+class _Bases:
+    """What corrections of positions, or of rotations, are made of: a basis for each trajectory.
+
+    Attributes
+    ----------
+    table, kind
+        Of trajectories, and which corrections these are.
+    unit, signs
+        What a number of the tables is in that of the coefficients, and (3,) which way their axes point.
+    words, numbers
+        (rows,) which basis it is, and what the columns say of it; `sd` of coefficients.
+    knots
+        Of each trajectory that has some, in seconds.
+    coefficients, rows
+        The table of coefficients, and its rows of each basis.
+    """
+
+    table: ColumnTable
+    kind: str
+    unit: float
+    signs: Floats
+    words: Sequence[str]
+    numbers: Mapping[str, Floats]
+    knots: Mapping[str, Floats]
+    coefficients: ColumnTable | None
+    rows: Groups
+
+    @classmethod
+    def read(cls, tables: Tables, table: ColumnTable, kind: str, places: Mapping[str, int]) -> _Bases:
+        """Read the tables; errors as of :func:`read_trajectories`."""
+        unit = tables.radians if kind == "rotation" else 1.0
+        given = tables.settings.sd.get("trajectories", (math.inf,) * 2)
+        numbers = {what: table.numbers(f"{kind}_{what}") for what in _ALL}
+        numbers |= {f"sd_{what}": table.numbers(f"sd_{kind}_{what}") * unit for what in _WITH_SD}
+        numbers["sd"] = table.numbers(f"sd_{kind}", given[BASES.index(kind)], infinite=True) * unit
+        if (negative := numbers["sd"] < 0).any():
+            raise table.error(int(np.argmax(negative)), f"column sd_{kind}: is negative")
+        knots: dict[str, Floats] = {}
+        if (own := tables.read("trajectory_knots")) is not None:
+            groups = trajectory_rows(own, places, bases=True)
+            values = _times(own, groups, "knot", multiple=True)
+            knots = {name: values[rows] for (name, of), rows in groups.items() if of == kind}
+        coefficients = tables.read("trajectory_coefficients")
+        rows = {} if coefficients is None else trajectory_rows(coefficients, places, bases=True)
+        signs = np.diag(tables.flip) if kind == "rotation" else np.ones(3)
+        words = [each.lower() for each in table.texts(kind, "none")]
+        return cls(table, kind, unit, signs, words, numbers, knots, coefficients, rows)
+
+    def of(self, row: int, name: str, known: Table) -> Basis | None:
+        """Return the basis of the trajectory of a row; None for no corrections."""
+        word = self.words[row]
+        rows = self.rows.get((name, self.kind))
+        self._check(row, name, word, rows)
+        if word == "none":
+            return None
+        sd = float(self.numbers["sd"][row])
+        basis = made(self.table, row, lambda: self._basis(row, name, word).over(*known.span))
+        if rows is None:
+            return replace(basis, sd=sd)
+        values, deviations = self._coefficients(rows, basis.count, sd)
+        return replace(basis, value=values, sd=deviations)
+
+    def _check(self, row: int, name: str, word: str, rows: Indices | None) -> None:
+        """Refuse what is no basis, and what is said of another."""
+        kind = self.kind
+        if word not in _COLUMNS:
+            raise self.table.error(row, f"column {kind}: {quoted(word)} is none of {', '.join(_COLUMNS)}")
+        there = [f"{kind}_{each}" for each in _ALL if self._number(row, each) is not None]
+        others = [each for each in there if each.removeprefix(f"{kind}_") not in _COLUMNS[word]]
+        others += ["trajectory_knots"] if name in self.knots and word != "spline" else []
+        others += ["trajectory_coefficients"] if rows is not None and word == "none" else []
+        if others:
+            raise self.table.error(row, f"{others[0]} says something of it, but its {kind} is {word}")
+
+    def _basis(self, row: int, name: str, word: str) -> Basis:
+        """Return the basis that a row says."""
+        degree = self._whole(row, "degree")
+        if word == "polynomial":
+            return Polynomial(degree or 0, self._number(row, "reference"), self._number(row, "scale"))
+        found = Spline(self._number(row, "every"), self.knots.get(name))
+        smooth = self._pair(row, "smooth")
+        return replace(
+            found,
+            degree=found.degree if degree is None else degree,
+            smooth=None if smooth is None else (self._whole(row, "smooth") or 0, smooth[1]),
+            correlation=self._pair(row, "correlation"),
+        )
+
+    def _number(self, row: int, what: str) -> float | None:
+        value = float(self.numbers[what][row])
+        return None if math.isnan(value) else value
+
+    def _whole(self, row: int, what: str) -> int | None:
+        value = self._number(row, what)
+        if value is not None and value != int(value):
+            raise self.table.error(row, f"column {self.kind}_{what}: {value:g} is no whole number")
+        return None if value is None else int(value)
+
+    def _pair(self, row: int, what: str) -> tuple[float, float] | None:
+        """Return a number and its standard deviation; None without both."""
+        value, sd = self._number(row, what), self._number(row, f"sd_{what}")
+        if value is None or sd is None:
+            if value is not None or sd is not None:
+                column = f"{self.kind}_{what}"
+                raise self.table.error(row, f"columns {column} and sd_{column} are given both, or neither")
+            return None
+        return value, sd
+
+    def _coefficients(self, rows: Indices, count: int, sd: float) -> tuple[Floats, Floats]:
+        """Return (K, 3) values and standard deviations of coefficients, those of no row by their default."""
+        table = self.coefficients
+        assert table is not None
+        values, deviations = np.zeros((count, 3)), np.full((count, 3), sd)
+        numbers = table.numbers("k")[rows]
+        given, own = table.vectors(AXES, 0.0)[rows], table.vectors(_SD, infinite=True)[rows]
+        seen: set[int] = set()
+        for row, number, value, each in zip(rows.tolist(), numbers.tolist(), given, own, strict=True):
+            if number not in range(count):
+                raise table.error(row, f"column k: {number:g} is no number from 0 to {count - 1}")
+            if number in seen:
+                raise table.error(row, f"the coefficient {number:g} is there twice")
+            if (each < 0).any():
+                raise table.error(row, f"column {_SD[int(np.argmax(each < 0))]}: is negative")
+            seen.add(number)
+            values[int(number)] = value * self.signs * self.unit
+            deviations[int(number)] = np.where(np.isnan(each), sd, each * self.unit)
+        return values, deviations
+
+
+def shared_trajectories(block: Block) -> list[Trajectory]:
+    """Return the trajectories of a block that are not those of single photos, each once.
+
+    Raises
+    ------
+    InputError
+        Two of one name.
+    """
+    own = [each.trajectory for each in block.timed if each.trajectory is not None]
+    own += [each.moment.trajectory for each in block.observations if each.moment is not None]
+    found = list({id(each): each for each in own}.values())
+    names = [each.name for each in found]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError(f"two trajectories are called {twice}: tables know them by their names")
+    return found
+
+
+def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
+    """Return the tables of the trajectories of a block; none where there are none.
+
+    Raises
+    ------
+    InputError
+        Two trajectories of one name.
+    """
+    own = shared_trajectories(block)
+    if not own:
+        return {}
+    tables = [each.table for each in own]
+    columns: dict[str, Any] = {
+        "trajectory": [each.name for each in own],
+        "interpolation": [each.interpolation for each in tables],
+        "attitude_interpolation": [each.attitude_interpolation for each in tables],
+    }
+    coefficients: list[dict[str, Any]] = []
+    for k, kind in enumerate(BASES):
+        bases = [each.position if k == 0 else each.rotation for each in own]
+        columns |= _basis_columns(kind, bases)
+        sd = [_common_sd(each, k) for each in own]
+        columns[f"sd_{kind}"] = np.array([math.nan if each is None else each for each in sd]) * _unit(kind)
+        coefficients += [
+            _coefficient_rows(each, k)
+            for each, common, basis in zip(own, sd, bases, strict=True)
+            if common is None and basis is not None
+        ]
+    found = {"trajectories": {name: each for name, each in columns.items() if not _is_empty(each)}}
+    found["trajectory_positions"] = _position_records(own)
+    attitudes = [(each.name, each.table.attitude_times, each.table.attitudes) for each in own]
+    found["trajectory_attitudes"] = _turned_records(attitudes, block)
+    if bodies := [(each.name, *each.body) for each in own if each.body is not None]:
+        turned = [(name, times, np.swapaxes(matrices, 1, 2)) for name, times, matrices in bodies]
+        found["body_rotations"] = _turned_records(turned, block)
+    if knots := _knots(own):
+        found["trajectory_knots"] = knots
+    if coefficients:
+        found["trajectory_coefficients"] = _joined(coefficients)
+    return found
+
+
+def _unit(kind: str) -> float:
+    """Return what a number of coefficients is in the unit of tables."""
+    return DEGREE if kind == "rotation" else 1.0
+
+
+def _is_empty(column: Any) -> bool:
+    if isinstance(column, np.ndarray):
+        return bool(np.isnan(column).all())
+    return all(each is None or each == "" for each in column)
+
+
+def _basis_columns(kind: str, bases: Sequence[Basis | None]) -> dict[str, Any]:
+    """Return what bases are; knots stand in a table of their own."""
+    words = {Polynomial: "polynomial", Spline: "spline"}
+    polynomials = [each if isinstance(each, Polynomial) else None for each in bases]
+    splines = [each if isinstance(each, Spline) else None for each in bases]
+    found: dict[str, Any] = {
+        kind: ["none" if each is None else words[type(each)] for each in bases],
+        f"{kind}_degree": [None if each is None else each.degree for each in bases],
+        f"{kind}_reference": [None if each is None else each.reference for each in polynomials],
+        f"{kind}_scale": [None if each is None else each.scale for each in polynomials],
+    }
+    for what in ("smooth", "correlation"):
+        pairs = [None if each is None else getattr(each, what) for each in splines]
+        found[f"{kind}_{what}"] = [None if each is None else each[0] for each in pairs]
+        found[f"sd_{kind}_{what}"] = [
+            None if each is None else float(each[1]) * _unit(kind) for each in pairs
+        ]
+    return found
+
+
+def _common_sd(own: Trajectory, which: int) -> float | None:
+    """Return the standard deviation of all coefficients whose given values are 0; None of others."""
+    coefficients = own.coefficients[which]
+    sd = {value for each in coefficients for value in each.deviations.tolist()}
+    alike = len(sd) == 1 and not any(each.position.any() for each in coefficients)
+    return sd.pop() if alike else None
+
+
+def _coefficient_rows(own: Trajectory, which: int) -> dict[str, Any]:
+    coefficients, unit = own.coefficients[which], _unit(BASES[which])
+    values = np.array([each.position for each in coefficients]) * unit
+    sd = np.array([each.deviations for each in coefficients]) * unit
+    return {
+        "trajectory": [own.name] * len(coefficients),
+        "of": [BASES[which]] * len(coefficients),
+        "k": np.arange(len(coefficients)),
+        **dict(zip(AXES, values.T, strict=True)),
+        **dict(zip(_SD, sd.T, strict=True)),
+    }
+
+
+def _joined(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return tables of the same columns as one."""
+    arrays = {name: [each[name] for each in parts] for name in parts[0]}
+    return {
+        name: np.concatenate(own)
+        if isinstance(own[0], np.ndarray)
+        else [each for part in own for each in part]
+        for name, own in arrays.items()
+    }
+
+
+def _position_records(own: Sequence[Trajectory]) -> dict[str, Any]:
+    parts = []
+    for each in own:
+        table = each.table
+        velocities = np.full((len(table.times), 3), np.nan) if table.velocities is None else table.velocities
+        parts.append(
+            {
+                "trajectory": [each.name] * len(table.times),
+                "time": table.times,
+                **dict(zip(AXES, table.positions.T, strict=True)),
+                **dict(zip(VELOCITY, velocities.T, strict=True)),
+            }
+        )
+    found = _joined(parts)
+    return {name: column for name, column in found.items() if name not in VELOCITY or not _is_empty(column)}
+
+
+def _turned_records(records: Sequence[tuple[str, Any, Any]], block: Block) -> dict[str, Any]:
+    return _joined(
+        [
+            {
+                "trajectory": [name] * len(times),
+                "time": np.asarray(times),
+                **dict(zip(_ANGLES, angles_of(np.asarray(matrices), block).T, strict=True)),
+            }
+            for name, times, matrices in records
+        ]
+    )
+
+
+def _knots(own: Sequence[Trajectory]) -> dict[str, Any]:
+    parts = [
+        {"trajectory": [each.name] * len(knots), "of": [kind] * len(knots), "knot": knots}
+        for each in own
+        for kind, basis in zip(BASES, (each.position, each.rotation), strict=True)
+        if isinstance(basis, Spline)
+        for knots in [np.asarray(basis.knots, dtype=float)]
+    ]
+    return _joined(parts) if parts else {}
