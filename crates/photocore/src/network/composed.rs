@@ -1,5 +1,7 @@
 //! Poses of a model that are made of several blocks: which these are, the poses, and their cofactors.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, Matrix6};
 
 use super::commons::CommonState;
@@ -37,7 +39,7 @@ impl Bundle {
     fn grounds<'a>(
         &'a self,
         photo: &'a dyn Fn(usize) -> Orientation,
-        common: &'a dyn Fn(usize) -> (CommonState, Option<usize>),
+        common: &'a dyn Fn(usize) -> (Cow<'a, CommonState>, Option<usize>),
     ) -> Grounds<'a> {
         Grounds { space: self.space, mounts: &self.mounts, photo, common }
     }
@@ -53,7 +55,7 @@ impl Bundle {
             let own = block.map_or(&[] as &[f64], |block| {
                 &unknowns[self.blocks.first[block]..self.blocks.first[block + 1]]
             });
-            (self.commons[common].at(own), block)
+            (Cow::Owned(self.commons[common].at(own)), block)
         };
         self.grounds(&own, &common).composed(photo, AT_PHOTO)
     }
@@ -66,7 +68,7 @@ impl Bundle {
         let own: Vec<Orientation> = photos.iter().map(|photo| photo.orientation).collect();
         let composed = {
             let photo = |photo: usize| own[photo];
-            let common = |common: usize| (commons[common].clone(), self.blocks.of_common[common]);
+            let common = |common: usize| (Cow::Borrowed(&commons[common]), self.blocks.of_common[common]);
             let grounds = self.grounds(&photo, &common);
             (0..own.len()).map(|photo| grounds.composed(photo, AT_PHOTO)).collect::<Vec<_>>()
         };
@@ -97,14 +99,14 @@ impl Bundle {
             return None;
         }
         let photo = |photo: usize| mounted.own[photo];
-        let common = |common: usize| (commons[common].clone(), self.blocks.of_common[common]);
+        let common = |common: usize| (Cow::Borrowed(&commons[common]), self.blocks.of_common[common]);
         self.grounds(&photo, &common).composed(own, self.time_of(image))
     }
 
     /// How a photo moves; None where it is on no trajectory.
     pub(super) fn moving(&self, mounted: &Mounted, commons: &[CommonState], photo: usize) -> Option<Moving> {
         let own = |photo: usize| mounted.own[photo];
-        let common = |common: usize| (commons[common].clone(), self.blocks.of_common[common]);
+        let common = |common: usize| (Cow::Borrowed(&commons[common]), self.blocks.of_common[common]);
         self.grounds(&own, &common).moving(photo, AT_PHOTO)
     }
 

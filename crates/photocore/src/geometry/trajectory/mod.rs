@@ -104,8 +104,11 @@ impl Basis {
             let found = self.at(time);
             found.first..found.first + found.values.len()
         };
-        let reach = if exactly { 0.0 } else { self.reach().unwrap_or(0.0) };
-        of(time - reach).start..of(time + reach).end
+        match self.reach() {
+            Some(reach) if !exactly => of(time - reach).start..of(time + reach).end,
+            Some(_) => of(time),
+            None => 0..self.count(),
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 //! Each kind is a file with a type that implements [`MountModel`], and a line of `kinds!` below. A pose is handed on from mount to mount
 //! with the list of the blocks that it is made of, and how it steps with the unknowns of each.
 
+use std::borrow::Cow;
 use std::ops::Deref;
 
 use nalgebra::{Matrix3xX, Matrix6};
@@ -274,7 +275,7 @@ pub struct Grounds<'a> {
     /// Photos as their own six unknowns have them.
     pub(super) photo: &'a dyn Fn(usize) -> Orientation,
     /// Common unknowns, and the block of each unless it is known.
-    pub(super) common: &'a dyn Fn(usize) -> (CommonState, Option<usize>),
+    pub(super) common: &'a dyn Fn(usize) -> (Cow<'a, CommonState>, Option<usize>),
 }
 
 impl Grounds<'_> {
@@ -284,7 +285,7 @@ impl Grounds<'_> {
     }
 
     /// A common unknown, and its block unless it is known.
-    pub fn common(&self, common: usize) -> (CommonState, Option<usize>) {
+    pub fn common(&self, common: usize) -> (Cow<'_, CommonState>, Option<usize>) {
         (self.common)(common)
     }
 
@@ -295,8 +296,12 @@ impl Grounds<'_> {
         }
         let Chain { pose, steps } = self.chain(photo, at);
         let orientation = Orientation::of_pose(self.space, &pose);
-        let unknowns = orientation.unknowns_by_step().unwrap_or_else(|| Matrix6::repeat(f64::NAN));
-        let mut parts: Vec<_> = steps.into_iter().map(|(block, steps)| (block, unknowns * steps)).collect();
+        let mut parts = steps;
+        // In rectangular space they step as the pose does.
+        if orientation.stepping_pose().is_none() {
+            let unknowns = orientation.unknowns_by_step().unwrap_or_else(|| Matrix6::repeat(f64::NAN));
+            parts.iter_mut().for_each(|(_, steps)| *steps = unknowns * &*steps);
+        }
         let main = self.mounts.main_block(photo, &|common| (self.common)(common).1);
         if parts.first().map(|part| part.0) != Some(main) {
             parts.insert(0, (main, Steps::zeros(POSE)));

@@ -152,10 +152,10 @@ impl MountModel for OnTrajectory {
         };
         let [p, r] = self.active(at, known);
         for k in p {
-            add(position[k], &|| columns(&flight.by_position(k), &Matrix3::zeros()));
+            add(position[k], &|| columns(0, &flight.by_position(k)));
         }
         for k in r {
-            add(rotation[k], &|| columns(&Matrix3::zeros(), &flight.by_rotation(k)));
+            add(rotation[k], &|| columns(3, &flight.by_rotation(k)));
         }
         let (velocity, turning) = flight.by_time();
         for (common, times) in self.scaled(at) {
@@ -164,8 +164,11 @@ impl MountModel for OnTrajectory {
     }
 }
 
-fn columns(shifts: &Matrix3, turns: &Matrix3) -> Steps {
-    steps((0..3).map(|k| -> (Vector3, Vector3) { (shifts.column(k).into(), turns.column(k).into()) }))
+/// Steps by three unknowns: dC where `first` is 0, rho where it is 3.
+fn columns(first: usize, partials: &Matrix3) -> Steps {
+    let mut steps = Steps::zeros(3);
+    steps.fixed_rows_mut::<3>(first).copy_from(partials);
+    steps
 }
 
 #[cfg(test)]

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::borrow::Cow;
+
 use nalgebra::Vector6;
 
 use super::{Composed, Grounds, Mount, Mounts, Trajectory};
@@ -53,7 +55,7 @@ fn agrees_at(
             |photo: usize| Orientation::new(poses, space, &std::array::from_fn(|k| values[6 * photo + k]));
         let common = |common: usize| {
             let block = 2 + common;
-            (commons[common].at(&values[first(block)..][..widths[block]]), Some(block))
+            (Cow::Owned(commons[common].at(&values[first(block)..][..widths[block]])), Some(block))
         };
         Grounds { space, mounts: &mounts, photo: &photo, common: &common }.composed(0, at).unwrap()
     };

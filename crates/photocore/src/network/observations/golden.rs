@@ -174,7 +174,7 @@ fn assert_rig(case: &Value) {
     let in_frame = list(&blocks[1]["position"]).try_into().unwrap();
     let sensor = state(CommonKind::Sensor, in_frame, matrix(&blocks[1]["matrix_photo_to_object"]));
     let mounts = mounted(OnFrame { photo: 1, frame: 0, sensor: 0 }.into(), 2);
-    let common = |_| (sensor.clone(), Some(2));
+    let common = |_| (std::borrow::Cow::Borrowed(&sensor), Some(2));
     let grounds = Grounds { space: SPACE, mounts: &mounts, photo: &|_| frame, common: &common };
     let Composed { orientation: photo, parts } = grounds.composed(1, AT_PHOTO).unwrap();
     let point = Point::new(SPACE, list(&blocks[2]["value"]).try_into().unwrap());

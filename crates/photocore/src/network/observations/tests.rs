@@ -118,7 +118,7 @@ impl Scene {
         let [first, second] = [0, 1].map(|k| Orientation::new(self.poses, self.space, &pose(k)));
         let mounts = mounted(OnFrame { photo: 3, frame: 2, sensor: SENSORS[0] }.into(), BLOCKS);
         let states = self.states(unknowns);
-        let common = |common: usize| (states[common].clone(), Some(BLOCKS + common));
+        let common = |common: usize| (std::borrow::Cow::Borrowed(&states[common]), Some(BLOCKS + common));
         let grounds = Grounds { space: self.space, mounts: &mounts, photo: &|_| first, common: &common };
         let mounted = grounds.composed(3, AT_PHOTO).filter(|_| self.rig);
         ([first, mounted.as_ref().map_or(second, |own| own.orientation)], mounted)
