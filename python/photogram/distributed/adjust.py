@@ -23,6 +23,7 @@ from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, core_options, opened
 from photogram.network.block import Block, checked
 from photogram.network.core import CoreOptions
+from photogram.network.motion import refuse_trajectories
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
 
@@ -75,8 +76,8 @@ def adjust_in_parts(
     OutOfMemoryError
         A part, or what parts have in common, takes more than the memory; says what would do.
     InputError
-        As of :func:`photogram.adjust`; more parts than photos, a cluster that does not answer or whose
-        workers cannot work together, the folder of another run.
+        As of :func:`photogram.adjust`; more parts than photos, photos or observations on trajectories, a
+        cluster that does not answer or whose workers cannot work together, the folder of another run.
     ModuleNotFoundError
         A cluster is asked for, and dask.distributed is not installed (extra `distributed`).
     """
@@ -133,6 +134,7 @@ def plan_in_parts(
 def _ready(block: Block) -> Block:
     """Return a block whose common unknowns have values to start from; refuse what cannot be adjusted."""
     check_cameras(checked(block))
+    refuse_trajectories(block, "blocks in parts")
     return started(block)
 
 

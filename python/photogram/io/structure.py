@@ -8,6 +8,7 @@ ones), arrays, tuples and tables of names are marked: `{"array": ...}`, `{"tuple
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
@@ -20,17 +21,32 @@ from photogram.arguments.annotations import check_members
 from photogram.errors import InputError
 from photogram.messages import quoted
 
-__all__ = ["Decoder", "Encoder"]
+__all__ = ["Decoder", "Encoder", "Stand"]
 
 SMALL = 36
 """Numbers up to which an array is written as numbers that people can read."""
 _NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
-class Encoder:
-    """Makes plain values; one for a whole document, which knows what it has written."""
+class Stand(ABC):
+    """An object of a data class that stands in a document for one that its own fields do not make."""
 
-    def __init__(self) -> None:
+    @abstractmethod
+    def original(self) -> object:
+        """Return what it stands for."""
+
+
+class Encoder:
+    """Makes plain values; one for a whole document, which knows what it has written.
+
+    Parameters
+    ----------
+    stands
+        What is written for objects of some classes, by these.
+    """
+
+    def __init__(self, stands: Mapping[type, Callable[[Any], Stand]] | None = None) -> None:
+        self._stands = stands or {}
         self._written: dict[int, int] = {}
         self._kept: list[object] = []
 
@@ -75,7 +91,8 @@ class Encoder:
     def _object(self, given: Any) -> dict[str, Any]:
         if id(given) in self._written:
             return {"same": self._written[id(given)]}
-        own = {"is": type(given).__name__, **self.fields(given)}
+        shown = self._stands[type(given)](given) if type(given) in self._stands else given
+        own = {"is": type(shown).__name__, **self.fields(shown)}
         self._written[id(given)] = len(self._kept)
         self._kept.append(given)  # as long as it lives nothing else has its id
         return own
@@ -163,6 +180,7 @@ class Decoder:
         try:
             check_members(self._classes[name], own)
             made = self._classes[name](**own)
+            made = made.original() if isinstance(made, Stand) else made
         except InputError as error:
             raise self._error(error.message) from None
         self._made.append(made)

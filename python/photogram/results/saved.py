@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -21,7 +21,7 @@ from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.io.parquet import Column, Repeated, Sheet, packed, parquet_content, read_sheet, unpacked
 from photogram.io.seals import SEAL, Seals, check_seal, check_sealed, seal
-from photogram.io.structure import Decoder, Encoder
+from photogram.io.structure import Decoder, Encoder, Stand
 from photogram.io.writing import Content
 from photogram.network.frame import Frame
 from photogram.results.network import AdjustedNetwork
@@ -272,6 +272,7 @@ def written(
     tables: Mapping[str, Sequence[Column]],
     frame: Frame,
     summary: Mapping[str, Any],
+    stands: Mapping[type, Callable[[Any], Stand]] | None = None,
 ) -> dict[str, Content]:
     """Return the files of a result.
 
@@ -293,6 +294,8 @@ def written(
         Where on the earth its coordinates are.
     summary
         What a reader wants first.
+    stands
+        What is written for objects of some classes.
     """
     unknowns, *state = result.state.__getnewargs__()
     about = _about(result, frame)
@@ -303,7 +306,7 @@ def written(
     core = Column("unknown", np.array(unknowns), "", "adjusted unknowns in the order of the core")
     sheets |= {**tables, _STATE: [core]}
     names = {part.field for own in parts.values() for part in own if part.form != "derived"}
-    encoder = Encoder()
+    encoder = Encoder(stands)
     inner = [name.removeprefix(f"{given}.") for name in names if name.startswith(f"{given}.")]
     kept = {
         given: encoder.fields(getattr(result, given), [*inner, *_ROWS]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from photogram.network.cameras import Camera
 from photogram.network.core import CoreOptions
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
+from photogram.network.motion import scanners
 from photogram.network.observations import Observation
 from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
@@ -38,6 +40,7 @@ from photogram.results.saved import (
     sheet,
     written,
 )
+from photogram.results.saved_trajectories import CLASSES, STANDS
 from photogram.results.tables import TABLES
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.ways import files_of
@@ -109,7 +112,8 @@ def block_files(result: Result) -> dict[str, Content]:
         "datum": str(result.datum),
         "degrees_of_freedom": result.degrees_of_freedom,
     }
-    return written(result, KIND, "block", _parts(block, result), leading, tables, block.frame, summary)
+    parts = _parts(block, result)
+    return written(result, KIND, "block", parts, leading, tables, block.frame, summary, STANDS)
 
 
 def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
@@ -120,7 +124,7 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     InputError
         Files that are missing, damaged or contradict each other.
     """
-    saved = read_saved(folder, [*_CLASSES, *_below(Observation), *_below(Unknown)], document)
+    saved = read_saved(folder, [*_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown)], document)
     given = saved.members("block", Block)
     images, names = saved.sheets["images"], {}
     for kind in ("photo", "point"):
@@ -138,20 +142,35 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     )
     own_arrays, block_arrays = saved.arrays(parts, "block")
     block = Block(**given, **block_arrays)
-    return Result(**saved.members("result", Result), **own_arrays, block=block, state=saved.state())
+    members = saved.members("result", Result)
+    if block.timed:
+        # Coefficients of photos with trajectories of their own are made with their block.
+        pairs = zip(members["unknowns"], block.unknowns, strict=True)
+        members["unknowns"] = tuple(replace(each, given=own) for each, own in pairs)
+    return Result(**members, **own_arrays, block=block, state=saved.state())
 
 
 def _parts(block: Block, result: Result) -> dict[str, list[Part]]:
     observed = [
         name for name in ("positions", "attitudes") if getattr(block, f"photo_{name}_observed") is not None
     ]
-    return _parts_of(
+    parts = _parts_of(
         geographic=block.geographic,
         unit=block.linear_unit,
         image_unit=block.image_unit,
         distances=block.principal_distances is not None,
         observed=observed,
     )
+    scanned = scanners(block)[block.image_photos]
+    if scanned.any():
+        # What is measured there has no length; residuals and deviations are in the focal plane.
+        units = ("1", "1") if scanned.all() else (f"{block.image_unit}; 1 of scanners",) * 2
+        xy, *others = parts["images"]
+        parts["images"] = [
+            replace(xy, units=units, description="measured {}; of scanners sample (x) and line (y)"),
+            *others,
+        ]
+    return parts
 
 
 def _parts_of(

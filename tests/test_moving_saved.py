@@ -1,0 +1,101 @@
+"""Results of blocks with trajectories that are saved and read again; blocks in parts, which have none."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from moving_blocks import rolling, scanned
+from photogram import InputError, adjust, adjust_in_parts, group_sums, read_result
+from photogram.distributed import Division, plan_in_parts
+from photogram.network.observations import Smoothness
+from photogram.network.trajectories import Spline, Trajectory
+
+pytest.importorskip("pyarrow")
+
+
+def jittered():
+    """Return a block with smoothness that somebody has made of the coefficients of a trajectory."""
+    block = scanned()
+    first = block.trajectories[0].coefficients[1]
+    own = [Smoothness(first[k : k + 3], [1.0, -2.0, 1.0], sd=1e-3) for k in range(len(first) - 2)]
+    return block.replace(observations=[*block.observations, *own])
+
+
+BLOCKS = {
+    "rolling": rolling,
+    "known readout": lambda: rolling(readout=0.03).replace(photo_position_sd=0.1),
+    "scanned": lambda: scanned(photos=True, smooth=True),
+    "jitter": jittered,
+}
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_a_result_is_read_as_it_was_saved(name, tmp_path):
+    """It could be saved, and not be read: `'Timed' is no class that this version knows`."""
+    result = adjust(BLOCKS[name]())
+    result.to_parquet(tmp_path / "result")
+    read = read_result(tmp_path / "result")
+    assert read.report() == result.report()
+    assert read.verdict.headline == result.verdict.headline
+    for each in dataclasses.fields(result.block):
+        if isinstance(getattr(result.block, each.name), np.ndarray):
+            np.testing.assert_array_equal(getattr(read.block, each.name), getattr(result.block, each.name))
+    known = [(each.kind, each.name, each.values.tolist(), each.sd.tolist()) for each in result.unknowns]
+    assert [(each.kind, each.name, each.values.tolist(), each.sd.tolist()) for each in read.unknowns] == known
+    assert all(each.given is own for each, own in zip(read.unknowns, read.block.unknowns, strict=True))
+    some = [("unknown", result.unknowns[0].name), ("photo", result.block.photo_ids[-1])]
+    np.testing.assert_array_equal(read.covariance(some), result.covariance(some))
+    assert group_sums(read).report() == group_sums(result).report()
+    again = adjust(read.block)
+    assert again.sums_of_squares == result.sums_of_squares
+    read.to_parquet(tmp_path / "again")
+    second = read_result(tmp_path / "again")
+    assert second.report() == read.report()
+
+
+def test_what_is_shared_is_shared_again(tmp_path):
+    result = adjust(scanned(photos=True, smooth=True))
+    result.to_parquet(tmp_path / "result")
+    block = read_result(tmp_path / "result").block
+    assert block.timed[0].trajectory is block.timed[2].trajectory
+    assert block.timed[0].trajectory is not block.timed[1].trajectory
+    of_records = {id(each.moment.trajectory) for each in block.observations if each.moment}
+    assert of_records == {id(each.trajectory) for each in block.timed}
+    assert len([each for each in block.observations if isinstance(each, Smoothness)]) == 12
+    assert len({id(each.clock) for each in block.observations if each.moment}) == 1
+
+
+def test_columns_of_scanners_say_what_they_are(tmp_path):
+    import pyarrow.parquet as parquet
+
+    for block, unit in ((scanned(), b"1"), (scanned(photos=True), b"mm; 1 of scanners"), (rolling(), b"px")):
+        folder = tmp_path / block.photo_ids[-1]
+        adjust(block).to_parquet(folder)
+        schema = parquet.read_schema(folder / "images.parquet")
+        assert schema.field("x").metadata[b"unit"] == unit
+        assert (b"sample" in schema.field("x").metadata[b"description"]) == (unit != b"px")
+        assert schema.field("residual_x").metadata[b"unit"] == unit.split(b";")[0].replace(b"1", b"mm")
+
+
+def test_damaged_coefficients_are_refused(tmp_path):
+    from photogram.results.saved_trajectories import KeptTrajectory
+
+    own = scanned().trajectories[0]
+    kept = KeptTrajectory.of(own)
+    assert kept.original().coefficients == own.coefficients
+    with pytest.raises(InputError, match="strip 1"):
+        dataclasses.replace(kept, position=Spline(1.0)).original()
+    assert isinstance(kept.original(), Trajectory)
+
+
+@pytest.mark.parametrize("block", [rolling, scanned])
+def test_blocks_in_parts_take_no_trajectories(block, tmp_path):
+    block = block()
+    first = block.photo_ids[0]
+    with pytest.raises(InputError, match=f"in parts: the photo {first} is on a trajectory"):
+        adjust_in_parts(block, Division(parts=2))
+    with pytest.raises(InputError, match=f"in parts: the photo {first} is on a trajectory"):
+        plan_in_parts(block, Division(parts=2, folder=tmp_path / "run"))
+    with pytest.raises(InputError, match="in parts: observations are of the trajectory strip 1"):
+        adjust_in_parts(scanned().replace(timed=()), Division(memory="8 GiB"))
