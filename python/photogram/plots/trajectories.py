@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from photogram.errors import InputError
 from photogram.plots.panels import Where, handed_out, panels
 from photogram.show.style import INK
-
-if TYPE_CHECKING:
-    from photogram.results.result import Result
 
 __all__ = ["trajectory"]
 
@@ -20,7 +17,7 @@ TIMES = 160
 COLOURS = ("#0072b2", "#d55e00", "#009e73")
 
 
-def trajectory(result: Result, ax: Where = None, *, name: str | None = None) -> Any:
+def trajectory(result: Any, ax: Where = None, *, name: str | None = None) -> Any:
     """Draw the corrections of a trajectory over time, bands of one standard deviation about them.
 
     Below stand the times of observations beside images that are of it.

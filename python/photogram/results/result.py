@@ -404,7 +404,7 @@ class Result(AdjustedNetwork):
     @property
     def trajectories(self) -> dict[str, AdjustedTrajectory]:
         """The trajectories that photos and records are on, by name: coefficients, poses at any time."""
-        return adjusted_trajectories(self)
+        return adjusted_trajectories(self.block, self.unknowns, self.covariances)
 
     def project(self, photo: str, points: ArrayLike) -> Floats:
         """Return where a photo on a trajectory sees points: the row or line at whose time it sees them there.
@@ -425,7 +425,7 @@ class Result(AdjustedNetwork):
         InputError
             A photo that is on no trajectory; a scanner on a trajectory that has one record.
         """
-        return project(self, photo, points)
+        return project(self.block, self.unknowns, self.cameras, photo, points)
 
     def camera_table(self) -> pd.DataFrame:
         """Return adjusted cameras as a data frame: a row for each parameter, with its unit."""

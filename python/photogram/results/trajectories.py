@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,16 +12,15 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import freeze_fields, shaped, standard_deviations
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.geometry import geographic_to_geocentric
 from photogram.network.projecting import projected
 from photogram.network.trajectories import Trajectory
 from photogram.network.whereabouts import reach
+from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances
 from photogram.results.unknowns import AdjustedUnknown
-
-if TYPE_CHECKING:
-    from photogram.results.result import Result
 
 __all__ = ["AdjustedTrajectory", "TrajectoryPoses", "adjusted_trajectories", "corrections", "project"]
 
@@ -159,20 +158,25 @@ def corrections(
     return sums(of_position, position), sums(of_rotation, rotation)
 
 
-def project(result: Result, photo: str, points: ArrayLike) -> Floats:
+def project(
+    block: Block,
+    unknowns: Sequence[AdjustedUnknown],
+    cameras: Sequence[AdjustedCamera],
+    photo: str,
+    points: ArrayLike,
+) -> Floats:
     """Return where a photo on a trajectory sees (n, 3) points of the object space, as adjusted.
 
     See :meth:`photogram.Result.project`.
     """
-    block = result.block
     timed = {each.photo: row for row, each in enumerate(block.timed)}
     if photo not in timed:
         raise InputError(f"the photo {photo} is on no trajectory, or is not there")
     row = timed[photo]
-    adjusted = {id(each.given): (each.position, each.attitude) for each in result.unknowns}
+    adjusted = {id(each.given): (each.position, each.attitude) for each in unknowns}
     index = block.photo_ids.index(photo)
-    if result.cameras and block.photo_cameras is not None:
-        camera = result.cameras[int(block.photo_cameras[index])].camera
+    if cameras and block.photo_cameras is not None:
+        camera = cameras[int(block.photo_cameras[index])].camera
     else:
         camera = Camera("perspective", {"c": float(block.known_distances("project")[index])})
     places = shaped("points", points, (len(np.asarray(points)), 3))
@@ -183,17 +187,19 @@ def project(result: Result, photo: str, points: ArrayLike) -> Floats:
     )
 
 
-def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
-    """Return the trajectories of photos and records of a block, by their names."""
-    found = {id(each.given): each for each in result.unknowns}
-    of_records = (each.moment.trajectory for each in result.block.observations if each.moment is not None)
-    covariances: list[Covariances] = []
+def adjusted_trajectories(
+    block: Block, unknowns: Sequence[AdjustedUnknown], covariances: Callable[[], Covariances]
+) -> dict[str, AdjustedTrajectory]:
+    """Return the trajectories of photos and records of a block, by their names.
+
+    `covariances` gives those of anything with anything: asked for once, and not before poses are.
+    """
+    found = {id(each.given): each for each in unknowns}
+    of_records = (each.moment.trajectory for each in block.observations if each.moment is not None)
+    once = cache(covariances)
 
     def joint(names: list[str]) -> Floats:
-        # One factor serves all questions.
-        if not covariances:
-            covariances.append(result.covariances())
-        return covariances[0].covariance([("unknown", name) for name in names])
+        return once().covariance([("unknown", name) for name in names])
 
     def adjusted(own: Trajectory) -> AdjustedTrajectory:
         def arrays(of: Callable[[AdjustedUnknown], Floats]) -> list[Floats]:
@@ -214,5 +220,5 @@ def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
             joint=joint,
         )
 
-    every = {id(each): each for each in (*result.block.trajectories, *of_records)}.values()
+    every = {id(each): each for each in (*block.trajectories, *of_records)}.values()
     return {each.name: adjusted(each) for each in every}
