@@ -25,6 +25,7 @@ from photogram.formats.project import Frame, Project, Repeated
 from photogram.formats.stated import with_cover
 from photogram.io.delimited import ColumnTable, Names
 from photogram.messages import Message, listed
+from photogram.network.motion import timed_photos
 from photogram.network.similarity import similarity
 from photogram.results.result import Result
 
@@ -123,6 +124,8 @@ def repeated_remarks(project: Project, result: Result) -> list[Message]:
     """Say what the sum of squares would be with second images of a point on a photo, where there are any."""
     first, second = _repeated_rows(project)
     used = result.used_images[first] if result.converged and len(result.used_images) else first[:0] > 0
+    # Where images of photos that move would be is not computed here.
+    used &= ~timed_photos(project.block)[project.block.image_photos[first]]
     if not used.any():
         return []
     from photogram.adjustment.prediction import at_adjusted, computed_images

@@ -14,8 +14,12 @@ __all__ = ["carried", "is_free"]
 
 
 def is_free(project: Project) -> bool:
-    """Whether nothing but its first values says where the model of a project is."""
-    return not (project.block.observations or np.isfinite(project.block.photo_position_sd).any())
+    """Whether nothing but its first values says where the model of a project is.
+
+    Trajectories say it: what is known of them beforehand is in the axes of the project.
+    """
+    block = project.block
+    return not (block.observations or block.timed or np.isfinite(block.photo_position_sd).any())
 
 
 def carried(project: Project, by: tuple[float, Floats, Floats], frame: Frame, message: Message) -> Project:

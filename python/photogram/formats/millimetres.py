@@ -7,9 +7,11 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.formats.plain.writing import known_cameras
 from photogram.formats.project import Project, Size
 from photogram.network.cameras import Camera
+from photogram.network.motion import scanners
 
 __all__ = ["in_pixels", "nominal_pixels"]
 
@@ -24,9 +26,19 @@ def in_pixels(project: Project) -> Project:
 
     Millimetres are divided by the size of a pixel, or a nominal one; negative planes are turned by 180
     degrees into positive ones. Pictures whose size is not known get one that holds all images, where
-    coordinates do not count from their corners.
+    coordinates do not count from their corners. Rolling shutters, whose rows count as images did, stay
+    behind.
+
+    Raises
+    ------
+    InputError
+        Photos of a scanner, which are no pictures.
     """
     block = project.block
+    if (strips := np.flatnonzero(scanners(block))).size:
+        raise InputError(
+            f"the photo {block.photo_ids[int(strips[0])]} is of a line scanner, and has no pixels"
+        )
     given = block.image_unit == "px"
     if given and not _unsized(project):
         return project
@@ -46,7 +58,12 @@ def in_pixels(project: Project) -> Project:
         sizes.append(_size(camera, xy[own]) if size is None and _is_free(camera) else size)
     return project.replace(
         block=block.replace(
-            cameras=made, photo_cameras=which, principal_distances=None, image_xy=xy, image_sd=sd
+            cameras=made,
+            photo_cameras=which,
+            principal_distances=None,
+            image_xy=xy,
+            image_sd=sd,
+            timed=(),
         ),
         sizes=tuple(sizes),
         pixel_mm=tuple(pixels),

@@ -236,8 +236,16 @@ def target(path: Path, file_format: str | None = None) -> Target:
 
 
 def cannot_hold(project: Project, file_format: str) -> list[str]:
-    """Return what of a project a format has no place for, in sentences."""
+    """Return what of a project a format has no place for, in sentences.
+
+    Raises
+    ------
+    InputError
+        Line scanners, which other formats than the plain project would take for photos.
+    """
     chosen = _named(file_format)
+    if chosen.name != "plain":
+        check_held(project.block, chosen.title)
     beside = [counted(len(project.features), "feature")] if project.features else []
     beside += parts_of_asked(project.statement) + lost_motions(project.block)
     return [

@@ -19,6 +19,7 @@ from photogram.network.geometry import (
     lengths_of_units,
     local_frames,
 )
+from photogram.network.motion import refuse_trajectories
 
 __all__ = ["in_topocentric", "topocentric_remarks"]
 
@@ -32,10 +33,16 @@ def in_topocentric(project: Project) -> Project:
     The rays are the same. Standard deviations stay along the local axes, which differ from those of the
     frame by the angle between the verticals; where a point is known in part, it is where its rays meet with
     the components that are known. Observations beside images stay behind.
+
+    Raises
+    ------
+    InputError
+        Photos on trajectories, whose tables are geocentric.
     """
     block = project.block
     if block.spheroid is None:
         return project
+    refuse_trajectories(block, "a topocentric frame")
     origin, spheroid = _origin(block), block.spheroid
     axes = local_frames(origin)[0]
     middle = geographic_to_geocentric(origin, spheroid)[0]

@@ -12,6 +12,8 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
 from photogram.formats.placing import Placed, placed
 from photogram.formats.project import frame_of
+from photogram.network.geometry import geocentric_to_geographic
+from photogram.network.timed import Moment
 from photogram.results.axes import point_axes
 from photogram.results.ellipses import CONFIDENCE, ellipses, fitting_scale
 from photogram.results.footprints import footprints
@@ -367,18 +369,33 @@ def _beside_images(found: Placed, places: Floats) -> Iterator[_Suspect]:
             each = block.observations[int(kind.rows[row])]
             if not (each.points or each.photos):
                 continue
-            at = places[points[each.points[0]]] if each.points else found.photos[photos[each.photos[0]]]
+            if each.points:
+                at = places[points[each.points[0]]]
+            elif each.moment is not None:
+                at = _flown(found, each.moment)
+            else:
+                at = found.photos[photos[each.photos[0]]]
             yield (
                 at,
                 {
                     "what": f"{kind.kind} {kind.components[k]} of {kind.names[row]}",
-                    "photo": each.photos[0] if each.photos else None,
+                    "photo": each.photos[0] if each.photos and each.moment is None else None,
                     "point": each.points[0] if each.points else None,
                     "residual": float(kind.residuals[row, k]),
                     "unit": kind.units[k],
                     "test": float(kind.standardized[row, k]),
                 },
             )
+
+
+def _flown(found: Placed, moment: Moment) -> Floats:
+    """Return where an adjusted trajectory was at a time, on the map."""
+    result, spheroid = found.result, found.result.block.spheroid
+    own = result.trajectories[moment.trajectory.name]
+    places, *_ = own.given.flown(np.array([moment.time]), own.position, own.rotation)
+    if spheroid is not None:
+        places = geocentric_to_geographic(places, spheroid)
+    return np.asarray(found.carried(places)[0])
 
 
 def _beyond(tests: Floats) -> list[list[int]]:
