@@ -1,12 +1,26 @@
 """Photos on trajectories in the tables of the plain project."""
 
+import shutil
+from pathlib import Path
+
 import numpy as np
+import pandas as pd
 import pytest
+from damaged import check_damaged
+from hypothesis import assume, given, settings
+from hypothesis.strategies import integers, sampled_from
 from moving import rolling, same, two_lines
-from test_plain_project import written
+from test_plain_project import change, written
 
 import test_moving
-from photogram import adjust, formats
+from photogram import Attitudes, InputError, adjust, formats
+from photogram.formats import Wishes
+from photogram.formats.moving import motions
+from photogram.formats.plain.streamed import Streamed, streamable
+from photogram.network.observations import Smoothness
+from photogram.network.timed import Timed
+from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
+from photogram.network.whereabouts import about
 
 GOLDEN = ("rolling_shutter", "pushbroom_strips", "jitter", "three_line", "planetary_pair")
 
@@ -98,3 +112,456 @@ def test_two_lines_on_one_trajectory_come_back(tmp_path):
     assert one.sensor is None
     assert {id(each.moment.trajectory) for each in found.observations if each.moment} == {id(one.trajectory)}
     check_adjusted(block, found)
+
+
+BASES = (
+    None,
+    Polynomial(0, sd=0.0),
+    Polynomial(3, value=[[0.1, 0.2, -1e-3]] * 4, sd=[1.0, np.inf, 0.0]),
+    Polynomial(2, reference=1.5, scale=0.25, sd=0.02),
+    Spline(every=2.5, sd=0.3, correlation=(4.0, 0.1)),
+    Spline(every=1.0, degree=1, smooth=(1, 2e-3), correlation=(0.1, 0.2)),
+    Spline(
+        knots=[-9, -7, -4, 0, 0.5, 1, 10 / 3, 5, 7, 10, 14, 20, 30],
+        degree=3,
+        value=[[1e-3, 0, 0]] * 9,
+        sd=0.5,
+    ),
+    Spline(knots=[-3, -2, -1, 0, 4, 4, 8, 12, 13, 14], degree=2, smooth=(3, 1e-4)),
+)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    position=sampled_from(BASES),
+    rotation=sampled_from(BASES),
+    table=sampled_from(["linear", "hermite", "lagrange"]),
+    name=sampled_from(["strip", "a, b", 'the "second"', "12", "Überflug 3", "none"]),
+    seed=integers(0, 2**31),
+)
+def test_any_trajectory_comes_back(tmp_path_factory, position, rotation, table, name, seed):
+    random = np.random.default_rng(seed)
+    count = int(random.integers(2, 9))
+    times = np.linspace(0.0, 10.0, count) + np.append(0.0, random.uniform(0, 0.3, count - 1))
+    turns = np.sort(random.uniform(0.0, 10.0, 5))
+    known = Table(
+        times,
+        random.normal(0, 1e5, (count, 3)),
+        turns,
+        Attitudes.of("rotation_vector", random.normal(0, 2, (5, 3))).matrices,
+        velocities=random.normal(0, 50, (count, 3)) if table == "hermite" else None,
+        interpolation=table,
+        attitude_interpolation=random.choice(["linear", "lagrange"]),
+    )
+    body = None
+    if seed % 2:
+        body = [0.0, 7.0], Attitudes.of("rotation_vector", random.normal(0, 2, (2, 3))).matrices
+    try:
+        own = Trajectory(name, known, position, rotation, body)
+    except InputError:
+        assume(False)
+    block = rolling()
+    timed = [
+        Timed(each.photo, own, time=float(random.uniform(1, 9)), shutter=each.shutter) for each in block.timed
+    ]
+    block = block.replace(timed=timed, observations=())
+    same(block, again(block, tmp_path_factory.mktemp("any")))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Write the projects of a rolling shutter and of two lines."""
+    place = tmp_path_factory.mktemp("made")
+    written(project_of(rolling(), place, sizes=((3000, 2000),)), place / "drone")
+    written(project_of(two_lines(), place), place / "lines")
+    return place
+
+
+@pytest.fixture
+def project(made, tmp_path):
+    """Return a copy of both projects."""
+    return Path(shutil.copytree(made, tmp_path / "own"))
+
+
+def edited(path, edit):
+    """Change a table; columns of numbers as they are written."""
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    edit(table).to_csv(path, index=False)
+
+
+def test_photos_on_a_trajectory_need_no_pose(project):
+    lines = project / "lines"
+    edited(lines / "photos.csv", lambda table: table[["photo", "camera", "trajectory", "rig", "sensor"]])
+    found = formats.read(lines).block
+    assert np.isfinite(found.photo_positions).all()
+    own = found.timed[1].trajectory
+    place, matrix = about(own, 200.5)
+    np.testing.assert_allclose(found.photo_positions[1], place, atol=1e-9)
+    read = Attitudes.of("omega_phi_kappa", found.photo_attitudes[1:]).matrices[0]
+    np.testing.assert_allclose(read, matrix, atol=1e-12)
+    assert found.timed[0].time is None
+    check_adjusted(found, found.replace(photo_positions=np.zeros((2, 3))))
+
+
+def test_deviations_of_coefficients_may_stand_in_the_settings(project):
+    lines = project / "lines"
+    (lines / "trajectory_coefficients.csv").unlink()
+    (lines / "trajectory_knots.csv").unlink()
+    (lines / "covariances.csv").unlink()
+    columns = ["trajectory", "position", "rotation", "position_degree", "interpolation"]
+    edited(lines / "trajectories.csv", lambda table: table[columns].assign(rotation_every="3"))
+    change(lines / "project.toml", "[adjust]", "[sd]\ntrajectories = [0.25, 0.5]\n\n[adjust]")
+    own = formats.read(lines).block.timed[0].trajectory
+    assert own.position.reference == pytest.approx(205.5)
+    assert own.position.scale == pytest.approx(5.5)
+    assert own.rotation.count == 4 + 3
+    np.testing.assert_array_equal([each.deviations for each in own.coefficients[0]], np.full((2, 3), 0.25))
+    np.testing.assert_allclose(
+        [each.deviations for each in own.coefficients[1]], np.radians(np.full((7, 3), 0.5))
+    )
+
+
+def in_other_axes(project):
+    """Write tables in gon, with matrices of photos whose y points down."""
+    flip = np.diag([1.0, -1.0, -1.0])
+    angles, elements = ["omega", "phi", "kappa"], [f"m{i}{j}" for i in "123" for j in "123"]
+
+    def turned(table, before, after):
+        given = table[angles].replace("", "nan").astype(float)
+        matrices = Attitudes.of("omega_phi_kappa", np.radians(given)).matrices
+        own = before @ matrices.transpose(0, 2, 1) @ after
+        text = pd.DataFrame(own.reshape(-1, 9), columns=elements, index=table.index).map(repr)
+        return table.drop(columns=angles).join(text.replace("nan", ""))
+
+    def scaled(table, columns, factor):
+        there = [name for name in columns if name in table]
+        own = table[there].replace("", "nan").astype(float) * factor
+        return table.assign(**own.map(repr).replace("nan", "").to_dict("list"))
+
+    for name in ("photos", "trajectory_attitudes", "attitudes", "attitude_groups", "rigs"):
+        path = project / f"{name}.csv"
+        if path.exists():
+            # Of sensors and boresights both sides are axes of photos, or of what moves as they do.
+            other = flip if name in ("rigs", "attitude_groups") else np.eye(3)
+            edited(path, lambda table, other=other: turned(table, flip, other))
+            edited(path, lambda table: scaled(table, [f"sd_rotation_{axis}" for axis in "xyz"], 10 / 9))
+    if (project / "attitudes.csv").exists():
+        for sign, columns in ((1.0, ["y_rotation_z"]), (-1.0, ["x_rotation_y", "x_rotation_z"])):
+            names, factor = [f"cov_rotation_{each}" for each in columns], sign * (10 / 9) ** 2
+            edited(project / "attitudes.csv", lambda table, n=names, f=factor: scaled(table, n, f))
+    for name, columns in (("rates", ["rate_y", "rate_z"]), ("attitude_groups", ["bias_y", "bias_z"])):
+        if (project / f"{name}.csv").exists():
+            edited(project / f"{name}.csv", lambda table, columns=columns: scaled(table, columns, -1.0))
+    if (project / "rates.csv").exists():
+        edited(
+            project / "rates.csv",
+            lambda table: scaled(table, ["cov_rate_x_rate_y", "cov_rate_x_rate_z"], -1.0),
+        )
+    for name, columns in (("rigs", ["y", "z"]), ("gnss_groups", ["lever_y", "lever_z"])):
+        if (project / f"{name}.csv").exists():
+            edited(project / f"{name}.csv", lambda table, columns=columns: scaled(table, columns, -1.0))
+    if (project / "trajectories.csv").exists():
+        for sign, pairs in ((1.0, ("xx", "yy", "zz", "zy")), (-1.0, ("yx", "zx"))):
+
+            def of_pairs(table, sign=sign, pairs=pairs):
+                rows = (table["first"] + table["second"]).isin(pairs)
+                own = scaled(table, ["covariance"], sign * (10 / 9) ** 2)
+                return table.assign(covariance=own["covariance"].where(rows, table["covariance"]))
+
+            edited(project / "covariances.csv", of_pairs)
+        units = ["sd_rotation", "sd_rotation_smooth"]
+        edited(project / "trajectories.csv", lambda table: scaled(table, units, 10 / 9))
+    else:
+        edited(project / "photos.csv", lambda table: scaled(table, ["rate_y", "rate_z"], -1.0))
+    change(project / "project.toml", 'angle = "deg"', 'angle = "gon"')
+    change(project / "project.toml", "[axes]", '[axes]\nattitude = "matrix"\nphoto = "y_down"')
+
+
+@pytest.mark.parametrize("name", ["drone", "lines"])
+def test_other_axes_and_units_of_angles(project, name):
+    plain = formats.read(project / name).block
+    in_other_axes(project / name)
+    other = formats.read(project / name).block
+    check_adjusted(plain, other, 1e-5)
+
+
+def test_pixels_from_the_middle_of_the_first_and_lengths_in_micrometres(project):
+    lines = project / "lines"
+    plain = formats.read(lines).block
+
+    def shifted(table):
+        return table.assign(
+            **{name: (table[name].astype(float) - 0.5).map(repr) for name in ("column", "row")},
+            **{name: (table[name].astype(float) * 1e3).map(repr) for name in ("sd_column", "sd_row")},
+        )
+
+    edited(lines / "images.csv", shifted)
+    powers = {"c": 1, "xp": 1, "K1": -2, "sd_K1": -2, "x0": 1, "y0": 1, "pitch_x": 1, "pitch_y": 1}
+    edited(
+        lines / "cameras.csv",
+        lambda table: table.assign(
+            **{name: (table[name].astype(float) * 1e3**power).map(repr) for name, power in powers.items()}
+        ),
+    )
+    change(lines / "project.toml", 'image = "mm"', 'image = "um"')
+    change(lines / "project.toml", "[axes]", '[axes]\npixel_origin = "center"')
+    other = formats.read(lines).block
+    np.testing.assert_allclose(other.image_xy, plain.image_xy, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(other.image_sd, plain.image_sd, rtol=1e-15)
+    assert other.timed[1].line_sensor.pitch == pytest.approx(plain.timed[1].line_sensor.pitch)
+    check_adjusted(plain, other, 1e-5)
+
+
+def test_records_that_a_trajectory_does_not_reach_are_left_out(project):
+    lines = project / "lines"
+    plain = formats.read(lines).block
+    for number, table in enumerate(("gnss", "rates"), 1):
+        text = (lines / f"{table}.csv").read_text().splitlines()
+        more = [text[1].replace(",201.0,", f",{time},") for time in (198.0, 212.5, 1e6)[:number]]
+        assert more[0] != text[1]
+        (lines / f"{table}.csv").write_text("\n".join([*text, *more, ""]))
+    found = formats.read(lines)
+    told = [str(each) for each in found.messages]
+    assert len(told) == 2
+    assert "gnss.csv: 1 record at times that their trajectory does not reach are left out" in told[0]
+    assert "rates.csv: 2 records at times" in told[1]
+    assert len(found.block.observations) == len(plain.observations)
+
+
+def test_photos_without_a_shutter_may_move_and_words_of_camera_lines(project):
+    drone = project / "drone"
+    edited(
+        drone / "cameras.csv",
+        lambda table: table.drop(columns=[c for c in table if "readout" in c or c == "shutter"]),
+    )
+    found = formats.read(drone).block
+    assert len(found.timed) == 6
+    assert found.timed[0].shutter is None
+    edited(
+        drone / "photos.csv",
+        lambda table: table.drop(columns=[c for c in table if c.endswith(("vx", "vy", "vz"))]),
+    )
+    edited(drone / "photos.csv", lambda table: table.drop(columns=[c for c in table if "rate" in c]))
+    (drone / "velocities.csv").unlink()
+    assert formats.read(drone).block.timed == ()
+    lines = project / "lines"
+    plain = formats.read(lines).block
+    edited(lines / "cameras.csv", lambda table: table.assign(model="line", width="6000", height="", s0=""))
+    found = formats.read(lines).block
+    assert [each.model for each in found.cameras] == ["brown", "brown"]
+    assert found.timed[0].line_sensor == plain.timed[0].line_sensor
+
+
+def test_what_tables_cannot_hold(tmp_path):
+    block = rolling()
+    others = block.timed[1:]
+    with pytest.raises(InputError, match="of the camera drone have several shutters or lines of sensors"):
+        formats.to_files(project_of(block.replace(timed=others, observations=()), tmp_path), "plain")
+    lines = two_lines()
+    turns = lines.timed[0].trajectory.coefficients[1]
+    more = Smoothness([turns[0], turns[2]], [1.0, -1.0], sd=0.1)
+    own = project_of(lines.replace(observations=[*lines.observations, more]), tmp_path)
+    assert formats.cannot_hold(own, "plain") == ["1 sums of coefficients that are no neighbours, or too many"]
+    assert "smoothness.csv" not in formats.to_files(own, "plain")
+    with pytest.raises(InputError, match=r"COLMAP.*: the photo L1 is of a line scanner"):
+        formats.to_files(own, "colmap")
+    drone = project_of(block, tmp_path, sizes=((3000, 2000),))
+    lost = formats.cannot_hold(drone, "colmap")
+    assert "trajectories: 6 photos with the poses that they are about" in lost
+
+
+def test_what_counts_from_where_is_kept(project):
+    lines = project / "lines"
+    for origin, told in (
+        ("2026-05-01T10:30:00Z", "2026-05-01T10:30:00+00:00"),
+        ('"2026-05-01"', "2026-05-01T00:00:00"),
+        ("86400", "86400.0"),
+    ):
+        text = (lines / "project.toml").read_text().split("\n[time]")[0]
+        (lines / "project.toml").write_text(f'{text}\n[time]\norigin = {origin}\nscale = "gps"\n')
+        read = formats.read(lines)
+        assert f"times: seconds from {told}, gps" in motions(read)
+        files = formats.to_files(read, "plain")
+        again_read = formats.read(written(read, project / "again"))
+        assert motions(again_read) == motions(read)
+        assert b"[time]" in files["project.toml"]
+        shutil.rmtree(project / "again")
+    for origin in ('"yesterday"', "07:32:00", "[1, 2]", "nan", "true"):
+        (lines / "project.toml").write_text(f"{text}\n[time]\norigin = {origin}\n")
+        with pytest.raises(InputError, match=r"project\.toml, record \d+: origin is"):
+            formats.read(lines)
+
+
+FAULTS = [
+    ("drone", "cameras.csv", "inf,down", "inf,sideways", ["record 2", "readout_direction", "sideways"]),
+    ("drone", "cameras.csv", "0.02,inf", ",inf", ["record 2", "column readout: is empty"]),
+    ("drone", "cameras.csv", "3000,2000", ",", ["record 2", "where the picture ends"]),
+    ("drone", "cameras.csv", "0.02,inf", "0.02,-1", ["record 2", "sd of readout rows"]),
+    ("drone", "photos.csv", "DJI_0,drone", "DJI_0,phone", ["record 2", "column camera"]),
+    ("drone", "velocities.csv", "DJI_0,", "DJI_9,", ["record 2", "no photo 'DJI_9'"]),
+    ("drone", "velocities.csv", "DJI_0,", "DJI_0,x", ["record 2", "column vx"]),
+    ("lines", "trajectories.csv", "polynomial", "polynom", ["record 2", "column position", "polynom"]),
+    ("lines", "trajectories.csv", "hermite", "cubic", ["record 2", "column interpolation", "cubic"]),
+    ("lines", "trajectories.csv", "polynomial,1", "polynomial,9", ["record 2", "from 0 to 8"]),
+    ("lines", "trajectories.csv", "polynomial,1", "polynomial,1.5", ["record 2", "no whole number"]),
+    ("lines", "trajectories.csv", "polynomial,1", "none,1", ["record 2", "position_degree", "is none"]),
+    ("lines", "trajectories.csv", "polynomial,1", "none,", ["record 2", "its position is none"]),
+    ("lines", "trajectories.csv", "strip 7", "strip 8", ["there is no trajectory 'strip 7'"]),
+    (
+        "lines",
+        "trajectory_positions.csv",
+        "strip 7,201.0",
+        "strip 7,200.0",
+        ["record 3", "does not increase"],
+    ),
+    ("lines", "trajectory_positions.csv", "strip 7,201.0", "strip 7,", ["record 3", "column time: is empty"]),
+    ("lines", "trajectory_positions.csv", ",60.0,", ",,", ["record 2", "some of vx, vy, vz are empty"]),
+    ("lines", "trajectory_attitudes.csv", "strip 7,200.25", "strip 7,200.25x", ["record 3", "column time"]),
+    ("lines", "trajectory_knots.csv", "rotation", "turns", ["record 2", "column of", "turns"]),
+    ("lines", "trajectory_coefficients.csv", "position,1", "position,2", ["record 3", "from 0 to 1"]),
+    ("lines", "trajectory_coefficients.csv", "position,1", "position,0", ["record 3", "is there twice"]),
+    (
+        "lines",
+        "trajectory_coefficients.csv",
+        "strip 7,position,1",
+        "strip 8,position,1",
+        ["record 3", "'strip 8'"],
+    ),
+    ("lines", "line_times.csv", "L1,1000.0", "L1,0.0", ["record 3", "column line: does not increase"]),
+    ("lines", "line_times.csv", "L2,", "L3,", ["record 4", "no photo 'L3'"]),
+    ("lines", "line_times.csv", ",0.002\nL2", ",0\nL2", ["record 2", "seconds per line"]),
+    (
+        "lines",
+        "cameras.csv",
+        "3000.0,0.01,0.0",
+        "3000.0,,",
+        ["cameras.csv, record 2", "has no s0"],
+    ),
+    ("lines", "cameras.csv", ",3000.0,", ",,", ["cameras.csv, record 2", "column s0"]),
+    (
+        "lines",
+        "cameras.csv",
+        "brown",
+        "rad_tan_thin_prism_fisheye",
+        ["cameras.csv, record 2", "column s0: is of the model"],
+    ),
+    ("lines", "photos.csv", "L1,down", "L1,", ["record 2", "column camera"]),
+    ("lines", "photos.csv", "strip 7", "strip 8", ["record 2", "column trajectory", "'strip 8'"]),
+    ("lines", "photos.csv", "rig,ahead", "rig,behind", ["record 3", "the rig rig has no sensor behind"]),
+    ("lines", "photos.csv", "rig,ahead", "pair,ahead", ["record 3", "column rig: there is no rig 'pair'"]),
+    (
+        "lines",
+        "photos.csv",
+        "oscillator,1.0,1e-05",
+        "oscillator,1.1,1e-05",
+        ["record 3", "column scan", "other values"],
+    ),
+    ("lines", "gnss.csv", "strip 7,201.0", "strip 7,", ["record 2", "column time: is empty"]),
+    ("lines", "gnss.csv", "strip 7,201.0", ",201.0", ["record 2", "one of both"]),
+    ("lines", "rates.csv", "strip 7,201.0", "strip 9,201.0", ["record 2", "no trajectory 'strip 9'"]),
+    ("lines", "gnss_groups.csv", "receiver,0.001", "receiver,0.002", ["other values", "column clock"]),
+    ("lines", "attitude_groups.csv", "gyro,", "gyro,x", ["record 3", "column bias_x"]),
+    (
+        "lines",
+        "covariances.csv",
+        "strip 7 rotation 0",
+        "strip 7 rotation 50",
+        ["record 2", "no rotation coefficient"],
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "file", "old", "new", "words"), FAULTS)
+def test_a_fault_is_named_with_file_record_and_text(project, name, file, old, new, words):
+    change(project / name / file, old, new)
+    with pytest.raises(InputError) as refused:
+        formats.read(project / name)
+    for word in words:
+        assert word in str(refused.value)
+    assert refused.value.file is not None
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "column", "value", "words"),
+    [
+        ("lines", "photos.csv", "vx", "1", ["photos.csv, record 2", "without a trajectory"]),
+        ("lines", "photos.csv", "sd_x", "1", ["photos.csv, record 2", "has no sd of its own"]),
+        ("lines", "cameras.csv", "sd_x0", "1", ["cameras.csv, record 2", "sd_xp"]),
+        (
+            "lines",
+            "trajectories.csv",
+            "rotation_scale",
+            "1",
+            ["record 2", "rotation_scale", "its rotation is spline"],
+        ),
+        ("lines", "trajectories.csv", "sd_position", "-1", ["record 2", "column sd_position: is negative"]),
+        ("drone", "photos.csv", "sd_omega", "1", ["photos.csv, record 2", "moves by itself"]),
+        ("drone", "photos.csv", "line_rate", "1.5", ["photos.csv, record 2", "line scanners"]),
+        ("drone", "photos.csv", "trajectory", "one", ["photos.csv, record 2", "no trajectory 'one'"]),
+        ("drone", "cameras.csv", "readout_begin", "1", ["cameras.csv, record 2"]),
+        ("drone", "velocities.csv", "group", "one", None),
+    ],
+)
+def test_a_column_that_does_not_belong_there(project, name, file, column, value, words):
+    edited(project / name / file, lambda table: table.assign(**{column: value}))
+    if words is None:
+        formats.read(project / name)
+        return
+    with pytest.raises(InputError) as refused:
+        formats.read(project / name)
+    for word in words:
+        assert word in str(refused.value)
+
+
+def test_tables_of_trajectories_that_there_are_not(project):
+    (project / "lines" / "trajectories.csv").unlink()
+    with pytest.raises(InputError, match=r"trajectory_positions\.csv: there is no table trajectories"):
+        formats.read(project / "lines")
+
+
+@pytest.mark.parametrize("name", ["drone", "lines"])
+def test_damaged_tables_end_in_a_message(project, tmp_path, name):
+    assert check_damaged(project / name, tmp_path / "damaged", "plain", 150, 7) > 40
+
+
+def test_adjust_and_info_on_the_command_line(run, project, tmp_path):
+    told = run("info", project / "lines")
+    assert told.exit_code == 0, told.output
+    text = " ".join(told.output.split())
+    assert "2 photos on trajectories: 2 of a line scanner" in text
+    assert "strip 7: 12 records of positions, 24 of attitudes, 200.0 to 211.0 s" in text
+    assert (
+        "position: polynomial of degree 1, 2 coefficients; rotation: spline of degree 3, 9 coefficients"
+        in text
+    )
+    assert "12 observations of the kind velocity" in text
+    assert "6 photos on trajectories: 6 with a rolling shutter, 6 with a motion of their own" in " ".join(
+        run("info", project / "drone").output.split()
+    )
+    edited(project / "lines" / "trajectories.csv", lambda table: table.assign(colour="red"))
+    for name in ("drone", "lines"):
+        done = run("adjust", project / name, "--out", name, "--no-html")
+        assert done.exit_code in (0, 4), done.output
+        if name == "lines":
+            assert "columns that the table trajectories does not have are not read: colour" in " ".join(
+                done.output.split()
+            )
+        result = adjust(formats.read(project / name).block)
+        table = pd.read_csv(tmp_path / name / "unknowns.csv", comment="#")
+        expected = result.unknown_table()
+        assert list(table["unknown"]) == list(expected["unknown"])
+        np.testing.assert_allclose(table["value"], expected["value"], rtol=1e-12, atol=1e-14)
+        assert (tmp_path / name / "report.txt").read_text()
+        same(formats.read(project / name).block, formats.read(tmp_path / name / "adjusted").block)
+
+
+def test_photos_that_move_are_not_adjusted_in_parts(project):
+    pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    drone = project / "drone"
+    (drone / "velocities.csv").unlink()
+    table = pd.read_csv(drone / "images.csv")
+    table.to_parquet(drone / "images.parquet")
+    (drone / "images.csv").unlink()
+    assert streamable(drone)
+    with pytest.raises(InputError, match="rolling shutter, or on trajectories, are read whole"):
+        Streamed(drone, Wishes(), project / "run")

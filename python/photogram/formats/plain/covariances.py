@@ -17,12 +17,14 @@ from photogram.messages import listed, quoted
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Observation, Prior
-from photogram.network.trajectories import GyroBias
-from photogram.network.unknowns import Drift, Sensor, Shift, Unknown
+from photogram.network.trajectories import GyroBias, RotationCoefficient
+from photogram.network.unknowns import Boresight, Drift, LeverArm, Sensor, Shift, Unknown
 
 __all__ = ["Covariances", "covariance_tables", "read_covariances"]
 
 CAMERA = "camera"
+_WITH_PHOTOS = {each.KIND for each in (LeverArm, Boresight, Sensor, GyroBias, RotationCoefficient)}
+"""Unknowns along, or about, the axes of photos or of bodies."""
 
 
 @dataclass
@@ -115,7 +117,7 @@ class Covariances:
                         raise table.error(
                             row, f"a {kind} has {', '.join(unknown.components)}, not {quoted(word)}"
                         )
-            units = _units(unknown, self.tables.radians)
+            units = _units(unknown, self.tables.radians, np.diag(self.tables.flip).tolist())
             covariance = matrix.over(unknown.components, units)
             found.append(
                 made(
@@ -174,12 +176,14 @@ def covariance_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs) -> di
     return {"covariances": {name: [row[k] for row in rows] for k, name in enumerate(columns)}}
 
 
-def _units(unknown: Unknown, angle: float) -> dict[str, float]:
-    """Return a factor for each component of an unknown: that of angles for angles."""
-    units = unknown.units("")
-    return {
-        name: angle if unit == "rad" else 1.0 for name, unit in zip(unknown.components, units, strict=True)
-    }
+def _units(unknown: Unknown, angle: float, signs: Sequence[float] = (1.0,) * 3) -> dict[str, float]:
+    """Return a factor for each component of an unknown: that of angles for angles, with the sign of its axis.
+
+    Signs are those of the axes of photos, and of bodies, as tables have them.
+    """
+    pairs = zip(unknown.components, unknown.units(""), strict=True)
+    axes = dict(zip("xyz", signs, strict=True)) if unknown.KIND in _WITH_PHOTOS else {}
+    return {name: (angle if unit == "rad" else 1.0) * axes.get(name[-1], 1.0) for name, unit in pairs}
 
 
 def _name(unknown: Unknown, rigs: Rigs) -> str:

@@ -135,7 +135,8 @@ def inertials(tables: Tables) -> dict[str, Inertial]:
     table = tables.read("attitude_groups")
     if table is None:
         return {}
-    matrices = tables.matrices(table)
+    # Both the photo and what carries it have axes as the settings say.
+    matrices = tables.turns(table)
     sd = table.vectors(_ROTATIONS, math.inf, infinite=True, read=tables.angle)
     biases = tables.vectors(table, BIAS, 0.0)
     bias_sd = table.vectors(deviation_columns(BIAS), math.inf, infinite=True)

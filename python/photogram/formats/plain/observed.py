@@ -246,7 +246,7 @@ def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
     unknown = np.isnan(matrices).any(axis=(1, 2))
     if unknown.any():
         raise table.error(int(np.argmax(unknown)), "there is no attitude")
-    covariances = covariances_of(sd, table, ROTATIONS, (tables.radians,) * 3)
+    covariances = tables.flip @ covariances_of(sd, table, ROTATIONS, (tables.radians,) * 3) @ tables.flip
     groups = grouped(tables, table, inertials(tables), "attitude_groups")
     found: list[Observation] = []
     for row, (own, group) in enumerate(zip(of, groups, strict=True)):

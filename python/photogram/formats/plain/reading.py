@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,21 +15,21 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN
 from photogram.formats.format import Wishes
-from photogram.formats.plain.cameras import read_cameras, spread_over_photos
+from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.images import Images, image_coordinates, read_images
 from photogram.formats.plain.moving import placed, read_timed
 from photogram.formats.plain.observed import Subjects, read_observations
-from photogram.formats.plain.photos import read_photos
+from photogram.formats.plain.photos import Photos, read_photos
 from photogram.formats.plain.rigs import read_frames, read_rigs
 from photogram.formats.plain.schema import AXES
-from photogram.formats.plain.settings import read_settings, unread_tables
+from photogram.formats.plain.settings import Settings, read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
 from photogram.formats.plain.tables import Tables, covariances_of
 from photogram.formats.plain.trajectories import read_trajectories
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project, assembled
-from photogram.formats.rigging import mounted
+from photogram.formats.rigging import Stand, mounted
 from photogram.io.delimited import ColumnTable
 from photogram.messages import quoted
 from photogram.network.geometry import Spheroid
@@ -92,19 +93,12 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     mounts, stands = mounted(
         read_frames(tables, rigs, photos.names, photos.taken), photos.names, photos.centres, photos.matrices
     )
-    places = {name: row for row, name in enumerate(photos.names)}
-    observations: list[Observation] = read_observations(
-        tables,
-        transform,
-        Subjects(places, photos.times.tolist(), trajectories),
-        {name: row for row, name in enumerate(points.names)},
-        rigs,
+    subjects = Subjects(
+        {name: row for row, name in enumerate(photos.names)}, photos.times.tolist(), trajectories
     )
+    places = {name: row for row, name in enumerate(points.names)}
+    observations = read_observations(tables, transform, subjects, places, rigs)
     observations += read_covariances(tables).priors(_unknowns(observations, mounts, timed))
-    extra = len(stands)
-    owners = {each.name: row for row, each in enumerate(cameras.cameras)} | dict(
-        zip(photos.taken, photo_cameras, strict=True)
-    )
     project = assembled(
         path=settings.path,
         title="plain project",
@@ -112,15 +106,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         cameras=cameras.cameras,
         sizes=cameras.sizes,
         pixel_mm=cameras.pixel_mm,
-        photo_ids=[*photos.names, *(each.name for each in stands)],
-        photo_cameras=[
-            *photo_cameras,
-            *(owners.get(each.camera, photo_cameras[each.like]) for each in stands),
-        ],
-        centres=np.vstack([photos.centres, *(each.centre[np.newaxis] for each in stands)]),
-        matrices=np.concatenate([photos.matrices, *(each.matrix[np.newaxis] for each in stands)]),
-        photo_position_sd=np.vstack([photos.position_sd, np.full((extra, 3), np.inf)]),
-        photo_attitude_sd=np.vstack([photos.attitude_sd, np.full((extra, 3), np.inf)]),
+        **_with_stands(photos, stands, photo_cameras, cameras),
         point_ids=points.names,
         starts=points.starts,
         point_positions=points.positions,
@@ -143,25 +129,42 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     ).replace(
         sd_taken=True,
         features=settings.features,
-        statement=asked_of(
-            tables,
-            {name: row for row, name in enumerate(points.names)},
-            frozenset() if given is None else given.vegetated,
-        ),
+        statement=asked_of(tables, places, frozenset() if given is None else given.vegetated),
     )
-    for name, (_, wanted) in settings.features.items():
-        try:
-            named_points(wanted, points.names)
-        except InputError as error:
-            raise InputError(f"the feature {name}: {error.message}", file=settings.path) from None
+    _check_features(settings, points.names)
     if control is not None and given is not None:
         from photogram.formats.exchanged import check_systems
 
-        raw = control.vectors(AXES)
-        places = {name: row for row, name in enumerate(points.names)}
         rows = np.array([places[name] for name in given.names], dtype=np.int64)
-        check_systems(project, settings, control, rows, raw, free=False)
+        check_systems(project, settings, control, rows, control.vectors(AXES), free=False)
     return project
+
+
+def _check_features(settings: Settings, names: Sequence[str]) -> None:
+    """Refuse features through points that are not there."""
+    for name, (_, wanted) in settings.features.items():
+        try:
+            named_points(wanted, names)
+        except InputError as error:
+            raise InputError(f"the feature {name}: {error.message}", file=settings.path) from None
+
+
+def _with_stands(
+    photos: Photos, stands: Sequence[Stand], photo_cameras: Sequence[int], cameras: Cameras
+) -> dict[str, Any]:
+    """Return photos, and what stands for frames without one, as :func:`assembled` takes them."""
+    free = np.full((len(stands), 3), np.inf)
+    owners = {each.name: row for row, each in enumerate(cameras.cameras)}
+    owners |= dict(zip(photos.taken, photo_cameras, strict=True))
+    more = [owners.get(each.camera, photo_cameras[each.like]) for each in stands]
+    return {
+        "photo_ids": [*photos.names, *(each.name for each in stands)],
+        "photo_cameras": [*photo_cameras, *more],
+        "centres": np.vstack([photos.centres, *(each.centre[np.newaxis] for each in stands)]),
+        "matrices": np.concatenate([photos.matrices, *(each.matrix[np.newaxis] for each in stands)]),
+        "photo_position_sd": np.vstack([photos.position_sd, free]),
+        "photo_attitude_sd": np.vstack([photos.attitude_sd, free]),
+    }
 
 
 def _with_cameras(tables: Tables, path: Path) -> Tables:

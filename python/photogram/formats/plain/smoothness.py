@@ -12,7 +12,8 @@ from photogram.arguments.types import Floats
 from photogram.formats.plain.schema import AXES, BASES, FACTORS, deviation_columns
 from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import DEGREE, Tables, correlations, covariances_of
-from photogram.formats.plain.trajectories import shared_trajectories, trajectory_rows
+from photogram.formats.plain.trajectories import trajectory_rows
+from photogram.formats.plain.trajectories_written import shared_trajectories
 from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness
 from photogram.network.observations.smoothness import smoothness_of

@@ -6,23 +6,21 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, cast, get_args
+from typing import cast, get_args
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.plain.schema import ANGLES, AXES, BASES, VELOCITY, deviation_columns
+from photogram.formats.plain.schema import AXES, BASES, VELOCITY, deviation_columns
 from photogram.formats.plain.shared import made
-from photogram.formats.plain.tables import DEGREE, Tables, angles_of, indices_of, vectors_of
+from photogram.formats.plain.tables import Tables, indices_of, vectors_of
 from photogram.io.delimited import ColumnTable
 from photogram.messages import quoted
-from photogram.network.block import Block
 from photogram.network.trajectories import Basis, Interpolation, Polynomial, Spline, Table, Trajectory
 
-__all__ = ["read_trajectories", "shared_trajectories", "trajectory_rows", "trajectory_tables"]
+__all__ = ["read_trajectories", "trajectory_rows"]
 
-_ANGLES = ANGLES["omega_phi_kappa"]
 _SD = deviation_columns(AXES)
 _OTHERS = (
     *("trajectory_positions", "trajectory_attitudes", "trajectory_knots", "trajectory_coefficients"),
@@ -320,167 +318,3 @@ class _Bases:
             values[int(number)] = value * self.signs * self.unit
             deviations[int(number)] = np.where(np.isnan(each), sd, each * self.unit)
         return values, deviations
-
-
-def shared_trajectories(block: Block) -> list[Trajectory]:
-    """Return the trajectories of a block that are not those of single photos, each once.
-
-    Raises
-    ------
-    InputError
-        Two of one name.
-    """
-    own = [each.trajectory for each in block.timed if each.trajectory is not None]
-    own += [each.moment.trajectory for each in block.observations if each.moment is not None]
-    found = list({id(each): each for each in own}.values())
-    names = [each.name for each in found]
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InputError(f"two trajectories are called {twice}: tables know them by their names")
-    return found
-
-
-def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
-    """Return the tables of the trajectories of a block; none where there are none.
-
-    Raises
-    ------
-    InputError
-        Two trajectories of one name.
-    """
-    own = shared_trajectories(block)
-    if not own:
-        return {}
-    tables = [each.table for each in own]
-    columns: dict[str, Any] = {
-        "trajectory": [each.name for each in own],
-        "interpolation": [each.interpolation for each in tables],
-        "attitude_interpolation": [each.attitude_interpolation for each in tables],
-    }
-    coefficients: list[dict[str, Any]] = []
-    for k, kind in enumerate(BASES):
-        bases = [each.position if k == 0 else each.rotation for each in own]
-        columns |= _basis_columns(kind, bases)
-        sd = [_common_sd(each, k) for each in own]
-        columns[f"sd_{kind}"] = np.array([math.nan if each is None else each for each in sd]) * _unit(kind)
-        coefficients += [
-            _coefficient_rows(each, k)
-            for each, common, basis in zip(own, sd, bases, strict=True)
-            if common is None and basis is not None
-        ]
-    found = {"trajectories": {name: each for name, each in columns.items() if not _is_empty(each)}}
-    found["trajectory_positions"] = _position_records(own)
-    attitudes = [(each.name, each.table.attitude_times, each.table.attitudes) for each in own]
-    found["trajectory_attitudes"] = _turned_records(attitudes, block)
-    if bodies := [(each.name, *each.body) for each in own if each.body is not None]:
-        turned = [(name, times, np.swapaxes(matrices, 1, 2)) for name, times, matrices in bodies]
-        found["body_rotations"] = _turned_records(turned, block)
-    if knots := _knots(own):
-        found["trajectory_knots"] = knots
-    if coefficients:
-        found["trajectory_coefficients"] = _joined(coefficients)
-    return found
-
-
-def _unit(kind: str) -> float:
-    """Return what a number of coefficients is in the unit of tables."""
-    return DEGREE if kind == "rotation" else 1.0
-
-
-def _is_empty(column: Any) -> bool:
-    if isinstance(column, np.ndarray):
-        return bool(np.isnan(column).all())
-    return all(each is None or each == "" for each in column)
-
-
-def _basis_columns(kind: str, bases: Sequence[Basis | None]) -> dict[str, Any]:
-    """Return what bases are; knots stand in a table of their own."""
-    words = {Polynomial: "polynomial", Spline: "spline"}
-    polynomials = [each if isinstance(each, Polynomial) else None for each in bases]
-    splines = [each if isinstance(each, Spline) else None for each in bases]
-    found: dict[str, Any] = {
-        kind: ["none" if each is None else words[type(each)] for each in bases],
-        f"{kind}_degree": [None if each is None else each.degree for each in bases],
-        f"{kind}_reference": [None if each is None else each.reference for each in polynomials],
-        f"{kind}_scale": [None if each is None else each.scale for each in polynomials],
-    }
-    for what in ("smooth", "correlation"):
-        pairs = [None if each is None else getattr(each, what) for each in splines]
-        found[f"{kind}_{what}"] = [None if each is None else each[0] for each in pairs]
-        found[f"sd_{kind}_{what}"] = [
-            None if each is None else float(each[1]) * _unit(kind) for each in pairs
-        ]
-    return found
-
-
-def _common_sd(own: Trajectory, which: int) -> float | None:
-    """Return the standard deviation of all coefficients whose given values are 0; None of others."""
-    coefficients = own.coefficients[which]
-    sd = {value for each in coefficients for value in each.deviations.tolist()}
-    alike = len(sd) == 1 and not any(each.position.any() for each in coefficients)
-    return sd.pop() if alike else None
-
-
-def _coefficient_rows(own: Trajectory, which: int) -> dict[str, Any]:
-    coefficients, unit = own.coefficients[which], _unit(BASES[which])
-    values = np.array([each.position for each in coefficients]) * unit
-    sd = np.array([each.deviations for each in coefficients]) * unit
-    return {
-        "trajectory": [own.name] * len(coefficients),
-        "of": [BASES[which]] * len(coefficients),
-        "k": np.arange(len(coefficients)),
-        **dict(zip(AXES, values.T, strict=True)),
-        **dict(zip(_SD, sd.T, strict=True)),
-    }
-
-
-def _joined(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return tables of the same columns as one."""
-    arrays = {name: [each[name] for each in parts] for name in parts[0]}
-    return {
-        name: np.concatenate(own)
-        if isinstance(own[0], np.ndarray)
-        else [each for part in own for each in part]
-        for name, own in arrays.items()
-    }
-
-
-def _position_records(own: Sequence[Trajectory]) -> dict[str, Any]:
-    parts = []
-    for each in own:
-        table = each.table
-        velocities = np.full((len(table.times), 3), np.nan) if table.velocities is None else table.velocities
-        parts.append(
-            {
-                "trajectory": [each.name] * len(table.times),
-                "time": table.times,
-                **dict(zip(AXES, table.positions.T, strict=True)),
-                **dict(zip(VELOCITY, velocities.T, strict=True)),
-            }
-        )
-    found = _joined(parts)
-    return {name: column for name, column in found.items() if name not in VELOCITY or not _is_empty(column)}
-
-
-def _turned_records(records: Sequence[tuple[str, Any, Any]], block: Block) -> dict[str, Any]:
-    return _joined(
-        [
-            {
-                "trajectory": [name] * len(times),
-                "time": np.asarray(times),
-                **dict(zip(_ANGLES, angles_of(np.asarray(matrices), block).T, strict=True)),
-            }
-            for name, times, matrices in records
-        ]
-    )
-
-
-def _knots(own: Sequence[Trajectory]) -> dict[str, Any]:
-    parts = [
-        {"trajectory": [each.name] * len(knots), "of": [kind] * len(knots), "knot": knots}
-        for each in own
-        for kind, basis in zip(BASES, (each.position, each.rotation), strict=True)
-        if isinstance(basis, Spline)
-        for knots in [np.asarray(basis.knots, dtype=float)]
-    ]
-    return _joined(parts) if parts else {}

@@ -21,7 +21,7 @@ from photogram.formats.plain.smoothness import lost_smoothness, smoothness_table
 from photogram.formats.plain.statement_settings import asked_files, asked_lines
 from photogram.formats.plain.statement_tables import COVERS, lengths_table
 from photogram.formats.plain.tables import correlations
-from photogram.formats.plain.trajectories import trajectory_tables
+from photogram.formats.plain.trajectories_written import trajectory_tables
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
 from photogram.io.toml import quoted_text
