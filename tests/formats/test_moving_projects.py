@@ -565,3 +565,19 @@ def test_photos_that_move_are_not_adjusted_in_parts(project):
     assert streamable(drone)
     with pytest.raises(InputError, match="rolling shutter, or on trajectories, are read whole"):
         Streamed(drone, Wishes(), project / "run")
+
+
+def test_a_drone_that_is_taken_to_stand_still_does_not_fit(tmp_path):
+    example = Path(formats.__file__).parents[1] / "examples" / "rolling"
+    moving = adjust(formats.read(example).block)
+    assert 0.8 < moving.variance_of_unit_weight < 1.2
+    assert np.abs(moving.check_points.differences).max() < 0.05
+    place = Path(shutil.copytree(example, tmp_path / "still"))
+    for name, more in (("cameras", ["readout"]), ("photos", ["v", "rate"])):
+        path = place / f"{name}.csv"
+        table = pd.read_csv(path, comment="#", dtype=str)
+        there = [column for column in table if column.removeprefix("sd_").startswith(tuple(more))]
+        table.drop(columns=there).to_csv(path, index=False)
+    still = formats.read(place).block
+    assert still.timed == ()
+    assert adjust(still).variance_of_unit_weight > 20.0

@@ -13,8 +13,8 @@ from photogram import adjust, formats
 from photogram.stellar.night_file import inputs
 
 
-@pytest.mark.parametrize("kind", ["metrology", "survey", "night"])
-def test_new_begins_a_metrology_job_a_survey_or_a_night(run, tmp_path, kind):
+@pytest.mark.parametrize("kind", ["metrology", "survey", "rolling", "night"])
+def test_new_begins_a_metrology_job_a_survey_a_drone_or_a_night(run, tmp_path, kind):
     assert run("new", "own", "--kind", kind).exit_code == 0
     refused = run("new", "own")
     assert refused.exit_code == 1
@@ -27,14 +27,23 @@ def test_new_begins_a_metrology_job_a_survey_or_a_night(run, tmp_path, kind):
         done = run("statement", "own")
         assert done.exit_code == 0, done.output
         assert "The accuracy asked for is met" in done.output
+    elif kind == "rolling":
+        done = run("adjust", "own", "--no-html")
+        assert done.exit_code == 0, done.output
+        assert "10 photos on trajectories: 10 with a rolling shutter" in done.output
+        unknowns = pd.read_csv(tmp_path / "own-adjusted" / "unknowns.csv", comment="#")
+        (readout,) = unknowns[unknowns["kind"] == "readout"].to_dict("records")
+        assert abs(readout["value"] - 0.0276) < 2 * readout["sd"]
+        assert readout["sd"] < 0.001
     else:
         night = tmp_path / "own" / "night.toml"
         assert inputs(night) == [night, night.with_name("images.csv")]
         assert all(path.is_file() for path in inputs(night))
 
 
-def test_the_metrology_example_is_what_its_script_makes(tmp_path):
-    script = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "make_targets.py"))
+@pytest.mark.parametrize("name", ["make_targets", "make_rolling"])
+def test_an_example_is_what_its_script_makes(tmp_path, name):
+    script = runpy.run_path(str(Path(__file__).parents[2] / "examples" / f"{name}.py"))
     script["main"]([str(tmp_path)])
     made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     assert made == {path.name: path.read_bytes() for path in script["EXAMPLE"].iterdir()}

@@ -13,7 +13,7 @@ TUTORIALS = dict(
 
 
 def test_there_is_one_for_each_origin():
-    assert set(TUTORIALS) == {"tables", "colmap", "opensfm", "blocks_exchange"}
+    assert set(TUTORIALS) == {"tables", "rolling", "colmap", "opensfm", "blocks_exchange"}
 
 
 @pytest.mark.parametrize("name", TUTORIALS)

@@ -21,6 +21,7 @@ class Kind(StrEnum):
     BLOCK = "block"
     METROLOGY = "metrology"
     SURVEY = "survey"
+    ROLLING = "rolling"
     NIGHT = "night"
 
 
@@ -28,6 +29,7 @@ SOURCES = {
     Kind.BLOCK: EXAMPLE,
     Kind.METROLOGY: ("flange",),
     Kind.SURVEY: ("survey",),
+    Kind.ROLLING: ("rolling",),
     Kind.NIGHT: ("exposures",),
 }
 """Packaged examples, directories of photogram.examples."""
@@ -45,7 +47,8 @@ def new(
         Kind,
         typer.Option(
             help="block: photos of a drone with control. metrology: targets and scale bars, no control."
-            " survey: check points enough to state an accuracy. night: exposures of stars."
+            " survey: check points enough to state an accuracy. rolling: photos of a drone with a rolling"
+            " shutter. night: exposures of stars."
         ),
     ] = Kind.BLOCK,
     overwrite: Annotated[
