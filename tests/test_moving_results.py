@@ -9,9 +9,11 @@ from scipy.interpolate import BSpline
 
 from moving_blocks import rolling, scanned
 from photogram import (
+    AdjustmentError,
     InnerConstraints,
     InputError,
     MinimumConstraints,
+    RankError,
     adjust,
     clean,
     group_sums,
@@ -21,7 +23,7 @@ from photogram import (
 )
 from photogram.network.chosen import kept_images
 from photogram.network.observations import Attitude
-from photogram.network.timed import Timed
+from photogram.network.timed import Lines, Timed
 from photogram.network.trajectories import Clock, Readout, Spline, Table, Trajectory
 from photogram.network.unknowns import Boresight, Sensor
 from photogram.results.courses import courses
@@ -289,3 +291,47 @@ def test_two_known_trajectories():
     assert "Trajectories: their corrections" not in result.report()
     assert Clock("c").KIND == "clock"
     assert Table is type(block.trajectories[0].table)
+
+
+def test_what_is_beyond_its_trajectory_is_named():
+    """The core named photo 30, 401 s from the beginning of trajectory 0."""
+    block = scanned()
+    own = next(each for each in block.observations if each.KIND == "position")
+    late = replace(own, time=500.0)
+    with pytest.raises(
+        AdjustmentError, match=r"1 observation of strip 1 at 500.0 s, receiver.*strip 1, which"
+    ):
+        adjust(block.replace(observations=[*block.observations, late]))
+    first, second = block.timed
+    early = replace(first, lines=Lines([[0, 20.0, 0.002]]))
+    with pytest.raises(
+        AdjustmentError, match=r"image of point P0 on the photo S1 is at 21\.\d+ s, beyond .* strip 1"
+    ):
+        adjust(block.replace(timed=[early, second]))
+    frames = scanned(photos=True)
+    last = replace(frames.timed[-1], time=90.0)
+    with pytest.raises(
+        AdjustmentError, match=r"on the photo F2 is at 90\.0 s, beyond the trajectory strip 1"
+    ):
+        adjust(frames.replace(timed=[*frames.timed[:-1], last]))
+
+
+def test_what_is_open_is_told_by_trajectory_and_time():
+    """One by one coefficients would fill pages."""
+    block = rolling()
+    free = [replace(each, sd_velocity=np.inf, sd_rate=np.inf) for each in block.timed]
+    with pytest.raises(RankError, match="moving readout drone, positions of IMG_1") as told:
+        adjust(block.replace(timed=free))
+    assert "readout time and motion of the photos" in str(told.value)
+    assert "position coefficient" not in str(told.value)
+    with pytest.raises(RankError, match="records of GNSS, or standard deviations of coefficients") as told:
+        adjust(block.replace(point_sd=np.inf))
+    strips = scanned(records=False)
+
+    def finer(own):
+        return Trajectory(own.name, own.table, position=Spline(0.5), rotation=Spline(2.0, sd=1e-3))
+
+    fine = [replace(each, trajectory=finer(each.trajectory)) for each in strips.timed]
+    with pytest.raises(RankError, match=r"positions of strip 1 between [\d.]+ and [\d.]+ s") as told:
+        adjust(strips.replace(timed=fine))
+    assert len(str(told.value).splitlines()) <= 42

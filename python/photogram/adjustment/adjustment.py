@@ -11,6 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from photogram import _photocore
+from photogram.adjustment.coefficients import outside
 from photogram.adjustment.ends import behind, folded, harmful, rounded, too_coarse, undetermined
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.started import started
@@ -425,4 +426,5 @@ def named(
         return too_coarse([block.photo_ids[i] for i in combinations[0][0]], point_names)
     if kind == "memory":
         return OutOfMemoryError(message)
-    return AdjustmentError(message)
+    # The core counts photos, trajectories and seconds from where these begin.
+    return AdjustmentError(outside(block) or message if kind == "input" else message)

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.messages import listed
+from photogram.messages import counted, listed
 from photogram.network.block import Block
+from photogram.network.observations import moments
 from photogram.network.trajectories import Coefficient, Spline, Trajectory
 from photogram.network.unknowns import Unknown
+from photogram.network.whereabouts import reach
 
-__all__ = ["named_unknowns", "of_motion"]
+__all__ = ["named_unknowns", "of_motion", "outside"]
 
 
 def named_unknowns(block: Block, unknowns: Sequence[Unknown]) -> list[str]:
@@ -33,7 +35,9 @@ def named_unknowns(block: Block, unknowns: Sequence[Unknown]) -> list[str]:
     for part, what in enumerate(("positions", "rotations")):
         names = [name for each in every if (name := _named(each, part, wanted))]
         found += [f"{what} of {listed(names)}"] if names else []
-    return found
+    known = {id(each) for own in every for each in (*own.coefficients[0], *own.coefficients[1])}
+    others = [each.title for each in unknowns if isinstance(each, Coefficient) and id(each) not in known]
+    return [*found, *dict.fromkeys(others)]
 
 
 def _named(trajectory: Trajectory, part: int, wanted: set[int]) -> str:
@@ -48,6 +52,40 @@ def _named(trajectory: Trajectory, part: int, wanted: set[int]) -> str:
     first, last = trajectory.table.span
     begin, end = max(knots[own[0]], first), min(knots[own[-1] + basis.degree + 1], last)
     return f"{trajectory.name} between {begin:.10g} and {end:.10g} s"
+
+
+def outside(block: Block) -> str:
+    """Say which photo, or record, is at a time that its trajectory does not reach; nothing where none is."""
+    photos = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
+    for own, trajectory in zip(block.timed, block.trajectories, strict=True):
+        rows = np.flatnonzero(block.image_photos == photos[own.photo])
+        time, scale, _ = own.images(block.image_xy[rows])
+        rate = 1.0 if own.readout is None else float(own.readout.position[0])
+        offset = 0.0 if own.offset is None else float(own.offset.position[0])
+        first, last = reach(trajectory)
+        times = time + offset + rate * scale
+        bad = np.flatnonzero((times < first) | (times > last))
+        if bad.size or not first <= time + offset <= last:
+            at = float(times[bad[0]]) if bad.size else time + offset
+            what = f"the photo {own.photo}"
+            if bad.size:
+                what = f"the image of point {block.point_ids[block.image_points[rows[bad[0]]]]} on {what}"
+            return f"{what} is at {at:.12g} s, {_beyond(trajectory, first, last)}"
+    for each in moments(block.observations):
+        first, last = reach(each.trajectory)
+        at = each.time + (0.0 if each.clock is None else float(each.clock.position[0]))
+        if not first <= at <= last:
+            count = sum(one.moment is not None and one.moment.name == each.name for one in block.observations)
+            what = f"{counted(count, 'observation')} of {each.name}"
+            return f"{what}: it is {_beyond(each.trajectory, first, last)}"
+    return ""
+
+
+def _beyond(trajectory: Trajectory, first: float, last: float) -> str:
+    return (
+        f"beyond the trajectory {trajectory.name}, which reaches from {first!r} to {last!r} s: half a record"
+        " beyond its table, within its knots"
+    )
 
 
 def of_motion(kinds: set[str], *, placed: bool) -> str:
