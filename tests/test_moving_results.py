@@ -10,14 +10,18 @@ from scipy.interpolate import BSpline
 from moving_blocks import rolling, scanned
 from photogram import (
     AdjustmentError,
+    Camera,
     InnerConstraints,
     InputError,
     MinimumConstraints,
     RankError,
     adjust,
     clean,
+    eliminate_terms,
     group_sums,
+    score_test,
     snoop,
+    terms_test,
     variance_components,
     variance_function,
 )
@@ -310,9 +314,7 @@ def test_what_is_beyond_its_trajectory_is_named():
         adjust(block.replace(timed=[early, second]))
     frames = scanned(photos=True)
     last = replace(frames.timed[-1], time=90.0)
-    with pytest.raises(
-        AdjustmentError, match=r"on the photo F2 is at 90\.0 s, beyond the trajectory strip 1"
-    ):
+    with pytest.raises(AdjustmentError, match=r"on the photo F2 is at 90 s, beyond the trajectory strip 1"):
         adjust(frames.replace(timed=[*frames.timed[:-1], last]))
 
 
@@ -335,3 +337,31 @@ def test_what_is_open_is_told_by_trajectory_and_time():
     with pytest.raises(RankError, match=r"positions of strip 1 between [\d.]+ and [\d.]+ s") as told:
         adjust(strips.replace(timed=fine))
     assert len(str(told.value).splitlines()) <= 42
+
+
+@pytest.mark.parametrize(
+    ("block", "model", "given", "terms"),
+    [
+        (scanned, "brown", {"c": -60.0, "K1": 0.0, "K2": 0.0}, ["K1", "K2"]),
+        (
+            rolling,
+            "opencv",
+            {"fx": 3000.0, "fy": 3000.0, "cx": 2000.0, "cy": 1500.0}
+            | dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0),
+            ["k1"],
+        ),
+    ],
+)
+def test_terms_of_lenses_of_what_moves(block, model, given, terms):
+    """Scores take places in the focal plane: they foretell what estimated terms come to."""
+    block = block(photos=True) if block is scanned else block()
+
+    def adjusted(**sd):
+        return adjust(block.replace(cameras=[Camera(model, given, sd=sd)]), tolerance=1e-8)
+
+    held, free = adjusted(), adjusted(**dict.fromkeys(terms, np.inf))
+    found = score_test(held, terms)
+    fall = held.sums_of_squares.total - free.sums_of_squares.total
+    assert found.statistic == pytest.approx(fall, rel=2e-3)
+    assert terms_test(free, terms).statistic == pytest.approx(fall, rel=5e-3)
+    assert eliminate_terms(free.block).result.converged
