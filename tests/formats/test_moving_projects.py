@@ -112,6 +112,8 @@ def test_two_lines_on_one_trajectory_come_back(tmp_path):
     assert one.sensor is None
     assert {id(each.moment.trajectory) for each in found.observations if each.moment} == {id(one.trajectory)}
     check_adjusted(block, found)
+    other = block.replace(photo_to_ground=True)
+    same(other, again(other, tmp_path / "other"))
 
 
 BASES = (
@@ -219,6 +221,62 @@ def test_deviations_of_coefficients_may_stand_in_the_settings(project):
     np.testing.assert_allclose(
         [each.deviations for each in own.coefficients[1]], np.radians(np.full((7, 3), 0.5))
     )
+
+
+def test_the_camera_tells_the_sensor_of_a_rig(project):
+    lines = project / "lines"
+    plain = formats.read(lines).block
+    edited(lines / "photos.csv", lambda table: table.assign(rig="pair").drop(columns="sensor"))
+    edited(
+        lines / "rigs.csv",
+        lambda table: table.assign(rig="pair", camera=["down", "ahead"]).drop(columns="sensor"),
+    )
+    found = formats.read(lines).block
+    assert found.timed[0].sensor is None
+    assert found.timed[1].sensor.name == "pair/ahead"
+    np.testing.assert_array_equal(found.timed[1].sensor.matrix, plain.timed[1].sensor.matrix)
+    edited(lines / "rigs.csv", lambda table: table.assign(camera=["down", "down"]))
+    with pytest.raises(InputError, match="has the camera down twice"):
+        formats.read(lines)
+    edited(lines / "rigs.csv", lambda table: table[:1])
+    with pytest.raises(InputError, match=r"photos\.csv, record 3.*the rig pair has no camera ahead"):
+        formats.read(lines)
+
+
+def test_cameras_for_each_photo_have_one_shutter(project):
+    drone = project / "drone"
+    edited(drone / "cameras.csv", lambda table: table.assign(for_each="photo").drop(columns="shutter"))
+    found = formats.read(drone).block
+    assert len(found.cameras) == 6
+    assert len({id(each.readout) for each in found.timed}) == 1
+    assert found.timed[0].readout.name == "drone"
+    same(found, again(found, project / "again", sizes=((3000, 2000),) * 6))
+
+
+def test_tables_of_parquet(project):
+    pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    lines = project / "lines"
+    plain = formats.read(lines).block
+    for path in sorted(lines.glob("*.csv")):
+        pd.read_csv(path).to_parquet(path.with_suffix(".parquet"))
+        path.unlink()
+    same(plain, formats.read(lines).block)
+
+
+def test_trajectories_need_a_frame_that_is_known(project):
+    pytest.importorskip("pyproj", reason="pyproj is not installed")
+    lines = project / "lines"
+    change(lines / "project.toml", "[adjust]", '[control]\ncrs = "EPSG:25832"\n\n[adjust]')
+
+    def placed(table):
+        moved = {"x": 5e5, "y": 5.2e6}
+        return table.assign(
+            **{name: (table[name].astype(float) + by).map(repr) for name, by in moved.items()}
+        )
+
+    edited(lines / "control.csv", placed)
+    with pytest.raises(InputError, match=r"project\.toml: trajectories are in the frame of the project"):
+        formats.read(lines)
 
 
 def in_other_axes(project):

@@ -99,6 +99,12 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     places = {name: row for row, name in enumerate(points.names)}
     observations = read_observations(tables, transform, subjects, places, rigs)
     observations += read_covariances(tables).priors(_unknowns(observations, mounts, timed))
+    if trajectories and transform.frame != settings.frame:
+        raise InputError(
+            "trajectories are in the frame of the project, and nothing says where that is: [frame] has no"
+            f" origin, and tables with a crs go into one that is {transform.frame}",
+            file=settings.path,
+        )
     project = assembled(
         path=settings.path,
         title="plain project",
