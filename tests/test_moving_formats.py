@@ -7,6 +7,7 @@ import pytest
 
 from moving_blocks import rolling, scanned
 from photogram import InputError, adjust, formats, predict
+from photogram.absolute_orientation import relative_model
 from photogram.formats.additions import repeated_remarks
 from photogram.formats.carrying import is_free
 from photogram.formats.millimetres import in_pixels
@@ -137,3 +138,12 @@ def test_maps_show_records_where_they_were_made():
 def test_names_of_timed_photos_are_names():
     with pytest.raises(InputError, match="the block has no photo X"):
         rolling().replace(timed=[Timed("X")])
+
+
+def test_models_of_two_photos_are_of_pictures():
+    with pytest.raises(InputError, match="a model of two photos: the photo IMG_1 is on a trajectory"):
+        relative_model(rolling(), "IMG_1", "IMG_2")
+
+
+def test_a_block_says_what_is_smooth():
+    assert "smoothness of 3 position coefficients" in repr(scanned(smooth=True))

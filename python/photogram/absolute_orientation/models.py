@@ -21,6 +21,7 @@ from photogram.errors import InputError, RankError
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos
 from photogram.network.datum import MinimumConstraints
+from photogram.network.motion import refuse_trajectories
 from photogram.results.result import Result
 
 __all__ = ["Model", "Strip", "relative_model", "strip_of"]
@@ -89,7 +90,7 @@ def relative_model(block: Block, first: str, second: str) -> Model:
     Raises
     ------
     InputError
-        Photos that are not there; geographic space.
+        Photos that are not there; geographic space; photos on trajectories.
     RankError
         Fewer than five common points.
     AdjustmentError
@@ -100,6 +101,7 @@ def relative_model(block: Block, first: str, second: str) -> Model:
         raise InputError(f"a model has two photos of the block: {missing[0] if missing else first}")
     if block.geographic:
         raise InputError("a model is cartesian: geographic coordinates have no place there")
+    refuse_trajectories(block, "a model of two photos")
     pair = of_photos(block, np.isin(np.array(block.photo_ids, dtype=object), [first, second]))
     twice = np.bincount(pair.image_points, minlength=len(pair.point_ids)) == 2
     if np.count_nonzero(twice) < LEAST:

@@ -413,7 +413,9 @@ class Block(Valued, Brief):
             ("unit", self.linear_unit),
         ]
         if kinds:
-            rows.append(("observations", ", ".join(f"{count} {name}" for name, count in kinds.items())))
+            # A kind of smoothness says how many coefficients of what it is of.
+            told = (f"{count} {name.replace(', ', ' of ')}" for name, count in kinds.items())
+            rows.append(("observations", ", ".join(told)))
         if self.mounts:
             rows.append(("on frames", few([each.photo for each in self.mounts])))
         if self.timed:
