@@ -10,6 +10,7 @@ from photogram.network.motion import at_rest, flown_by, focal_images, of_picture
 from photogram.network.observations import Attitude, Position, Rate, Smoothness, Velocity
 from photogram.network.timed import Timed
 from photogram.network.trajectories import Clock, Polynomial, Table, Trajectory
+from photogram.network.unknowns import Sensor
 
 
 def table():
@@ -144,3 +145,22 @@ def test_some_of_the_photos():
     apart = Position(None, [0.0, 0.0, 0.0], sd=1.0, trajectory=known(), time=0.5)
     left = of_photos(block.replace(observations=[*block.observations, apart]), np.arange(5) == 1)
     assert {each.moment.trajectory.name for each in left.observations if each.moment} == {"strip 2", "pass"}
+
+
+def test_the_motion_of_what_does_not_move():
+    """The core named photo 0 of observation 0."""
+    block = rolling()
+    still = block.replace(timed=block.timed[1:])
+    for kind, name, value in ((Velocity, "velocity", [0.0] * 3), (Rate, "rate", [0.0] * 3)):
+        block.replace(observations=[kind("IMG_1", value, sd=1.0)])
+        with pytest.raises(InputError, match=f"the {name} of the photo IMG_1: it is on no trajectory"):
+            still.replace(observations=[kind("IMG_1", value, sd=1.0)])
+        with pytest.raises(InputError, match="of the photo NOBODY, which the block has not"):
+            still.replace(observations=[kind("NOBODY", value, sd=1.0)])
+    frames = scanned(photos=True)
+    *others, last = frames.timed
+    oblique = Timed(
+        "F2", last.trajectory, last.time, sensor=Sensor("oblique", np.zeros(3), np.eye(3), sd=0.0)
+    )
+    with pytest.raises(InputError, match="the rate of the photo F2: it is a sensor on a trajectory"):
+        frames.replace(timed=[*others, oblique], observations=[Rate("F2", [0.0] * 3, sd=1.0)])

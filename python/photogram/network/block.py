@@ -20,7 +20,7 @@ from photogram.messages import listed
 from photogram.network.cameras import Camera, CameraRow, camera_rows, checked_cameras, photo_indices
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
-from photogram.network.observations import Observation, observation_rows
+from photogram.network.observations import Observation, Rate, Velocity, observation_rows
 from photogram.network.observations.smoothness import with_smoothness
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.rigs import Mount, checked_mounts
@@ -373,6 +373,21 @@ class Block(Valued, Brief):
                 " photogram.first_values finds it of the block without what is timed"
             )
 
+    def _check_motions(self) -> None:
+        """Refuse motions of photos that have none of their own."""
+        sensors = {each.photo: each.sensor for each in self.timed}
+        for each in self.observations:
+            if not isinstance(each, Rate | Velocity) or each.moment is not None:
+                continue
+            photo = each.photos[0]
+            if photo not in sensors and photo in self.photo_ids:
+                raise InputError(f"the {each.KIND} of the photo {photo}: it is on no trajectory")
+            if sensors.get(photo) is not None:
+                raise InputError(
+                    f"the {each.KIND} of the photo {photo}: it is a sensor on a trajectory; take the"
+                    " trajectory at its time"
+                )
+
     def _check_observations(self) -> None:
         if not isinstance(self.observations, Sequence):
             raise InputError(f"observations is no list: {shown(self.observations)}")
@@ -382,6 +397,7 @@ class Block(Valued, Brief):
                 raise InputError(f"observations[{row}] is no observation: {shown(each)}")
         self._check_mounts()
         self._check_timed()
+        self._check_motions()
         self._set("observations", with_smoothness(self.observations, self.trajectories))
         observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
 
