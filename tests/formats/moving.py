@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 
-from photogram import Attitudes, Block, Camera
+from photogram import Attitudes, Block, Camera, formats
 from photogram.network.observations import Attitude, Position, Prior, Rate, Velocity
 from photogram.network.timed import Lines, LineSensor, Shutter, Timed
 from photogram.network.trajectories import Clock, GyroBias, Polynomial, Readout, Spline, Table, Trajectory
@@ -32,9 +33,11 @@ def rolling(unit: str = "px", direction: str = "down") -> Block:
             "opencv", {"fx": 2400.0, "fy": 2400.0, "cx": 1500.0, "cy": 1000.0, "k1": -0.02}, name="drone"
         )
         edges = {"down": (0.0, 2000.0), "up": (2000.0, 0.0), "right": (0.0, 3000.0), "left": (3000.0, 0.0)}
+        middle, half = [1500.0, 1000.0], [1500.0, 1000.0]
     else:
         camera = Camera("brown", {"c": -9.6, "K1": 1e-4}, name="drone")
         edges = {"down": (4.0, -4.0), "up": (-4.0, 4.0), "right": (-6.0, 6.0), "left": (6.0, -6.0)}
+        middle, half = [0.0, 0.0], [6.0, 4.0]
     shutter = Shutter(Readout("rows", 0.02, sd=np.inf), edges[direction], direction)
     readout = 0.025
     centres, angles, velocities, rates, rows = [], [], [], [], []
@@ -50,7 +53,7 @@ def rolling(unit: str = "px", direction: str = "down") -> Block:
                 turn = Attitudes.of("rotation_vector", [rates[-1] * time]).matrices[0]
                 xy = camera.project([(matrix @ turn).T @ (place - centres[-1] - velocities[-1] * time)])
                 time = float(shutter.times(xy)[0]) * readout
-            if 0.0 < time < readout and abs(xy[0, 0] - xy[0].mean()) < 1e9:
+            if (np.abs(xy[0] - middle) < half).all():
                 rows.append((photo, point, *xy[0]))
     photos, seen, x, y = (np.array(column) for column in zip(*rows, strict=True))
     size = 1.0 if unit == "px" else 0.004
@@ -86,52 +89,86 @@ def rolling(unit: str = "px", direction: str = "down") -> Block:
     )
 
 
+def _strip() -> Trajectory:
+    """Return the trajectory of a pass: records with velocities, a polynomial and a smooth spline."""
+    times, tilts = np.arange(200.0, 211.5, 1.0), np.arange(199.75, 211.5, 0.5)
+    places = np.column_stack([SPEED * (times - 205.0), 2 * np.sin(times), 800 + np.cos(times)])
+    speeds = np.column_stack([np.full(len(times), SPEED), 2 * np.cos(times), -np.sin(times)])
+    angles = [(0.01 * np.sin(t), 0.01 * np.cos(t), -np.pi / 2 + 0.005 * t % 0.1) for t in tilts]
+    drift = [[0.2, -0.1, 0.3], [0.01, 0.02, -0.05]]
+    return Trajectory(
+        "strip 7",
+        Table(
+            times,
+            places,
+            tilts,
+            np.array([turned(*each) for each in angles]),
+            velocities=speeds,
+            interpolation="hermite",
+        ),
+        position=Polynomial(1, value=drift, sd=[[0.3, 0.3, 0.2], [0.1, np.inf, 0.1]]),
+        rotation=Spline(every=2.0, sd=0.02, smooth=(2, 1e-3)),
+    )
+
+
+def _scans(strip: Trajectory) -> list[Timed]:
+    """Return two scans: of a line that looks down, and of one that looks ahead."""
+    mount_sd = [0, 0, 0, 1e-3, 1e-3, 1e-3]
+    ahead = Sensor("ahead", [0.1, 0.0, -0.02], turned(np.radians(18.0), 0.001, -0.002), sd=mount_sd)
+    oscillator = Readout("oscillator", 1.0, sd=1e-5)
+    return [
+        Timed(
+            "L1",
+            strip,
+            lines=Lines([[0, 202.0, LINE], [1000, 204.0, LINE]]),
+            line_sensor=LineSensor((0.01, 0.0), 3000.0),
+            rate=oscillator,
+            time=205.0,
+            offset=Clock("lines", 0.0, sd=1e-4),
+        ),
+        Timed(
+            "L2",
+            strip,
+            lines=Lines([[0, 200.5, LINE]]),
+            line_sensor=LineSensor((-0.01, 0.0), 3000.0, x0=0.05),
+            sensor=ahead,
+            rate=oscillator,
+        ),
+    ]
+
+
+def _images(
+    timed: list[Timed], cameras: list[Camera], points: np.ndarray
+) -> list[tuple[int, int, float, float]]:
+    """Return photo, point, sample and line of each image."""
+    rows = []
+    for photo, (own, camera) in enumerate(zip(timed, cameras, strict=True)):
+        line, begin = own.line_sensor, own.lines.table[0, 1]
+        for point, ground in enumerate(points):
+            found = _line_of(own.trajectory, own.sensor, camera, ground, begin)
+            if found is not None:
+                time, xy = found
+                rows.append(
+                    (photo, point, (xy[0] - line.x0) / line.pitch[0] + line.s0, (time - begin) / LINE)
+                )
+    return rows
+
+
 def two_lines() -> Block:
     """Return a strip of a scanner with a line that looks down and one that looks ahead.
 
     Everything that tables may say is there: a table with velocities, a polynomial with given coefficients, a
     spline that is smooth, mounts, factors of line rates, clocks, records of GNSS and of an inertial unit.
     """
-    random = np.random.default_rng(5)
-    times = np.arange(200.0, 211.5, 1.0)
-    places = np.column_stack([SPEED * (times - 205.0), 2 * np.sin(times), 800 + np.cos(times)])
-    speeds = np.column_stack([np.full(len(times), SPEED), 2 * np.cos(times), -np.sin(times)])
-    tilts = np.arange(199.75, 211.5, 0.5)
-    attitudes = np.array(
-        [turned(0.01 * np.sin(t), 0.01 * np.cos(t), -np.pi / 2 + 0.005 * t % 0.1) for t in tilts]
-    )
-    drift = [[0.2, -0.1, 0.3], [0.01, 0.02, -0.05]]
-    strip = Trajectory(
-        "strip 7",
-        Table(times, places, tilts, attitudes, velocities=speeds, interpolation="hermite"),
-        position=Polynomial(1, value=drift, sd=[[0.3, 0.3, 0.2], [0.1, np.inf, 0.1]]),
-        rotation=Spline(every=2.0, sd=0.02, smooth=(2, 1e-3)),
-    )
-    ahead = Sensor(
-        "ahead", [0.1, 0.0, -0.02], turned(np.radians(18.0), 0.001, -0.002), sd=[0, 0, 0, 1e-3, 1e-3, 1e-3]
-    )
+    random, strip = np.random.default_rng(5), _strip()
     lens = {"c": -120.0, "xp": 0.01, "K1": 2e-7}
-    cameras = [
-        Camera("brown", lens, {"K1": 1e-8} if name == "down" else 0.0, name=name)
-        for name in ("down", "ahead")
-    ]
-    lines = [LineSensor((0.01, 0.0), 3000.0), LineSensor((-0.01, 0.0), 3000.0, y0=0.0, x0=0.05)]
-    begins = [202.0, 200.5]
+    cameras = [Camera("brown", lens, {"K1": 1e-8}, name="down"), Camera("brown", lens, name="ahead")]
+    timed = _scans(strip)
     x, y = (each.ravel() for each in np.meshgrid(np.linspace(-120, 120, 6), np.linspace(-160, 160, 5)))
     points = np.column_stack([x, y, random.uniform(0, 60, len(x))])
-    rows = []
-    for photo, (camera, line, begin) in enumerate(zip(cameras, lines, begins, strict=True)):
-        mount = None if photo == 0 else ahead
-        for point, ground in enumerate(points):
-            found = _line_of(strip, mount, camera, ground, begin)
-            if found is not None:
-                time, xy = found
-                sample = (xy[0] - line.x0) / line.pitch[0] + line.s0
-                rows.append((photo, point, sample, (time - begin) / LINE))
+    rows = _images(timed, cameras, points)
     photos, seen, *xy = (np.array(column) for column in zip(*rows, strict=True))
-    errors = random.normal(0, 0.3, (len(rows), 2))
     held = np.arange(len(points))[:, np.newaxis] % 5 == 0
-    oscillator = Readout("oscillator", 1.0, sd=1e-5)
     return Block(
         photo_ids=["L1", "L2"],
         photo_positions=[[0.0, 0.0, 800.0]] * 2,
@@ -143,27 +180,9 @@ def two_lines() -> Block:
         point_sd=np.where(held, 0.02, np.inf) * np.ones(3),
         image_photos=photos.astype(int),
         image_points=seen.astype(int),
-        image_xy=np.column_stack(xy) + errors,
-        image_sd=np.column_stack([np.full(len(rows), 0.004), np.full(len(rows), 0.005)]),
-        timed=[
-            Timed(
-                "L1",
-                strip,
-                lines=Lines([[0, begins[0], LINE], [1000, begins[0] + 2.0, LINE]]),
-                line_sensor=lines[0],
-                rate=oscillator,
-                time=205.0,
-                offset=Clock("lines", 0.0, sd=1e-4),
-            ),
-            Timed(
-                "L2",
-                strip,
-                lines=Lines([[0, begins[1], LINE]]),
-                line_sensor=lines[1],
-                sensor=ahead,
-                rate=oscillator,
-            ),
-        ],
+        image_xy=np.column_stack(xy) + random.normal(0, 0.3, (len(rows), 2)),
+        image_sd=np.tile([0.004, 0.005], (len(rows), 1)),
+        timed=timed,
         observations=[
             *_records(strip, random),
             Prior(strip.coefficients[1][0], covariance=np.eye(3) * 1e-4 + 2e-5),
@@ -213,6 +232,25 @@ def _records(strip, random):
         )
         found.append(Rate(None, 2e-3 * noise[2], covariance=covariance / 10, boresight=imu, bias=bias, **at))
     return found
+
+
+def project_of(block, place, sizes=None, pixel_mm=None):
+    """Return a project of a block that somebody has made."""
+    count = len(block.cameras)
+    return formats.Project(
+        block=block,
+        path=place,
+        title="made",
+        sizes=sizes or (None,) * count,
+        pixel_mm=pixel_mm or (None,) * count,
+        starts=block.point_positions,
+    )
+
+
+def edited(path, edit):
+    """Change a table; columns of numbers as they are written."""
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    edit(table).to_csv(path, index=False)
 
 
 def same(one: Block, other: Block) -> None:

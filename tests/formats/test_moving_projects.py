@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from damaged import check_damaged
 from hypothesis import assume, given, settings
 from hypothesis.strategies import integers, sampled_from
-from moving import rolling, same, two_lines
+from moving import edited, project_of, rolling, same, two_lines
 from test_plain_project import change, written
 
 import test_moving
@@ -23,19 +22,6 @@ from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 from photogram.network.whereabouts import about
 
 GOLDEN = ("rolling_shutter", "pushbroom_strips", "jitter", "three_line", "planetary_pair")
-
-
-def project_of(block, place, sizes=None, pixel_mm=None):
-    """Return a project of a block that somebody has made."""
-    count = len(block.cameras)
-    return formats.Project(
-        block=block,
-        path=place,
-        title="made",
-        sizes=sizes or (None,) * count,
-        pixel_mm=pixel_mm or (None,) * count,
-        starts=block.point_positions,
-    )
 
 
 def again(block, place, **more):
@@ -170,29 +156,8 @@ def test_any_trajectory_comes_back(tmp_path_factory, position, rotation, table, 
     same(block, again(block, tmp_path_factory.mktemp("any")))
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """Write the projects of a rolling shutter and of two lines."""
-    place = tmp_path_factory.mktemp("made")
-    written(project_of(rolling(), place, sizes=((3000, 2000),)), place / "drone")
-    written(project_of(two_lines(), place), place / "lines")
-    return place
-
-
-@pytest.fixture
-def project(made, tmp_path):
-    """Return a copy of both projects."""
-    return Path(shutil.copytree(made, tmp_path / "own"))
-
-
-def edited(path, edit):
-    """Change a table; columns of numbers as they are written."""
-    table = pd.read_csv(path, dtype=str, keep_default_na=False)
-    edit(table).to_csv(path, index=False)
-
-
-def test_photos_on_a_trajectory_need_no_pose(project):
-    lines = project / "lines"
+def test_photos_on_a_trajectory_need_no_pose(moving_projects):
+    lines = moving_projects / "lines"
     edited(lines / "photos.csv", lambda table: table[["photo", "camera", "trajectory", "rig", "sensor"]])
     found = formats.read(lines).block
     assert np.isfinite(found.photo_positions).all()
@@ -205,8 +170,8 @@ def test_photos_on_a_trajectory_need_no_pose(project):
     check_adjusted(found, found.replace(photo_positions=np.zeros((2, 3))))
 
 
-def test_deviations_of_coefficients_may_stand_in_the_settings(project):
-    lines = project / "lines"
+def test_deviations_of_coefficients_may_stand_in_the_settings(moving_projects):
+    lines = moving_projects / "lines"
     (lines / "trajectory_coefficients.csv").unlink()
     (lines / "trajectory_knots.csv").unlink()
     (lines / "covariances.csv").unlink()
@@ -223,8 +188,8 @@ def test_deviations_of_coefficients_may_stand_in_the_settings(project):
     )
 
 
-def test_the_camera_tells_the_sensor_of_a_rig(project):
-    lines = project / "lines"
+def test_the_camera_tells_the_sensor_of_a_rig(moving_projects):
+    lines = moving_projects / "lines"
     plain = formats.read(lines).block
     edited(lines / "photos.csv", lambda table: table.assign(rig="pair").drop(columns="sensor"))
     edited(
@@ -243,19 +208,19 @@ def test_the_camera_tells_the_sensor_of_a_rig(project):
         formats.read(lines)
 
 
-def test_cameras_for_each_photo_have_one_shutter(project):
-    drone = project / "drone"
+def test_cameras_for_each_photo_have_one_shutter(moving_projects):
+    drone = moving_projects / "drone"
     edited(drone / "cameras.csv", lambda table: table.assign(for_each="photo").drop(columns="shutter"))
     found = formats.read(drone).block
     assert len(found.cameras) == 6
     assert len({id(each.readout) for each in found.timed}) == 1
     assert found.timed[0].readout.name == "drone"
-    same(found, again(found, project / "again", sizes=((3000, 2000),) * 6))
+    same(found, again(found, moving_projects / "again", sizes=((3000, 2000),) * 6))
 
 
-def test_tables_of_parquet(project):
+def test_tables_of_parquet(moving_projects):
     pytest.importorskip("pyarrow", reason="pyarrow is not installed")
-    lines = project / "lines"
+    lines = moving_projects / "lines"
     plain = formats.read(lines).block
     for path in sorted(lines.glob("*.csv")):
         pd.read_csv(path).to_parquet(path.with_suffix(".parquet"))
@@ -263,9 +228,9 @@ def test_tables_of_parquet(project):
     same(plain, formats.read(lines).block)
 
 
-def test_trajectories_need_a_frame_that_is_known(project):
+def test_trajectories_need_a_frame_that_is_known(moving_projects):
     pytest.importorskip("pyproj", reason="pyproj is not installed")
-    lines = project / "lines"
+    lines = moving_projects / "lines"
     change(lines / "project.toml", "[adjust]", '[control]\ncrs = "EPSG:25832"\n\n[adjust]')
 
     def placed(table):
@@ -279,72 +244,68 @@ def test_trajectories_need_a_frame_that_is_known(project):
         formats.read(lines)
 
 
-def in_other_axes(project):
+GON = 10 / 9
+SD = [f"sd_rotation_{axis}" for axis in "xyz"]
+OTHER_NUMBERS = (
+    *((name, SD, GON) for name in ("attitudes", "attitude_groups", "rigs")),
+    ("attitudes", ["cov_rotation_y_rotation_z"], GON**2),
+    ("attitudes", ["cov_rotation_x_rotation_y", "cov_rotation_x_rotation_z"], -(GON**2)),
+    ("rates", ["rate_y", "rate_z", "cov_rate_x_rate_y", "cov_rate_x_rate_z"], -1.0),
+    ("attitude_groups", ["bias_y", "bias_z"], -1.0),
+    ("rigs", ["y", "z"], -1.0),
+    ("gnss_groups", ["lever_y", "lever_z"], -1.0),
+    ("trajectories", ["sd_rotation", "sd_rotation_smooth"], GON),
+    ("photos", ["rate_y", "rate_z"], -1.0),
+)
+"""What gon, and axes of photos whose y points down, change of numbers: table, columns, factor."""
+
+
+def scaled(table, columns, factor):
+    """Return a table with other numbers in some of its columns, those that it has."""
+    own = table[[name for name in columns if name in table]].replace("", "nan").astype(float) * factor
+    return table.assign(**own.map(repr).replace("nan", "").to_dict("list"))
+
+
+def in_other_axes(place):
     """Write tables in gon, with matrices of photos whose y points down."""
     flip = np.diag([1.0, -1.0, -1.0])
     angles, elements = ["omega", "phi", "kappa"], [f"m{i}{j}" for i in "123" for j in "123"]
 
-    def turned(table, before, after):
+    def turned(table, after):
         given = table[angles].replace("", "nan").astype(float)
         matrices = Attitudes.of("omega_phi_kappa", np.radians(given)).matrices
-        own = before @ matrices.transpose(0, 2, 1) @ after
+        own = flip @ matrices.transpose(0, 2, 1) @ after
         text = pd.DataFrame(own.reshape(-1, 9), columns=elements, index=table.index).map(repr)
         return table.drop(columns=angles).join(text.replace("nan", ""))
 
-    def scaled(table, columns, factor):
-        there = [name for name in columns if name in table]
-        own = table[there].replace("", "nan").astype(float) * factor
-        return table.assign(**own.map(repr).replace("nan", "").to_dict("list"))
+    def covariances(table):
+        signs = (table["first"] + table["second"]).map(lambda pair: -1.0 if pair in ("yx", "zx") else 1.0)
+        return table.assign(covariance=(table["covariance"].astype(float) * signs * GON**2).map(repr))
 
-    for name in ("photos", "trajectory_attitudes", "attitudes", "attitude_groups", "rigs"):
-        path = project / f"{name}.csv"
-        if path.exists():
-            # Of sensors and boresights both sides are axes of photos, or of what moves as they do.
-            other = flip if name in ("rigs", "attitude_groups") else np.eye(3)
-            edited(path, lambda table, other=other: turned(table, flip, other))
-            edited(path, lambda table: scaled(table, [f"sd_rotation_{axis}" for axis in "xyz"], 10 / 9))
-    if (project / "attitudes.csv").exists():
-        for sign, columns in ((1.0, ["y_rotation_z"]), (-1.0, ["x_rotation_y", "x_rotation_z"])):
-            names, factor = [f"cov_rotation_{each}" for each in columns], sign * (10 / 9) ** 2
-            edited(project / "attitudes.csv", lambda table, n=names, f=factor: scaled(table, n, f))
-    for name, columns in (("rates", ["rate_y", "rate_z"]), ("attitude_groups", ["bias_y", "bias_z"])):
-        if (project / f"{name}.csv").exists():
-            edited(project / f"{name}.csv", lambda table, columns=columns: scaled(table, columns, -1.0))
-    if (project / "rates.csv").exists():
-        edited(
-            project / "rates.csv",
-            lambda table: scaled(table, ["cov_rate_x_rate_y", "cov_rate_x_rate_z"], -1.0),
-        )
-    for name, columns in (("rigs", ["y", "z"]), ("gnss_groups", ["lever_y", "lever_z"])):
-        if (project / f"{name}.csv").exists():
-            edited(project / f"{name}.csv", lambda table, columns=columns: scaled(table, columns, -1.0))
-    if (project / "trajectories.csv").exists():
-        for sign, pairs in ((1.0, ("xx", "yy", "zz", "zy")), (-1.0, ("yx", "zx"))):
-
-            def of_pairs(table, sign=sign, pairs=pairs):
-                rows = (table["first"] + table["second"]).isin(pairs)
-                own = scaled(table, ["covariance"], sign * (10 / 9) ** 2)
-                return table.assign(covariance=own["covariance"].where(rows, table["covariance"]))
-
-            edited(project / "covariances.csv", of_pairs)
-        units = ["sd_rotation", "sd_rotation_smooth"]
-        edited(project / "trajectories.csv", lambda table: scaled(table, units, 10 / 9))
-    else:
-        edited(project / "photos.csv", lambda table: scaled(table, ["rate_y", "rate_z"], -1.0))
-    change(project / "project.toml", 'angle = "deg"', 'angle = "gon"')
-    change(project / "project.toml", "[axes]", '[axes]\nattitude = "matrix"\nphoto = "y_down"')
+    # Of sensors and boresights both sides are axes of photos, or of what moves as they do.
+    sides = dict.fromkeys(("photos", "trajectory_attitudes", "attitudes"), np.eye(3))
+    for name, after in (sides | dict.fromkeys(("attitude_groups", "rigs"), flip)).items():
+        if (place / f"{name}.csv").exists():
+            edited(place / f"{name}.csv", lambda table, after=after: turned(table, after))
+    for name, columns, factor in OTHER_NUMBERS:
+        if (place / f"{name}.csv").exists():
+            edited(place / f"{name}.csv", lambda table, own=columns, by=factor: scaled(table, own, by))
+    if (place / "covariances.csv").exists():
+        edited(place / "covariances.csv", covariances)
+    change(place / "project.toml", 'angle = "deg"', 'angle = "gon"')
+    change(place / "project.toml", "[axes]", '[axes]\nattitude = "matrix"\nphoto = "y_down"')
 
 
 @pytest.mark.parametrize("name", ["drone", "lines"])
-def test_other_axes_and_units_of_angles(project, name):
-    plain = formats.read(project / name).block
-    in_other_axes(project / name)
-    other = formats.read(project / name).block
+def test_other_axes_and_units_of_angles(moving_projects, name):
+    plain = formats.read(moving_projects / name).block
+    in_other_axes(moving_projects / name)
+    other = formats.read(moving_projects / name).block
     check_adjusted(plain, other, 1e-5)
 
 
-def test_pixels_from_the_middle_of_the_first_and_lengths_in_micrometres(project):
-    lines = project / "lines"
+def test_pixels_from_the_middle_of_the_first_and_lengths_in_micrometres(moving_projects):
+    lines = moving_projects / "lines"
     plain = formats.read(lines).block
 
     def shifted(table):
@@ -370,8 +331,8 @@ def test_pixels_from_the_middle_of_the_first_and_lengths_in_micrometres(project)
     check_adjusted(plain, other, 1e-5)
 
 
-def test_records_that_a_trajectory_does_not_reach_are_left_out(project):
-    lines = project / "lines"
+def test_records_that_a_trajectory_does_not_reach_are_left_out(moving_projects):
+    lines = moving_projects / "lines"
     plain = formats.read(lines).block
     for number, table in enumerate(("gnss", "rates"), 1):
         text = (lines / f"{table}.csv").read_text().splitlines()
@@ -386,8 +347,8 @@ def test_records_that_a_trajectory_does_not_reach_are_left_out(project):
     assert len(found.block.observations) == len(plain.observations)
 
 
-def test_photos_without_a_shutter_may_move_and_words_of_camera_lines(project):
-    drone = project / "drone"
+def test_photos_without_a_shutter_may_move_and_words_of_camera_lines(moving_projects):
+    drone = moving_projects / "drone"
     edited(
         drone / "cameras.csv",
         lambda table: table.drop(columns=[c for c in table if "readout" in c or c == "shutter"]),
@@ -402,7 +363,7 @@ def test_photos_without_a_shutter_may_move_and_words_of_camera_lines(project):
     edited(drone / "photos.csv", lambda table: table.drop(columns=[c for c in table if "rate" in c]))
     (drone / "velocities.csv").unlink()
     assert formats.read(drone).block.timed == ()
-    lines = project / "lines"
+    lines = moving_projects / "lines"
     plain = formats.read(lines).block
     edited(lines / "cameras.csv", lambda table: table.assign(model="line", width="6000", height="", s0=""))
     found = formats.read(lines).block
@@ -428,8 +389,8 @@ def test_what_tables_cannot_hold(tmp_path):
     assert "trajectories: 6 photos with the poses that they are about" in lost
 
 
-def test_what_counts_from_where_is_kept(project):
-    lines = project / "lines"
+def test_what_counts_from_where_is_kept(moving_projects):
+    lines = moving_projects / "lines"
     for origin, told in (
         ("2026-05-01T10:30:00Z", "2026-05-01T10:30:00+00:00"),
         ('"2026-05-01"', "2026-05-01T00:00:00"),
@@ -440,150 +401,18 @@ def test_what_counts_from_where_is_kept(project):
         read = formats.read(lines)
         assert f"times: seconds from {told}, gps" in motions(read)
         files = formats.to_files(read, "plain")
-        again_read = formats.read(written(read, project / "again"))
+        again_read = formats.read(written(read, moving_projects / "again"))
         assert motions(again_read) == motions(read)
         assert b"[time]" in files["project.toml"]
-        shutil.rmtree(project / "again")
+        shutil.rmtree(moving_projects / "again")
     for origin in ('"yesterday"', "07:32:00", "[1, 2]", "nan", "true"):
         (lines / "project.toml").write_text(f"{text}\n[time]\norigin = {origin}\n")
         with pytest.raises(InputError, match=r"project\.toml, record \d+: origin is"):
             formats.read(lines)
 
 
-FAULTS = [
-    ("drone", "cameras.csv", "inf,down", "inf,sideways", ["record 2", "readout_direction", "sideways"]),
-    ("drone", "cameras.csv", "0.02,inf", ",inf", ["record 2", "column readout: is empty"]),
-    ("drone", "cameras.csv", "3000,2000", ",", ["record 2", "where the picture ends"]),
-    ("drone", "cameras.csv", "0.02,inf", "0.02,-1", ["record 2", "sd of readout rows"]),
-    ("drone", "photos.csv", "DJI_0,drone", "DJI_0,phone", ["record 2", "column camera"]),
-    ("drone", "velocities.csv", "DJI_0,", "DJI_9,", ["record 2", "no photo 'DJI_9'"]),
-    ("drone", "velocities.csv", "DJI_0,", "DJI_0,x", ["record 2", "column vx"]),
-    ("lines", "trajectories.csv", "polynomial", "polynom", ["record 2", "column position", "polynom"]),
-    ("lines", "trajectories.csv", "hermite", "cubic", ["record 2", "column interpolation", "cubic"]),
-    ("lines", "trajectories.csv", "polynomial,1", "polynomial,9", ["record 2", "from 0 to 8"]),
-    ("lines", "trajectories.csv", "polynomial,1", "polynomial,1.5", ["record 2", "no whole number"]),
-    ("lines", "trajectories.csv", "polynomial,1", "none,1", ["record 2", "position_degree", "is none"]),
-    ("lines", "trajectories.csv", "polynomial,1", "none,", ["record 2", "its position is none"]),
-    ("lines", "trajectories.csv", "strip 7", "strip 8", ["there is no trajectory 'strip 7'"]),
-    (
-        "lines",
-        "trajectory_positions.csv",
-        "strip 7,201.0",
-        "strip 7,200.0",
-        ["record 3", "does not increase"],
-    ),
-    ("lines", "trajectory_positions.csv", "strip 7,201.0", "strip 7,", ["record 3", "column time: is empty"]),
-    ("lines", "trajectory_positions.csv", ",60.0,", ",,", ["record 2", "some of vx, vy, vz are empty"]),
-    ("lines", "trajectory_attitudes.csv", "strip 7,200.25", "strip 7,200.25x", ["record 3", "column time"]),
-    ("lines", "trajectory_knots.csv", "rotation", "turns", ["record 2", "column of", "turns"]),
-    ("lines", "trajectory_coefficients.csv", "position,1", "position,2", ["record 3", "from 0 to 1"]),
-    ("lines", "trajectory_coefficients.csv", "position,1", "position,0", ["record 3", "is there twice"]),
-    (
-        "lines",
-        "trajectory_coefficients.csv",
-        "strip 7,position,1",
-        "strip 8,position,1",
-        ["record 3", "'strip 8'"],
-    ),
-    ("lines", "line_times.csv", "L1,1000.0", "L1,0.0", ["record 3", "column line: does not increase"]),
-    ("lines", "line_times.csv", "L2,", "L3,", ["record 4", "no photo 'L3'"]),
-    ("lines", "line_times.csv", ",0.002\nL2", ",0\nL2", ["record 2", "seconds per line"]),
-    (
-        "lines",
-        "cameras.csv",
-        "3000.0,0.01,0.0",
-        "3000.0,,",
-        ["cameras.csv, record 2", "has no s0"],
-    ),
-    ("lines", "cameras.csv", ",3000.0,", ",,", ["cameras.csv, record 2", "column s0"]),
-    (
-        "lines",
-        "cameras.csv",
-        "brown",
-        "rad_tan_thin_prism_fisheye",
-        ["cameras.csv, record 2", "column s0: is of the model"],
-    ),
-    ("lines", "photos.csv", "L1,down", "L1,", ["record 2", "column camera"]),
-    ("lines", "photos.csv", "strip 7", "strip 8", ["record 2", "column trajectory", "'strip 8'"]),
-    ("lines", "photos.csv", "rig,ahead", "rig,behind", ["record 3", "the rig rig has no sensor behind"]),
-    ("lines", "photos.csv", "rig,ahead", "pair,ahead", ["record 3", "column rig: there is no rig 'pair'"]),
-    (
-        "lines",
-        "photos.csv",
-        "oscillator,1.0,1e-05",
-        "oscillator,1.1,1e-05",
-        ["record 3", "column scan", "other values"],
-    ),
-    ("lines", "gnss.csv", "strip 7,201.0", "strip 7,", ["record 2", "column time: is empty"]),
-    ("lines", "gnss.csv", "strip 7,201.0", ",201.0", ["record 2", "one of both"]),
-    ("lines", "rates.csv", "strip 7,201.0", "strip 9,201.0", ["record 2", "no trajectory 'strip 9'"]),
-    ("lines", "gnss_groups.csv", "receiver,0.001", "receiver,0.002", ["other values", "column clock"]),
-    ("lines", "attitude_groups.csv", "gyro,", "gyro,x", ["record 3", "column bias_x"]),
-    (
-        "lines",
-        "covariances.csv",
-        "strip 7 rotation 0",
-        "strip 7 rotation 50",
-        ["record 2", "no rotation coefficient"],
-    ),
-]
-
-
-@pytest.mark.parametrize(("name", "file", "old", "new", "words"), FAULTS)
-def test_a_fault_is_named_with_file_record_and_text(project, name, file, old, new, words):
-    change(project / name / file, old, new)
-    with pytest.raises(InputError) as refused:
-        formats.read(project / name)
-    for word in words:
-        assert word in str(refused.value)
-    assert refused.value.file is not None
-
-
-@pytest.mark.parametrize(
-    ("name", "file", "column", "value", "words"),
-    [
-        ("lines", "photos.csv", "vx", "1", ["photos.csv, record 2", "without a trajectory"]),
-        ("lines", "photos.csv", "sd_x", "1", ["photos.csv, record 2", "has no sd of its own"]),
-        ("lines", "cameras.csv", "sd_x0", "1", ["cameras.csv, record 2", "sd_xp"]),
-        (
-            "lines",
-            "trajectories.csv",
-            "rotation_scale",
-            "1",
-            ["record 2", "rotation_scale", "its rotation is spline"],
-        ),
-        ("lines", "trajectories.csv", "sd_position", "-1", ["record 2", "column sd_position: is negative"]),
-        ("drone", "photos.csv", "sd_omega", "1", ["photos.csv, record 2", "moves by itself"]),
-        ("drone", "photos.csv", "line_rate", "1.5", ["photos.csv, record 2", "line scanners"]),
-        ("drone", "photos.csv", "trajectory", "one", ["photos.csv, record 2", "no trajectory 'one'"]),
-        ("drone", "cameras.csv", "readout_begin", "1", ["cameras.csv, record 2"]),
-        ("drone", "velocities.csv", "group", "one", None),
-    ],
-)
-def test_a_column_that_does_not_belong_there(project, name, file, column, value, words):
-    edited(project / name / file, lambda table: table.assign(**{column: value}))
-    if words is None:
-        formats.read(project / name)
-        return
-    with pytest.raises(InputError) as refused:
-        formats.read(project / name)
-    for word in words:
-        assert word in str(refused.value)
-
-
-def test_tables_of_trajectories_that_there_are_not(project):
-    (project / "lines" / "trajectories.csv").unlink()
-    with pytest.raises(InputError, match=r"trajectory_positions\.csv: there is no table trajectories"):
-        formats.read(project / "lines")
-
-
-@pytest.mark.parametrize("name", ["drone", "lines"])
-def test_damaged_tables_end_in_a_message(project, tmp_path, name):
-    assert check_damaged(project / name, tmp_path / "damaged", "plain", 150, 7) > 40
-
-
-def test_adjust_and_info_on_the_command_line(run, project, tmp_path):
-    told = run("info", project / "lines")
+def test_adjust_and_info_on_the_command_line(run, moving_projects, tmp_path):
+    told = run("info", moving_projects / "lines")
     assert told.exit_code == 0, told.output
     text = " ".join(told.output.split())
     assert "2 photos on trajectories: 2 of a line scanner" in text
@@ -594,35 +423,35 @@ def test_adjust_and_info_on_the_command_line(run, project, tmp_path):
     )
     assert "12 observations of the kind velocity" in text
     assert "6 photos on trajectories: 6 with a rolling shutter, 6 with a motion of their own" in " ".join(
-        run("info", project / "drone").output.split()
+        run("info", moving_projects / "drone").output.split()
     )
-    edited(project / "lines" / "trajectories.csv", lambda table: table.assign(colour="red"))
+    edited(moving_projects / "lines" / "trajectories.csv", lambda table: table.assign(colour="red"))
     for name in ("drone", "lines"):
-        done = run("adjust", project / name, "--out", name, "--no-html")
+        done = run("adjust", moving_projects / name, "--out", name, "--no-html")
         assert done.exit_code in (0, 4), done.output
         if name == "lines":
             assert "columns that the table trajectories does not have are not read: colour" in " ".join(
                 done.output.split()
             )
-        result = adjust(formats.read(project / name).block)
+        result = adjust(formats.read(moving_projects / name).block)
         table = pd.read_csv(tmp_path / name / "unknowns.csv", comment="#")
         expected = result.unknown_table()
         assert list(table["unknown"]) == list(expected["unknown"])
         np.testing.assert_allclose(table["value"], expected["value"], rtol=1e-12, atol=1e-14)
         assert (tmp_path / name / "report.txt").read_text()
-        same(formats.read(project / name).block, formats.read(tmp_path / name / "adjusted").block)
+        same(formats.read(moving_projects / name).block, formats.read(tmp_path / name / "adjusted").block)
 
 
-def test_photos_that_move_are_not_adjusted_in_parts(project):
+def test_photos_that_move_are_not_adjusted_in_parts(moving_projects):
     pytest.importorskip("pyarrow", reason="pyarrow is not installed")
-    drone = project / "drone"
+    drone = moving_projects / "drone"
     (drone / "velocities.csv").unlink()
     table = pd.read_csv(drone / "images.csv")
     table.to_parquet(drone / "images.parquet")
     (drone / "images.csv").unlink()
     assert streamable(drone)
     with pytest.raises(InputError, match="rolling shutter, or on trajectories, are read whole"):
-        Streamed(drone, Wishes(), project / "run")
+        Streamed(drone, Wishes(), moving_projects / "run")
 
 
 def test_a_drone_that_is_taken_to_stand_still_does_not_fit(tmp_path):
