@@ -1,5 +1,7 @@
 """What blocks with photos on trajectories refuse, and what is asked of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -164,3 +166,14 @@ def test_the_motion_of_what_does_not_move():
     )
     with pytest.raises(InputError, match="the rate of the photo F2: it is a sensor on a trajectory"):
         frames.replace(timed=[*others, oblique], observations=[Rate("F2", [0.0] * 3, sd=1.0)])
+
+
+def test_a_scanner_has_no_one_pose():
+    """It would have been that in the middle of its images, another without some of them."""
+    block = scanned()
+    first, second = block.timed
+    own = Position("S1", [0.0, -60.0, 600.0], sd=1.0)
+    with pytest.raises(InputError, match="the position of the photo S1: a scanner has no one pose"):
+        block.replace(observations=[*block.observations, own])
+    dated = replace(first, time=104.0)
+    block.replace(timed=[dated, second], observations=[*block.observations, own])

@@ -374,9 +374,17 @@ class Block(Valued, Brief):
             )
 
     def _check_motions(self) -> None:
-        """Refuse motions of photos that have none of their own."""
+        """Refuse motions of photos that have none of their own, and poses of scanners at no time."""
         sensors = {each.photo: each.sensor for each in self.timed}
+        # The middle of their images is another where one of these is left out.
+        strips = {each.photo for each in self.timed if each.lines is not None and each.time is None}
         for each in self.observations:
+            if each.moment is None and not strips.isdisjoint(each.photos):
+                name = next(photo for photo in each.photos if photo in strips)
+                raise InputError(
+                    f"the {each.KIND} of the photo {name}: a scanner has no one pose; give it a time, or take"
+                    " the trajectory at one"
+                )
             if not isinstance(each, Rate | Velocity) or each.moment is not None:
                 continue
             photo = each.photos[0]
