@@ -564,3 +564,15 @@ def test_the_example_of_a_line_scanner(capsys):
         result.trajectories["strip"].poses([1e3])
     with pytest.raises(InputError, match="on no trajectory"):
         result.project("none", [[0.0, 0.0, 0.0]])
+
+
+def test_known_readout_times_of_one_length_are_one():
+    first, second, other = (Shutter(seconds, (0.0, 100.0)) for seconds in (0.02, 0.02, 0.03))
+    assert first.readout is second.readout
+    assert first.readout is not other.readout
+    assert (first.readout.value, first.readout.is_held) == (0.02, True)
+
+
+def test_a_scanner_without_a_trajectory_needs_the_time_of_its_pose():
+    with pytest.raises(InputError, match="the scanner A needs a trajectory, or the time of its own pose"):
+        Timed("A", lines=Lines([[0.0, 0.0, 0.01]]), line_sensor=SENSOR)

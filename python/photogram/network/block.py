@@ -438,8 +438,8 @@ class Block(Valued, Brief):
         ]
         if kinds:
             # A kind of smoothness says how many coefficients of what it is of.
-            told = (f"{count} {name.replace(', ', ' of ')}" for name, count in kinds.items())
-            rows.append(("observations", ", ".join(told)))
+            named = (f"{count} {name.replace(', ', ' of ')}" for name, count in kinds.items())
+            rows.append(("observations", ", ".join(named)))
         if self.mounts:
             rows.append(("on frames", few([each.photo for each in self.mounts])))
         if self.timed:

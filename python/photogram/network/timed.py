@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -19,6 +20,12 @@ from photogram.network.unknowns import Sensor, Unknown
 __all__ = ["LineSensor", "Lines", "Moment", "Poses", "Shutter", "Timed", "checked_timed", "own_trajectories"]
 
 Direction = Literal["down", "up", "right", "left"]
+
+
+@cache
+def _known(readout: float) -> Readout:
+    """Return a readout time that is known: one for all shutters of so many seconds."""
+    return Readout(f"{readout!r} s", readout, sd=0.0)
 
 
 @dataclass(frozen=True)
@@ -47,8 +54,7 @@ class Shutter:
         if not np.isfinite([first, last]).all() or first == last:
             raise InputError(f"the edges of a shutter are two coordinates: {shown(self.edges)}")
         if not isinstance(self.readout, Readout):
-            sd = 0.0
-            object.__setattr__(self, "readout", Readout("readout", number("readout", self.readout), sd))
+            object.__setattr__(self, "readout", _known(number("readout", self.readout)))
 
     def times(self, xy: Floats) -> Floats:
         """Return (n,) r / h of (n, 2) images."""
@@ -190,6 +196,8 @@ class Timed:
             raise InputError(f"the photo {self.photo} has a shutter or lines, not both")
         if self.rate is not None and self.lines is None:
             raise InputError(f"the photo {self.photo} has a factor of line rates, but no lines")
+        if self.lines is not None and self.trajectory is None and self.time is None:
+            raise InputError(f"the scanner {self.photo} needs a trajectory, or the time of its own pose")
 
     @property
     def readout(self) -> Readout | None:
