@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import names, number, one_of, shaped, shown
+from photogram.arguments.arrays import names, number, numbers, one_of, shaped, shown
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.attitudes import Attitudes, Representation
@@ -50,9 +50,10 @@ class Shutter:
 
     def __post_init__(self) -> None:
         one_of("direction", self.direction, get_args(Direction))
-        first, last = (number("edge of a shutter", each) for each in self.edges)
+        first, last = shaped("edges of a shutter", self.edges, (2,)).tolist()
         if not np.isfinite([first, last]).all() or first == last:
             raise InputError(f"the edges of a shutter are two coordinates: {shown(self.edges)}")
+        object.__setattr__(self, "edges", (first, last))
         if not isinstance(self.readout, Readout):
             object.__setattr__(self, "readout", _known(number("readout", self.readout)))
 
@@ -77,7 +78,7 @@ class Lines:
     table: ArrayLike
 
     def __post_init__(self) -> None:
-        rows = np.atleast_2d(np.asarray(self.table, dtype=float))
+        rows = np.atleast_2d(numbers("lines", self.table))
         sound = rows.ndim == 2 and rows.shape[1] == 3 and len(rows) and np.isfinite(rows).all()
         if not sound or not (np.diff(rows[:, 0]) > 0).all() or not (rows[:, 2] != 0).all():
             raise InputError(f"lines are first line, time, seconds per line, ascending: {shown(self.table)}")
@@ -120,6 +121,18 @@ class LineSensor:
     def places(self, samples: Floats) -> Floats:
         """Return (n, 2) places of samples in the focal plane, in millimetres."""
         return np.asarray([self.x0, self.y0] + (samples[:, np.newaxis] - self.s0) * np.array(self.pitch))
+
+
+_KINDS: dict[str, type] = {
+    "trajectory": Trajectory,
+    "shutter": Shutter,
+    "lines": Lines,
+    "line_sensor": LineSensor,
+    "sensor": Sensor,
+    "offset": Clock,
+    "rate": Readout,
+}
+"""What some fields of a timed photo are, where they are not None."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,6 +203,16 @@ class Timed:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "photo", names("photo of a trajectory", [self.photo])[0])
+        for name, kind in _KINDS.items():
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, kind):
+                raise InputError(f"{name} of the photo {self.photo} is no {kind.__name__}: {shown(value)}")
+        if self.time is not None and not np.isfinite(number(f"time of the photo {self.photo}", self.time)):
+            raise InputError(f"time of the photo {self.photo} is not finite: {self.time}")
+        for name in ("velocity", "rotation_rate", "sd_velocity", "sd_rate"):
+            object.__setattr__(
+                self, name, shaped(f"{name} of the photo {self.photo}", getattr(self, name), (3,))
+            )
         if (self.lines is None) != (self.line_sensor is None):
             raise InputError(f"the scanner {self.photo} needs both lines and line_sensor")
         if self.shutter is not None and (self.lines is not None or self.rate is not None):
@@ -214,7 +237,8 @@ class Timed:
         """Return its time, and of (n, 2) images their times on its scale and coordinates for the core."""
         if self.lines is not None and self.line_sensor is not None:
             times = self.lines.times(xy[:, 1])
-            time = float(times.mean()) if self.time is None and len(times) else self.time or 0.0
+            first = float(np.asarray(self.lines.table)[0, 1])
+            time = self.time if self.time is not None else float(times.mean()) if len(times) else first
             return time, times - time, self.line_sensor.places(xy[:, 0])
         time = self.time or 0.0
         return time, np.zeros(len(xy)) if self.shutter is None else self.shutter.times(xy), xy
@@ -259,7 +283,10 @@ class Poses:
 def own_trajectories(timed: Sequence[Timed], poses: Poses) -> list[Trajectory]:
     """Return the trajectory of each timed photo: that which it is given, or uniform motion from its pose."""
     places = {name: row for row, name in enumerate(poses.photo_ids)} if timed else {}
-    return [each.trajectory or _uniform(poses, each, places[each.photo]) for each in timed]
+    return [
+        _uniform(poses, each, places[each.photo]) if each.trajectory is None else each.trajectory
+        for each in timed
+    ]
 
 
 def _uniform(poses: Poses, own: Timed, row: int) -> Trajectory:

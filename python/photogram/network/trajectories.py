@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import names, number, one_of, shaped, shown
+from photogram.arguments.arrays import names, number, numbers, one_of, shaped, shown, whole_number
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.unknowns import Unknown
@@ -180,7 +180,7 @@ class Table:
 
 def increasing(name: str, values: ArrayLike) -> Floats:
     """Return (k,) finite times that increase."""
-    times = np.atleast_1d(np.asarray(values, dtype=float))
+    times = np.atleast_1d(numbers(name, values))
     if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
         raise InputError(f"{name} do not increase, or are no times: {shown(values)}")
     return times
@@ -231,8 +231,13 @@ class Polynomial:
     def over(self, first: float, last: float) -> Polynomial:
         """Return it with reference and scale for a span of time."""
         least, most = DEGREES["polynomial"]
-        if not least <= self.degree <= most:
+        if not least <= whole_number("degree of a polynomial", self.degree) <= most:
             raise InputError(f"the degree of a polynomial is from {least} to {most}, not {self.degree}")
+        for name, value in (("reference", self.reference), ("scale", self.scale)):
+            if value is not None and not (
+                np.isfinite(number(f"{name} of a polynomial", value)) and (value or name != "scale")
+            ):
+                raise InputError(f"{name} of a polynomial is no number of seconds: {value}")
         alone = not last > first
         reference = self.reference if self.reference is not None else 0.0 if alone else (first + last) / 2
         scale = self.scale if self.scale is not None else 1.0 if alone else (last - first) / 2
@@ -288,18 +293,23 @@ class Spline:
     def _knots(self) -> Floats:
         if self.knots is None:
             raise InputError("a spline without knots is of no trajectory")
-        return np.asarray(self.knots, dtype=float)
+        return numbers("knots", self.knots)
 
     def over(self, first: float, last: float) -> Spline:
         """Return it with knots for a span of time: even over it, as many beyond each end as the degree."""
         least, most = DEGREES["spline"]
-        p = self.degree
+        p = whole_number("degree of a spline", self.degree)
         if not least <= p <= most:
             raise InputError(f"the degree of a spline is from {least} to {most}, not {p}")
         if (self.every is None) == (self.knots is None):
             raise InputError("a spline needs either every or knots")
+        for name, pair in (("smooth", self.smooth), ("correlation", self.correlation)):
+            if pair is not None and (not isinstance(pair, tuple | list) or len(pair) != 2):
+                raise InputError(f"{name} of a spline is a pair of numbers: {shown(pair)}")
+            for value in pair or ():
+                number(f"{name} of a spline", value)
         if self.every is not None:
-            if not (self.every > 0 and last > first):
+            if not (0 < number("every", self.every) < np.inf and last > first):
                 raise InputError(f"every is a positive number of seconds of a table, not {self.every}")
             parts = max(1, round((last - first) / self.every))
             h = (last - first) / parts
@@ -400,6 +410,10 @@ class Trajectory:
         kinds = (("position", PositionCoefficient), ("rotation", RotationCoefficient))
         self._set("coefficients", tuple(self._coefficients(name, kind) for name, kind in kinds))
         if self.body is not None:
+            if not isinstance(self.body, tuple | list) or len(self.body) != 2:
+                raise InputError(
+                    f"body of the trajectory {self.name} is no pair of times and matrices: {shown(self.body)}"
+                )
             times, matrices = self.body
             times = increasing("times of a body", times)
             self._set("body", (times, rotations("matrices of a body", matrices, len(times))))
