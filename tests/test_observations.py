@@ -132,7 +132,7 @@ def test_the_report_the_table_and_the_document_tell_of_them(example):
     text = result.report()
     section = text[text.index("Observations beside images") :]
     lines = {line.split("  ")[0]: line for line in section.splitlines()}
-    assert lines["P0 - P15"].split()[3:6] == ["length", "m", "0.00002"]
+    assert lines["P0 - P15"].split()[3:6] == ["length", "m", "0.000020"]
     assert "rotation x arcsec" in section
     assert "412.52961" in section  # 0.002 rad
     assert "weighted sum of squares, position" in text

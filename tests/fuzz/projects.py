@@ -18,6 +18,7 @@ import photogram
 from photogram import Block, formats
 from photogram.cli import adjust as adjusting
 from photogram.cli.components import UnitVarianceName
+from photogram.distributed import Division
 from photogram.formats.additions import self_calibrated, with_control
 from photogram.formats.format import Wishes
 from photogram.formats.images import to_corner
@@ -193,15 +194,17 @@ def _adjusted(
         block = photogram.first_values(block).block
     datum = options["datum"] or project.options.datum
     kinds = {"inner": photogram.InnerConstraints, "minimum": photogram.MinimumConstraints}
-    result = photogram.adjust(
-        block,
-        datum=kinds[datum]() if datum in kinds else None,
-        loss=options["loss"] or project.options.loss,
-        unit_variance=str(options["unit_variance"] or project.options.unit_variance),
-        parts=2 if rng.random() < 0.05 else None,
-        max_iterations=30,
-        threads=1,
-    )
+    unit_variance = str(options["unit_variance"] or project.options.unit_variance)
+    shared = {"unit_variance": unit_variance, "max_iterations": 30, "threads": 1}
+    if rng.random() < 0.05:
+        result = photogram.adjust_in_parts(block, Division(parts=2), **shared)
+    else:
+        result = photogram.adjust(
+            block,
+            datum=kinds[datum]() if datum in kinds else None,
+            loss=options["loss"] or project.options.loss,
+            **shared,
+        )
     result.report()
     result.to_json()
     return []

@@ -128,7 +128,7 @@ class Streamed:
             raise InputError(
                 "nothing gives the block a datum (no control, no weighted position, no observation), and what"
                 " to hold is found of blocks that are read whole:"
-                " photogram.adjust(photogram.formats.read(path).block, parts=...)",
+                " photogram.adjust_in_parts(photogram.formats.read(path).block, ...)",
                 file=settings.path,
             )
         named = {name for each in self.block.observations for name in each.points}
