@@ -576,3 +576,48 @@ def test_known_readout_times_of_one_length_are_one():
 def test_a_scanner_without_a_trajectory_needs_the_time_of_its_pose():
     with pytest.raises(InputError, match="the scanner A needs a trajectory, or the time of its own pose"):
         Timed("A", lines=Lines([[0.0, 0.0, 0.01]]), line_sensor=SENSOR)
+
+
+def test_a_factor_of_line_rates_counts_from_the_middle_of_the_images():
+    strip, rows = flight(), Lines([[0.0, 0.5, 0.004], [2000.0, 8.5, 0.0041]])
+    own = {"lines": rows, "line_sensor": SENSOR, "rate": Readout("rates", 1.002, sd=0.0)}
+    with pytest.raises(InputError, match="needs a time to count from"):
+        projected(Timed("0", strip, **own), strip, LENS, GROUND)
+    time = 10.0
+    for _ in range(20):
+        images = projected(Timed("0", strip, time=time, **own), strip, LENS, GROUND)
+        time = float(rows.times(images[:, 1]).mean())
+    block = Block(
+        photo_positions=np.zeros((1, 3)),
+        photo_attitudes=np.zeros((1, 3)),
+        point_positions=GROUND,
+        point_sd=1.0,
+        image_photos=np.zeros(len(GROUND), dtype=int),
+        image_points=np.arange(len(GROUND)),
+        image_xy=images,
+        image_sd=0.003,
+        cameras=[LENS],
+        photo_cameras=[0],
+        timed=[Timed("0", strip, **own)],
+    )
+    result = adjust(block)
+    np.testing.assert_allclose(result.residuals, 0.0, atol=1e-8)
+    np.testing.assert_allclose(result.project("0", GROUND), images, rtol=0, atol=1e-5)
+
+
+def test_two_clocks_of_one_name_are_refused_at_one_time_too():
+    strip = flight(position=Polynomial(0))
+    records = [
+        Position(None, [0.0, 0.0, 500.0], sd=0.1, trajectory=strip, time=3.0, clock=Clock("receiver"))
+        for _ in range(2)
+    ]
+    empty = {"image_photos": [], "image_points": [], "image_xy": np.zeros((0, 2)), "image_sd": 1.0}
+    with pytest.raises(InputError, match="two unknowns are called clock receiver"):
+        Block(
+            photo_positions=np.zeros((0, 3)),
+            photo_attitudes=np.zeros((0, 3)),
+            principal_distances=np.zeros(0),
+            point_positions=np.zeros((0, 3)),
+            observations=records,
+            **empty,
+        )

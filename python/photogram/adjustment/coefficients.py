@@ -30,8 +30,7 @@ def named_unknowns(block: Block, unknowns: Sequence[Unknown]) -> list[str]:
     wanted = {id(each) for each in unknowns if isinstance(each, Coefficient)}
     if not wanted:
         return found
-    records = (each.moment.trajectory for each in block.observations if each.moment is not None)
-    every = {id(each): each for each in (*block.trajectories, *records)}.values()
+    every = block.all_trajectories
     for part, what in enumerate(("positions", "rotations")):
         names = [name for each in every if (name := _named(each, part, wanted))]
         found += [f"{what} of {listed(names)}"] if names else []

@@ -20,7 +20,14 @@ from photogram.messages import listed
 from photogram.network.cameras import Camera, CameraRow, camera_rows, checked_cameras, photo_indices
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
-from photogram.network.observations import Observation, Rate, Velocity, observation_rows
+from photogram.network.observations import (
+    Observation,
+    Rate,
+    Velocity,
+    all_trajectories,
+    observation_rows,
+    of_records,
+)
 from photogram.network.observations.smoothness import with_smoothness
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.rigs import Mount, checked_mounts
@@ -354,9 +361,8 @@ class Block(Valued, Brief):
             raise InputError(
                 f"the photo {scanned[0]} is a scanner's: its camera is in mm, not {self.image_unit}"
             )
-        of_records = (each.moment.trajectory for each in self.observations if each.moment is not None)
-        every = {id(each): each for each in (*self.trajectories, *of_records)}.values()
-        twice = [name for name, count in Counter(each.name for each in every).items() if count > 1]
+        named = Counter(each.name for each in self.all_trajectories)
+        twice = [name for name, count in named.items() if count > 1]
         if twice:
             raise InputError(
                 f"two trajectories are called {twice[0]}: photos and records that are on one take one object"
@@ -460,6 +466,11 @@ class Block(Valued, Brief):
         return own
 
     @property
+    def all_trajectories(self) -> list[Trajectory]:
+        """Those of photos, then those of records, each once."""
+        return all_trajectories(self.trajectories, self.observations)
+
+    @property
     def unknowns(self) -> list[Unknown]:
         """What observations, and photos on frames or trajectories, have in common, in order."""
         of_observations = (each for own in self.observations for each in own.unknowns if each is not None)
@@ -467,8 +478,8 @@ class Block(Valued, Brief):
         sensors += [each.sensor for each in self.timed if each.sensor is not None]
         of_times = [scalar for each in self.timed for scalar in each.scalars]
         coefficients = [each for own in self.trajectories for all_ in own.coefficients for each in all_]
-        of_records = (each for own in self.observations if own.moment for each in own.moment.unknowns)
-        return different_unknowns([*sensors, *of_times, *coefficients, *of_records, *of_observations])
+        records = of_records(self.observations)
+        return different_unknowns([*sensors, *of_times, *coefficients, *records, *of_observations])
 
     @property
     def image_unit(self) -> str:

@@ -12,7 +12,6 @@ from photogram.arguments.types import Floats
 from photogram.network.block import Block
 from photogram.network.observations import moments
 from photogram.network.timed import Moment
-from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown
 
 if TYPE_CHECKING:
@@ -55,11 +54,8 @@ def flown(block: Block, unknowns: Sequence[Unknown]) -> Flown:
     if not block.timed and not records:
         return Flown([], [], block.image_xy, [], 0, np.zeros((0, 3)))
     places = {id(each): row for row, each in enumerate(unknowns)}
-    numbers: dict[int, int] = {}
-    trajectories: list[Trajectory] = []
-    for each in (*block.trajectories, *(own.trajectory for own in records)):
-        if numbers.setdefault(id(each), len(trajectories)) == len(trajectories):
-            trajectories.append(each)
+    trajectories = block.all_trajectories
+    numbers = {id(each): number for number, each in enumerate(trajectories)}
     image_xy, image_times = block.image_xy.copy(), np.zeros(len(block.image_xy))
     timed: list[TimedRow] = []
     photos = {name: row for row, name in enumerate(block.photo_ids)}

@@ -58,7 +58,7 @@ def projected(
     Raises
     ------
     InputError
-        A scanner on a trajectory that has one record.
+        A scanner on a trajectory that has one record, or with a factor of line rates and no time.
     """
     places = shaped("points", points, (len(np.asarray(points)), 3))
     coefficients = [np.array([values(each)[0] for each in part]) for part in trajectory.coefficients]
@@ -75,12 +75,15 @@ def projected(
 
     offset = 0.0 if own.offset is None else float(values(own.offset)[0][0])
     rate = 1.0 if own.readout is None else float(values(own.readout)[0][0])
+    if own.rate is not None and own.time is None:
+        raise InputError(
+            f"the scanner {own.photo} has a factor of line rates, which needs a time to count from"
+        )
     if own.lines is not None:
         times, samples = _crossed(own, reach(trajectory), seen, len(places))
-        # The time of the line by the scanner's own clock, and by its own rates.
-        counted = times - offset if own.rate is None else (times - offset - float(own.time or 0.0)) / rate
-        counted = counted if own.rate is None else counted + float(own.time or 0.0)
-        return np.column_stack([samples, own.lines.at(counted)])
+        # By the clock and the rates of the scanner itself.
+        start = float(own.time or 0.0)
+        return np.column_stack([samples, own.lines.at(start + (times - offset - start) / rate)])
     times = np.full(len(places), (own.time or 0.0) + offset)
     if own.shutter is None:
         return seen(times)

@@ -149,12 +149,6 @@ class Moment:
         clock = "" if self.clock is None else f", {self.clock.name}"
         return f"{self.trajectory.name} at {self.time!r} s{clock}"
 
-    @property
-    def unknowns(self) -> list[Unknown]:
-        """What its pose is made of."""
-        position, rotation = self.trajectory.coefficients
-        return [*position, *rotation, *([] if self.clock is None else [self.clock])]
-
 
 @dataclass(frozen=True, eq=False)
 class Timed:

@@ -62,13 +62,10 @@ class Course:
 
 def courses(result: Result) -> list[Course]:
     """Return positions and rotations of all trajectories that have corrections, in the order of the block."""
-    block = result.block
-    records = (each.moment.trajectory for each in block.observations if each.moment is not None)
-    every = {id(each): each for each in (*block.trajectories, *records)}.values()
     # By names: those of photos of their own are made anew with their block.
     adjusted = {(each.kind, each.name): each for each in result.unknowns}
     found = []
-    for each in every:
+    for each in result.block.all_trajectories:
         for what, basis, own in zip(
             ("position", "rotation"), (each.position, each.rotation), each.coefficients, strict=True
         ):

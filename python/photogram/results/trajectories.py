@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -72,6 +72,8 @@ class AdjustedTrajectory:
         (K, 3) their standard deviations; 0 for known ones.
     position_redundancy, rotation_redundancy
         (K, 3) redundancy numbers of what was given of them; 0 unless weighted.
+    joint
+        Gives covariances of common unknowns, by their names, all with all.
     """
 
     given: Trajectory
@@ -182,9 +184,11 @@ def project(
     places = shaped("points", points, (len(np.asarray(points)), 3))
     if block.spheroid is not None:
         places = geographic_to_geocentric(places, block.spheroid)
-    return projected(
-        block.timed[row], block.trajectories[row], camera, places, lambda each: adjusted[id(each)]
-    )
+    own = block.timed[row]
+    if own.rate is not None:
+        # It counts from where the adjustment has it count from.
+        own = replace(own, time=own.images(block.image_xy[block.image_photos == index])[0])
+    return projected(own, block.trajectories[row], camera, places, lambda each: adjusted[id(each)])
 
 
 def adjusted_trajectories(
@@ -195,7 +199,6 @@ def adjusted_trajectories(
     `covariances` gives those of anything with anything: asked for once, and not before poses are.
     """
     found = {id(each.given): each for each in unknowns}
-    of_records = (each.moment.trajectory for each in block.observations if each.moment is not None)
     once = cache(covariances)
 
     def joint(names: list[str]) -> Floats:
@@ -220,5 +223,4 @@ def adjusted_trajectories(
             joint=joint,
         )
 
-    every = {id(each): each for each in (*block.trajectories, *of_records)}.values()
-    return {each.name: adjusted(each) for each in every}
+    return {each.name: adjusted(each) for each in block.all_trajectories}

@@ -33,7 +33,7 @@ from photogram.formats.rigging import Stand, mounted
 from photogram.io.delimited import ColumnTable
 from photogram.messages import quoted
 from photogram.network.geometry import Spheroid
-from photogram.network.observations import Control, Observation
+from photogram.network.observations import Control, Observation, of_records
 from photogram.network.rigs import Mount
 from photogram.network.timed import Timed
 from photogram.network.unknowns import Unknown
@@ -184,7 +184,7 @@ def _unknowns(
 ) -> list[Unknown]:
     """Return the common unknowns of which covariances may be known."""
     found = [unknown for each in observations for unknown in each.unknowns if unknown is not None]
-    found += [unknown for each in observations if each.moment for unknown in each.moment.unknowns]
+    found += of_records(observations)
     found += [each.sensor for each in mounts]
     for each in timed:
         found += [*([] if each.sensor is None else [each.sensor]), *each.scalars]

@@ -12,6 +12,7 @@ from photogram.errors import InputError
 from photogram.formats.plain.schema import ANGLES, AXES, BASES, VELOCITY, deviation_columns
 from photogram.formats.plain.tables import DEGREE, angles_of
 from photogram.network.block import Block
+from photogram.network.observations import all_trajectories
 from photogram.network.trajectories import Basis, Polynomial, Spline, Trajectory
 
 __all__ = ["shared_trajectories", "trajectory_tables"]
@@ -29,8 +30,7 @@ def shared_trajectories(block: Block) -> list[Trajectory]:
         Two of one name.
     """
     own = [each.trajectory for each in block.timed if each.trajectory is not None]
-    own += [each.moment.trajectory for each in block.observations if each.moment is not None]
-    found = list({id(each): each for each in own}.values())
+    found = all_trajectories(own, block.observations)
     names = [each.name for each in found]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)

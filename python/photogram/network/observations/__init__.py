@@ -11,7 +11,13 @@ from photogram.network.observations.control import Control
 from photogram.network.observations.difference import Difference
 from photogram.network.observations.distance import Distance
 from photogram.network.observations.equal_height import EqualHeight
-from photogram.network.observations.observation import Observation, moments, observation_rows
+from photogram.network.observations.observation import (
+    Observation,
+    all_trajectories,
+    moments,
+    observation_rows,
+    of_records,
+)
 from photogram.network.observations.on_level import OnLevel
 from photogram.network.observations.on_line import OnLine, OnPlumbLine
 from photogram.network.observations.on_plane import OnPlane
@@ -40,6 +46,8 @@ __all__ = [
     "Relative",
     "Smoothness",
     "Velocity",
+    "all_trajectories",
     "moments",
     "observation_rows",
+    "of_records",
 ]

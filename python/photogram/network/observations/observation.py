@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -16,7 +16,16 @@ from photogram.network.timed import Moment
 from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Unknown, rotation
 
-__all__ = ["AXES", "ROTATIONS", "Group", "Observation", "moments", "observation_rows"]
+__all__ = [
+    "AXES",
+    "ROTATIONS",
+    "Group",
+    "Observation",
+    "all_trajectories",
+    "moments",
+    "observation_rows",
+    "of_records",
+]
 
 Group = tuple[str, Indices, Indices, Indices, Floats, Floats]
 """A kind, (k, p) indices of points, (k, q) photos, (k, c) unknowns; (k, v) values, (k, r, r) covariances."""
@@ -114,7 +123,9 @@ class Observation:
     @property
     def moment(self) -> Moment | None:
         """The time on a trajectory that it is of, in the place of a photo."""
-        return None
+        own = vars(self)
+        trajectory = own.get("trajectory")
+        return None if trajectory is None else Moment(trajectory, float(own["time"]), own["clock"])
 
     @property
     def of(self) -> tuple[str, ...]:
@@ -197,7 +208,35 @@ class Observation:
 
 def moments(observations: Sequence[Observation]) -> list[Moment]:
     """Return the different times on trajectories that observations are of."""
-    return list({each.moment.name: each.moment for each in observations if each.moment is not None}.values())
+    return list({each.name: each for each in _moments(observations)}.values())
+
+
+def of_records(observations: Sequence[Observation]) -> list[Unknown]:
+    """Return the coefficients and clocks that times on trajectories are made of, each once."""
+    found: dict[int, Unknown] = {}
+    seen: set[int] = set()
+    for each in _moments(observations):
+        own: list[Unknown] = []
+        # A trajectory has many records, and may have many coefficients.
+        if id(each.trajectory) not in seen:
+            seen.add(id(each.trajectory))
+            own += [one for part in each.trajectory.coefficients for one in part]
+        own += [] if each.clock is None else [each.clock]
+        found |= {id(one): one for one in own}
+    return list(found.values())
+
+
+def all_trajectories(
+    of_photos: Sequence[Trajectory], observations: Sequence[Observation]
+) -> list[Trajectory]:
+    """Return trajectories of photos, then those of records, each once."""
+    of_times = (each.trajectory for each in _moments(observations))
+    return list({id(each): each for each in (*of_photos, *of_times)}.values())
+
+
+def _moments(observations: Sequence[Observation]) -> Iterator[Moment]:
+    """Yield the time of each observation that is of one."""
+    return (moment for each in observations if (moment := each.moment) is not None)
 
 
 def observation_rows(

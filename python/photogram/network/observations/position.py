@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.network.observations.observation import AXES, Observation
-from photogram.network.timed import Moment
 from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Drift, LeverArm, Shift, Unknown
 
@@ -67,11 +66,6 @@ class Position(Observation):
     time: float = 0.0
     trajectory: Trajectory | None = None
     clock: Clock | None = None
-
-    @property
-    def moment(self) -> Moment | None:
-        """The time on a trajectory that it is of."""
-        return None if self.trajectory is None else Moment(self.trajectory, float(self.time), self.clock)
 
     @classmethod
     def values_of(cls, observations: Sequence[Observation]) -> Floats:

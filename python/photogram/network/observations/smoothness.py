@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import shaped, shown
 from photogram.errors import InputError
-from photogram.network.observations.observation import Observation
+from photogram.network.observations.observation import Observation, all_trajectories
 from photogram.network.trajectories import Coefficient, Trajectory
 from photogram.network.unknowns import Unknown
 
@@ -96,12 +96,11 @@ def with_smoothness(
     observations: Sequence[Observation], trajectories: Sequence[Trajectory]
 ) -> tuple[Observation, ...]:
     """Return observations with those of trajectories that are not among them."""
-    of_records = [each.moment.trajectory for each in observations if each.moment is not None]
     known: set[Unknown | None] = set()
     for each in observations:
         if isinstance(each, Smoothness):
             known.update(each.unknowns)
     found = list(observations)
-    for trajectory in {id(each): each for each in (*trajectories, *of_records)}.values():
+    for trajectory in all_trajectories(trajectories, observations):
         found += [each for each in smoothness_of(trajectory) if not known.issuperset(each.unknowns)]
     return tuple(found)

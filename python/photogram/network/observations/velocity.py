@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from photogram.network.observations.observation import AXES, Observation
-from photogram.network.timed import Moment
 from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import LeverArm
 
@@ -53,11 +52,6 @@ class Velocity(Observation):
     trajectory: Trajectory | None = None
     time: float = 0.0
     clock: Clock | None = None
-
-    @property
-    def moment(self) -> Moment | None:
-        """The time on a trajectory that it is of."""
-        return None if self.trajectory is None else Moment(self.trajectory, float(self.time), self.clock)
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
         """Lengths in a second."""

@@ -111,8 +111,7 @@ def judged(
     against = _against(result, of_all, left_out, standards)
     bad = against.always or (strict and against.strictly)
     doubtful = against.strictly or _doubtful(of_all)
-    block = result.block
-    held = not block.photo_position_sd.any() and not block.photo_attitude_sd.any()
+    held = not result.photo_given_sd.any()
     remarks = _remarks(asked, texts, found, of_all, of_vegetated, standards, layout, held)
     remarks += [
         texts("control.wrong", point=each.point, p=texts.significant(each.p, 2))

@@ -151,9 +151,8 @@ pub struct Flight {
     turning: Vector3,
     /// Jr(r).
     pub jacobian: Matrix3,
-    jacobian_rate: Matrix3,
-    /// w without the turning of the body.
-    own_rate: Vector3,
+    /// r and r'.
+    turn: [Vector3; 2],
 }
 
 impl Trajectory {
@@ -167,8 +166,8 @@ impl Trajectory {
         let (exp, jacobian) = (angle_axis_rotation(&turn), right_jacobian(&turn));
         let mut pose = Pose { position: place + shift, attitude: attitude * exp };
         let mut velocity = speed + drift;
-        let own_rate = exp.tr_mul(&rate) + jacobian * turn_rate;
-        let (mut rate, mut axes, mut turning) = (own_rate, Matrix3::identity(), Vector3::zeros());
+        let mut rate = exp.tr_mul(&rate) + jacobian * turn_rate;
+        let (mut axes, mut turning) = (Matrix3::identity(), Vector3::zeros());
         if let Some(body) = &self.body {
             (axes, turning) = body.at(time);
             velocity = axes * (velocity + turning.cross(&pose.position));
@@ -182,8 +181,7 @@ impl Trajectory {
             axes,
             turning,
             jacobian,
-            jacobian_rate: right_jacobian_rate(&turn, &turn_rate),
-            own_rate,
+            turn: [turn, turn_rate],
         }
     }
 
@@ -205,11 +203,6 @@ impl Trajectory {
 }
 
 impl Flight {
-    /// How the pose steps with time, dC and rho in a second.
-    pub fn by_time(&self) -> (Vector3, Vector3) {
-        (self.motion.velocity, self.motion.rate)
-    }
-
     /// B_k and the partials of C by c_k.
     pub fn by_position(&self, k: usize) -> Matrix3 {
         self.position.value(k) * self.axes
@@ -229,10 +222,10 @@ impl Flight {
     /// The partials of w by r_k: `W_k = B_k' Jr + B_k (Jr' + [w]x Jr)`.
     pub fn rate_by_rotation(&self, k: usize) -> Matrix3 {
         let (value, rate) = (self.rotation.value(k), self.rotation.rate(k));
-        // The turning of the body, seen in the photo's axes, steps by itself: [A' turning]x Jr.
-        let turning = self.motion.rate - self.own_rate;
+        let [turn, turn_rate] = &self.turn;
+        // The turning of the body, which is in w, steps as it is seen in the photo's axes.
         rate * self.jacobian
-            + value * (self.jacobian_rate + (self.own_rate + turning).cross_matrix() * self.jacobian)
+            + value * (right_jacobian_rate(turn, turn_rate) + self.motion.rate.cross_matrix() * self.jacobian)
     }
 }
 

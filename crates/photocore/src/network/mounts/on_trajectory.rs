@@ -157,9 +157,9 @@ impl MountModel for OnTrajectory {
         for k in r {
             add(rotation[k], &|| columns(3, &flight.by_rotation(k)));
         }
-        let (velocity, turning) = flight.by_time();
+        let Motion { velocity, rate, .. } = flight.motion;
         for (common, times) in self.scaled(at) {
-            add(common, &|| steps([(times * velocity, times * turning)]));
+            add(common, &|| steps([(times * velocity, times * rate)]));
         }
     }
 }
