@@ -131,7 +131,7 @@ def test_a_free_project_is_refused_before_its_images_are_read(tmp_path):
         block.replace(observations=[], point_sd=free, photo_position_sd=np.inf),
         tmp_path / "free",
     )
-    with pytest.raises(InputError, match=r"nothing gives the block a datum .* photogram\.adjust\("):
+    with pytest.raises(InputError, match=r"nothing gives the block a datum .* photogram\.adjust_in_parts\("):
         Streamed(project, Wishes(), tmp_path / "parts")
 
 
