@@ -14,12 +14,17 @@ from photogram.arguments.arrays import names, number, numbers, one_of, shaped, s
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.attitudes import Attitudes, Representation
+from photogram.network.lens import Lens
 from photogram.network.trajectories import Clock, Polynomial, Readout, Table, Trajectory
 from photogram.network.unknowns import Sensor, Unknown
 
 __all__ = ["LineSensor", "Lines", "Moment", "Poses", "Shutter", "Timed", "checked_timed", "own_trajectories"]
 
 Direction = Literal["down", "up", "right", "left"]
+
+STEPS = 100
+CLOSE = 1e-10
+"""Samples: where steps to the sample abreast of a place end."""
 
 
 @cache
@@ -101,7 +106,7 @@ class Lines:
 
 @dataclass(frozen=True)
 class LineSensor:
-    """Where a sample is in the focal plane: (x0, y0) + (sample - s0) (pitch_x, pitch_y).
+    """Where a sample is in the focal plane: (x0, y0) + (sample - s0) (pitch_x, pitch_y), behind a lens.
 
     Parameters
     ----------
@@ -111,16 +116,49 @@ class LineSensor:
         The sample at (x0, y0): half of all samples, from the edge of the first, where that is the middle.
     x0, y0
         Millimetres.
+    lens
+        What is known of the lens before it: it corrects the places before the camera does, and makes a line
+        of them that is curved. None: the camera alone corrects.
+
+    Raises
+    ------
+    InputError
+        A line without a pitch, a lens that is none.
     """
 
     pitch: tuple[float, float]
     s0: float
     x0: float = 0.0
     y0: float = 0.0
+    lens: Lens | None = None
+
+    def __post_init__(self) -> None:
+        pitch = shaped("pitch of a line of sensors", self.pitch, (2,))
+        if not (np.isfinite(pitch).all() and pitch.any()):
+            raise InputError(f"the pitch of a line of sensors is {shown(self.pitch)}")
+        object.__setattr__(self, "pitch", tuple(pitch.tolist()))
+        if self.lens is not None and not isinstance(self.lens, Lens):
+            raise InputError(f"the lens of a line of sensors is no Lens: {shown(self.lens)}")
 
     def places(self, samples: Floats) -> Floats:
-        """Return (n, 2) places of samples in the focal plane, in millimetres."""
-        return np.asarray([self.x0, self.y0] + (samples[:, np.newaxis] - self.s0) * np.array(self.pitch))
+        """Return (n, 2) places of samples in the focal plane, as the lens corrects them, in millimetres."""
+        straight = np.asarray([self.x0, self.y0] + (samples[:, np.newaxis] - self.s0) * np.array(self.pitch))
+        return straight if self.lens is None else self.lens.corrected(straight)
+
+    def abreast(self, places: Floats) -> tuple[Floats, Floats]:
+        """Return the samples that are abreast of (n, 2) places, and how far these are from the line, in mm.
+
+        Of a curved line the sample is that at whose place the two are apart square to the pitch.
+        """
+        length = float(np.hypot(*self.pitch))
+        along = np.array(self.pitch) / length
+        samples = self.s0 + (places - [self.x0, self.y0]) @ along / length
+        for _ in range(0 if self.lens is None else STEPS):
+            step = (places - self.places(samples)) @ along / length
+            samples = samples + step
+            if not (np.abs(step) > CLOSE).any():
+                break
+        return samples, (places - self.places(samples)) @ np.array([-along[1], along[0]])
 
 
 _KINDS: dict[str, type] = {

@@ -196,10 +196,16 @@ def exposure_columns(
     Raises
     ------
     InputError
-        A shutter whose edges are no image coordinates of tables.
+        A shutter whose edges are no image coordinates of tables, a line of sensors with a lens of its own.
     """
     lines = [each if isinstance(each, LineSensor) else None for each in exposures]
     own = [each if isinstance(each, Shutter) else None for each in exposures]
+    for camera, line in zip(cameras, lines, strict=True):
+        if line is not None and line.lens is not None:
+            raise InputError(
+                f"the line of sensors of the camera {camera.title} is behind a lens {line.lens.model}, which"
+                " tables of cameras have no columns for"
+            )
     found = _line_columns(lines) if any(lines) else {}
     return found | _shutter_columns(cameras, own, sizes, pixel_mm, image_y) if any(own) else found
 
