@@ -1,4 +1,4 @@
-"""Lenses that are known: from where something was measured in the focal plane to where a perfect lens has it."""
+"""Lenses that are known: from what was measured in the focal plane to what a perfect lens would show."""
 
 from __future__ import annotations
 
@@ -94,9 +94,10 @@ class Lens:
             (a, c), (b, d) = (each.T for each in slopes)
             miss = places - self._formula(found)
             with np.errstate(divide="ignore", invalid="ignore"):
-                step = np.column_stack(
-                    [d * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - c * miss[:, 0]]
-                ) / (a * d - b * c)[:, np.newaxis]
+                step = (
+                    np.column_stack([d * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - c * miss[:, 0]])
+                    / (a * d - b * c)[:, np.newaxis]
+                )
             found = found + step
             if not (np.abs(step) > CLOSE * size).any():
                 break
