@@ -1,1 +1,1 @@
-"""Community Sensor Model: support data of images (ISDs of ALE) and labels of ISIS cubes as photos on trajectories."""
+"""Support data of images (ISDs of the Community Sensor Model), labels of ISIS cubes, as photos that move."""

@@ -24,7 +24,7 @@ Pixels = Literal["isis", "csm"]
 
 @dataclass(frozen=True, eq=False)
 class Positions:
-    """Where a camera was: (k,) seconds, (k, 3) inertial metres from the body's centre, (k, 3) metres a second.
+    """Where a camera was: (k,) seconds, (k, 3) metres from the body's centre, inertial, (k, 3) m/s.
 
     `interpolation` is that which the records ask for; None: whoever uses them says it.
     """

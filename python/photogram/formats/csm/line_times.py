@@ -19,7 +19,7 @@ APART = 0.01
 
 @dataclass(frozen=True)
 class Drift:
-    """What the rate of lines lacks: it is dt (1 + factor) + further, and begins some lines later (LROC NAC)."""
+    """What times lack: the rate is dt (1 + factor) + further, the first line so many lines later."""
 
     factor: float
     further: float
@@ -83,8 +83,8 @@ def fitting(lines: Lines, count: int, table: Floats, drift: Drift | None) -> tup
     if drift is not None and misfit(drift.of(lines)) < misfit(lines):
         lines = drift.of(lines)
         remarks.append(
-            "line_scan_rate lacks the corrections of the keywords MULTIPLI_LINE_ERROR, ADDITIVE_LINE_ERROR and"
-            f" ADDITIONAL_PREROLL, which were added: {np.asarray(lines.table)[0, 2]:.10g} s a line"
+            "line_scan_rate lacks what the keywords MULTIPLI_LINE_ERROR, ADDITIVE_LINE_ERROR and"
+            f" ADDITIONAL_PREROLL say, which was added: {np.asarray(lines.table)[0, 2]:.10g} s a line"
         )
     span, known = float(abs(np.diff(lines.times([0.0, count]))[0])), float(ends[1] - ends[0])
     if known > 0 and abs(span - known) > APART * known:

@@ -1,4 +1,4 @@
-"""An image with support data as photos on a trajectory: what a block needs, and where pixels lie on the ground."""
+"""An image with support data as photos on a trajectory, and where its pixels lie on the ground."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ class SupportedImage:
         return (Timed(self.name, on, time=isd.time),)
 
     def _line_sensor(self) -> LineSensor:
-        """Return the line of sensors: the detector's line is that at which it begins, whatever the image's."""
+        """Return the line of sensors: its line of the detector is that at which the image begins."""
         isd, middle = self.isd, self.isd.size[0] / 2
         detector = isd.detector.from_centre(np.array([[middle, 0.0]]), self.pixels)
         detector[:, 1] = isd.detector.first[1] - isd.detector.centre[1]
