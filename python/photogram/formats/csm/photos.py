@@ -17,6 +17,7 @@ from photogram.network.cameras import Camera
 from photogram.network.projecting import projected
 from photogram.network.timed import LineSensor, Timed
 from photogram.network.trajectories import Basis, Interpolation, Table, Trajectory
+from photogram.network.whereabouts import reach
 
 __all__ = ["SupportedImage", "camera_of", "trajectory_of"]
 
@@ -208,6 +209,11 @@ class SupportedImage:
         -------
         (n, 3) X, Y, Z from the body's centre, fixed to the body, metres: of the two points of a ray that
         which is nearer to the camera, and of a ray that misses the body its nearest.
+
+        Raises
+        ------
+        InputError
+            Lines at times that the tables do not reach, arrays as for :meth:`coordinates`.
         """
         photos, xy = self.coordinates(samples, lines)
         if self.isd.lines is None:
@@ -215,10 +221,22 @@ class SupportedImage:
         else:
             times = self.isd.lines.times(xy[:, 1])
             xy = self._line_sensor().places(xy[:, 0])
+        self._check_reached(times, np.atleast_1d(np.asarray(lines, dtype=float)))
         places, turned, *_ = self.flown.flown(times, *_coefficients(self.flown))
         rays = np.einsum("nij,nj->ni", turned.reshape(-1, 3, 3), self.camera.rays(xy))
         a, b = self.isd.radii
         return nearest_intersection(places, rays, a + height, b + height)
+
+    def _check_reached(self, times: Floats, lines: Floats) -> None:
+        """Refuse times at which nothing is known of the pose."""
+        first, last = reach(self.flown)
+        beyond = (times < first) | (times > last)
+        if beyond.any():
+            row = int(np.argmax(beyond))
+            raise self.isd.error(
+                f"line {lines[row]:g} of {self.name} is at {float(times[row])!r} s, the tables reach from"
+                f" {first!r} to {last!r} s"
+            )
 
     def to_image(self, xyz: ArrayLike) -> Floats:
         """Return the line and the sample at which points appear.
@@ -256,6 +274,10 @@ _STEPS = 5
 """Until a shift no longer changes the line that it is of: shifts are less than a line."""
 
 
+_EDGE = 1e-6
+"""Rows beyond a framelet that are rounding at its edge."""
+
+
 def _coefficients(trajectory: Trajectory) -> tuple[Floats, Floats]:
     """Return what is given of the corrections of a trajectory."""
     position, rotation = (np.array([each.position for each in own]) for own in trajectory.coefficients)
@@ -272,5 +294,5 @@ def _in_framelets(framelets: Framelets, images: Floats) -> Floats:
     best = off.argmin(axis=0)
     own = images[best, np.arange(images.shape[1])]
     lines = framelets.lines(own[:, 1], best)
-    seen = off.min(axis=0, initial=np.inf) <= framelets.height / 2
+    seen = off.min(axis=0, initial=np.inf) <= framelets.height / 2 + _EDGE
     return np.where(seen[:, np.newaxis], np.column_stack([own[:, 0], lines]), np.nan)
