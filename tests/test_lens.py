@@ -104,6 +104,25 @@ def test_a_curved_line_has_a_sample_abreast_of_every_place(pitch):
     np.testing.assert_allclose(apart, 0.25, atol=1e-12)
 
 
+def test_a_line_of_sensors_may_be_told_by_a_table():
+    table = np.array([[0.5, -3.0, 0.1], [200.5, -1.0, 0.12], [400.5, 1.01, 0.09], [600.5, 3.0, 0.1]])
+    line = LineSensor.of_table(table)
+    np.testing.assert_allclose(line.places(table[:, 0]), table[:, 1:], atol=1e-15)
+    np.testing.assert_allclose(line.places(np.array([300.5])), [[0.005, 0.105]], atol=1e-15)
+    samples = np.array([100.0, 300.0, 599.0])
+    found, apart = line.abreast(line.places(samples) + np.array([0.0, 0.2]))
+    np.testing.assert_allclose(found, samples, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(apart, 0.2, atol=1e-12)
+    assert line == LineSensor.of_table(table)
+    assert line != LineSensor.of_table(table + [0.0, 0.0, 1e-3] * np.eye(4)[:, :1])
+    with pytest.raises(InputError, match="do not ascend"):
+        LineSensor.of_table(table[::-1])
+    with pytest.raises(InputError, match="ascending"):
+        LineSensor.of_table(table[[0, 2, 1, 3]])
+    lensed = LineSensor.of_table(table, Lens("lrolrocnac", (0.05,)))
+    np.testing.assert_allclose(lensed.places(table[:1, 0]), [[-3.0, 0.1 / 1.0005]], rtol=1e-12)
+
+
 def test_a_line_of_sensors_has_a_pitch_and_a_lens():
     with pytest.raises(InputError, match="pitch"):
         LineSensor((0.0, 0.0), 10.0)
