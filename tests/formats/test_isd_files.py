@@ -130,6 +130,7 @@ FAULTS = [
     ),
     (setting({}, "optical_distortion"), "optical_distortion: has 0 models"),
     (setting([1.0], "optical_distortion", "radial", "coefficients"), "radial: .*has 3 coefficients"),
+    (setting({"lineExposureTimes": [1.0]}, "jitter"), "jitter: is known of frames alone"),
     (setting([], "line_scan_rate"), "line_scan_rate: is empty"),
     (setting([[0.5, -2.0, 0.0]], "line_scan_rate"), "line_scan_rate: lines are first line"),
     (setting([[0.5, -2.0]], "line_scan_rate"), "line_scan_rate/0: has 2 numbers"),

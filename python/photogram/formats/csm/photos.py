@@ -44,8 +44,9 @@ def trajectory_of(
     name
         For reports.
     interpolation
-        `csm`: polynomials through eight records, of positions and quaternions; `isis`: positions straight,
-        attitudes uniformly from record to record. Records that say it themselves (cubes) are joined so.
+        `csm`: polynomials through eight records, of positions and quaternions, at their own times however
+        far apart these are; `isis`: positions straight, attitudes uniformly from record to record. Records
+        that say it themselves (cubes) are joined so.
     position, rotation
         What corrections are made of, as for :class:`Trajectory`.
 

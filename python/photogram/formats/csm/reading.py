@@ -53,6 +53,8 @@ def read_isd(path: Path) -> Isd:
     _check_frames(tree)
     pointing, center = _turns(tree, "instrument_pointing"), tree["center_ephemeris_time"].number()
     own: dict[str, Any] = {}
+    if kind != "frame" and "jitter" in tree:
+        raise tree["jitter"].error("is known of frames alone")
     if kind == "line":
         drift = read_drift(keywords, instrument(tree, keywords))
         lines = read_lines(tree, center)
