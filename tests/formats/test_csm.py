@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from photogram import Block, adjust
-from photogram.formats.csm.angles import AngleFit, fitted_angles, of_angles
-from photogram.formats.csm.photos import SupportedImage, trajectory_of
+from photogram import Block, InputError, adjust
+from photogram.formats.csm.angles import Polynomials, fitted_angles, of_angles
+from photogram.formats.csm.photos import SupportedImage, trajectory_of, with_polynomial_pointing
 from photogram.formats.csm.reading import read_isd
 from photogram.io.pvl import parsed
 from photogram.network.trajectories import Table, Trajectory
@@ -132,7 +132,22 @@ def test_three_angles_as_polynomials(side, lro, isds):
         (truth["reference_time"], truth["time_scale"]), rel=1e-12
     )
     np.testing.assert_allclose(np.rad2deg(fit.coefficients), truth["coefficients_deg"], rtol=1e-9)
-    np.testing.assert_allclose(of_angles(fit.angles(isd.pointing.times)), isd.pointing.matrices, atol=1e-4)
+    np.testing.assert_allclose(of_angles(fit.at(isd.pointing.times)), isd.pointing.matrices, atol=1e-4)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_pointing_of_polynomials_is_that_of_its_angles(side, isds):
+    isd = isds[side]
+    on = trajectory_of(with_polynomial_pointing(isd, 2), side, interpolation="isis")
+    assert on.table.interpolation == "linear"
+    times = np.linspace(isd.pointing.times[0], isd.pointing.times[-1], 1001)
+    _, turned, *_ = Trajectory(side, on.table).flown(times, *np.zeros((2, 0, 3)))
+    fit = fitted_angles(isd.pointing.times, isd.pointing.matrices, 2)
+    expected = np.swapaxes(of_angles(fit.at(times)), 1, 2) @ OURS
+    # A turn of 1e-3 rad a second, times that have 6e-8 s of resolution.
+    np.testing.assert_allclose(turned.reshape(-1, 3, 3), expected, rtol=0, atol=3e-10)
+    with pytest.raises(InputError, match="503 records of the pointing do not give polynomials"):
+        with_polynomial_pointing(isd, 503)
 
 
 def held(side, lro, isds, measures):
@@ -141,11 +156,11 @@ def held(side, lro, isds, measures):
     fit = fitted_angles(isd.pointing.times, isd.pointing.matrices, 2)
     pointing = lro["published"]["pointing_deg"][side]
     a1, a2 = np.deg2rad([pointing["right_ascension"], pointing["declination"]])
-    angles = AngleFit(np.array([a1, a2, [*fit.coefficients[2], 0.0]]), fit.reference, fit.scale)
+    angles = Polynomials(np.array([a1, a2, [*fit.coefficients[2], 0.0]]), fit.reference, fit.scale)
     own = trajectory_of(isd, side, interpolation="isis")
     at = np.unique(isd.lines.times(measures[side][:, 1] - 0.5))
     at = np.concatenate([[at[0] - 1e-2], at, [at[-1] + 1e-2]])
-    attitudes = np.swapaxes(of_angles(angles.angles(at)), 1, 2) @ OURS
+    attitudes = np.swapaxes(of_angles(angles.at(at)), 1, 2) @ OURS
     table = Table(own.table.times, own.table.positions, at, attitudes)
     on = Trajectory(side, table, body=own.body)
     return SupportedImage(isd, side, pixels="isis", interpolation="isis", trajectory=on)

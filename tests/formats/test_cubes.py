@@ -6,7 +6,7 @@ import pytest
 from support_data import START, written
 
 from photogram import InputError
-from photogram.formats.csm.angles import AngleFit, of_angles
+from photogram.formats.csm.angles import Polynomials, of_angles
 from photogram.formats.csm.cube_tables import read_label, read_positions, read_turns
 from photogram.formats.csm.cubes import read_cube, serial_number
 from photogram.formats.csm.lists import read_list, read_support
@@ -72,7 +72,7 @@ def test_polynomials_are_tables(tmp_path):
     s = ((times - reference) / scale)[:, np.newaxis]
     inertial = 1000 * (places.T[0] + s * places.T[1] + s**2 * places.T[2])
     matrices = np.reshape(made_cubes.CONSTANT, (3, 3)) @ of_angles(
-        AngleFit(angles, reference, scale).angles(times)
+        Polynomials(angles, reference, scale).at(times)
     )
     body = np.stack([made_cubes.support_data.body(np.array([t]))[0] for t in times])
     np.testing.assert_allclose(at, np.einsum("nij,nj->ni", body, inertial), rtol=0, atol=1e-6)

@@ -8,7 +8,12 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 
-__all__ = ["AngleFit", "fitted_angles", "of_angles", "of_quaternions", "to_angles"]
+__all__ = ["Polynomials", "fitted_angles", "of_angles", "of_quaternions", "to_angles"]
+
+RECORDS = 64
+"""Parts of a span that polynomials are sampled in: eight neighbours give them to the last digits."""
+BEYOND = 4
+"""Records beyond either end: as many as count on a side."""
 
 
 def of_quaternions(quaternions: Floats) -> Floats:
@@ -42,20 +47,34 @@ def to_angles(matrices: Floats) -> Floats:
     return np.unwrap(np.column_stack([a1, a2, a3]), axis=0)
 
 
-class AngleFit(NamedTuple):
-    """Three angles as polynomials of (t - reference) / scale: (3, degree + 1) radians, powers from 0 on."""
+class Polynomials(NamedTuple):
+    """Three angles, or coordinates, as polynomials of (t - reference) / scale.
+
+    Attributes
+    ----------
+    coefficients
+        (3, degree + 1), powers from 0 on.
+    reference, scale
+        Seconds.
+    """
 
     coefficients: Floats
     reference: float
     scale: float
 
-    def angles(self, times: Floats) -> Floats:
-        """Return (n, 3) angles at (n,) times."""
+    def at(self, times: Floats) -> Floats:
+        """Return (n, 3) values at (n,) times."""
         powers = np.vander((times - self.reference) / self.scale, self.coefficients.shape[1], increasing=True)
         return np.asarray(powers @ self.coefficients.T)
 
+    def sampled(self, first: float, last: float) -> tuple[Floats, Floats]:
+        """Return (k,) times and (k, 3) values that `lagrange` joins without loss between two times."""
+        steps = np.arange(-BEYOND, RECORDS + BEYOND + 1, dtype=float)
+        times: Floats = first + (last - first) / RECORDS * steps
+        return times, self.at(times)
 
-def fitted_angles(times: Floats, matrices: Floats, degree: int) -> AngleFit:
+
+def fitted_angles(times: Floats, matrices: Floats, degree: int) -> Polynomials:
     """Return polynomials that fit the angles of records, all of one weight, as the program jigsaw does.
 
     Parameters
@@ -68,4 +87,4 @@ def fitted_angles(times: Floats, matrices: Floats, degree: int) -> AngleFit:
     reference, scale = (times[0] + times[-1]) / 2, (times[-1] - times[0]) / 2 or 1.0
     powers = np.vander((times - reference) / scale, degree + 1, increasing=True)
     solved = np.linalg.lstsq(powers, to_angles(matrices), rcond=None)[0]
-    return AngleFit(np.asarray(solved.T), float(reference), float(scale))
+    return Polynomials(np.asarray(solved.T), float(reference), float(scale))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from os import SEEK_END
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.csm.angles import AngleFit, of_angles, of_quaternions
+from photogram.formats.csm.angles import Polynomials, of_angles, of_quaternions
 from photogram.formats.csm.isd import Positions, Turns
 from photogram.formats.tree import Tree
 from photogram.io.files import reading
@@ -25,10 +26,6 @@ PIECE = 1 << 16
 LONGEST = 1 << 26
 """Bytes of a label, at most."""
 KM = 1000.0
-RECORDS = 64
-"""Parts of a span that a polynomial is sampled in: eight neighbours give it to the last digits."""
-BEYOND = 4
-"""Records beyond either end: as many as count on a side."""
 
 _END = re.compile(rb"(?mi)^[ \t]*End[ \t]*\r?$")
 _MARK = b"Object = IsisCube"
@@ -129,11 +126,12 @@ class _Table:
             raise self.error(
                 f"has {self.keys['Bytes'].value} bytes, {records} records of {width} doubles {size}"
             )
+        begin = self.keys["StartByte"].whole(1, 1 << 62) - 1
         with reading(self.path), self.path.open("rb") as file:
-            file.seek(self.keys["StartByte"].whole(1, 1 << 62) - 1)
+            if begin + size > file.seek(0, SEEK_END):
+                raise self.error("goes on beyond the end of the file")
+            file.seek(begin)
             data = file.read(size)
-        if len(data) < size:
-            raise self.error("goes on beyond the end of the file")
         found = np.frombuffer(data, dtype="<f8" if order == "lsb" else ">f8").astype(float)
         if not np.isfinite(found).all():
             raise self.error("has numbers that are not finite")
@@ -165,9 +163,7 @@ class _Table:
         first, last = (self.keys[f"{kernel}Table{end}Time"].number() for end in ("Start", "End"))
         if not last > first:
             raise self.error(f"reaches from {first!r} to {last!r}")
-        steps = np.arange(-BEYOND, RECORDS + BEYOND + 1, dtype=float)
-        times: Floats = first + (last - first) / RECORDS * steps
-        return times, AngleFit(own.T, float(reference), float(scale)).angles(times)
+        return Polynomials(own.T, float(reference), float(scale)).sampled(first, last)
 
     @property
     def constant(self) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.csm.isd import Framelets, Isd, Pixels, check_choice
+from photogram.formats.csm.angles import fitted_angles, of_angles
+from photogram.formats.csm.isd import Framelets, Isd, Pixels, Turns, check_choice
 from photogram.formats.csm.spheroids import nearest_intersection
 from photogram.network.cameras import Camera
 from photogram.network.projecting import projected
@@ -19,7 +20,7 @@ from photogram.network.timed import LineSensor, Timed
 from photogram.network.trajectories import Basis, Interpolation, Table, Trajectory
 from photogram.network.whereabouts import reach
 
-__all__ = ["SupportedImage", "camera_of", "trajectory_of"]
+__all__ = ["SupportedImage", "camera_of", "trajectory_of", "with_polynomial_pointing"]
 
 _OURS = np.diag([1.0, -1.0, -1.0])
 """From the axes of cameras that look along +z, y down, to those of photos; and back."""
@@ -70,6 +71,31 @@ def trajectory_of(
         attitude_interpolation=pointing.interpolation or joined,
     )
     return Trajectory(name, table, position, rotation, (isd.body.times, isd.body.matrices))
+
+
+def with_polynomial_pointing(isd: Isd, degree: int) -> Isd:
+    """Return support data whose pointing is that of polynomials fitted to its three angles, as jigsaw has it.
+
+    Parameters
+    ----------
+    isd
+        The support data.
+    degree
+        Of the polynomials: CKDEGREE.
+
+    Raises
+    ------
+    InputError
+        Fewer records than coefficients.
+    """
+    own = isd.pointing
+    if not 0 <= degree < len(own.times):
+        raise isd.error(
+            f"{len(own.times)} records of the pointing do not give polynomials of degree {degree}"
+        )
+    fit = fitted_angles(own.times, own.matrices, degree)
+    times, angles = fit.sampled(float(own.times[0]), float(own.times[-1]))
+    return replace(isd, pointing=Turns(times, of_angles(angles), "lagrange"))
 
 
 def camera_of(isd: Isd, name: str = "") -> Camera:
@@ -249,7 +275,8 @@ class SupportedImage:
 
         Returns
         -------
-        (n, 2) lines and samples, counted as `pixels` says; NaN for points that are not seen.
+        (n, 2) lines and samples, counted as `pixels` says, beyond the edges as if the image went on; NaN for
+        points that are not seen at any time.
         """
         points = np.atleast_2d(numbers("xyz", xyz))
         seen = [projected(each, self.flown, self.camera, points) for each in self.timed]
