@@ -183,3 +183,37 @@ def test_ways_to_count_and_to_join_have_names(tmp_path):
             image(tmp_path, document(), **how)
     with pytest.raises(InputError, match="shapes"):
         image(tmp_path, document()).coordinates([1.0, 2.0], [1.0])
+
+
+def places(value, at=()):
+    """Yield where things stand in a document; of lists the first and the last."""
+    if at:
+        yield at
+    inside = value.items() if isinstance(value, dict) else []
+    if isinstance(value, list):
+        inside = {k: value[k] for k in (0, len(value) - 1)}.items() if value else []
+    for key, each in inside:
+        yield from places(each, (*at, key))
+
+
+HOSTILE = [None, True, "x", "", [], {}, [None], [[]], {"a": 1}, -1, 0, 0.5, 1e15, -1e299, [1e299] * 3, 10**30]
+
+
+@pytest.mark.parametrize("kind", ["LINE_SCANNER", "FRAME", "PUSH_FRAME"])
+def test_whatever_stands_in_a_document_is_understood_or_refused(tmp_path, kind):
+    plain = json.dumps(document(kind, records=9) | {"naif_keywords": {}})
+    known = 0
+    for at in list(places(json.loads(plain))):
+        for hostile in HOSTILE:
+            data = json.loads(plain)
+            setting(hostile, *at)(data)
+            try:
+                with np.errstate(all="ignore"):
+                    own = image(tmp_path, data)
+                    own.to_image(own.to_ground([100.0], [100.0]))
+                known += 1
+            except InputError:
+                continue
+            except Exception as error:
+                raise AssertionError(f"{at} = {hostile}: {error!r}") from error
+    assert known > 20

@@ -23,6 +23,8 @@ _KINDS = {
     "USGS_ASTRO_FRAME_SENSOR_MODEL": "frame",
     "USGS_ASTRO_PUSH_FRAME_SENSOR_MODEL": "push frame",
 }
+FRAMELETS = 100_000
+"""At most in an image: each is a photo."""
 _UNITS = {"m": 1.0, "km": 1000.0}
 
 
@@ -51,6 +53,7 @@ def read_isd(path: Path) -> Isd:
     if not focal_length:
         raise tree["focal_length_model"]["focal_length"].error("is zero")
     _check_frames(tree)
+    detector = read_detector(tree, keywords)
     pointing, center = _turns(tree, "instrument_pointing"), tree["center_ephemeris_time"].number()
     own: dict[str, Any] = {}
     if kind != "frame" and "jitter" in tree:
@@ -60,7 +63,7 @@ def read_isd(path: Path) -> Isd:
         lines = read_lines(tree, center)
         own["lines"], own["remarks"] = fitting(lines, size[1], pointing.times, drift)
     elif kind == "push frame":
-        own["framelets"] = _framelets(tree, size[1])
+        own["framelets"] = _framelets(tree, size[1], float(detector.summing[1]))
     elif "jitter" in tree:
         own["jitter"] = _jitter(tree["jitter"])
     return Isd(
@@ -71,7 +74,7 @@ def read_isd(path: Path) -> Isd:
         size,
         _radii(tree["radii"]),
         focal_length,
-        read_detector(tree, keywords),
+        detector,
         read_lens(tree, focal_length),
         _positions(tree["instrument_position"]),
         pointing,
@@ -158,14 +161,16 @@ def _turns(tree: Tree, name: str) -> Turns:
     return Turns(_times(own, len(quaternions)), constant @ of_quaternions(quaternions))
 
 
-def _framelets(tree: Tree, lines: int) -> Framelets:
+def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
     """Return the framelets of a push frame camera: each is exposed about its own time."""
-    height = tree["framelet_height"].number() / tree["detector_line_summing"].number()
+    height = tree["framelet_height"].number() / summing
     every = tree["interframe_delay"].number()
     if not (height > 0 and every > 0):
         raise tree["framelet_height"].error("is not positive, or interframe_delay is not")
-    if lines % height:
-        raise tree["framelet_height"].error(f"does not divide the {lines} lines of the image")
+    if lines % height or lines / height > FRAMELETS:
+        raise tree["framelet_height"].error(
+            f"does not divide the {lines} lines of the image, or into more than {FRAMELETS} framelets"
+        )
     first = tree["starting_ephemeris_time"].number() + 0.5 * tree["exposure_duration"].number()
     backwards, flipped = (
         _truth(tree.get(name, False)) for name in ("framelet_order_reversed", "framelets_flipped")
