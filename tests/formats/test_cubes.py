@@ -109,6 +109,9 @@ FAULTS = [
     (columns("InstrumentPointing", "J2000Q2"), "InstrumentPointing: has no column J2000Q2"),
     (changed("BodyRotation", ConstantRotation="(1, 2, 3)"), "BodyRotation/ConstantRotation: has 3 numbers"),
     (changed("BodyRotation", **{"^Table": '"body.tab"'}), "BodyRotation: stands in another file"),
+    ({"known": made_cubes.keywords() | {"INS-85600_ITRANSL": [0, 0, 0]}}, "ITRANSS: has no inverse"),
+    ({"instrument": made_cubes.INSTRUMENT | {"LineExposureDuration": "0"}}, "LineExposureDuration: is zero"),
+    ({"instrument": made_cubes.INSTRUMENT | {"SpatialSumming": "0"}}, "SpatialSumming: is not positive"),
     (less("INS-85600_OD_K"), "NaifKeywords: INS-85600_OD_K is missing"),
     (less("BODY301_RADII"), "NaifKeywords: BODY301_RADII is missing"),
     (less(f"CLOCK_ET_-85_{made_cubes.CLOCK}_COMPUTED"), "has no CLOCK_ET"),
@@ -191,3 +194,29 @@ def test_what_is_wrong_with_a_list_is_named(tmp_path, text, record, said):
     with pytest.raises(InputError, match=said) as caught:
         read_list(listed)
     assert (caught.value.file, caught.value.record) == (listed, record)
+
+
+HOSTILE = ["NULL", '""', "x", "()", "(1, (2))", "-1", "0", "1e300", "9999999999999999", "2 <km>"]
+
+
+def test_whatever_stands_in_a_label_is_understood_or_refused(tmp_path):
+    path = made_cubes.cube(tmp_path / "a.cub")
+    data = path.read_bytes()
+    lines, rest = data[: made_cubes.LABEL].rstrip(b"\0").decode().split("\n"), data[made_cubes.LABEL :]
+    known = 0
+    for row, line in enumerate(lines):
+        if " = " not in line:
+            continue
+        for hostile in HOSTILE:
+            changed = [*lines[:row], f"{line.split(' = ')[0]} = {hostile}", *lines[row + 1 :]]
+            path.write_bytes("\n".join(changed).encode().ljust(made_cubes.LABEL, b"\0") + rest)
+            try:
+                with np.errstate(all="ignore"):
+                    own = SupportedImage(read_cube(path), "I", pixels="isis", interpolation="isis")
+                    own.to_image(own.to_ground([100.0], [100.0]))
+                known += 1
+            except InputError:
+                continue
+            except Exception as error:
+                raise AssertionError(f"{line} = {hostile}: {error!r}") from error
+    assert known > 20

@@ -121,7 +121,10 @@ FAULTS = [
     (setting("x", "focal_length_model", "focal_length"), "focal_length_model/focal_length: is no number"),
     (setting(0, "focal_length_model", "focal_length"), "focal_length: is zero"),
     (without("detector_center", "line"), "detector_center: line is missing"),
-    (setting([0.0, 0.0, 0.0], "focal2pixel_lines"), "focal2pixel_samples: has no inverse"),
+    (
+        setting([0.0, 0.0, 0.0], "focal2pixel_lines"),
+        "focal2pixel_samples: has no inverse, together with /focal2pixel_lines",
+    ),
     (setting([0.0, 1.0], "focal2pixel_lines"), "focal2pixel_lines: has 2 numbers, not 3"),
     (setting(0, "detector_sample_summing"), "detector_sample_summing: is not positive"),
     (

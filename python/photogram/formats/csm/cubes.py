@@ -11,9 +11,9 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.formats.csm.cube_tables import members, one, read_label, read_positions, read_turns
-from photogram.formats.csm.isd import Detector, Isd, Plane
+from photogram.formats.csm.isd import Detector, Isd
 from photogram.formats.csm.line_times import fitting, read_drift
-from photogram.formats.csm.optics import transformed
+from photogram.formats.csm.optics import from_pixels, not_zero, transformed
 from photogram.formats.tree import Tree
 from photogram.io.pvl import Group
 from photogram.network.lens import Lens
@@ -81,7 +81,7 @@ def _nac(label: Group, cube: Group, instrument: Tree, path: Path) -> Isd:
     size = members(one(one(cube, "Core", path), "Dimensions", path), path)
     samples, count = size["Samples"].whole(1), size["Lines"].whole(1)
     pointing = read_turns(label, "InstrumentPointing", path)
-    rate = instrument["LineExposureDuration"].number() / 1000
+    rate = not_zero(instrument["LineExposureDuration"]) / 1000
     lines = Lines([[0.0, _start(instrument, keywords), rate]])
     lines, remarks = fitting(lines, count, pointing.times, read_drift(keywords, code))
     return Isd(
@@ -91,7 +91,7 @@ def _nac(label: Group, cube: Group, instrument: Tree, path: Path) -> Isd:
         _named(instrument)[1],
         (samples, count),
         _radii(keywords),
-        keywords[f"{code}_FOCAL_LENGTH"].number(),
+        not_zero(keywords[f"{code}_FOCAL_LENGTH"]),
         _detector(instrument, keywords, code),
         Lens("lrolrocnac", (keywords[f"{code}_OD_K"].number(),)),
         read_positions(label, path),
@@ -107,14 +107,17 @@ def _detector(instrument: Tree, keywords: Tree, code: str) -> Detector:
     """Return the detector of a scanner whose images are summed along lines alone."""
     summing = instrument["SpatialSumming"].number()
     centre = [keywords[f"{code}_BORESIGHT_{axis}"].number() for axis in ("SAMPLE", "LINE")]
-    # What instruments call ITRANSS, ITRANSL are focal2pixel of an ISD.
-    rows = np.array([keywords[f"{code}_ITRANS{axis}"].numbers(3) for axis in "SL"])
-    inverse = np.linalg.inv(rows[:, 1:])
+    if not summing > 0:
+        raise instrument["SpatialSumming"].error("is not positive")
     return Detector(
         np.array(centre),
         np.array([instrument["SampleFirstPixel"].number(), 0.0]),
         np.array([summing, 1.0]),
-        {"csm": Plane(-inverse @ rows[:, 0], inverse), "isis": transformed(keywords, code)},
+        {
+            # What instruments call ITRANSS, ITRANSL are focal2pixel of an ISD.
+            "csm": from_pixels(keywords[f"{code}_ITRANSS"], keywords[f"{code}_ITRANSL"]),
+            "isis": transformed(keywords, code),
+        },
     )
 
 

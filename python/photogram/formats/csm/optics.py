@@ -12,7 +12,7 @@ from photogram.formats.csm.isd import Detector, Pixels, Plane
 from photogram.formats.tree import Tree, unknown
 from photogram.network.lens import Lens, LensModel
 
-__all__ = ["instrument", "read_detector", "read_lens"]
+__all__ = ["from_pixels", "instrument", "not_zero", "read_detector", "read_lens", "transformed"]
 
 _MEMBERS = {
     "radial": ("coefficients",),
@@ -72,7 +72,7 @@ def read_detector(tree: Tree, keywords: Tree) -> Detector:
     summing = pair("detector_{}_summing")
     if not (summing > 0).all():
         raise tree["detector_sample_summing"].error("is not positive, or that of lines is not")
-    csm = _from_pixels(tree)
+    csm = from_pixels(tree["focal2pixel_samples"], tree["focal2pixel_lines"])
     planes: dict[Pixels, Plane] = {"csm": csm, "isis": csm}
     code = instrument(tree, keywords)
     if code is not None:
@@ -85,13 +85,24 @@ def read_detector(tree: Tree, keywords: Tree) -> Detector:
     )
 
 
-def _from_pixels(tree: Tree) -> Plane:
-    """Return the inverse of focal2pixel."""
-    rows = np.array([tree[f"focal2pixel_{axis}"].numbers(3) for axis in ("samples", "lines")])
-    if not abs(np.linalg.det(rows[:, 1:])) > 0:
-        raise tree["focal2pixel_samples"].error("has no inverse, together with focal2pixel_lines")
-    inverse = np.linalg.inv(rows[:, 1:])
+def from_pixels(samples: Tree, lines: Tree) -> Plane:
+    """Return the inverse of the affine transformation from millimetres to samples and lines of the detector.
+
+    Raises
+    ------
+    InputError
+        Coefficients that are not three numbers each, one without an inverse.
+    """
+    rows = _affine(samples, lines)
+    inverse: Floats = np.asarray(np.linalg.inv(rows[:, 1:]), dtype=float)
     return Plane(-inverse @ rows[:, 0], inverse)
+
+
+def _affine(first: Tree, second: Tree) -> Floats:
+    rows = np.array([first.numbers(3), second.numbers(3)])
+    if not 0 < abs(np.linalg.det(rows[:, 1:])) < np.inf:
+        raise first.error(f"has no inverse, together with {second.path}")
+    return rows
 
 
 def instrument(tree: Tree, keywords: Tree) -> str | None:
@@ -121,7 +132,19 @@ def transformed(keywords: Tree, code: str) -> Plane:
     InputError
         One that is missing, or has no inverse.
     """
-    rows = np.array([keywords[f"{code}_TRANS{axis}"].numbers(3) for axis in "XY"])
-    if not abs(np.linalg.det(rows[:, 1:])) > 0:
-        raise keywords[f"{code}_TRANSX"].error("has no inverse, together with TRANSY")
+    rows = _affine(keywords[f"{code}_TRANSX"], keywords[f"{code}_TRANSY"])
     return Plane(rows[:, 0], rows[:, 1:])
+
+
+def not_zero(tree: Tree) -> float:
+    """Return a number that is not zero.
+
+    Raises
+    ------
+    InputError
+        None, or zero.
+    """
+    found = tree.number()
+    if not found:
+        raise tree.error("is zero")
+    return found

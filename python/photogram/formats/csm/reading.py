@@ -12,7 +12,7 @@ from photogram.errors import InputError
 from photogram.formats.csm.angles import of_quaternions
 from photogram.formats.csm.isd import Framelets, Isd, Jitter, Positions, Turns
 from photogram.formats.csm.line_times import fitting, read_drift, read_lines
-from photogram.formats.csm.optics import instrument, read_detector, read_lens
+from photogram.formats.csm.optics import instrument, not_zero, read_detector, read_lens
 from photogram.formats.tree import Tree, read_json, unknown
 from photogram.network.trajectories import increasing, rotations
 
@@ -49,9 +49,7 @@ def read_isd(path: Path) -> Isd:
         raise unknown(model, "the sensor model", _KINDS)
     kind = cast("Any", _KINDS[model.text()])
     size = tree["image_samples"].whole(1), tree["image_lines"].whole(1)
-    focal_length = tree["focal_length_model"]["focal_length"].number()
-    if not focal_length:
-        raise tree["focal_length_model"]["focal_length"].error("is zero")
+    focal_length = not_zero(tree["focal_length_model"]["focal_length"])
     _check_frames(tree)
     detector = read_detector(tree, keywords)
     pointing, center = _turns(tree, "instrument_pointing"), tree["center_ephemeris_time"].number()
