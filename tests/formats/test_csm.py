@@ -1,12 +1,14 @@
 """Images with support data: published answers of usgscsm, a pair of the Lunar Reconnaissance Orbiter."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from photogram import Block, InputError, adjust
 from photogram.formats.csm.angles import Polynomials, fitted_angles, of_angles
+from photogram.formats.csm.isd import Positions
 from photogram.formats.csm.photos import SupportedImage, trajectory_of, with_polynomial_pointing
 from photogram.formats.csm.reading import read_isd
 from photogram.io.pvl import parsed
@@ -37,12 +39,24 @@ def test_a_scanner_sees_what_was_published(line, sample, ground):
 
 
 def test_a_camera_that_looks_away_sees_what_was_published_first():
-    # The answer of the same test of usgscsm before and with the detector's line; a later one is 0.445 m away
-    # for the same file.
+    # What usgscsm's own test of this image said before that program resampled positions.
     found = supported("orbitalLineScan").to_ground([8.5], [8.0])
-    np.testing.assert_allclose(
-        found[0], [999999.67040488799, 0.0, -811.90523782723039], rtol=1e-13, atol=1e-9
-    )
+    published = [999999.67040488799, 0.0, -811.90523782723039]
+    np.testing.assert_allclose(found[0], published, rtol=1e-13, atol=1e-9)
+
+
+def test_resampled_positions_see_what_was_published_later():
+    # 25 positions evenly spaced, of the 16 records by cubics with their velocities, and polynomials through
+    # these: velocities of 1.05 km/s beside places 1 km apart in a second move them by up to 0.48 m.
+    own = supported("orbitalLineScan")
+    records = own.isd.position
+    times = np.linspace(records.times[0], records.times[-1], 25)
+    joined = replace(own.isd, position=replace(records, interpolation="hermite"))
+    places, *_ = trajectory_of(joined, "t").flown(times, *np.zeros((2, 0, 3)))
+    isd = replace(own.isd, position=Positions(times, places))
+    found = SupportedImage(isd, "resampled").to_ground([8.5], [8.0])
+    published = [999999.67004351015, 0.0, -812.35021438796923]
+    np.testing.assert_allclose(found[0], published, rtol=1e-13, atol=1e-9)
 
 
 def test_jitter_shifts_what_a_frame_has_measured(tmp_path):
