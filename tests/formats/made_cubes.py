@@ -93,7 +93,7 @@ INSTRUMENT = {
 }
 
 
-def cube(path, *, instrument=INSTRUMENT, tables=None, order="<", known=None, label=LABEL):
+def cube(path, *, instrument=INSTRUMENT, tables=None, order="<", known=None, label=LABEL, group=None):
     """Write a cube, whose pixels nobody reads, and return its path."""
     own = globals()["tables"]() if tables is None else tables
     lines = ["Object = IsisCube", "  Object = Core", "    StartByte = 65537", "    Group = Dimensions"]
@@ -103,6 +103,7 @@ def cube(path, *, instrument=INSTRUMENT, tables=None, order="<", known=None, lab
         *(f"    {key} = {text}" for key, text in instrument.items()),
         "  End_Group",
     ]
+    lines += [] if group is None else [f"  Group = {group}", "    Of = something", "  End_Group"]
     lines += ["  Group = Kernels", f"    NaifFrameCode = {CODE}", "  End_Group", "End_Object"]
     data = b""
     for name, (columns, rows, keys) in own.items():

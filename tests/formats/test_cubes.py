@@ -100,6 +100,8 @@ def less(*names):
 
 FAULTS = [
     ({"instrument": made_cubes.INSTRUMENT | {"InstrumentId": "WAC"}}, "WAC of LUNAR .* make an ISD"),
+    ({"group": "AlphaCube"}, r"is a part of another cube, or made smaller \(AlphaCube\)"),
+    ({"group": "Mapping"}, r"is a map \(Mapping\)"),
     ({"tables": {}}, "has no table InstrumentPointing: run spiceinit"),
     (
         changed("InstrumentPosition", CacheType="PolyFunctionOverHermiteConstant"),

@@ -24,6 +24,8 @@ __all__ = ["read_cube", "serial_number"]
 KM = 1000.0
 _LRO, _APOLLO = "LUNAR RECONNAISSANCE ORBITER", re.compile(r"APOLLO[ _]?(1[567])")
 _NAC = ("NACL", "NACR")
+_CHANGED = {"AlphaCube": "a part of another cube, or made smaller", "Mapping": "a map"}
+"""Groups of cubes whose samples and lines are not those of their camera."""
 
 
 def _named(instrument: Tree) -> tuple[str, str]:
@@ -59,10 +61,14 @@ def read_cube(path: Path) -> Isd:
     Raises
     ------
     InputError
-        No cube, one without spiceinit; an instrument that is not known by its label and needs an ISD.
+        No cube, one without spiceinit, a part of another one or a map; an instrument that is not known by its
+        label and needs an ISD.
     """
     label = read_label(path)
     cube = one(label, "IsisCube", path)
+    for name, what in _CHANGED.items():
+        if cube.groups(name):
+            raise InputError(f"is {what} ({name}): take the cube that was made into it", file=path)
     instrument = members(one(cube, "Instrument", path), path)
     known = _CAMERAS.get(_named(instrument))
     if known is None:

@@ -155,7 +155,7 @@ class SupportedImage:
     def _photos(self, on: Trajectory) -> tuple[Timed, ...]:
         isd = self.isd
         if isd.lines is not None:
-            return (Timed(self.name, on, lines=isd.lines, line_sensor=self._line_sensor()),)
+            return (Timed(self.name, on, isd.time, lines=isd.lines, line_sensor=self._line_sensor()),)
         if isd.framelets is not None:
             all_of_them = range(isd.framelets.count)
             return tuple(Timed(f"{self.name}/{k}", on, time=isd.framelets.time(k)) for k in all_of_them)
