@@ -10,6 +10,7 @@
 //! Vectors and matrices are those of [`nalgebra`]. The crate reads no files, prints nothing and has no global state.
 
 pub mod adjustment;
+pub mod files;
 pub mod geometry;
 pub mod network;
 pub mod normals;

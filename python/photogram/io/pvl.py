@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 from photogram.errors import InputError
+from photogram.messages import quoted
 
-__all__ = ["Group", "Quantity", "Value", "parsed"]
+__all__ = ["Group", "Quantity", "Value", "label_text", "parsed"]
 
 
 class Quantity(NamedTuple):
@@ -75,6 +76,8 @@ _WHOLE = re.compile(r"[-+]?(?:0|[1-9]\d{0,17})")
 """Whole numbers. What begins with zeros is a name that digits make up."""
 _DECIMAL = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _BASED = re.compile(r"(2|8|16)#([-+]?[0-9A-Fa-f]{1,16})#")
+_PLAIN = re.compile(r"[^\s=(){},;\"'<>#/-](?:[^\s=(){},;\"'<>#/-]|/(?!\*)|-(?!$))*")
+"""Words that need no marks of quotation."""
 _DEEPEST = 32
 _OPENING = {"(": ")", "{": "}"}
 _SHOWN = 40
@@ -91,8 +94,8 @@ class _Token(NamedTuple):
 class _Reader:
     """The tokens of a label, one after the other."""
 
-    def __init__(self, text: str, file: Path) -> None:
-        self.text, self.file, self.at = text, file, 0
+    def __init__(self, text: str, file: Path, numbers: bool) -> None:
+        self.text, self.file, self.at, self.numbers = text, file, 0, numbers
         self.token = self._next()
 
     def line(self, at: int) -> int:
@@ -125,7 +128,7 @@ class _Reader:
         return _Token("end", "", self.at)
 
 
-def parsed(text: str, file: Path) -> Group:
+def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
     """Return what a label says, up to its `End` or the end of the text.
 
     Parameters
@@ -134,13 +137,15 @@ def parsed(text: str, file: Path) -> Group:
         The label.
     file
         Where it comes from, for errors.
+    numbers
+        Whether words that are numbers become numbers; if not, all values are texts as they stand there.
 
     Raises
     ------
     InputError
         The text is no label; the error has the number of the line.
     """
-    reader = _Reader(text, file)
+    reader = _Reader(text, file, numbers)
     label = Group("", "label")
     open_groups = [label]
     while reader.token.kind == "word" and reader.token.text.lower() != "end":
@@ -209,7 +214,9 @@ def _scalar(reader: _Reader, key: str) -> str | int | float:
         raise reader.error(f"{key[:_SHOWN]} has no value", start)
     reader.take()
     text = _CONTINUED.sub("", text)
-    return _number(text) if kind == "word" else _FOLDED.sub(" ", text)
+    if kind != "word":
+        return _FOLDED.sub(" ", text)
+    return _number(text) if reader.numbers else text
 
 
 def _number(word: str) -> str | int | float:
@@ -224,3 +231,44 @@ def _number(word: str) -> str | int | float:
     if _DECIMAL.fullmatch(word) and not word.isdigit() and math.isfinite(float(word)):
         return float(word)
     return word
+
+
+def label_text(label: Group) -> str:
+    """Return a label as text, which :func:`parsed` reads as it was.
+
+    Raises
+    ------
+    InputError
+        A text that no marks of quotation can hold: it has both kinds, or several lines.
+    """
+    return "\n".join([*_lines(label, ""), "End", ""])
+
+
+def _lines(group: Group, indent: str) -> list[str]:
+    width = max((len(key) for key, _ in group.items), default=0)
+    lines = [f"{indent}{key:{width}} = {_value_text(value)}" for key, value in group.items]
+    for each in group.inside:
+        kind = each.kind.capitalize()
+        lines += [
+            f"{indent}{kind} = {_value_text(each.name)}",
+            *_lines(each, f"{indent}  "),
+            f"{indent}End_{kind}",
+        ]
+    return lines
+
+
+def _value_text(value: Value) -> str:
+    if isinstance(value, Quantity):
+        return f"{_value_text(value.value)} <{value.unit}>"
+    if isinstance(value, list):
+        return f"({', '.join(map(_value_text, value))})"
+    if not isinstance(value, str):
+        return repr(value)
+    if _PLAIN.fullmatch(value) and value == _number(value):
+        return value
+    mark = "'" if '"' in value else '"'
+    if mark in value or "\n" in value:
+        raise InputError(
+            f"{quoted(value)} cannot stand in a label: it has several lines, or both quotation marks"
+        )
+    return f"{mark}{value}{mark}"
