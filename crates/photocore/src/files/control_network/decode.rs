@@ -2,14 +2,12 @@
 
 use std::ops::Range;
 
-use crate::Stopped;
-
 use super::columns::{Cell, Column, Points, Table, Value};
 use super::fault::{Fault, Reason};
 use super::fields::{Field, Kind, MEASURE};
 use super::values::number_or_absent;
+use super::watch::{Watch, go_on};
 use super::wire::{LARGEST, Message, Packed, Packet};
-use super::{PATIENCE, Watch};
 
 /// How long each message is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,10 +32,8 @@ pub fn decoded(
     let mut at = part.start;
     let end = part.end.min(file.len());
     while let Some(message) = next_message(file, at..end, framing, all.points.rows)? {
-        if all.points.rows.is_multiple_of(PATIENCE) && watch().is_break() {
-            return Err(Reason::from(Stopped::Interrupted).at_byte(at));
-        }
         let number = all.points.rows;
+        go_on(watch, number).map_err(|stopped| stopped.at_byte(at))?;
         read_point(&file[message.clone()], message.start, &mut all)
             .map_err(|fault| fault.in_point(number))?;
         at = message.end;

@@ -1,12 +1,10 @@
 //! Columns as messages.
 
-use crate::Stopped;
-
 use super::columns::{Column, Points, Table};
 use super::fault::{Fault, Reason};
 use super::fields::MEASURE;
-use super::wire::{LARGEST, Message, put_bytes, put_number, put_whole};
-use super::{PATIENCE, Watch};
+use super::watch::{Watch, go_on};
+use super::wire::{LARGEST, Message, Packed, put_bytes, put_number, put_whole};
 
 /// Writes points as messages of version 5, each behind its length.
 ///
@@ -19,9 +17,7 @@ pub fn encoded(all: &Points<'_>, watch: Watch<'_>) -> Result<Vec<u8>, Fault> {
     let (orders, mut to, mut own) = ((order(&all.points), order(&all.measures)), vec![], vec![]);
     for point in 0..all.points.rows {
         let fault = |reason: Reason| reason.of_columns().in_point(point);
-        if point.is_multiple_of(PATIENCE) && watch().is_break() {
-            return Err(fault(Stopped::Interrupted.into()));
-        }
+        go_on(watch, point).map_err(fault)?;
         let start = to.len();
         to.extend([0; 4]);
         let mut measures = |to: &mut Vec<u8>| {
@@ -63,8 +59,7 @@ fn write_row(
     for packet in Message::new(table.rest.row(row), 0) {
         let packet = packet.map_err(|fault| fault.reason)?;
         if packet.number > LARGEST {
-            let kept = String::from_utf8_lossy(packet.raw).into_owned();
-            return Err(Reason::NoPlace(kept, "a binary network"));
+            return Err(Reason::NoPlace(shown(packet.value), "a binary network"));
         }
         while let Some(slot) = slots.next_if(|&slot| u64::from(table.fields[slot].number) < packet.number) {
             write_field(table, slot, row, to);
@@ -82,6 +77,12 @@ fn write_row(
     }
     slots.for_each(|slot| write_field(table, slot, row, to));
     inside.take().map_or(Ok(()), |write| write(to))
+}
+
+/// The first line of what was kept of text.
+fn shown(kept: Packed<'_>) -> String {
+    let Packed::Bytes(bytes) = kept else { return "what is no text".to_owned() };
+    String::from_utf8_lossy(bytes).lines().next().unwrap_or_default().trim().to_owned()
 }
 
 fn write_field(table: &Table<'_>, slot: usize, row: usize, to: &mut Vec<u8>) {

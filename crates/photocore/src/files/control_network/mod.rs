@@ -13,6 +13,7 @@ mod header;
 mod read_text;
 mod scan;
 mod values;
+mod watch;
 mod wire;
 mod write_text;
 
@@ -22,13 +23,8 @@ pub use encode::encoded;
 pub use fault::{Fault, Place, Reason};
 pub use header::Header;
 pub use read_text::read_text;
+pub use watch::Watch;
 pub use write_text::text;
-
-/// Asked now and then whether to go on.
-pub type Watch<'a> = &'a mut dyn FnMut() -> std::ops::ControlFlow<()>;
-
-/// Points between two questions.
-const PATIENCE: usize = 1024;
 
 #[cfg(test)]
 mod tests;

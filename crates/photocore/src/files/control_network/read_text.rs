@@ -1,18 +1,19 @@
 //! Text as columns.
 
-use crate::Stopped;
-
 use super::columns::{Cell, Points, Table, Value};
 use super::fault::{Fault, Reason};
 use super::fields::{Field, Kind, LOGS};
-use super::scan::{Act, Read, Statement, Statements};
+use super::scan::{Act, Kind as Part, Read, Statement, Statements};
+use super::watch::{Watch, go_on};
 use super::wire::{LARGEST, put_bytes, put_number, put_whole};
-use super::{PATIENCE, Watch};
 
 /// The number of a field, which no file can have, that keeps text that nobody knows.
 pub(super) const UNKNOWN: u64 = LARGEST + 1;
 /// The key of the measure that a point refers to.
 pub(super) const REFERENCE: &str = "Reference";
+
+/// The unit of what text gives no unit.
+const PIXELS: &str = "pixels";
 
 /// Reads the points of a network in text, and what stands around them: the same text without its points, on the same lines.
 ///
@@ -28,10 +29,8 @@ pub fn read_text(file: &[u8], watch: Watch<'_>) -> Result<(Points<'static>, Stri
     while let Some(statement) = statements.next() {
         let statement = statement?;
         let number = all.points.rows;
-        if statement.begins("ControlPoint") {
-            if number.is_multiple_of(PATIENCE) && watch().is_break() {
-                return Err(Reason::from(Stopped::Interrupted).on_line(statement.line));
-            }
+        if statement.begins(Part::Object, "ControlPoint") {
+            go_on(watch, number).map_err(|stopped| stopped.on_line(statement.line))?;
             let read = read_point(&mut statements, statement.line, &mut all);
             read.map_err(|fault| fault.in_point(number))?;
             continue;
@@ -51,9 +50,9 @@ fn read_point(statements: &mut Statements<'_>, begun: usize, all: &mut Points<'_
     loop {
         let statement = next(statements, begun)?;
         match statement.act() {
-            Act::End => break,
-            Act::Stop => return Err(statement.fault()),
-            Act::Begin if statement.begins("ControlMeasure") => {
+            Act::End(Part::Object) => break,
+            Act::End(_) | Act::Stop => return Err(statement.fault()),
+            Act::Begin(_) if statement.begins(Part::Group, "ControlMeasure") => {
                 if read_measure(statements, statement.line, &mut all.measures)? {
                     let index = (all.measures.rows - first - 1) as i32;
                     if reference.replace(index).is_some() {
@@ -61,7 +60,7 @@ fn read_point(statements: &mut Statements<'_>, begun: usize, all: &mut Points<'_
                     }
                 }
             }
-            Act::Begin => keep_group(statements, &statement, &mut all.points)?,
+            Act::Begin(kind) => keep_group(statements, &statement, kind, &mut all.points)?,
             Act::Give => give(&statement, &mut all.points)?,
         }
     }
@@ -77,9 +76,9 @@ fn read_measure(statements: &mut Statements<'_>, begun: usize, table: &mut Table
     loop {
         let statement = next(statements, begun)?;
         match statement.act() {
-            Act::End => break,
-            Act::Stop => return Err(statement.fault()),
-            Act::Begin => keep_group(statements, &statement, table)?,
+            Act::End(Part::Group) => break,
+            Act::End(_) | Act::Stop => return Err(statement.fault()),
+            Act::Begin(kind) => keep_group(statements, &statement, kind, table)?,
             Act::Give if statement.key.eq_ignore_ascii_case(REFERENCE) => {
                 let read = statement.read()?;
                 is_reference =
@@ -100,15 +99,16 @@ fn next<'a>(statements: &mut Statements<'a>, begun: usize) -> Result<Statement<'
 fn keep_group(
     statements: &mut Statements<'_>,
     begin: &Statement<'_>,
+    kind: Part,
     table: &mut Table<'_>,
 ) -> Result<(), Fault> {
-    let (mut kept, mut depth) = (begin.text.to_owned(), 1);
-    while depth > 0 {
+    let (mut kept, mut open) = (begin.text.to_owned(), vec![kind]);
+    while let Some(&innermost) = open.last() {
         let statement = next(statements, begin.line)?;
         match statement.act() {
-            Act::Begin => depth += 1,
-            Act::End => depth -= 1,
-            Act::Stop => return Err(statement.fault()),
+            Act::Begin(kind) => open.push(kind),
+            Act::End(kind) if kind == innermost => drop(open.pop()),
+            Act::End(_) | Act::Stop => return Err(statement.fault()),
             Act::Give => {}
         }
         kept.push('\n');
@@ -188,11 +188,10 @@ fn wrong(key: &'static str, value: &str, expected: &'static str) -> Reason {
 }
 
 fn check_unit(key: &'static str, read: &Read<'_>, unit: Option<&'static str>) -> Result<(), Reason> {
-    match (&read.unit, unit) {
-        (None, _) => Ok(()),
-        (Some(found), Some(unit)) if found.eq_ignore_ascii_case(unit) => Ok(()),
-        (Some(found), Some(unit)) => Err(wrong(key, &format!("<{found}>"), unit)),
-        (Some(found), None) => Err(wrong(key, &format!("<{found}>"), "without a unit")),
+    let unit = unit.unwrap_or(PIXELS);
+    match &read.unit {
+        Some(found) if !found.eq_ignore_ascii_case(unit) => Err(wrong(key, &format!("<{found}>"), unit)),
+        _ => Ok(()),
     }
 }
 

@@ -114,13 +114,22 @@ impl<'a> Iterator for Statements<'a> {
     }
 }
 
+/// What has an end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// `Object` .. `End_Object`.
+    Object,
+    /// `Group` .. `End_Group`.
+    Group,
+}
+
 /// What a statement does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Act {
     /// Begins a group or object.
-    Begin,
+    Begin(Kind),
     /// Ends one.
-    End,
+    End(Kind),
     /// Ends the text.
     Stop,
     /// Gives a key its value.
@@ -140,21 +149,20 @@ impl<'a> Statement<'a> {
     /// What it does.
     pub fn act(&self) -> Act {
         let is = |words: &[&str]| words.iter().any(|word| self.key.eq_ignore_ascii_case(word));
-        match self.key.as_bytes().first() {
-            Some(b'O' | b'o' | b'G' | b'g' | b'B' | b'b')
-                if is(&["Object", "Group", "Begin_Object", "Begin_Group"]) =>
-            {
-                Act::Begin
-            }
-            Some(b'E' | b'e') if is(&["End_Object", "End_Group", "EndObject", "EndGroup"]) => Act::End,
-            Some(b'E' | b'e') if self.value.is_empty() && is(&["End"]) => Act::Stop,
+        // Few keys begin so.
+        match self.key.as_bytes().first().map(u8::to_ascii_lowercase) {
+            Some(b'o' | b'b') if is(&["Object", "Begin_Object"]) => Act::Begin(Kind::Object),
+            Some(b'g' | b'b') if is(&["Group", "Begin_Group"]) => Act::Begin(Kind::Group),
+            Some(b'e') if is(&["End_Object", "EndObject"]) => Act::End(Kind::Object),
+            Some(b'e') if is(&["End_Group", "EndGroup"]) => Act::End(Kind::Group),
+            Some(b'e') if self.value.is_empty() && is(&["End"]) => Act::Stop,
             _ => Act::Give,
         }
     }
 
-    /// Whether it begins what has a name.
-    pub fn begins(&self, name: &str) -> bool {
-        self.act() == Act::Begin && self.value.eq_ignore_ascii_case(name)
+    /// Whether it begins a thing of this kind and name.
+    pub fn begins(&self, kind: Kind, name: &str) -> bool {
+        self.act() == Act::Begin(kind) && self.value.eq_ignore_ascii_case(name)
     }
 
     /// The fault of a statement that is not understood.

@@ -81,10 +81,11 @@ impl<'a> Message<'a> {
         Err(self.fault(Reason::Endless, start))
     }
 
-    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
-        let taken = self.bytes.get(self.at..self.at.checked_add(count)?)?;
-        self.at += count;
-        Some(taken)
+    /// The next bytes of a field that begins at `start`.
+    fn take(&mut self, count: usize, start: usize) -> Result<&'a [u8], Fault> {
+        let taken = self.at.checked_add(count).and_then(|end| self.bytes.get(self.at..end));
+        self.at += taken.map_or(0, <[u8]>::len);
+        taken.ok_or_else(|| self.fault(Reason::Ends("a field"), start))
     }
 
     fn fault(&self, reason: Reason, at: usize) -> Fault {
@@ -98,15 +99,18 @@ impl<'a> Message<'a> {
         if number == 0 {
             return Err(self.fault(Reason::Number(number), start));
         }
-        let ends = self.fault(Reason::Ends("a field"), start);
         let value = match wire {
             0 => Packed::Varint(self.whole()?),
-            1 => Packed::Eight(self.take(8).and_then(|taken| taken.try_into().ok()).ok_or(ends)?),
+            1 => {
+                let mut eight = [0; 8];
+                eight.copy_from_slice(self.take(8, start)?);
+                Packed::Eight(eight)
+            }
             2 => {
                 let length = usize::try_from(self.whole()?).unwrap_or(usize::MAX);
-                Packed::Bytes(self.take(length).ok_or(ends)?)
+                Packed::Bytes(self.take(length, start)?)
             }
-            5 => self.take(4).map(|_| Packed::Four).ok_or(ends)?,
+            5 => self.take(4, start).map(|_| Packed::Four)?,
             _ => return Err(self.fault(Reason::Wire(number, wire), start)),
         };
         let (raw, end) = (&self.bytes[start..self.at], self.base + self.at);

@@ -3,15 +3,13 @@
 use std::borrow::Cow;
 use std::fmt::Write;
 
-use crate::Stopped;
-
 use super::columns::{Column, Points, Table};
 use super::fault::{Fault, Reason};
 use super::fields::{Field, Kind, LOGS};
 use super::read_text::{REFERENCE, UNKNOWN};
 use super::values::number_or_absent;
+use super::watch::{Watch, go_on};
 use super::wire::{Message, Packed, Packet};
-use super::{PATIENCE, Watch};
 
 /// What text is called where something has no place in it.
 const TEXT: &str = "a network in text";
@@ -25,9 +23,7 @@ pub fn text(all: &Points<'_>, watch: Watch<'_>) -> Result<String, Fault> {
     let mut to = String::new();
     for point in 0..all.points.rows {
         let fault = |reason: Reason| reason.of_columns().in_point(point);
-        if point.is_multiple_of(PATIENCE) && watch().is_break() {
-            return Err(fault(Stopped::Interrupted.into()));
-        }
+        go_on(watch, point).map_err(fault)?;
         to.push_str("\n  Object = ControlPoint\n");
         put_items(&items(&all.points, point).map_err(fault)?, 4, &mut to);
         for (index, measure) in all.measures_of(point).enumerate() {
