@@ -214,9 +214,9 @@ impl Column<'_> {
         }
     }
 
-    /// Whether it is as long as so many rows, or empty, and holds only what its field can have.
+    /// Whether it is no longer than so many rows, and holds only what its field can have.
     fn agrees(&self, field: &Field, rows: usize) -> bool {
-        let fits = |length: usize| length == rows || length == 0;
+        let fits = |length: usize| length <= rows;
         match (self, field.kind) {
             (Self::Texts(own), _) => own.ends.len() == rows,
             (Self::Names(own), _) => {
