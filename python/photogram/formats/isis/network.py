@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io.pvl import Group
 
@@ -43,7 +43,6 @@ MESSAGE = ("network_id", "target", "created", "modified", "description", "user")
 
 _Codes = NDArray[np.int8]
 _Indices = NDArray[np.int32]
-_Truths = NDArray[np.bool_]
 _Rest = tuple[NDArray[np.uint8], NDArray[np.int64]]
 
 
@@ -101,15 +100,15 @@ class ControlPoints(_Columns):
 
     ids: Sequence[str]
     types: _Codes
-    edit_lock: _Truths
-    ignore: _Truths
-    rejected: _Truths
+    edit_lock: Bools
+    ignore: Bools
+    rejected: Bools
     reference: _Indices
     apriori_source: _Codes
     apriori_radius_source: _Codes
     apriori: Floats
     apriori_covariance: Floats
-    constrained: _Truths
+    constrained: Bools
     adjusted: Floats
     adjusted_covariance: Floats
     rest: _Rest
@@ -121,6 +120,16 @@ class ControlPoints(_Columns):
     def __len__(self) -> int:
         """Return the number of points."""
         return len(self.ids)
+
+    @property
+    def is_fixed(self) -> Bools:
+        """(n,) whether a point is held where it is: `Fixed`, in old networks `Ground`."""
+        return np.isin(self.types, [POINT_TYPES.index("Fixed"), POINT_TYPES.index("Ground")])
+
+    @property
+    def is_constrained(self) -> Bools:
+        """(n,) whether the a-priori coordinates of a point are observed: `Constrained`."""
+        return np.asarray(self.types == POINT_TYPES.index("Constrained"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,9 +175,9 @@ class ControlMeasures(_Columns):
     sample_residual: Floats
     line_residual: Floats
     diameter: Floats
-    edit_lock: _Truths
-    ignore: _Truths
-    rejected: _Truths
+    edit_lock: Bools
+    ignore: Bools
+    rejected: Bools
     rest: _Rest
 
     def __post_init__(self) -> None:
@@ -194,7 +203,7 @@ class ControlNetwork:
     firsts
         (n + 1,) the first measure of each point, and the number of all.
     network_id, target, user, created, modified, description
-        What its header says; None where it does not.
+        What its header says; None where it does not. ISIS reads no network without the first two.
     version
         Of the file that it was read from.
     radii
@@ -208,8 +217,8 @@ class ControlNetwork:
     points: ControlPoints
     measures: ControlMeasures
     firsts: NDArray[np.int64]
-    network_id: str | None = None
-    target: str | None = None
+    network_id: str | None = ""
+    target: str | None = ""
     user: str | None = None
     created: str | None = None
     modified: str | None = None
