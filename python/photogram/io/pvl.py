@@ -62,7 +62,7 @@ class Group:
 
 
 _TOKEN = re.compile(
-    r"""(?P<space>(?:\s|\#[^\n]*|/\*(?s:.*?)\*/)+)
+    r"""(?P<space>(?:\s+|\#[^\n]*|/\*(?s:.*?)\*/)+)
     |"(?P<double>[^"]*)"|'(?P<single>[^']*)'
     |<(?P<unit>[^<>\n]*)>
     |(?P<sign>[=(){},;])
