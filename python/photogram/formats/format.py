@@ -52,6 +52,10 @@ class Wishes:
         What the columns of the control of a plain project are.
     photos
         Where its photographs lie, whose files carry positions; None: as the project says.
+    cubes
+        The list of cubes or ISDs of a control network.
+    jigsaw
+        How a control network is adjusted: settings by the names of jigsaw, or the path of a file with them.
     """
 
     cameras: Path | None = None
@@ -61,6 +65,8 @@ class Wishes:
     sd: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     columns: Columns = PLAIN
     photos: PhotoFiles | None = None
+    cubes: Path | None = None
+    jigsaw: str | None = None
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,7 @@ FORMATS: dict[str, Format] = {
         "dbat",
         "aicon",
         "giant",
+        "isis",
         "results",
     )
 }

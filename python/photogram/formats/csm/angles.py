@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 
-__all__ = ["Polynomials", "fitted_angles", "of_angles", "of_quaternions", "to_angles"]
+__all__ = ["Polynomials", "fitted", "fitted_angles", "of_angles", "of_quaternions", "to_angles"]
 
 RECORDS = 64
 """Parts of a span that polynomials are sampled in: eight neighbours give them to the last digits."""
@@ -84,7 +84,23 @@ def fitted_angles(times: Floats, matrices: Floats, degree: int) -> Polynomials:
     degree
         Of the polynomials; time is scaled by the middle and half of the records.
     """
+    return fitted(times, to_angles(matrices), degree)
+
+
+def fitted(times: Floats, values: Floats, degree: int) -> Polynomials:
+    """Return polynomials that fit (k, 3) values of records, all of one weight.
+
+    Parameters
+    ----------
+    times, values
+        (k,) seconds, and the values.
+    degree
+        Of the polynomials; time is scaled by the middle and half of the records.
+    """
     reference, scale = (times[0] + times[-1]) / 2, (times[-1] - times[0]) / 2 or 1.0
     powers = np.vander((times - reference) / scale, degree + 1, increasing=True)
-    solved = np.linalg.lstsq(powers, to_angles(matrices), rcond=None)[0]
-    return Polynomials(np.asarray(solved.T), float(reference), float(scale))
+    # Of values about their mean: positions in metres are large beside what they change.
+    middle = values.mean(axis=0)
+    solved = np.asarray(np.linalg.lstsq(powers, values - middle, rcond=None)[0].T)
+    solved[:, 0] += middle
+    return Polynomials(solved, float(reference), float(scale))

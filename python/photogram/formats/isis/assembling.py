@@ -1,0 +1,255 @@
+"""Control networks with the support data of their images as projects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from photogram.adjustment.known import Cartesian
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.formats.csm.lists import read_list, read_support
+from photogram.formats.csm.photos import SupportedImage
+from photogram.formats.format import Wishes
+from photogram.formats.isis.contents import DETAILS, PITCHES, Contents, Image
+from photogram.formats.isis.network import ControlNetwork
+from photogram.formats.isis.points import given_starts, known_points
+from photogram.formats.isis.reading import read_network
+from photogram.formats.isis.settings import Settings, read_settings
+from photogram.formats.isis.solving import solving
+from photogram.formats.project import Project, assembled
+from photogram.io.files import read_lines
+from photogram.io.places import Place
+from photogram.messages import Message, counted, listed
+from photogram.network.geometry import Spheroid
+from photogram.network.timed import Timed
+from photogram.network.whereabouts import about
+
+__all__ = ["TITLE", "read"]
+
+TITLE = "control network (ISIS)"
+
+
+def read(path: Path, wishes: Wishes) -> Project:
+    """Read a control network, and the support data of the images that a list names.
+
+    Raises
+    ------
+    InputError
+        No list of images, measures in images that it does not name, settings that are none; what readers of
+        networks and support data refuse.
+    """
+    if wishes.cubes is None:
+        raise InputError(
+            "has no images: --cubes FILE names them, a line each: the path of a cube, or serial number, comma"
+            " and path of an ISD",
+            file=path,
+        )
+    settings = read_settings(wishes.jigsaw or "")
+    network = read_network(path)
+    files = read_list(wishes.cubes)
+    images = _images(network, files, settings, wishes.cubes)
+    contents = Contents(network, path, {each.photo: own for own in images for each in own.supported.timed}, settings)
+    seen = _seen(network, images, path)
+    unused = [serial for serial in files if serial not in {each.serial for each in images}]
+    return _project(contents, seen, [*_left_out(network, unused, wishes.cubes), *_remarks(images)])
+
+
+def _images(
+    network: ControlNetwork, files: dict[str, Path], settings: Settings, cubes: Path
+) -> list[Image]:
+    """Return the images that have measures, in the order of the network."""
+    held, found = _held(settings, files), []
+    for row in np.unique(network.measures.serial[_counting(network)]).tolist():
+        serial = network.measures.serials[row]
+        if serial not in files:
+            raise InputError(f"names no image {serial}, which has measures", file=cubes)
+        isd = read_support(files[serial])
+        own = solving(isd, serial, settings, held=serial in held)
+        found.append(
+            Image(serial, files[serial], SupportedImage(isd, serial, "isis", "isis", own.trajectory), own)
+        )
+    return found
+
+
+def _held(settings: Settings, files: dict[str, Path]) -> set[str]:
+    """Return serial numbers of the images of HELDLIST, which are named by these or by their files."""
+    if settings.held is None:
+        return set()
+    names = {str(file.resolve()): serial for serial, file in files.items()}
+    found = set()
+    for record, line in enumerate(read_lines(settings.held), 1):
+        text = line.strip()
+        if not text or text.startswith("#"):
+            continue
+        serial = text if text in files else names.get(str((settings.held.parent / text).resolve()))
+        if serial is None:
+            raise InputError("is no image of --cubes", file=settings.held, record=record, text=text)
+        found.add(serial)
+    return found
+
+
+def _counting(network: ControlNetwork) -> Indices:
+    """Return measures that count: those that are not ignored, nor their points."""
+    ignored = network.measures.ignore | network.points.ignore[network.point_of_measure]
+    return np.flatnonzero(~ignored)
+
+
+class _Seen(NamedTuple):
+    """Measures that count, as images of a block.
+
+    Attributes
+    ----------
+    measures, points
+        Their rows in the network; (n,) those of their points.
+    image_points, image_photos, xy, sd
+        (m,), (m,), (m, 2), (m,) as of blocks.
+    """
+
+    measures: Indices
+    points: Indices
+    image_points: Indices
+    image_photos: Indices
+    xy: Floats
+    sd: Floats
+
+
+def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
+    """Return the measures of all images.
+
+    Raises
+    ------
+    InputError
+        There are none; one has no sample or line.
+    """
+    rows, own = _counting(network), network.measures
+    if not len(rows):
+        raise InputError("has no measures that count", file=path)
+    bad = ~(np.isfinite(own.sample[rows]) & np.isfinite(own.line[rows]))
+    if bad.any():
+        point = network.points.ids[network.point_of_measure[rows[np.argmax(bad)]]]
+        raise InputError(f"a measure of {point} has no Sample or no Line", file=path)
+    points, image_points = np.unique(network.point_of_measure[rows], return_inverse=True)
+    photos, xy, sd = np.zeros(len(rows), np.int64), np.zeros((len(rows), 2)), np.zeros(len(rows))
+    first = 0
+    for each in images:
+        mine = np.flatnonzero(own.serial[rows] == own.serials.index(each.serial))
+        which, xy[mine] = each.supported.coordinates(own.sample[rows[mine]], own.line[rows[mine]])
+        photos[mine], sd[mine] = first + which, PITCHES * each.pitch
+        first += len(each.supported.timed)
+    return _Seen(rows, points, image_points, photos, xy, sd)
+
+
+def _starts(contents: Contents, seen: _Seen, place: Place) -> Floats:
+    """Return (n, 3) X, Y, Z of points: as given, or in the middle of where their rays meet the spheroid."""
+    network = contents.network
+    starts = given_starts(network, seen.points, place)
+    unknown = np.isnan(starts).any(axis=1)
+    sums, counts = np.zeros_like(starts), np.zeros(len(starts))
+    of_measure = network.measures.serial[seen.measures]
+    for each in contents.different if unknown.any() else []:
+        serial = network.measures.serials.index(each.serial)
+        rows = np.flatnonzero((of_measure == serial) & unknown[seen.image_points])
+        own = seen.measures[rows]
+        met = each.supported.to_ground(network.measures.line[own], network.measures.sample[own])
+        np.add.at(sums, seen.image_points[rows], met)
+        np.add.at(counts, seen.image_points[rows], 1.0)
+    starts[unknown] = (sums / np.maximum(counts, 1.0)[:, np.newaxis])[unknown]
+    return starts
+
+
+def _spheroid(contents: Contents) -> Spheroid | None:
+    """Return the sphere above which points are; None where X, Y, Z are adjusted."""
+    if contents.settings.axes == "rectangular":
+        return None
+    a, b = contents.different[0].supported.isd.radii
+    return Spheroid((2 * a + b) / 3, (2 * a + b) / 3)
+
+
+def _project(contents: Contents, seen: _Seen, messages: list[Message]) -> Project:
+    network, place, spheroid = contents.network, Place(contents.path), _spheroid(contents)
+    starts = _starts(contents, seen, place)
+    known = known_points(network, seen.points, starts, contents.settings, spheroid, place)
+    timed = [each for own in contents.different for each in own.supported.timed]
+    centres, matrices = _poses(timed, spheroid)
+    cameras, of_photos = _cameras(contents)
+    return assembled(
+        path=contents.path,
+        title=TITLE,
+        name=network.network_id or "",
+        cameras=[each.supported.camera for each in cameras],
+        sizes=[None] * len(cameras),
+        pixel_mm=[each.pitch for each in cameras],
+        photo_ids=[each.photo for each in timed],
+        photo_cameras=of_photos,
+        centres=centres,
+        matrices=matrices,
+        point_ids=[network.points.ids[row] for row in seen.points.tolist()],
+        starts=known.starts,
+        point_positions=known.positions,
+        point_sd=known.sd,
+        image_photos=seen.image_photos,
+        image_points=seen.image_points,
+        image_xy=seen.xy,
+        image_sd=np.column_stack([seen.sd, seen.sd]),
+        observations=known.controls,
+        timed=timed,
+        spheroid=spheroid,
+        messages=[*messages, *known.messages, *_settled(contents)],
+        details={DETAILS: contents},
+    )
+
+
+def _poses(timed: list[Timed], spheroid: Spheroid | None) -> tuple[Floats, Floats]:
+    """Return where photos are about, and how they are turned, in the space of the block."""
+    axes = Cartesian(spheroid)
+    begins = [each.lines.table[0][1] if each.lines is not None else each.time for each in timed]
+    found = [
+        about(each.trajectory, float(begin)) for each, begin in zip(timed, begins, strict=True)
+    ]
+    centres = axes.from_cartesian(np.array([centre for centre, _ in found]))
+    return centres, axes.to_local(np.array([matrix for _, matrix in found]), centres)
+
+
+def _cameras(contents: Contents) -> tuple[list[Image], Indices]:
+    """Return an image of each camera, and which camera each photo has."""
+    known: dict[object, int] = {}
+    first, rows = [], []
+    for each in contents.different:
+        isd = each.supported.isd
+        row = known.setdefault((isd.platform, isd.sensor, isd.focal_length), len(known))
+        if row == len(first):
+            first.append(each)
+        rows += [row] * len(each.supported.timed)
+    return first, np.array(rows)
+
+
+def _remarks(images: list[Image]) -> list[Message]:
+    """Return what support data contradict themselves in."""
+    return [Message(text, each.path) for each in images for text in each.supported.isd.remarks]
+
+
+def _left_out(network: ControlNetwork, unused: list[str], cubes: Path) -> list[Message]:
+    """Return what does not count: what is ignored, images without measures; and what counts again."""
+    measures, points = network.measures, network.points
+    of_ignored = points.ignore[network.point_of_measure] & ~measures.ignore
+    counts = {
+        "ignored point": int(points.ignore.sum()),
+        "ignored measure": int((measures.ignore | of_ignored).sum()),
+    }
+    found = [
+        Message(f"{counted(count, what)}: left out, and written as read") for what, count in counts.items() if count
+    ]
+    if rejected := int(((measures.rejected | points.rejected[network.point_of_measure]) & ~measures.ignore).sum()):
+        found.append(Message(f"{counted(rejected, 'measure')} that an adjustment had rejected: taken in again"))
+    if unused:
+        found.append(Message(f"images without measures, left out: {listed(unused, 3)}", cubes))
+    return found
+
+
+def _settled(contents: Contents) -> list[Message]:
+    """Return what settings mean here."""
+    text = f"standard deviations of image coordinates: {PITCHES} pixels of the detector, as jigsaw has them"
+    return [Message(text), *(Message(each) for each in contents.settings.told)]

@@ -1,0 +1,87 @@
+"""What a control network and its images are beyond their block."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from photogram.errors import InputError
+from photogram.formats.csm.photos import SupportedImage
+from photogram.formats.isis.network import ControlNetwork
+from photogram.formats.isis.settings import Settings
+from photogram.formats.isis.solving import Solving
+
+__all__ = ["PITCHES", "Contents", "Image", "contents_of"]
+
+DETAILS = "control network"
+PITCHES = 1.4
+"""Standard deviation of image coordinates, in pixels of the detector."""
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """An image of a network.
+
+    Attributes
+    ----------
+    serial
+        Its serial number.
+    path
+        Its support data.
+    supported
+        The same with its photos.
+    solving
+        What is adjusted of it.
+    """
+
+    serial: str
+    path: Path
+    supported: SupportedImage
+    solving: Solving
+
+    @property
+    def pitch(self) -> float:
+        """The side of a pixel of the detector in millimetres."""
+        (x, y), _ = self.supported.isd.detector.planes["isis"].matrix.T
+        return float((x * x + y * y) ** 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """A network with its images, and how it is adjusted.
+
+    Attributes
+    ----------
+    network, path
+        As it was read, and where.
+    images
+        Those that have measures, by the names of their photos.
+    settings
+        How they are adjusted.
+    """
+
+    network: ControlNetwork
+    path: Path
+    images: Mapping[str, Image]
+    settings: Settings
+
+    @property
+    def different(self) -> list[Image]:
+        """The images, each once: a push frame camera has several photos in one."""
+        return list(dict.fromkeys(self.images.values()))
+
+
+def contents_of(details: Mapping[str, Any]) -> Contents:
+    """Return the contents of a project.
+
+    Raises
+    ------
+    InputError
+        It was not read from a control network.
+    """
+    found = details.get(DETAILS)
+    if not isinstance(found, Contents):
+        raise InputError("the project was not read from a control network")
+    return found

@@ -1,0 +1,169 @@
+"""Points of control networks as those of blocks: what is known of them, and how well."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from photogram.adjustment.known import Cartesian
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.formats.isis.network import ControlNetwork
+from photogram.formats.isis.settings import Settings
+from photogram.io.places import Place
+from photogram.messages import Message, counted, listed
+from photogram.network.geometry import Spheroid, local_frames
+from photogram.network.observations import Control
+
+__all__ = ["KnownPoints", "full_matrices", "given_starts", "known_points"]
+
+_LOCAL = [1, 0, 2]
+"""Longitude, latitude and radius in the order of jigsaw: latitude, longitude, radius."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownPoints:
+    """What is known of n points before their adjustment, in the coordinates of a block.
+
+    Attributes
+    ----------
+    positions, sd
+        (n, 3) as of blocks: what is observed or fixed, NaN else, and its standard deviations.
+    starts
+        (n, 3) where points begin.
+    controls
+        Points with a full covariance.
+    messages
+        What was taken otherwise than it stands in the network.
+    """
+
+    positions: Floats
+    sd: Floats
+    starts: Floats
+    controls: list[Control] = field(default_factory=list)
+    messages: list[Message] = field(default_factory=list)
+
+
+def known_points(
+    network: ControlNetwork,
+    rows: Indices,
+    starts: Floats,
+    settings: Settings,
+    spheroid: Spheroid | None,
+    place: Place,
+) -> KnownPoints:
+    """Return what a network and the settings say of points.
+
+    Free points have the standard deviations of the settings, and a fixed radius unless that is asked for;
+    constrained ones their own covariance, or where single coordinates are constrained the standard deviations
+    of these; fixed ones none.
+
+    Parameters
+    ----------
+    network
+        The network.
+    rows
+        (n,) its points that count.
+    starts
+        (n, 3) X, Y, Z where they begin, in metres.
+    settings
+        How they are weighted.
+    spheroid
+        A sphere where latitude, longitude and radius are adjusted; None: X, Y, Z.
+    place
+        Of the network, for messages.
+
+    Raises
+    ------
+    InputError
+        Covariances that are none.
+    """
+    points = network.points
+    coordinates = Cartesian(spheroid).from_cartesian(starts)
+    metres = _per_metre(coordinates, spheroid)
+    order = _LOCAL if spheroid else [0, 1, 2]
+    sigmas = np.array([np.inf if each is None else each for each in settings.point_sigmas])[order]
+    sd = np.broadcast_to(sigmas, coordinates.shape) * metres
+    if spheroid and not settings.radius:
+        sd[:, 2] = np.where(points.is_constrained[rows], sd[:, 2], 0.0)
+    sd[points.is_fixed[rows]] = 0.0
+    known = KnownPoints(coordinates, sd, coordinates)
+    _constrain(known, network, rows, metres, spheroid, place)
+    positions = np.where(np.isfinite(sd), coordinates, np.nan)
+    return KnownPoints(positions, sd, coordinates, known.controls, known.messages)
+
+
+def _per_metre(coordinates: Floats, spheroid: Spheroid | None) -> Floats:
+    """Return (n, 3) what a metre is of each coordinate: s / (R cos latitude) of longitude, s / R of latitude."""
+    if spheroid is None:
+        return np.ones_like(coordinates)
+    radius = spheroid.a + coordinates[:, 2]
+    return np.column_stack(
+        [1 / (radius * np.cos(coordinates[:, 1])), 1 / radius, np.ones(len(coordinates))]
+    )
+
+
+def full_matrices(packed: Floats) -> Floats:
+    """Return (n, 3, 3) symmetric matrices of (n, 6) upper triangles, row by row."""
+    return packed[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+
+
+def _constrain(
+    known: KnownPoints,
+    network: ControlNetwork,
+    rows: Indices,
+    metres: Floats,
+    spheroid: Spheroid | None,
+    place: Place,
+) -> None:
+    """Weigh constrained points by their own covariances."""
+    points, own = network.points, np.flatnonzero(network.points.is_constrained[rows])
+    covariances = full_matrices(points.apriori_covariance[rows[own]])
+    given = np.isfinite(covariances).all(axis=(1, 2))
+    _tell(known, "have no covariance and are weighted as free ones", points.ids, rows[own[~given]])
+    own, covariances = own[given], covariances[given]
+    _check(covariances, points.ids, rows[own], place)
+    if spheroid:
+        axes = local_frames(known.starts[own])
+        covariances = axes @ covariances @ axes.transpose(0, 2, 1)
+    single = points.constrained[rows[own]][:, _LOCAL if spheroid else [0, 1, 2]]
+    whole = single.all(axis=1) | ~single.any(axis=1)
+    for row, covariance in zip(own[whole], covariances[whole], strict=True):
+        known.sd[row] = np.inf
+        known.controls.append(Control(points.ids[rows[row]], known.starts[row], covariance=covariance))
+    deviations = np.sqrt(np.einsum("nkk->nk", covariances)) * metres[own]
+    parts = np.flatnonzero(~whole)
+    known.sd[own[parts]] = np.where(single[parts], deviations[parts], known.sd[own[parts]])
+    text = "have single coordinates constrained: these by their own standard deviations, without correlations"
+    _tell(known, text, points.ids, rows[own[parts]])
+
+
+def _check(covariances: Floats, ids: list[str], rows: Indices, place: Place) -> None:
+    """Refuse covariances that weigh nothing."""
+    bad: Bools = ~(np.linalg.eigvalsh(covariances) > 0).all(axis=1)
+    if bad.any():
+        raise place.error(f"the AprioriCovarianceMatrix of {ids[rows[np.argmax(bad)]]} is not positive definite")
+
+
+def _tell(known: KnownPoints, text: str, ids: list[str], rows: Indices) -> None:
+    if len(rows):
+        names = listed([ids[row] for row in rows.tolist()], 3)
+        known.messages.append(Message(f"{counted(len(rows), 'constrained point')} {text}: {names}"))
+
+
+def given_starts(network: ControlNetwork, rows: Indices, place: Place) -> Floats:
+    """Return (n, 3) X, Y, Z that a network gives for points, a-priori ones before adjusted; NaN without.
+
+    Raises
+    ------
+    InputError
+        A fixed or constrained point without coordinates.
+    """
+    points = network.points
+    apriori, adjusted = points.apriori[rows], points.adjusted[rows]
+    there = np.isfinite(apriori).all(axis=1, keepdims=True)
+    found: Floats = np.where(there, apriori, adjusted)
+    missing = ~np.isfinite(found).all(axis=1) & (points.is_fixed | points.is_constrained)[rows]
+    if missing.any():
+        raise place.error(f"the point {points.ids[rows[np.argmax(missing)]]} is held, but has no coordinates")
+    return found

@@ -1,0 +1,258 @@
+"""Settings of ISIS's program jigsaw, by its names."""
+
+from __future__ import annotations
+
+import math
+import re
+import shlex
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from photogram.errors import InputError
+from photogram.io.files import read_lines
+from photogram.messages import nearest
+
+__all__ = ["PARAMETERS", "Settings", "Sigmas", "Solved", "read_settings"]
+
+Solved = Literal["none", "first", "second", "third", "all"]
+"""Which coefficients are unknown: none, that of degree 0, those to degree 1, to degree 2, all."""
+Sigmas = tuple[float | None, float | None, float | None]
+"""Standard deviations of three things, None where they are not weighted."""
+Axes = Literal["latitudinal", "rectangular"]
+
+MOST = 8
+"""The highest degree of a polynomial."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is adjusted, and how it is weighted; defaults are those of jigsaw.
+
+    Attributes
+    ----------
+    ck_degree, ck_solve_degree
+        Degree of the polynomials that are fitted to the angles of an image, and of those that are adjusted.
+    angles, twist
+        Which of their coefficients are unknown, and whether those of the third angle are.
+    over_existing
+        Whether polynomials are added to the angles of the table instead.
+    spk_degree, spk_solve_degree, positions, over_hermite
+        The same of positions.
+    angle_sigmas
+        Degrees: of the coefficients of degree 0, 1 and 2, by scaled time.
+    position_sigmas
+        Metres: likewise.
+    radius
+        Whether radii of free points are unknown.
+    axes
+        What point coordinates are adjusted.
+    latitude_sigmas, rectangular_sigmas
+        Metres: of latitude, longitude, radius of all points, and of X, Y, Z.
+    held
+        The list of images whose poses are known; None: no image is.
+    told
+        What was said and has another form here, in sentences.
+    """
+
+    ck_degree: int = 2
+    ck_solve_degree: int = 2
+    angles: Solved = "first"
+    twist: bool = True
+    over_existing: bool = False
+    spk_degree: int = 2
+    spk_solve_degree: int = 2
+    positions: Solved = "none"
+    over_hermite: bool = False
+    angle_sigmas: Sigmas = (None, None, None)
+    position_sigmas: Sigmas = (None, None, None)
+    radius: bool = False
+    axes: Axes = "latitudinal"
+    latitude_sigmas: Sigmas = (None, None, None)
+    rectangular_sigmas: Sigmas = (None, None, None)
+    held: Path | None = None
+    told: tuple[str, ...] = field(default=())
+
+    @property
+    def angle_coefficients(self) -> int:
+        """How many coefficients of each angle are unknown."""
+        return _count(self.angles, self.ck_solve_degree)
+
+    @property
+    def position_coefficients(self) -> int:
+        """How many coefficients of each coordinate are unknown."""
+        return _count(self.positions, self.spk_solve_degree)
+
+    @property
+    def point_sigmas(self) -> Sigmas:
+        """Metres: of the coordinates of all points that are adjusted."""
+        return self.latitude_sigmas if self.axes == "latitudinal" else self.rectangular_sigmas
+
+
+def _count(solved: Solved, degree: int) -> int:
+    return degree + 1 if solved == "all" else ("none", "first", "second", "third").index(solved)
+
+
+def _yes(text: str) -> bool:
+    if text.lower() in ("yes", "y", "true", "t", "on", "1"):
+        return True
+    if text.lower() in ("no", "n", "false", "f", "off", "0"):
+        return False
+    raise InputError("is neither yes nor no")
+
+
+def _degree(text: str) -> int:
+    if not re.fullmatch(r"\d+", text) or int(text) > MOST:
+        raise InputError(f"is no degree from 0 to {MOST}")
+    return int(text)
+
+
+def _sigma(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if text.lower() in ("none", "null", ""):
+        return None
+    if not 0 < value < math.inf:
+        raise InputError("is no positive number")
+    return value
+
+
+def _word(**words: str) -> Callable[[str], str]:
+    def found(text: str) -> str:
+        if text.lower() not in words:
+            raise InputError(f"is none of {', '.join(word.upper() for word in words)}")
+        return words[text.lower()]
+
+    return found
+
+
+_SOLVED = {"velocities": "second", "accelerations": "third", "all": "all", "none": "none"}
+_AXES = _word(latitudinal="latitudinal", rectangular="rectangular")
+
+
+class _Parameter(NamedTuple):
+    """A field of the settings, how its text is read, and its place in a field of three."""
+
+    field: str
+    read: Callable[[str], Any]
+    place: int | None = None
+
+
+PARAMETERS: Mapping[str, _Parameter] = {
+    "CKDEGREE": _Parameter("ck_degree", _degree),
+    "CKSOLVEDEGREE": _Parameter("ck_solve_degree", _degree),
+    "CAMSOLVE": _Parameter("angles", _word(**_SOLVED, angles="first")),
+    "TWIST": _Parameter("twist", _yes),
+    "OVEREXISTING": _Parameter("over_existing", _yes),
+    "SPKDEGREE": _Parameter("spk_degree", _degree),
+    "SPKSOLVEDEGREE": _Parameter("spk_solve_degree", _degree),
+    "SPSOLVE": _Parameter("positions", _word(**_SOLVED, position="first", positions="first")),
+    "OVERHERMITE": _Parameter("over_hermite", _yes),
+    "RADIUS": _Parameter("radius", _yes),
+    "CONTROL_POINT_COORDINATE_TYPE_BUNDLE": _Parameter("axes", _AXES),
+    "CAMERA_ANGLES_SIGMA": _Parameter("angle_sigmas", _sigma, 0),
+    "CAMERA_ANGULAR_VELOCITY_SIGMA": _Parameter("angle_sigmas", _sigma, 1),
+    "CAMERA_ANGULAR_ACCELERATION_SIGMA": _Parameter("angle_sigmas", _sigma, 2),
+    "SPACECRAFT_POSITION_SIGMA": _Parameter("position_sigmas", _sigma, 0),
+    "SPACECRAFT_VELOCITY_SIGMA": _Parameter("position_sigmas", _sigma, 1),
+    "SPACECRAFT_ACCELERATION_SIGMA": _Parameter("position_sigmas", _sigma, 2),
+    "POINT_LATITUDE_SIGMA": _Parameter("latitude_sigmas", _sigma, 0),
+    "POINT_LONGITUDE_SIGMA": _Parameter("latitude_sigmas", _sigma, 1),
+    "POINT_RADIUS_SIGMA": _Parameter("latitude_sigmas", _sigma, 2),
+    "POINT_X_SIGMA": _Parameter("rectangular_sigmas", _sigma, 0),
+    "POINT_Y_SIGMA": _Parameter("rectangular_sigmas", _sigma, 1),
+    "POINT_Z_SIGMA": _Parameter("rectangular_sigmas", _sigma, 2),
+    "HELDLIST": _Parameter("held", Path),
+}
+"""What each name of jigsaw is here."""
+
+_FILES = "PATH, --cubes and --out say what is read and written"
+OTHERWISE: Mapping[str, str] = {
+    "MAXITS": "the adjustment ends by itself, after 50 iterations at the latest",
+    "SIGMA0": "the adjustment ends where no unknown changes by 1e-5 of its standard deviation",
+    "ERRORPROPAGATION": "the covariance of everything is always computed",
+    "REJECTION_MULTIPLIER": "--snoop tests each measure by its own redundancy, --level says how strictly",
+    "CONTROL_POINT_COORDINATE_TYPE_REPORTS": "points.csv has latitude, longitude, radius and X, Y, Z",
+    "UPDATE": "the labels of cubes are left as they are; adjusted support data are written beside",
+    **dict.fromkeys(("BUNDLEOUT_TXT", "IMAGESCSV", "OUTPUT_CSV", "RESIDUALS_CSV"), "it is always written"),
+    **dict.fromkeys(("FROMLIST", "CNET", "ONET", "FILE_PREFIX"), _FILES),
+}
+"""What has another form here."""
+_ONLY_NO = {
+    "OBSERVATIONS": "which images share coefficients is a rule of each mission, which is not known here",
+    "SOLVETARGETBODY": "how the body turns is taken as known",
+    "OUTLIER_REJECTION": "--snoop takes measures out one by one instead",
+}
+"""What cannot be asked for."""
+
+
+def read_settings(text: str) -> Settings:
+    """Read settings as they stand on jigsaw's command line, or in a file.
+
+    Parameters
+    ----------
+    text
+        `NAME=value` with blanks between, names in any case, values with blanks in quotes; or the path of a
+        file with such lines, in which # begins a comment. A later value counts in place of an earlier one.
+
+    Raises
+    ------
+    InputError
+        A name that jigsaw does not have, or that has no counterpart here; a value that is none.
+    """
+    given: dict[str, Any] = {}
+    told: dict[str, str] = {}
+    for name, value, where in _said(text):
+        try:
+            if name in PARAMETERS:
+                _put(given, PARAMETERS[name], value)
+            else:
+                told |= _elsewhere(name, value)
+        except InputError as error:
+            raise InputError(f"{name}={value} {error.message}", **where) from None
+    return Settings(**given, told=tuple(f"{name}: {sentence}" for name, sentence in told.items()))
+
+
+def _said(text: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Yield names and values, and where they stand in a file."""
+    path = Path(text) if "=" not in text else None
+    lines = [text] if path is None else read_lines(path)
+    for record, line in enumerate(lines, 1):
+        where: dict[str, Any] = {} if path is None else {"file": path, "record": record, "text": line.strip()}
+        try:
+            # `NAME = value` is one setting, as jigsaw has it.
+            words = shlex.split(re.sub(r"\s*=\s*", "=", line), comments=path is not None)
+        except ValueError as error:
+            raise InputError(f"settings of jigsaw: {error}", **where) from None
+        for word in words:
+            name, equals, value = word.partition("=")
+            if not equals:
+                if word.lower() == "jigsaw":
+                    continue
+                raise InputError(f"settings of jigsaw are NAME=value, not {word}", **where)
+            yield name.upper(), value, where
+
+
+def _put(given: dict[str, Any], own: _Parameter, value: str) -> None:
+    found = own.read(value)
+    if own.place is None:
+        given[own.field] = found
+        return
+    three = list(given.get(own.field, (None, None, None)))
+    three[own.place] = found
+    given[own.field] = tuple(three)
+
+
+def _elsewhere(name: str, value: str) -> dict[str, str]:
+    """Return what is told of a setting that has another form here; nothing of one that asks for nothing."""
+    if name in OTHERWISE:
+        return {name: OTHERWISE[name]}
+    if name in _ONLY_NO:
+        if _yes(value):
+            raise InputError(f"is not done: {_ONLY_NO[name]}")
+        return {}
+    known = [*PARAMETERS, *OTHERWISE, *_ONLY_NO]
+    raise InputError(f"is no setting of jigsaw that is known{nearest(name, known)}")
