@@ -450,11 +450,12 @@ def _files(
     read = "\n".join(line for title, lines in sections for line in (title, *(f"  {each}" for each in lines)))
     files = {"report.txt": f"{report}\n{read}\n".encode(), **table_files(result)}
     after = adjusted(project, result)
-    files |= {f"adjusted/{name}": content for name, content in to_files(after, "plain").items()}
     own = next((name for name, each in FORMATS.items() if each.title == project.title), None)
+    plain = to_files(after, "plain") if own in (None, "plain") else _in_format(after, "plain")
+    files |= {f"adjusted/{name}": content for name, content in plain.items()}
     if own not in (None, "plain"):
         files |= {
-            f"adjusted-{own}/{name}": content for name, content in _same_format(after, str(own)).items()
+            f"adjusted-{own}/{name}": content for name, content in _in_format(after, str(own)).items()
         }
         beside = FORMATS[str(own)].results
         if beside is not None:
@@ -467,8 +468,8 @@ def _sizes(project: Project) -> Sequence[tuple[float, float] | None]:
     return project.sizes if project.block.image_unit == "px" else ()
 
 
-def _same_format(project: Project, name: str) -> dict[str, bytes]:
-    """Return the adjusted project in the format in which it came, if that can hold it."""
+def _in_format(project: Project, name: str) -> dict[str, bytes]:
+    """Return the adjusted project in a format, if that can hold it."""
     from photogram import InputError
     from photogram.formats import FORMATS, to_files
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from photogram.cli.job import Job, Reads
+from photogram.cli.planetary import CubesFile, JigsawSettings
 from photogram.cli.photographs import MrkAntenna, PhotosCrs, PhotosFolder
 from photogram.messages import counted, listed
 
@@ -186,6 +187,8 @@ class Additions:
     model: Model = None
     angles: Angles = None
     keep_repeated: KeepRepeated = False
+    cubes: CubesFile = None
+    jigsaw: JigsawSettings = None
 
 
 NOTHING = Additions()
@@ -235,6 +238,8 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
 
     if added.photos_dir is None and (added.photos_crs or added.mrk_antenna):
         raise typer.BadParameter("says something of --photos-dir", param_hint="--photos-crs, --mrk-antenna")
+    if added.cubes is None and added.jigsaw is not None:
+        raise typer.BadParameter("says how the images of --cubes are adjusted", param_hint="--jigsaw")
     if path.is_dir():
         job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))
     sd = deviations(added.sd or [])
@@ -250,6 +255,8 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
         photos=None
         if added.photos_dir is None
         else PhotoFiles(added.photos_dir, added.photos_crs, added.mrk_antenna),
+        cubes=added.cubes,
+        jigsaw=added.jigsaw,
     )
     project = with_sd(read(path, added.file_format, wishes), sd)
     job.reads(*project.details.get("photo tables", ()))

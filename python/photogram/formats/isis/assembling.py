@@ -51,8 +51,11 @@ def read(path: Path, wishes: Wishes) -> Project:
     network = read_network(path)
     files = read_list(wishes.cubes)
     images = _images(network, files, settings, wishes.cubes)
-    contents = Contents(network, path, {each.photo: own for own in images for each in own.supported.timed}, settings)
     seen = _seen(network, images, path)
+    photos = {each.photo: own for own in images for each in own.supported.timed}
+    starts = np.full((len(network.points), 3), np.nan)
+    starts[seen.points] = _starts(network, images, seen, Place(path))
+    contents = Contents(network, path, photos, settings, starts)
     unused = [serial for serial in files if serial not in {each.serial for each in images}]
     return _project(contents, seen, [*_left_out(network, unused, wishes.cubes), *_remarks(images)])
 
@@ -142,14 +145,13 @@ def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
     return _Seen(rows, points, image_points, photos, xy, sd)
 
 
-def _starts(contents: Contents, seen: _Seen, place: Place) -> Floats:
+def _starts(network: ControlNetwork, images: list[Image], seen: _Seen, place: Place) -> Floats:
     """Return (n, 3) X, Y, Z of points: as given, or in the middle of where their rays meet the spheroid."""
-    network = contents.network
     starts = given_starts(network, seen.points, place)
     unknown = np.isnan(starts).any(axis=1)
     sums, counts = np.zeros_like(starts), np.zeros(len(starts))
     of_measure = network.measures.serial[seen.measures]
-    for each in contents.different if unknown.any() else []:
+    for each in images if unknown.any() else []:
         serial = network.measures.serials.index(each.serial)
         rows = np.flatnonzero((of_measure == serial) & unknown[seen.image_points])
         own = seen.measures[rows]
@@ -170,7 +172,7 @@ def _spheroid(contents: Contents) -> Spheroid | None:
 
 def _project(contents: Contents, seen: _Seen, messages: list[Message]) -> Project:
     network, place, spheroid = contents.network, Place(contents.path), _spheroid(contents)
-    starts = _starts(contents, seen, place)
+    starts = contents.starts[seen.points]
     known = known_points(network, seen.points, starts, contents.settings, spheroid, place)
     timed = [each for own in contents.different for each in own.supported.timed]
     centres, matrices = _poses(timed, spheroid)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.isis.network import ControlNetwork
@@ -60,12 +61,15 @@ class Contents:
         Those that have measures, by the names of their photos.
     settings
         How they are adjusted.
+    starts
+        (N, 3) X, Y, Z in metres where the points of the network begin; NaN for those that do not count.
     """
 
     network: ControlNetwork
     path: Path
     images: Mapping[str, Image]
     settings: Settings
+    starts: Floats
 
     @property
     def different(self) -> list[Image]:

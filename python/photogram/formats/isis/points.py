@@ -15,7 +15,7 @@ from photogram.messages import Message, counted, listed
 from photogram.network.geometry import Spheroid, local_frames
 from photogram.network.observations import Control
 
-__all__ = ["KnownPoints", "full_matrices", "given_starts", "known_points"]
+__all__ = ["KnownPoints", "full_matrices", "given_starts", "known_points", "per_metre"]
 
 _LOCAL = [1, 0, 2]
 """Longitude, latitude and radius in the order of jigsaw: latitude, longitude, radius."""
@@ -80,7 +80,7 @@ def known_points(
     """
     points = network.points
     coordinates = Cartesian(spheroid).from_cartesian(starts)
-    metres = _per_metre(coordinates, spheroid)
+    metres = per_metre(coordinates, spheroid)
     order = _LOCAL if spheroid else [0, 1, 2]
     sigmas = np.array([np.inf if each is None else each for each in settings.point_sigmas])[order]
     sd = np.broadcast_to(sigmas, coordinates.shape) * metres
@@ -93,7 +93,7 @@ def known_points(
     return KnownPoints(positions, sd, coordinates, known.controls, known.messages)
 
 
-def _per_metre(coordinates: Floats, spheroid: Spheroid | None) -> Floats:
+def per_metre(coordinates: Floats, spheroid: Spheroid | None) -> Floats:
     """Return (n, 3) what a metre is of each coordinate: s / (R cos latitude) of longitude, s / R of latitude."""
     if spheroid is None:
         return np.ones_like(coordinates)

@@ -1,0 +1,122 @@
+"""What an adjustment has found, in the terms of control networks: pixels, body-fixed axes, rows of measures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from photogram.adjustment.known import Cartesian
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.formats.isis.contents import Contents, Image
+from photogram.formats.isis.points import per_metre
+from photogram.network.geometry import local_frames
+from photogram.network.motion import focal_images
+from photogram.results.result import Result
+
+__all__ = ["Outcome", "spherical"]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A network after its adjustment.
+
+    Parameters
+    ----------
+    contents
+        The network.
+    result
+        Of the adjustment of its block, from which images and points may have been taken out.
+    """
+
+    contents: Contents
+    result: Result
+
+    @cached_property
+    def point_rows(self) -> Indices:
+        """(n,) the point of the network that each point of the block is."""
+        places = {name: row for row, name in enumerate(self.contents.network.points.ids)}
+        return np.array([places[name] for name in self.result.block.point_ids], dtype=np.int64)
+
+    @cached_property
+    def images(self) -> list[Image]:
+        """The image that each photo of the block is of."""
+        return [self.contents.images[name] for name in self.result.block.photo_ids]
+
+    @cached_property
+    def measure_rows(self) -> Indices:
+        """(m,) the measure of the network that each image of the block is: the first one of its point there."""
+        network, block = self.contents.network, self.result.block
+        measures, count = network.measures, len(network.points)
+        serial_of = {serial: row for row, serial in enumerate(measures.serials)}
+        of_photo = np.array([serial_of[each.serial] for each in self.images], dtype=np.int64)
+        counting = np.flatnonzero(~(measures.ignore | network.points.ignore[network.point_of_measure]))
+        keys = measures.serial[counting].astype(np.int64) * count + network.point_of_measure[counting]
+        known, first = np.unique(keys, return_index=True)
+        own = of_photo[block.image_photos] * count + self.point_rows[block.image_points]
+        return np.asarray(counting[first[np.searchsorted(known, own)]])
+
+    @cached_property
+    def rejected(self) -> Bools:
+        """(M,) measures of the network that count and took no part in the end."""
+        network = self.contents.network
+        measures, count = network.measures, len(network.points)
+        keys = measures.serial.astype(np.int64) * count + network.point_of_measure
+        used = keys[self.measure_rows[self.result.used_images]]
+        ignored = measures.ignore | network.points.ignore[network.point_of_measure]
+        return np.asarray(~ignored & ~np.isin(keys, used))
+
+    @cached_property
+    def residuals(self) -> Floats:
+        """(m, 2) measured minus computed sample and line, at the instant of the measured line, in pixels."""
+        block, found = self.result.block, np.full((len(self.result.residuals), 2), np.nan)
+        for row, image in enumerate(self.images):
+            mine = block.image_photos == row
+            detector = image.supported.isd.detector
+            turned = np.linalg.inv(detector.planes["isis"].matrix)
+            found[mine] = (self.result.residuals[mine] * [1.0, -1.0]) @ turned.T / detector.summing
+        return found
+
+    @cached_property
+    def focal(self) -> Floats:
+        """(m, 2) measured x and y in the focal plane behind a perfect lens, y down, millimetres."""
+        return focal_images(self.result.block) * [1.0, -1.0]
+
+    @cached_property
+    def xyz(self) -> Floats:
+        """(n, 3) adjusted points, fixed to the body, metres; NaN where left out."""
+        return Cartesian.of(self.result.block).positions(np.array(self.result.point_positions))
+
+    @cached_property
+    def latitudes(self) -> Floats:
+        """(n, 3) latitude and longitude (radians, longitude from 0), and radius in metres, of the same."""
+        return spherical(self.xyz)
+
+    @cached_property
+    def covariances(self) -> Floats:
+        """(n, 3, 3) of X, Y, Z, a posteriori, square metres."""
+        own, spheroid = self.result.point_covariances, self.result.block.spheroid
+        if spheroid is None:
+            return np.asarray(own)
+        to_xyz = self._axes.transpose(0, 2, 1) / per_metre(self.result.point_positions, spheroid)[:, np.newaxis]
+        return np.asarray(to_xyz @ own @ to_xyz.transpose(0, 2, 1))
+
+    @property
+    def _axes(self) -> Floats:
+        """(n, 3, 3) east, north and up at the points, as rows."""
+        places = self.latitudes
+        return local_frames(np.column_stack([places[:, 1], places[:, 0], places[:, 2]]))
+
+    @cached_property
+    def local_sigmas(self) -> Floats:
+        """(n, 3) standard deviations along latitude, longitude and radius, metres."""
+        own = self._axes @ self.covariances @ self._axes.transpose(0, 2, 1)
+        return np.sqrt(np.maximum(np.einsum("nkk->nk", own), 0.0))[:, [1, 0, 2]]
+
+
+def spherical(xyz: Floats) -> Floats:
+    """Return (n, 3) latitudes, longitudes from 0 on, and radii, of (n, 3) X, Y, Z."""
+    radius = np.linalg.norm(xyz, axis=1)
+    latitude = np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))
+    return np.column_stack([latitude, np.arctan2(xyz[:, 1], xyz[:, 0]) % (2 * np.pi), radius])
