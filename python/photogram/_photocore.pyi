@@ -60,6 +60,8 @@ class TrajectoryRow(TypedDict):
     position: list[int]
     rotation: list[int]
     body: tuple[list[float], _Floats, str] | None
+    axes: str
+    rotations: str
 
 __version__: str
 
