@@ -454,9 +454,7 @@ def _files(
     plain = to_files(after, "plain") if own in (None, "plain") else _in_format(after, "plain")
     files |= {f"adjusted/{name}": content for name, content in plain.items()}
     if own not in (None, "plain"):
-        files |= {
-            f"adjusted-{own}/{name}": content for name, content in _in_format(after, str(own)).items()
-        }
+        files |= {f"adjusted-{own}/{name}": content for name, content in _in_format(after, str(own)).items()}
         beside = FORMATS[str(own)].results
         if beside is not None:
             files |= {f"adjusted-{own}/{name}": content for name, content in beside(after, result).items()}

@@ -27,8 +27,8 @@ JigsawSettings = Annotated[
     typer.Option(
         "--jigsaw",
         metavar="NAME=VALUE ...",
-        help="With --cubes: settings as on the command line of jigsaw, in quotes (CAMSOLVE=all RADIUS=yes), or"
-        " the path of a file with them.",
+        help="With --cubes: settings as on the command line of jigsaw, in quotes (CAMSOLVE=all RADIUS=yes),"
+        " or the path of a file with them.",
         show_default=False,
     ),
 ]

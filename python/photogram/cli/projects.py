@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from photogram.cli.job import Job, Reads
-from photogram.cli.planetary import CubesFile, JigsawSettings
 from photogram.cli.photographs import MrkAntenna, PhotosCrs, PhotosFolder
+from photogram.cli.planetary import CubesFile, JigsawSettings
 from photogram.messages import counted, listed
 
 if TYPE_CHECKING:

@@ -7,8 +7,18 @@ from typing import NamedTuple
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.network.attitudes import Attitudes
 
-__all__ = ["Polynomials", "fitted", "fitted_angles", "of_angles", "of_quaternions", "to_angles"]
+__all__ = [
+    "Polynomials",
+    "angle_axes",
+    "fitted",
+    "fitted_angles",
+    "of_angles",
+    "of_quaternions",
+    "to_angles",
+    "to_quaternions",
+]
 
 RECORDS = 64
 """Parts of a span that polynomials are sampled in: eight neighbours give them to the last digits."""
@@ -47,6 +57,21 @@ def to_angles(matrices: Floats) -> Floats:
     return np.unwrap(np.column_stack([a1, a2, a3]), axis=0)
 
 
+def angle_axes(angles: Floats) -> Floats:
+    """Return (n, 3, 3) the axes, in columns, about which (n, 3) angles turn: in those turned from."""
+    (c1, c2, _), (s1, s2, _) = np.cos(angles).T, np.sin(angles).T
+    zero, one = np.zeros_like(c1), np.ones_like(c1)
+    return np.moveaxis(np.array([[zero, c1, s2 * s1], [zero, s1, -s2 * c1], [one, zero, c2]]), 2, 0)
+
+
+def to_quaternions(matrices: Floats) -> Floats:
+    """Return (n, 4) quaternions w, x, y, z of (n, 3, 3) matrices that follow each other, of near signs."""
+    found = np.array(Attitudes(matrices).values("quaternion"))
+    turned = np.einsum("ni,ni->n", found[1:], found[:-1]) < 0
+    found[1:][np.cumsum(turned) % 2 == 1] *= -1
+    return found
+
+
 class Polynomials(NamedTuple):
     """Three angles, or coordinates, as polynomials of (t - reference) / scale.
 
@@ -66,6 +91,12 @@ class Polynomials(NamedTuple):
         """Return (n, 3) values at (n,) times."""
         powers = np.vander((times - self.reference) / self.scale, self.coefficients.shape[1], increasing=True)
         return np.asarray(powers @ self.coefficients.T)
+
+    def rates(self, times: Floats) -> Floats:
+        """Return (n, 3) what the values change by in a second at (n,) times."""
+        powers = np.arange(1, self.coefficients.shape[1])
+        slopes = self.coefficients[:, 1:] * (powers / self.scale)
+        return self._replace(coefficients=slopes).at(times) if len(powers) else np.zeros((len(times), 3))
 
     def sampled(self, first: float, last: float) -> tuple[Floats, Floats]:
         """Return (k,) times and (k, 3) values that `lagrange` joins without loss between two times."""

@@ -20,7 +20,7 @@ from photogram.network.timed import LineSensor, Timed
 from photogram.network.trajectories import Basis, Interpolation, Table, Trajectory
 from photogram.network.whereabouts import reach
 
-__all__ = ["SupportedImage", "camera_of", "trajectory_of", "with_polynomial_pointing"]
+__all__ = ["SupportedImage", "camera_of", "to_camera", "trajectory_of", "with_polynomial_pointing"]
 
 _OURS = np.diag([1.0, -1.0, -1.0])
 """From the axes of cameras that look along +z, y down, to those of photos; and back."""
@@ -71,6 +71,11 @@ def trajectory_of(
         attitude_interpolation=pointing.interpolation or joined,
     )
     return Trajectory(name, table, position, rotation, (isd.body.times, isd.body.matrices))
+
+
+def to_camera(attitudes: Floats) -> Floats:
+    """Return (n, 3, 3) matrices from inertial axes to those of cameras, of attitudes photo to inertial."""
+    return np.asarray(np.swapaxes(attitudes @ _OURS, 1, 2))
 
 
 def with_polynomial_pointing(isd: Isd, degree: int) -> Isd:

@@ -16,7 +16,7 @@ from photogram.formats.csm.optics import instrument, not_zero, read_detector, re
 from photogram.formats.tree import Tree, read_json, unknown
 from photogram.network.trajectories import increasing, rotations
 
-__all__ = ["is_isd", "read_isd"]
+__all__ = ["UNITS", "is_isd", "read_isd"]
 
 _KINDS = {
     "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL": "line",
@@ -25,7 +25,8 @@ _KINDS = {
 }
 FRAMELETS = 100_000
 """At most in an image: each is a photo."""
-_UNITS = {"m": 1.0, "km": 1000.0}
+UNITS = {"m": 1.0, "km": 1000.0}
+"""Metres; km where nothing is said."""
 
 
 def is_isd(tree: Tree) -> bool:
@@ -94,9 +95,9 @@ def _check_frames(tree: Tree) -> None:
 
 def _unit(tree: Tree) -> float:
     unit = tree.get("unit", "km")
-    if unit.text() not in _UNITS:
-        raise unknown(unit, "the unit", _UNITS)
-    return _UNITS[unit.text()]
+    if unit.text() not in UNITS:
+        raise unknown(unit, "the unit", UNITS)
+    return UNITS[unit.text()]
 
 
 def _radii(tree: Tree) -> tuple[float, float]:

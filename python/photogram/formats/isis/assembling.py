@@ -60,9 +60,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     return _project(contents, seen, [*_left_out(network, unused, wishes.cubes), *_remarks(images)])
 
 
-def _images(
-    network: ControlNetwork, files: dict[str, Path], settings: Settings, cubes: Path
-) -> list[Image]:
+def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings, cubes: Path) -> list[Image]:
     """Return the images that have measures, in the order of the network."""
     held, found = _held(settings, files), []
     for row in np.unique(network.measures.serial[_counting(network)]).tolist():
@@ -130,9 +128,9 @@ def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
     rows, own = _counting(network), network.measures
     if not len(rows):
         raise InputError("has no measures that count", file=path)
-    bad = ~(np.isfinite(own.sample[rows]) & np.isfinite(own.line[rows]))
-    if bad.any():
-        point = network.points.ids[network.point_of_measure[rows[np.argmax(bad)]]]
+    bad = rows[~(np.isfinite(own.sample[rows]) & np.isfinite(own.line[rows]))]
+    if len(bad):
+        point = network.points.ids[network.point_of_measure[bad[0]]]
         raise InputError(f"a measure of {point} has no Sample or no Line", file=path)
     points, image_points = np.unique(network.point_of_measure[rows], return_inverse=True)
     photos, xy, sd = np.zeros(len(rows), np.int64), np.zeros((len(rows), 2)), np.zeros(len(rows))
@@ -148,7 +146,7 @@ def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
 def _starts(network: ControlNetwork, images: list[Image], seen: _Seen, place: Place) -> Floats:
     """Return (n, 3) X, Y, Z of points: as given, or in the middle of where their rays meet the spheroid."""
     starts = given_starts(network, seen.points, place)
-    unknown = np.isnan(starts).any(axis=1)
+    unknown = np.asarray(np.isnan(starts).any(axis=1))
     sums, counts = np.zeros_like(starts), np.zeros(len(starts))
     of_measure = network.measures.serial[seen.measures]
     for each in images if unknown.any() else []:
@@ -175,7 +173,7 @@ def _project(contents: Contents, seen: _Seen, messages: list[Message]) -> Projec
     starts = contents.starts[seen.points]
     known = known_points(network, seen.points, starts, contents.settings, spheroid, place)
     timed = [each for own in contents.different for each in own.supported.timed]
-    centres, matrices = _poses(timed, spheroid)
+    centres, matrices = _poses(contents, spheroid)
     cameras, of_photos = _cameras(contents)
     return assembled(
         path=contents.path,
@@ -204,21 +202,25 @@ def _project(contents: Contents, seen: _Seen, messages: list[Message]) -> Projec
     )
 
 
-def _poses(timed: list[Timed], spheroid: Spheroid | None) -> tuple[Floats, Floats]:
+def _poses(contents: Contents, spheroid: Spheroid | None) -> tuple[Floats, Floats]:
     """Return where photos are about, and how they are turned, in the space of the block."""
-    axes = Cartesian(spheroid)
-    begins = [each.lines.table[0][1] if each.lines is not None else each.time for each in timed]
-    found = [
-        about(each.trajectory, float(begin)) for each, begin in zip(timed, begins, strict=True)
-    ]
+    axes, found = Cartesian(spheroid), []
+    for own in contents.different:
+        found += [about(own.supported.flown, _begin(each)) for each in own.supported.timed]
     centres = axes.from_cartesian(np.array([centre for centre, _ in found]))
     return centres, axes.to_local(np.array([matrix for _, matrix in found]), centres)
+
+
+def _begin(own: Timed) -> float:
+    """Return the time of a frame, or that of the first line."""
+    return float(own.time or 0.0) if own.lines is None else float(own.lines.times([0.0])[0])
 
 
 def _cameras(contents: Contents) -> tuple[list[Image], Indices]:
     """Return an image of each camera, and which camera each photo has."""
     known: dict[object, int] = {}
-    first, rows = [], []
+    first: list[Image] = []
+    rows: list[int] = []
     for each in contents.different:
         isd = each.supported.isd
         row = known.setdefault((isd.platform, isd.sensor, isd.focal_length), len(known))
@@ -241,11 +243,11 @@ def _left_out(network: ControlNetwork, unused: list[str], cubes: Path) -> list[M
         "ignored point": int(points.ignore.sum()),
         "ignored measure": int((measures.ignore | of_ignored).sum()),
     }
-    found = [
-        Message(f"{counted(count, what)}: left out, and written as read") for what, count in counts.items() if count
-    ]
-    if rejected := int(((measures.rejected | points.rejected[network.point_of_measure]) & ~measures.ignore).sum()):
-        found.append(Message(f"{counted(rejected, 'measure')} that an adjustment had rejected: taken in again"))
+    again = (measures.rejected | points.rejected[network.point_of_measure]) & ~measures.ignore
+    texts = [f"{counted(n, what)}: left out, and written as read" for what, n in counts.items() if n]
+    if again.any():
+        texts.append(f"{counted(int(again.sum()), 'measure')} that were rejected before: taken in again")
+    found = [Message(text) for text in texts]
     if unused:
         found.append(Message(f"images without measures, left out: {listed(unused, 3)}", cubes))
     return found

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.formats.isis.network import POINT_TYPES
-from photogram.formats.isis.outcome import Outcome, spherical
+from photogram.formats.isis.outcome import Outcome
 from photogram.formats.isis.parameters import KM, Parameter, parameters
 from photogram.io.csv_text import csv_text
 
@@ -57,11 +57,11 @@ def _images(outcome: Outcome) -> bytes:
         if image.solving.trajectory.name in trajectories
     }
     # Held images have fewer coefficients.
-    names = list(max(found.values(), key=len))
+    names = max((list(own) for own in found.values()), key=len)
     rows = []
     for image, own in found.items():
-        mine = [row for row, each in enumerate(outcome.images) if each is image]
-        cells = [str(image.path), *rms(outcome.residuals[used & np.isin(photos, mine)]).tolist()]
+        mine = used & np.isin(photos, outcome.photos_of(image))
+        cells = [str(image.path), *rms(outcome.residuals[mine]).tolist()]
         rows.append(cells + [cell for name in names for cell in _cells(own.get(name))])
     heads = [("Image", "Filename"), *(("rms", f"{what} res") for what in ("sample", "line", "total"))]
     heads += [(f"{name}(t{power})", what) for name, power in names for what in _CELLS]
@@ -88,7 +88,6 @@ def _points(outcome: Outcome) -> bytes:
     taken = block.image_points[outcome.result.used_images]
     accepted = np.bincount(taken, minlength=len(block.point_ids))[used]
     places, xyz = outcome.latitudes[used], outcome.xyz[used]
-    corrections = _corrections(outcome, used)
     sd = np.sqrt(np.maximum(np.einsum("nkk->nk", outcome.covariances[used]), 0.0))
     degrees = np.rad2deg(places[:, :2]).T
     columns = [
@@ -96,11 +95,11 @@ def _points(outcome: Outcome) -> bytes:
         [POINT_TYPES[code].upper() for code in network.points.types[rows].tolist()],
         accepted,
         rejected,
-        _point_rms(outcome)[used],
+        outcome.point_rms[used],
         *degrees,
         places[:, 2] / KM,
         *outcome.local_sigmas[used].T,
-        *corrections.T,
+        *outcome.corrections[used].T,
         *(xyz / KM).T,
         *sd.T,
     ]
@@ -120,24 +119,6 @@ _POINT_HEADS = [
     *(("Coordinate", axis, "(km)") for axis in "XYZ"),
     *(("Sigma", axis, "(m)") for axis in "XYZ"),
 ]
-
-
-def _corrections(outcome: Outcome, used: Indices) -> Floats:
-    """Return (n, 3) what latitude, longitude and radius have changed by, in metres."""
-    before = spherical(outcome.contents.starts[outcome.point_rows[used]])
-    after = outcome.latitudes[used]
-    change = after - before
-    # Across the meridian from which longitudes are counted.
-    change[:, 1] = (change[:, 1] + np.pi) % (2 * np.pi) - np.pi
-    return change * np.column_stack([after[:, 2], after[:, 2] * np.cos(after[:, 0]), np.ones(len(after))])
-
-
-def _point_rms(outcome: Outcome) -> Floats:
-    """Return (n,) root mean squares of the residuals of both coordinates of all measures of points."""
-    used, block = outcome.result.used_images, outcome.result.block
-    points, count = block.image_points[used], len(block.point_ids)
-    squares = np.bincount(points, (outcome.residuals[used] ** 2).mean(axis=1), minlength=count)
-    return np.asarray(np.sqrt(squares / np.maximum(np.bincount(points, minlength=count), 1)))
 
 
 def _residuals(outcome: Outcome) -> bytes:

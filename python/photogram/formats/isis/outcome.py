@@ -1,4 +1,4 @@
-"""What an adjustment has found, in the terms of control networks: pixels, body-fixed axes, rows of measures."""
+"""What an adjustment has found, in the terms of control networks: pixels, axes of the body, measures."""
 
 from __future__ import annotations
 
@@ -44,9 +44,13 @@ class Outcome:
         """The image that each photo of the block is of."""
         return [self.contents.images[name] for name in self.result.block.photo_ids]
 
+    def photos_of(self, image: Image) -> list[int]:
+        """Return the photos of the block that are of an image."""
+        return [row for row, each in enumerate(self.images) if each is image]
+
     @cached_property
     def measure_rows(self) -> Indices:
-        """(m,) the measure of the network that each image of the block is: the first one of its point there."""
+        """(m,) the measure of the network that each image of the block is: the first of its point there."""
         network, block = self.contents.network, self.result.block
         measures, count = network.measures, len(network.points)
         serial_of = {serial: row for row, serial in enumerate(measures.serials)}
@@ -94,12 +98,37 @@ class Outcome:
         return spherical(self.xyz)
 
     @cached_property
+    def before(self) -> Floats:
+        """(n, 3) where the points began: as :attr:`latitudes`."""
+        return spherical(self.contents.starts[self.point_rows])
+
+    @cached_property
+    def corrections(self) -> Floats:
+        """(n, 3) what latitude, longitude and radius have changed by, metres."""
+        after = self.latitudes
+        change = after - self.before
+        # Across the meridian from which longitudes are counted.
+        change[:, 1] = (change[:, 1] + np.pi) % (2 * np.pi) - np.pi
+        radius = after[:, 2]
+        metres = np.column_stack([radius, radius * np.cos(after[:, 0]), np.ones(len(after))])
+        return np.asarray(change * metres)
+
+    @cached_property
+    def point_rms(self) -> Floats:
+        """(n,) root mean squares of the residuals of points, both coordinates of all measures, in pixels."""
+        used, block = self.result.used_images, self.result.block
+        points, count = block.image_points[used], len(block.point_ids)
+        squares = np.bincount(points, (self.residuals[used] ** 2).mean(axis=1), minlength=count)
+        return np.asarray(np.sqrt(squares / np.maximum(np.bincount(points, minlength=count), 1)))
+
+    @cached_property
     def covariances(self) -> Floats:
         """(n, 3, 3) of X, Y, Z, a posteriori, square metres."""
         own, spheroid = self.result.point_covariances, self.result.block.spheroid
         if spheroid is None:
             return np.asarray(own)
-        to_xyz = self._axes.transpose(0, 2, 1) / per_metre(self.result.point_positions, spheroid)[:, np.newaxis]
+        metres = per_metre(self.result.point_positions, spheroid)
+        to_xyz = self._axes.transpose(0, 2, 1) / metres[:, np.newaxis]
         return np.asarray(to_xyz @ own @ to_xyz.transpose(0, 2, 1))
 
     @property
@@ -112,7 +141,7 @@ class Outcome:
     def local_sigmas(self) -> Floats:
         """(n, 3) standard deviations along latitude, longitude and radius, metres."""
         own = self._axes @ self.covariances @ self._axes.transpose(0, 2, 1)
-        return np.sqrt(np.maximum(np.einsum("nkk->nk", own), 0.0))[:, [1, 0, 2]]
+        return np.asarray(np.sqrt(np.maximum(np.einsum("nkk->nk", own), 0.0))[:, [1, 0, 2]])
 
 
 def spherical(xyz: Floats) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.formats.csm.angles import to_angles
 from photogram.formats.csm.isd import Isd
+from photogram.formats.csm.photos import to_camera
 from photogram.formats.isis.contents import Image
 from photogram.network.trajectories import Trajectory
 from photogram.network.whereabouts import about
@@ -63,9 +64,10 @@ def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
     """
     solving, own = image.solving, adjusted.given
     places, angles = _middle(image.supported.isd, own)
+    degrees = float(np.rad2deg(1.0))
     kinds = (
         (own.coefficients[0], adjusted.position, adjusted.position_sd, solving.position, places, 1 / KM),
-        (own.coefficients[1], adjusted.rotation, adjusted.rotation_sd, solving.angles, angles, np.rad2deg(1.0)),
+        (own.coefficients[1], adjusted.rotation, adjusted.rotation_sd, solving.angles, angles, degrees),
     )
     found = []
     for part, (coefficients, values, sd, begun, middle, unit) in enumerate(kinds):
@@ -77,7 +79,7 @@ def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
                 found.append(Parameter(name, 0, _UNITS[part], float(middle[axis] * unit), 0.0, 0.0, 0.0))
             for k in range(solved):
                 change = float(values[k, axis] - start[k, axis])
-                apriori = given[k, axis] * (np.rad2deg(1.0) if part else 1.0)
+                apriori = given[k, axis] * (degrees if part else 1.0)
                 numbers = (begun[axis, k] * unit, change * unit, apriori, sd[k, axis] * unit)
                 found.append(Parameter(name, k, _UNITS[part], *map(float, numbers)))
     return found
@@ -88,7 +90,7 @@ def _middle(isd: Isd, own: Trajectory) -> tuple[Floats, Floats]:
     still = Trajectory(own.name, own.table)
     places, _ = about(still, _half(isd.position.times))
     _, turned = about(still, _half(isd.pointing.times))
-    return places, to_angles((turned @ np.diag([1.0, -1.0, -1.0])).T[np.newaxis])[0]
+    return places, to_angles(to_camera(turned[np.newaxis]))[0]
 
 
 def _half(times: Floats) -> float:

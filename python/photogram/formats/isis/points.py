@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from photogram.adjustment.known import Cartesian
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.settings import Settings
 from photogram.io.places import Place
@@ -94,13 +95,11 @@ def known_points(
 
 
 def per_metre(coordinates: Floats, spheroid: Spheroid | None) -> Floats:
-    """Return (n, 3) what a metre is of each coordinate: s / (R cos latitude) of longitude, s / R of latitude."""
+    """Return (n, 3) what a metre is of each coordinate: 1 / (R cos B) of longitude, 1 / R of latitude B."""
     if spheroid is None:
         return np.ones_like(coordinates)
     radius = spheroid.a + coordinates[:, 2]
-    return np.column_stack(
-        [1 / (radius * np.cos(coordinates[:, 1])), 1 / radius, np.ones(len(coordinates))]
-    )
+    return np.column_stack([1 / (radius * np.cos(coordinates[:, 1])), 1 / radius, np.ones(len(coordinates))])
 
 
 def full_matrices(packed: Floats) -> Floats:
@@ -138,14 +137,14 @@ def _constrain(
     _tell(known, text, points.ids, rows[own[parts]])
 
 
-def _check(covariances: Floats, ids: list[str], rows: Indices, place: Place) -> None:
+def _check(covariances: Floats, ids: Sequence[str], rows: Indices, place: Place) -> None:
     """Refuse covariances that weigh nothing."""
-    bad: Bools = ~(np.linalg.eigvalsh(covariances) > 0).all(axis=1)
-    if bad.any():
-        raise place.error(f"the AprioriCovarianceMatrix of {ids[rows[np.argmax(bad)]]} is not positive definite")
+    bad = np.flatnonzero(~(np.linalg.eigvalsh(covariances) > 0).all(axis=1))
+    if len(bad):
+        raise place.error(f"the AprioriCovarianceMatrix of {ids[rows[bad[0]]]} is not positive definite")
 
 
-def _tell(known: KnownPoints, text: str, ids: list[str], rows: Indices) -> None:
+def _tell(known: KnownPoints, text: str, ids: Sequence[str], rows: Indices) -> None:
     if len(rows):
         names = listed([ids[row] for row in rows.tolist()], 3)
         known.messages.append(Message(f"{counted(len(rows), 'constrained point')} {text}: {names}"))

@@ -15,10 +15,10 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.isis.columns import measures_of, points_of
 from photogram.formats.isis.network import MESSAGE, ControlNetwork
-from photogram.io.files import read_bytes
+from photogram.io.files import read_bytes, reading
 from photogram.io.pvl import Group, Quantity, Value, parsed
 
-__all__ = ["is_network", "read_network"]
+__all__ = ["is_binary", "is_network", "read_network"]
 
 LABEL_BYTES = 65536
 """Bytes of the label of a binary network; zeros follow what it says."""
@@ -48,6 +48,12 @@ def _kind(data: bytes) -> str:
 def is_network(head: bytes) -> bool:
     """Return whether a file that begins so is a control network."""
     return _kind(head) in (_BINARY, _TEXT)
+
+
+def is_binary(path: Path) -> bool:
+    """Return whether a control network is a binary one."""
+    with reading(path), path.open("rb") as file:
+        return _kind(file.read(LABEL_BYTES)) == _BINARY
 
 
 def read_network(path: Path) -> ControlNetwork:

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.csm.angles import Polynomials, fitted, to_angles
-from photogram.formats.csm.isd import Isd, Positions
+from photogram.formats.csm.angles import Polynomials, fitted, fitted_angles, of_angles
+from photogram.formats.csm.isd import Isd, Positions, Turns
 from photogram.formats.csm.photos import trajectory_of
-from photogram.formats.isis.settings import Settings, Sigmas
+from photogram.formats.isis.settings import Settings
 from photogram.network.trajectories import Polynomial, Trajectory
 
 __all__ = ["Solving", "solving"]
-
-Angles = Literal["zxz", "zxz only"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +28,14 @@ class Solving:
     position, angles
         (3, n) coefficients of the polynomials that stand for the tables, to which those of corrections of
         positions are added; 0 where the tables stay.
+    over
+        Whether the tables of positions, and of angles, stay.
     """
 
     trajectory: Trajectory
     position: Floats
     angles: Floats
+    over: tuple[bool, bool]
 
 
 def solving(isd: Isd, name: str, settings: Settings, *, held: bool) -> Solving:
@@ -58,11 +59,13 @@ def solving(isd: Isd, name: str, settings: Settings, *, held: bool) -> Solving:
     """
     counts = (0, 0) if held else (settings.position_coefficients, settings.angle_coefficients)
     position, isd, places = _positions(isd, settings, counts[0])
-    rotation, angles, kind = _angles(isd, settings, counts[1])
+    rotation, isd, angles = _angles(isd, settings, counts[1])
     own = trajectory_of(isd, name, interpolation="isis", position=position)
-    if rotation is not None:
-        own = replace(own, rotation=rotation, angles=kind)
-    return Solving(own, places, angles)
+    return Solving(replace(own, rotation=rotation, angles="zxz"), places, angles, _over(settings))
+
+
+def _over(settings: Settings) -> tuple[bool, bool]:
+    return settings.over_hermite, settings.over_existing
 
 
 def _scaled(times: Floats) -> tuple[float, float]:
@@ -89,33 +92,41 @@ def _positions(isd: Isd, settings: Settings, count: int) -> tuple[Polynomial | N
     return basis, isd, fit.coefficients
 
 
-def _angles(isd: Isd, settings: Settings, count: int) -> tuple[Polynomial | None, Floats, Angles]:
-    """Return the polynomials of angles with what is known of them, their first values, and what they are."""
+def _angles(isd: Isd, settings: Settings, count: int) -> tuple[Polynomial | None, Isd, Floats]:
+    """Return corrections of angles, support data with what they are added to, and its coefficients.
+
+    Angles that are polynomials are added to a table of one record, their value in the middle: they have no
+    other attitude.
+    """
     own, none = isd.pointing, np.zeros((3, 0))
     if not count:
-        return None, none, "zxz"
+        return None, isd, none
     degree = max(settings.ck_solve_degree, count - 1)
     reference, scale = _scaled(own.times)
-    sd = deviations(tuple(None if s is None else np.deg2rad(s) for s in settings.angle_sigmas), count, degree)
+    sigmas = [None if each is None else float(np.deg2rad(each)) for each in settings.angle_sigmas]
+    sd = deviations(sigmas, count, degree)
     if not settings.twist:
         sd[:, 2] = 0.0
     if settings.over_existing:
-        return Polynomial(degree, reference, scale, sd=sd), np.zeros((3, degree + 1)), "zxz"
-    angles = to_angles(own.matrices)
-    fit = _of_degree(fitted(own.times, angles, min(settings.ck_degree, len(own.times) - 1)), degree)
-    basis = Polynomial(degree, reference, scale, value=fit.coefficients.T, sd=sd)
-    return basis, fit.coefficients, "zxz only"
+        return Polynomial(degree, reference, scale, sd=sd), isd, np.zeros((3, degree + 1))
+    fit = fitted_angles(own.times, own.matrices, min(settings.ck_degree, len(own.times) - 1))
+    fit = _of_degree(fit, degree)
+    value = fit.coefficients.T.copy()
+    value[0] = 0.0
+    middle = Turns(np.array([reference]), of_angles(fit.coefficients[:, :1].T), "linear")
+    basis = Polynomial(degree, reference, scale, value=value, sd=sd)
+    return basis, replace(isd, pointing=middle), fit.coefficients
 
 
 def _of_degree(fit: Polynomials, degree: int) -> Polynomials:
-    """Return polynomials of another degree: with zeros, or without their last coefficients, as jigsaw has it."""
+    """Return polynomials of another degree: with zeros, or without their last ones, as jigsaw has it."""
     own = np.zeros((3, degree + 1))
     most = min(degree + 1, fit.coefficients.shape[1])
     own[:, :most] = fit.coefficients[:, :most]
     return fit._replace(coefficients=own)
 
 
-def deviations(sigmas: Sigmas, count: int, degree: int) -> Floats:
+def deviations(sigmas: Sequence[float | None], count: int, degree: int) -> Floats:
     """Return (degree + 1, 3) standard deviations of coefficients, of which the first `count` are unknown."""
     found = np.zeros((degree + 1, 3))
     given = [np.inf if sigma is None else sigma for sigma in sigmas]
