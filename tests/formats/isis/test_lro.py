@@ -58,9 +58,8 @@ def test_residuals_and_redundancy(weighted, side):
     truth = answers()["weighted"]["solution"]
     mine = np.array([each.serial == f"{SERIAL}{side}" for each in outcome.images])[result.block.image_photos]
     order = np.argsort(result.block.image_points[mine])
-    # The line, then the sample, in 0.007 mm of the focal plane; samples of the right camera run the other way.
-    sense = [1.0, 1.0 if side == "L" else -1.0]
-    found = (outcome.residuals[mine][order][:, ::-1]) * sense
+    # The line, then the sample, in 0.007 mm of the focal plane; the right camera is turned by 180 degrees.
+    found = (outcome.residuals[mine][order][:, ::-1]) * (1.0 if side == "L" else -1.0)
     np.testing.assert_allclose(found, truth["residuals_px"][side], rtol=0, atol=1e-5)
     redundancy = result.redundancy[mine][order]
     np.testing.assert_allclose(redundancy, truth["kinds"][f"image_{side}"]["redundancy"], rtol=0, atol=1e-6)
