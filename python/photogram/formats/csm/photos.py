@@ -108,6 +108,11 @@ def camera_of(isd: Isd, name: str = "") -> Camera:
     return Camera("perspective", {"c": -isd.focal_length}, name=name)
 
 
+def _named(isd: Isd) -> str:
+    """Return the platform and the sensor; many sensors have the name of their platform before their own."""
+    return isd.sensor if isd.sensor.startswith(isd.platform) else f"{isd.platform} {isd.sensor}"
+
+
 @dataclass(frozen=True, eq=False)
 class SupportedImage:
     """An image with support data.
@@ -154,7 +159,7 @@ class SupportedImage:
         if own is None:
             own = trajectory_of(self.isd, self.name, interpolation=self.interpolation)
         object.__setattr__(self, "flown", own)
-        object.__setattr__(self, "camera", camera_of(self.isd, f"{self.isd.platform} {self.isd.sensor}"))
+        object.__setattr__(self, "camera", camera_of(self.isd, _named(self.isd)))
         object.__setattr__(self, "timed", self._photos(own))
 
     def _photos(self, on: Trajectory) -> tuple[Timed, ...]:
