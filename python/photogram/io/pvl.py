@@ -48,7 +48,7 @@ class Group:
 
     name: str
     kind: str
-    line: int = 1
+    line: int = field(default=1, compare=False)
     items: list[tuple[str, Value]] = field(default_factory=list)
     inside: list[Group] = field(default_factory=list)
 
