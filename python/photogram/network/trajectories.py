@@ -391,9 +391,10 @@ class Trajectory:
         flight, across it (to the left) and radial, away from the origin of the axes; `flight`: along, across
         and up, the third axis of the table.
     angles
-        What rotation coefficients are: rotation `vector` about the axes of the photo, A = A0 Exp(r); or `zxz`,
-        in radians, added to the angles a1, a2, a3 of the table, M = [a3]_3 [a2]_1 [a1]_3 from its axes to those
-        of a camera that looks along +z, x right, y down.
+        What rotation coefficients are: `vector`, rotation vectors about the axes of the photo, A = A0 Exp(r);
+        or `zxz`, radians added to the angles a1, a2, a3 of the table, M = [a3]_3 [a2]_1 [a1]_3 from its axes
+        to those of a camera that looks along +z, x right, y down. Polynomials in the place of the table are
+        the same with a table that they are sampled to (`formats.csm.photos.with_polynomial_pointing`).
 
     Attributes
     ----------
