@@ -6,8 +6,8 @@ the position of its photo, and d the way from one exposure to the next, the imag
     (a d) (r/h) tau,      tau = T / time between two exposures
 
 of which position, attitude and points take up a part. The score of tau tells what is left (Rao): its value,
-and by how much the sum of squares would fall. Its standard deviation is from how the photos differ, which turn
-meanwhile, each its own way.
+and by how much the sum of squares would fall. Its standard deviation is from how the photos differ: each of
+them turns meanwhile, its own way.
 """
 
 from __future__ import annotations
@@ -112,8 +112,8 @@ def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> st
     omega = result.sums_of_squares.total
     return (
         f"probably the shutter of {name} rolls: a readout of its {READ[axis, readout > 0]}, in"
-        f" {100 * abs(readout):.2g} % (sd {100 * sd:.1g}) of the time between two exposures, explains residuals"
-        f" that grow with {('column', 'row')[axis]} times velocity; they would be"
+        f" {100 * abs(readout):.2g} % (sd {100 * sd:.1g}) of the time between two exposures, explains"
+        f" residuals that grow with {('column', 'row')[axis]} times velocity; they would be"
         f" {math.sqrt(omega / (omega - alone)):.3g} times smaller"
     )
 

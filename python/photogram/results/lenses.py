@@ -47,7 +47,7 @@ def fall_by_lens(result: Result, images: Bools) -> float:
 
 
 def lens_partials(result: Result, own: Bools) -> Floats:
-    """(7, m, 2) partials by what a lens may have, in standard deviations, of the (m,) images that are `own`."""
+    """(7, m, 2) partials of the images that are `own` by what a lens may have, in standard deviations."""
     block = result.block
     xy = focal_images(block)[own]
     low, high = xy.min(axis=0), xy.max(axis=0)

@@ -56,7 +56,7 @@ class Scores:
     @cached_property
     def sizes(self) -> Floats:
         """(k,) roots of the diagonal of B' B."""
-        return np.sqrt(np.einsum("kmi,kmi->k", self.partials, self.partials))
+        return np.asarray(np.sqrt(np.einsum("kmi,kmi->k", self.partials, self.partials)))
 
     @property
     def taken_up(self) -> bool:
