@@ -28,6 +28,8 @@ def flown_hypotheses(block: Block, photos: Indices) -> Iterator[Hypothesis]:
         yield from _of_tables()
         for text, seconds in shifts("images"):
             yield Hypothesis(f"images {seconds:+g} s", text, partial(_shifted_images, seconds=seconds))
+    if block.principal_distances is not None or any("c" in each.names for each in block.cameras):
+        yield Hypothesis("sign of c", "the principal distance has the wrong sign", _looking_back)
     if any(each.lines is not None for each in block.timed):
         yield from _of_scanners(block, photos)
 
@@ -85,6 +87,19 @@ def _with_tables(block: Block, change: Callable[[Table], Table]) -> Block:
         for each in block.timed
     ]
     return block.replace(timed=timed)
+
+
+def _looking_back(block: Block) -> Block:
+    """Return a block whose principal distances have the other sign."""
+    if block.principal_distances is not None:
+        return block.replace(principal_distances=-block.principal_distances)
+    cameras = [
+        each.replace(parameters={**each.parameters, "c": -each.parameters["c"]})
+        if "c" in each.names
+        else each
+        for each in block.cameras
+    ]
+    return block.replace(cameras=cameras)
 
 
 def _shifted_images(block: Block, seconds: float) -> Block:
