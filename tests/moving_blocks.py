@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from photogram import Block, Camera
@@ -37,6 +39,95 @@ def heading(turn: float) -> Floats:
     return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
+def _read(
+    points: Floats, motions: Iterable[tuple[Floats, ...]], readout: float, direction: str = "down"
+) -> tuple[list[int], list[int], Floats]:
+    """Return photos, points and places of the images that a shutter reads from uniform motions."""
+    photos, seen, xy = [], [], []
+    for photo, (centre, matrix, v, w) in enumerate(motions):
+        for point, place in enumerate(points):
+            column, row = WIDTH / 2, HEIGHT / 2
+            for _ in range(20):
+                share = {"down": row / HEIGHT, "up": 1 - row / HEIGHT, "right": column / WIDTH}[direction]
+                time = share * readout
+                u = (matrix @ exponential(w * time)).T @ (place - centre - v * time)
+                column, row = WIDTH / 2 - F * u[0] / u[2], HEIGHT / 2 + F * u[1] / u[2]
+            if 0 < column < WIDTH and 0 < row < HEIGHT:
+                photos.append(photo)
+                seen.append(point)
+                xy.append([column, row])
+    return photos, seen, np.array(xy)
+
+
+def flown_frames(
+    *,
+    readout: float = READOUT,
+    direction: str = "down",
+    turned: bool = False,
+    strips: int = 2,
+    millimetres: bool = False,
+    relief: float = 15.0,
+    seed: int = 5,
+) -> Block:
+    """Return strips of a drone, eight photos each that are frames, 18 m and 2 s apart; nine points held.
+
+    The shutter rolls for `readout` seconds. `turned`: the camera turns with the drone, and is always moved
+    the same way in its axes; else it is moved the other way on every second strip. `millimetres`: the same
+    of a camera without lens, of 0.004 mm a pixel.
+    """
+    random = np.random.default_rng(seed)
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(-110, 110, 17), np.linspace(-75, 75, 11)))
+    points = np.column_stack([x, y, random.uniform(-relief, relief, len(x))])
+    points[:, :2] += random.uniform(-3, 3, (len(x), 2))
+    motions = []
+    for strip in range(strips):
+        sense = -1.0 if strip % 2 else 1.0
+        for photo in range(8):
+            centre = [sense * (-63.0 + 18.0 * photo), 50.0 * (strip - (strips - 1) / 2), 100.0]
+            turn = heading((np.pi if strip % 2 and turned else 0.0) - np.pi / 2)
+            motions.append(
+                (
+                    np.array(centre) + random.normal(0, 0.5, 3),
+                    turn @ exponential(random.normal(0, 0.03, 3)),
+                    np.array([9.0 * sense, 0.0, 0.0]) + random.normal(0, 0.2, 3),
+                    random.normal(0, 0.02, 3),
+                )
+            )
+    photos, seen, xy = _read(points, motions, readout, direction)
+    xy += 0.3 * random.standard_normal(xy.shape)
+    held = np.zeros(len(points), dtype=bool)
+    held[:: len(points) // 8] = True
+    count = len(motions)
+    camera = {"fx": F, "fy": F, "cx": WIDTH / 2, "cy": HEIGHT / 2}
+    own = (
+        {
+            "principal_distances": np.full(count, -0.004 * F),
+            "image_xy": (xy - [WIDTH / 2, HEIGHT / 2]) * [0.004, -0.004],
+            "image_sd": 0.0012,
+        }
+        if millimetres
+        else {
+            "cameras": [Camera("pinhole", camera)],
+            "photo_cameras": [0] * count,
+            "image_xy": xy,
+            "image_sd": 0.3,
+        }
+    )
+    angles = Attitudes(np.array([matrix for _, matrix, *_ in motions]))
+    return Block(
+        photo_ids=[f"IMG_{k + 1}" for k in range(count)],
+        photo_positions=np.array([centre for centre, *_ in motions]) + random.normal(0, 0.05, (count, 3)),
+        photo_attitudes=angles.values("omega_phi_kappa"),
+        point_ids=[f"P{k}" for k in range(len(points))],
+        point_positions=np.where(held[:, np.newaxis], points + random.normal(0, 0.01, points.shape), np.nan),
+        point_sd=np.where(held[:, np.newaxis], 0.01, np.inf) * np.ones(3),
+        image_photos=photos,
+        image_points=seen,
+        title="frames of a drone",
+        **own,
+    )
+
+
 def rolling(*, readout: Readout | float | None = None, noise: float = 0.3, gross: bool = False) -> Block:
     """Return eight photos in two strips of a drone, each with its own uniform motion, and nine points held.
 
@@ -55,19 +146,8 @@ def rolling(*, readout: Readout | float | None = None, noise: float = 0.3, gross
             along = [0.0, 9.0, 0.0] if photo % 2 else [9.0 * np.cos(turn), 0.0, 0.0]
             velocities.append(along + random.normal(0, 0.3, 3))
             rates.append(random.normal(0, 0.15, 3))
-    photos, seen, xy = [], [], []
-    for photo, (centre, matrix, v, w) in enumerate(zip(centres, matrices, velocities, rates, strict=True)):
-        for point, place in enumerate(points):
-            row = HEIGHT / 2
-            for _ in range(20):
-                time = row / HEIGHT * READOUT
-                u = (matrix @ exponential(w * time)).T @ (place - centre - v * time)
-                column, row = WIDTH / 2 - F * u[0] / u[2], HEIGHT / 2 + F * u[1] / u[2]
-            if 0 < column < WIDTH and 0 < row < HEIGHT:
-                photos.append(photo)
-                seen.append(point)
-                xy.append([column, row])
-    xy = np.array(xy) + noise * random.standard_normal((len(xy), 2))
+    photos, seen, xy = _read(points, zip(centres, matrices, velocities, rates, strict=True), READOUT)
+    xy += noise * random.standard_normal(xy.shape)
     xy[0, 0] += 12.0 * gross
     kept = np.bincount(seen, minlength=len(points)) > 0
     number = np.cumsum(kept) - 1

@@ -25,8 +25,9 @@ from photogram import (
     variance_components,
     variance_function,
 )
+from photogram.formats import Project, read, to_files
 from photogram.network.chosen import kept_images
-from photogram.network.observations import Attitude
+from photogram.network.observations import Attitude, Prior
 from photogram.network.timed import Lines, Timed
 from photogram.network.trajectories import Clock, Readout, Spline, Table, Trajectory
 from photogram.network.unknowns import Boresight, Sensor
@@ -221,6 +222,85 @@ def test_restarted(scan, drone):
     for result in (scan, drone):
         again = adjust(result.restarted())
         assert again.sums_of_squares.total == pytest.approx(result.sums_of_squares.total, rel=1e-5)
+
+
+def loosened(block, **bases):
+    """Return a block whose trajectories have other bases."""
+    known = {}
+
+    def meant(given):
+        return known.setdefault(id(given), replace(given, **bases))
+
+    others = [each for each in block.observations if each.KIND != "smoothness"]
+    return block.replace(
+        timed=[replace(each, trajectory=meant(each.trajectory)) for each in block.timed],
+        observations=[replace(each, trajectory=meant(each.trajectory)) for each in others],
+    )
+
+
+def test_restarted_trajectories(tmp_path):
+    """Free coefficients start where they have ended; what is given of weighted ones is an observation."""
+    free = np.array([np.inf, np.inf, 1.0])
+    block = loosened(
+        scanned(),
+        position=Spline(2.0, value=[0.0, 0.0, 0.1], sd=free, smooth=(2, 0.3)),
+        rotation=Spline(2.0, sd=0.01),
+    )
+    result = adjust(block)
+    started = result.restarted()
+    assert len(started.all_trajectories) == 2
+    assert len(started.observations) == len(block.observations)
+    assert {id(each.trajectory) for each in started.timed} == {id(each) for each in started.all_trajectories}
+    for own, given in zip(started.all_trajectories, block.all_trajectories, strict=True):
+        found = result.trajectories[own.name]
+        values = np.array([each.position for each in own.coefficients[0]])
+        np.testing.assert_array_equal(values[:, :2], found.position[:, :2])
+        assert np.abs(values[:, :2]).max() > 0.1
+        assert (values[:, 2] == 0.1).all()
+        assert not np.array([each.position for each in own.coefficients[1]]).any()
+        assert own.table is given.table
+    again = adjust(started)
+    assert len(again.iterations) < len(result.iterations)
+    assert again.sums_of_squares.total == pytest.approx(result.sums_of_squares.total, rel=1e-6)
+    (smooth,) = (name for name in result.kinds if name.startswith("smoothness"))
+    assert again.kinds[smooth].sum_of_squares == pytest.approx(result.kinds[smooth].sum_of_squares, rel=1e-4)
+    none = (None,) * len(started.cameras)
+    starts = np.full((len(started.point_ids), 3), np.nan)
+    project = Project(block=started, path=tmp_path, title="", sizes=none, pixel_mm=none, starts=starts)
+    for name, content in to_files(project, "plain").items():
+        (tmp_path / name).write_bytes(content)
+    read_again = read(tmp_path).block
+    for own, one in zip(read_again.all_trajectories, started.all_trajectories, strict=True):
+        both = [np.array([each.position for each in all_.coefficients[0]]) for all_ in (own, one)]
+        np.testing.assert_allclose(*both, rtol=0, atol=1e-12)
+
+
+def test_restarted_coefficients_with_priors():
+    """A prior is of the value that its coefficient was given: it does not move."""
+    block = loosened(scanned(), position=Spline(2.0, sd=np.inf), rotation=Spline(2.0, sd=0.01))
+    first = block.all_trajectories[0].coefficients[0][0]
+    result = adjust(block.replace(observations=[*block.observations, Prior(first, sd=0.5)]))
+    started = result.restarted()
+    own = started.all_trajectories[0].coefficients[0]
+    assert not own[0].position.any()
+    assert all(each.position.any() for each in own[1:])
+    assert [each.unknown for each in started.observations if isinstance(each, Prior)] == [own[0]]
+    again = adjust(started)
+    assert again.sums_of_squares.total == pytest.approx(result.sums_of_squares.total, rel=1e-6)
+
+
+def test_restarted_motions_of_photos():
+    """A free velocity starts where it has ended, with the pose from which it counts."""
+    block = rolling(readout=0.03)
+    result = adjust(block.replace(timed=[replace(each, sd_velocity=np.inf) for each in block.timed]))
+    started = result.restarted()
+    for own in started.timed:
+        found = result.trajectories[own.photo]
+        np.testing.assert_array_equal(own.velocity, found.position[1])
+        assert not np.asarray(own.rotation_rate).any()
+    again = adjust(started)
+    assert again.initial_weighted_sum_of_squares < result.initial_weighted_sum_of_squares
+    assert again.sums_of_squares.total == pytest.approx(result.sums_of_squares.total, rel=1e-6)
 
 
 @pytest.mark.parametrize("groups", ["kind", "photo", "strip", "camera", "component"])

@@ -1,6 +1,7 @@
 """`photogram adjust` in parts."""
 
 import re
+from inspect import signature
 
 import numpy as np
 import pytest
@@ -12,6 +13,9 @@ from typer.testing import CliRunner
 import photogram
 from photogram import adjust, adjust_in_parts, read_result
 from photogram.cli.commands import app
+from photogram.cli.job import _option
+from photogram.cli.on_disk import TAKEN
+from photogram.cli.projects import Additions
 from photogram.distributed import Division
 from photogram.formats import read
 
@@ -72,6 +76,72 @@ def test_a_project_on_disk_is_adjusted_without_being_read_whole(tmp_path, projec
     np.testing.assert_allclose(own[used], whole.point_positions[used], rtol=0, atol=1e-6)
     # The same command finds everything done, and says the same.
     assert called(project, "--parts", 3, "--out", tmp_path / "out").count("converged after") == 1
+
+
+REFUSED = {
+    "--datum": "control",
+    "--hold": "A=XYZ",
+    "--loss": "huber",
+    "--self-calibrate": "all",
+    "--snoop": None,
+    "--level": 0.01,
+    "--fdr": 0.1,
+    "--unit-weight": "unknown",
+    "--statement": None,
+    "--strict": None,
+    "--ordering": "amd",
+    "--json": "found.json",
+    "--xlsx": "found.xlsx",
+    "--html": "found.html",
+    "--plots": None,
+    "--plot-format": "svg",
+    "--parquet": "found",
+    "--crs": "EPSG:25832",
+    "--map": "found.svg",
+    "--ply": "found.ply",
+    "--ply-origin": [1, 0, 0],
+}
+
+
+def test_every_option_is_taken_or_refused_of_a_project_on_disk():
+    """What is read batch by batch left options out without a word; whoever adds one decides what it does."""
+    of_files = {each.name for each in signature(Additions, eval_str=True).parameters.values()}
+    command = next(each for each in app.registered_commands if each.callback.__name__ == "adjust")
+    options = {
+        _option(each)
+        for each in signature(command.callback).parameters.values()
+        if each.name not in of_files | {"path", "example"}
+    }
+    assert options == REFUSED.keys() | TAKEN - {"PATH"}
+    assert not REFUSED.keys() & TAKEN
+
+
+@pytest.mark.parametrize("option", REFUSED)
+def test_what_is_not_done_of_a_project_on_disk_is_refused(tmp_path, project, option):
+    given = REFUSED[option]
+    value = given if isinstance(given, list) else [] if given is None else [given]
+    value = [tmp_path / each if str(each).startswith("found") else each for each in value]
+    said = called(project, "--parts", 3, option, *value, "--out", tmp_path / "out", code=2)
+    assert f"Invalid value for {option}: is not done of a project" in " ".join(said.replace("│", " ").split())
+    assert not (tmp_path / "out" / "report.txt").exists()
+
+
+def test_a_project_on_disk_that_chooses_a_loss_is_refused(tmp_path):
+    given = project_of(tied_block(), tmp_path / "robust")
+    settings = given / "project.toml"
+    settings.write_text(settings.read_text().replace('loss = "none"', 'loss = "huber"'))
+    assert read(given).options.loss == "huber"
+    said = called(given, "--parts", 3, "--out", tmp_path / "out", code=1)
+    assert "in parts there is no loss and no datum to choose" in said
+
+
+@pytest.mark.parametrize("chosen", ["unity", "constrained"])
+def test_the_unit_variance_of_a_project_on_disk_is_chosen(tmp_path, project, chosen):
+    called(project, "--parts", 2, "--unit-variance", chosen, "--keep-all", "--out", tmp_path / "out")
+    found = read_result(min((tmp_path / "out" / "run" / "results").iterdir()))
+    assert found.unit_variance == chosen
+    said = called(project, "--parts", 2, "--unit-variance", "redundancy", "--out", tmp_path / "b", code=1)
+    assert "in parts the unit variance is not based on redundancy numbers" in said
 
 
 def test_two_workers_give_the_bits_of_parts_one_after_the_other():

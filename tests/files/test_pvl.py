@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photogram.errors import InputError
-from photogram.io.pvl import Quantity, parsed
+from photogram.io.pvl import Group, Quantity, label_text, parsed
 from shared_data import SHARED
 
 FILE = Path("some.lbl")
@@ -94,6 +94,40 @@ def test_what_is_no_label_is_told_with_its_line(text, line, said):
 def test_any_text_is_read_or_refused(text):
     with suppress(InputError):
         assert parsed(text, FILE).kind == "label"
+
+
+def shape(group):
+    """Return all that a group says, without its lines."""
+    return group.name, group.kind, group.items, [shape(each) for each in group.inside]
+
+
+def test_a_label_is_written_as_it_was_read():
+    label = parsed(LABEL, FILE)
+    written = label_text(label)
+    assert shape(parsed(written, FILE)) == shape(label)
+    assert label_text(parsed(written, FILE)) == written
+    assert "    StartByte = 65537\n    Format    = Tile\n" in written
+    words = dict(parsed("A = 1.50\nB = '2'\nC = (007, 8)\n", FILE, numbers=False).items)
+    assert words == {"A": "1.50", "B": "2", "C": ["007", "8"]}
+
+
+VALUES = st.one_of(
+    st.integers(-(10**17), 10**17),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.text(st.characters(codec="utf-8", exclude_characters='"\n\r', exclude_categories=["Cc", "Cs"])),
+)
+
+
+@given(VALUES | st.lists(VALUES) | st.builds(Quantity, VALUES, st.just("km")))
+def test_values_come_back(value):
+    label = Group("", "label", items=[("key", value)])
+    assert parsed(label_text(label), FILE).items == label.items
+
+
+@pytest.mark.parametrize("text", ["two\nlines", "both ' and \""])
+def test_a_text_that_no_marks_hold_is_refused(text):
+    with pytest.raises(InputError, match="cannot stand in a label"):
+        label_text(Group("", "label", items=[("key", text)]))
 
 
 @pytest.mark.skipif(not (SHARED / "moving").is_dir(), reason="the published network is not there")

@@ -24,6 +24,7 @@ from control_networks import (
 from photogram.errors import InputError
 from photogram.formats.isis.reading import is_network, read_network
 from photogram.formats.isis.writing import binary_network, network_text
+from photogram.io.pvl import Group
 from shared_data import SHARED
 
 NETWORKS = SHARED / "moving" / "control_network"
@@ -246,6 +247,8 @@ def test_version_2_lists_the_lengths_of_its_points(tmp_path):
 
 @pytest.mark.parametrize("write", [binary_network, network_text])
 def test_a_network_is_made_of_columns_alone(write, tmp_path):
-    again = read_again(write(small()), tmp_path)
-    assert differing(small(), again) == []
+    others = Group("", "label", items=[("Größe", "è vero")])
+    network = replace(small(), description='Région "A"', others=others)
+    again = read_again(write(network), tmp_path)
+    assert differing(network, again) == []
     assert np.isnan(again.points.adjusted).tolist() == [[False, True, True]] * 2

@@ -58,14 +58,12 @@ def outside(block: Block) -> str:
     photos = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
     for own, trajectory in zip(block.timed, block.trajectories, strict=True):
         rows = np.flatnonzero(block.image_photos == photos[own.photo])
-        time, scale, _ = own.images(block.image_xy[rows])
-        rate = 1.0 if own.readout is None else float(own.readout.position[0])
-        offset = 0.0 if own.offset is None else float(own.offset.position[0])
+        times = own.times(block.image_xy[rows])
+        begin = own.images(block.image_xy[rows])[0] + own.delay
         first, last = reach(trajectory)
-        times = time + offset + rate * scale
         bad = np.flatnonzero((times < first) | (times > last))
-        if bad.size or not first <= time + offset <= last:
-            at = float(times[bad[0]]) if bad.size else time + offset
+        if bad.size or not first <= begin <= last:
+            at = float(times[bad[0]]) if bad.size else begin
             what = f"the photo {own.photo}"
             if bad.size:
                 what = f"the image of point {block.point_ids[block.image_points[rows[bad[0]]]]} on {what}"

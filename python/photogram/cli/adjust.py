@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from photogram.cli.components import UnitVarianceName
-from photogram.cli.console import NOT_CONVERGED, ON_TOP, output, print_remark, print_sections
+from photogram.cli.console import ON_TOP, output, print_remark, print_sections
 from photogram.cli.division import WHOLE, Parts
 from photogram.cli.documents import NONE_ASKED, Documents
 from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.maps import check_maps
+from photogram.cli.on_disk import adjusted_on_disk
 from photogram.cli.options import (
     KEPT,
     Ordering,
@@ -183,7 +184,7 @@ def adjust(
     with job:
         pictures = documents.pictures(job, target)
         division = divided.division
-        if added == NOTHING and _on_disk(job, path, target, divided, threads):
+        if added == NOTHING and adjusted_on_disk(job, path, target, divided, choices.unit_variance, threads):
             return
         project = read_project(job, path, added)
         check_maps(documents.map)  # now that all inputs are known, which it must not be
@@ -299,36 +300,6 @@ def _in_system(result: Result, crs: str | None) -> tuple[dict[str, bytes], list[
 
     found = placed(result, crs)
     return {f"in_crs/{name}": each for name, each in placed_files(found).items()}, [placed_section(found)]
-
-
-def _on_disk(job: Job, path: Path, target: Path, divided: Parts, threads: int | None) -> bool:
-    """Plan or adjust a project that is read batch by batch; False where it has to be read whole."""
-    division = divided.division
-    if division is None:
-        return False
-    from photogram.formats import Wishes
-    from photogram.formats.plain.streamed import streamable
-
-    if not streamable(path):
-        return False
-    from photogram.formats.in_parts import adjusted_on_disk, planned_on_disk
-
-    folder = divided.run or target / "run"
-    if divided.plan:
-        plan = planned_on_disk(path, Wishes(), folder, division)
-        output.print("\n".join(plan.lines()))
-        plan.check()
-        return True
-    with job.status("adjusting") as status:
-        told = shown(status, "weighted sum of squares", 1.0) if status is not None else None
-        found = adjusted_on_disk(path, Wishes(), folder, division, threads=threads, progress=told)
-    lines = [*found.lines(), f"what was found of each node: {folder / 'results'}"]
-    report = {target / "report.txt": ("\n".join(lines) + "\n").encode()}
-    code = 0 if found.outcome.status == "converged" else NOT_CONVERGED
-    job.finish(
-        report, summary=lambda: print_sections([("adjusted in parts", lines)], "report.txt"), code=code
-    )
-    return True
 
 
 def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | None]:

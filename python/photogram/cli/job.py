@@ -108,6 +108,11 @@ class Job:
         self._resources.close()
         return self._failures.__exit__(kind, error, trace)
 
+    @property
+    def given(self) -> Mapping[str, Any]:
+        """What was given on the command line and is not the default, by the names of options."""
+        return self._options
+
     def packaged(self, *example: str) -> Path:
         """Return a packaged example, a file or a directory, for as long as the job lasts."""
         found = self._resources.enter_context(as_file(files("photogram").joinpath("examples", *example)))
@@ -394,6 +399,9 @@ def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
 def _option(parameter: Parameter) -> str:
     """Return the name of an option on the command line."""
     for mark in get_args(parameter.annotation)[1:]:
-        if isinstance(mark, OptionInfo) and mark.param_decls:
-            return mark.param_decls[0]
+        if isinstance(mark, OptionInfo):
+            # Where it is annotated, the first of its names stands in the place of a default.
+            names = [each for each in (mark.default, *(mark.param_decls or ())) if isinstance(each, str)]
+            if names:
+                return next((each for each in names if each.startswith("--")), names[0])
     return "--" + parameter.name.replace("_", "-")

@@ -7,15 +7,21 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from photogram.adjustment.first_values import FirstValues
+from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.clocks import known_offsets
 from photogram.diagnosis.conventions import hints
 from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section
+from photogram.diagnosis.flown_hints import flown_hints
 from photogram.diagnosis.names import with_exchanges
+from photogram.diagnosis.rolling import rolling_hints
+from photogram.diagnosis.shutters import backward_readouts, shutter_hints
 from photogram.diagnosis.weights import weight_hints
 from photogram.errors import AdjustmentError, OutOfMemoryError
+from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.results.result import Result
 
-__all__ = ["diagnosed", "diagnosis_of", "errors_explained"]
+__all__ = ["diagnosed", "diagnosis_of", "errors_explained", "explained", "remarks"]
 
 BAD = 5.0
 """Sigma0 above which an adjustment that has converged is doubted."""
@@ -30,8 +36,9 @@ def errors_explained(block: Block | FirstValues) -> Iterator[None]:
         raise
     except AdjustmentError as error:
         block = block.usable() if isinstance(block, FirstValues) else block
+        found = _of_block(block) or shutter_hints(block, None, Adjuster({}))
         error.args = (
-            "\n".join([str(error), *(f"  hint: {hint}" for hint in hints(block))]),
+            "\n".join([str(error), *(f"  hint: {hint}" for hint in found)]),
             *error.args[1:],
         )
         raise
@@ -47,16 +54,39 @@ def diagnosed(result: Result) -> Result:
     return with_exchanges(_with_hints(result))
 
 
-def _with_hints(result: Result) -> Result:
+def explained(result: Result) -> list[Message]:
+    """Name mistakes in what the data of an adjustment mean that explain why it has failed, or fits badly."""
+    if result.loss is not None:
+        return []
+    found = _of_block(result.block) if _bad(result) else []
+    if result.WHOLE:
+        found = found or shutter_hints(result.block, result, Adjuster({}))
+        found = found or rolling_hints(result)
+    return found
+
+
+def remarks(result: Result) -> list[Message]:
+    """Name what fits and is hardly what was meant: readouts against their direction, offsets of clocks."""
+    return [*backward_readouts(result), *known_offsets(result)] if result.converged else []
+
+
+def _of_block(block: Block) -> list[Message]:
+    """Try conventions of photos at rest, and of those on trajectories."""
+    return [*hints(block), *flown_hints(block)]
+
+
+def _bad(result: Result) -> bool:
     variance = result.variance_of_unit_weight
-    fits = variance is None or variance <= BAD**2
-    if (result.converged and fits) or result.loss is not None:
+    return not (result.converged and (variance is None or variance <= BAD**2))
+
+
+def _with_hints(result: Result) -> Result:
+    found, said = explained(result), remarks(result)
+    if not found and result.converged and result.loss is None and _bad(result):
+        said = [*weight_hints(result), *said]
+    if not (found or said):
         return result
-    conventions = hints(result.block)
-    found = conventions or (weight_hints(result) if result.converged else [])
-    if not found:
-        return result
-    return replace(result, hints=tuple(map(str, conventions)), messages=[*found, *result.messages])
+    return replace(result, hints=tuple(map(str, found)), messages=[*found, *said, *result.messages])
 
 
 def diagnosis_of(result: Result) -> Diagnosis:
@@ -65,6 +95,7 @@ def diagnosis_of(result: Result) -> Diagnosis:
     section = Section("Adjustment", "One mistake in the data makes every observation look wrong.")
     section.findings += [Finding("convention", "grave", hint) for hint in found.hints]
     section.findings += [Finding("exchanged-points", "grave", names) for names in found.exchanged]
+    section.findings += [Finding("moving", "look", str(each)) for each in remarks(found)]
     if found.converged and not found.hints:
         section.findings += [Finding("weights", "look", str(hint)) for hint in weight_hints(found)]
     verdict = found.verdict

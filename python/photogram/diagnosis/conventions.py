@@ -9,7 +9,7 @@ The verdict is the ratio of the misfit m of images under a hypothesis to that as
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -22,6 +22,7 @@ from photogram.diagnosis.hypotheses import TURNS, Hypothesis, attitude_readings,
 from photogram.diagnosis.regression import (
     LEAST,
     MOST,
+    UNKNOWN,
     control_misfit,
     control_residuals,
     eligible,
@@ -40,7 +41,7 @@ from photogram.network.motion import at_rest
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
 
-__all__ = ["Verdict", "conventions", "further", "hints", "verdicts"]
+__all__ = ["Verdict", "conventions", "further", "hints", "passing", "verdicts"]
 
 SUSPICION = 0.35
 """Misfit m above which photos are looked at more closely."""
@@ -78,18 +79,23 @@ class Verdict:
     """
 
     def __init__(
-        self, passing: list[tuple[float, Hypothesis]], given: float, photos: Sequence[str] = ()
+        self,
+        found: list[tuple[float, Hypothesis]],
+        given: float,
+        photos: Sequence[str] = (),
+        what: str = "images",
     ) -> None:
-        passing.sort(key=lambda each: each[0])
-        least = passing[0][0]
-        best = [each for misfit, each in passing if misfit <= AS_GOOD * least]
+        found.sort(key=lambda each: each[0])
+        least = found[0][0]
+        best = [each for misfit, each in found if misfit <= AS_GOOD * least]
         # One mistake may be right in several forms.
         best = list({each.text: each for each in reversed(best)}.values())[::-1]
         self.names = [each.name for each in best]
         self.change, self.exact = best[0].change, best[0].exact
         self.photos = photos
         where = f" (on photo{'s' if len(photos) > 1 else ''} {listed(list(photos))})" if photos else ""
-        fall = f"images would miss their places by {least:.2g} of their spread and not by {given:.2g}"
+        far = f" and not by {given:.2g}" if given < UNKNOWN else "; as it is, most are nowhere near"
+        fall = f"{what} would miss their places by {least:.2g} of their spread{far}"
         if len(best) == 1:
             self.text = f"probably {best[0].text}{where}: {fall}"
         else:
@@ -139,25 +145,37 @@ def verdicts(block: Block) -> list[Verdict]:
         return single or _of_control(view(block, spread(photos, MOST)), spread(photos, MOST))
     chosen = spread(photos, MOST)
     looked = view(block, chosen)
-    passing = _passing(looked, chosen)
-    return [Verdict(passing, float(np.median(misfits(looked, chosen))))] if passing else []
+    fits = regressions(looked, chosen)
+    found = passing(hypotheses(looked, fits), looked, fits.misfit, partial(misfits, photos=chosen))
+    return [Verdict(found, float(np.median(fits.misfit)))] if found else []
 
 
-def _passing(looked: Block, photos: Indices) -> list[tuple[float, Hypothesis]]:
-    """Return hypotheses under which photos fit, with the misfit that is left."""
-    seen = regressions(looked, photos)
-    passing: dict[str, tuple[float, Hypothesis]] = {}
-    for hypothesis in hypotheses(looked, seen):
-        left = misfits(hypothesis.change(looked), photos)
-        ratio, median = left / seen.misfit, float(np.median(left))
+def passing(
+    tried: Iterable[Hypothesis], looked: Block, given: Floats, misfits_of: Callable[[Block], Floats]
+) -> list[tuple[float, Hypothesis]]:
+    """Return hypotheses under which photos fit, with the misfit that is left.
+
+    Parameters
+    ----------
+    tried
+        Hypotheses.
+    looked
+        The block that they change.
+    given
+        (k,) misfits of the photos as they are given.
+    misfits_of
+        Those of a changed block.
+    """
+    found: dict[str, tuple[float, Hypothesis]] = {}
+    for hypothesis in tried:
+        left = misfits_of(hypothesis.change(looked))
+        ratio, median = left / given, float(np.median(left))
         limit = PASSES_ROUGH if median > ROUGH else PASSES
-        each = (ratio < EACH) | (np.maximum(left, seen.misfit) < SUSPICION)
+        each = (ratio < EACH) | (np.maximum(left, given) < SUSPICION)
         if np.median(ratio) < limit and each.all() and median < SUSPICION:
-            found = (median, hypothesis)
-            passing[hypothesis.name] = min(
-                passing.get(hypothesis.name, found), found, key=lambda each: each[0]
-            )
-    return list(passing.values())
+            now = (median, hypothesis)
+            found[hypothesis.name] = min(found.get(hypothesis.name, now), now, key=lambda each: each[0])
+    return list(found.values())
 
 
 def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
@@ -165,14 +183,14 @@ def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
     given = control_misfit(looked)
     if not given_points(looked)[looked.image_points].any() or given <= SUSPICION:
         return []
-    passing = []
+    fitting = []
     for hypothesis in hypotheses(looked):
         meant = hypothesis.change(looked)
         left = control_misfit(meant)
         fits = left < given * (PASSES_ROUGH if left > ROUGH else PASSES) and left < SUSPICION
         if fits and _most_come_nearer(looked, meant) and np.median(misfits(meant, photos)) < SUSPICION:
-            passing.append((left, hypothesis))
-    return [Verdict(passing, given)] if passing else []
+            fitting.append((left, hypothesis))
+    return [Verdict(fitting, given)] if fitting else []
 
 
 def _most_come_nearer(given: Block, meant: Block) -> bool:
@@ -188,17 +206,17 @@ def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
         own = np.array([photo])
         looked = view(block, own)
         given = float(misfits(looked, own)[0])
-        passing = []
+        fitting = []
         for name, (turn, text) in TURNS.items():
             change = partial(_turned, photo=block.photo_ids[photo], turn=np.array(turn, dtype=np.float64))
             left = float(misfits(change(looked), own)[0])
             if left < PASSES * given and left < SUSPICION:
-                passing.append((left, Hypothesis(name, text, change)))
-        if passing:
-            names = tuple(sorted(each.name for _, each in passing))
-            by_names.setdefault(names, (passing, given, []))[2].append(block.photo_ids[photo])
-    for passing, given, photo_ids in by_names.values():
-        yield Verdict(passing, given, photo_ids)
+                fitting.append((left, Hypothesis(name, text, change)))
+        if fitting:
+            names = tuple(sorted(each.name for _, each in fitting))
+            by_names.setdefault(names, (fitting, given, []))[2].append(block.photo_ids[photo])
+    for fitting, given, photo_ids in by_names.values():
+        yield Verdict(fitting, given, photo_ids)
 
 
 def _turned(block: Block, photo: str, turn: Floats) -> Block:

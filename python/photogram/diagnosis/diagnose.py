@@ -32,6 +32,7 @@ from photogram.diagnosis.lenses import half_pixel, lenses_estimated, lenses_put_
 from photogram.diagnosis.orientation import orientation, spare_explained
 from photogram.diagnosis.positions import wrong_positions
 from photogram.diagnosis.residuals import residuals
+from photogram.diagnosis.rolling import rolling_hints
 from photogram.diagnosis.stations import stations
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.views import View
@@ -210,6 +211,10 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     if edited.first is not None and edited.last is not None:
         named = {point for each in [*errors.findings, *edited.section.findings] for point in each.points}
         edited.section.findings[:0] = held_values(edited.first) + points_left_out(edited.last, named)
+    if edited.first is not None:
+        rolls = [Finding("rolling-shutter", "grave", str(each)) for each in rolling_hints(edited.first)]
+        # What a lens, control or single images seem to have is what a shutter does to them.
+        sets.findings, exact = [*rolls, *sets.findings], exact and not rolls
     sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
     sections += _after_adjustment(oriented, edited, misleading, words)
     if edited.last is not None and edited.last.converged:

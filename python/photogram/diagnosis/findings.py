@@ -43,6 +43,7 @@ CONVENTIONS = frozenset(
         "sense-of-rotation",
         "convention",
         "lens",
+        "rolling-shutter",
         "control-set",
         "control-system",
         "observed-positions",

@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.adjustment.snooping import snoop
+from photogram.diagnosis.adjusted import explained, remarks
 from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.clocks import counted_lines
 from photogram.diagnosis.findings import Finding, Level, Section
+from photogram.diagnosis.flown_hints import flown_hints
+from photogram.diagnosis.shutters import shutter_hints
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.weights import weight_hints
 from photogram.errors import AdjustmentError, InputError
@@ -57,7 +61,12 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
         result = adjusted(block)
     except (AdjustmentError, InputError) as error:
         section.findings.append(Finding("no-adjustment", "grave", f"it cannot be adjusted: {error}"))
+        mistakes = flown_hints(block) or shutter_hints(block, None, adjusted)
+        section.findings += [Finding("convention", "grave", str(each)) for each in mistakes]
         return [structure, section], None
+    section.findings += [Finding("convention", "grave", str(each)) for each in explained(result)]
+    section.findings += [Finding("moving", "look", str(each)) for each in remarks(result)]
+    section.findings += counted_lines(block, adjusted)
     found = _snooped(block, adjusted)
     if found is not None and (result.converged or found.result.converged):
         section.findings += [_finding(each) for each in found.removed]

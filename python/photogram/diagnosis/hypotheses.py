@@ -21,6 +21,7 @@ __all__ = [
     "attitude_readings",
     "hypotheses",
     "image_hypothesis",
+    "quaternion_readings",
     "read_as",
 ]
 
@@ -216,15 +217,22 @@ def attitude_readings(block: Block) -> dict[str, tuple[str, Floats]]:
         "sign of kappa": ("kappa has the wrong sign, as yaw has", read(own, numbers * [1.0, 1.0, -1.0])),
     }
     matrices = read(own, numbers)
+    found |= quaternion_readings(matrices)
+    if np.abs(numbers).max() > _BEYOND:
+        del found["radians for degrees"]
+    return found
+
+
+def quaternion_readings(matrices: Floats) -> dict[str, tuple[str, Floats]]:
+    """(P, 3, 3) attitudes by the numbers of their quaternions in rival orders, with their texts, by names."""
+    found = {}
     forms: tuple[Representation, ...] = ("quaternion", "quaternion_to_vision")
     for form in forms:
         known = Attitudes(matrices).values(form)
         for given, said, order in (("x, y, z, w", "w, x, y, z", -1), ("w, x, y, z", "x, y, z, w", 1)):
             # The numbers as they were read, then as they were meant: both have length 1.
             text = f"quaternions were given in the order {given} and read as {said}"
-            found[f"{form} {given}"] = text, read(form, np.roll(known, -order, axis=1))
-    if np.abs(numbers).max() > _BEYOND:
-        del found["radians for degrees"]
+            found[f"{form} {given}"] = text, Attitudes.of(form, np.roll(known, -order, axis=1)).matrices
     return found
 
 

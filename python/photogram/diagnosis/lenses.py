@@ -11,13 +11,13 @@ import numpy as np
 
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.findings import Finding
+from photogram.diagnosis.trials import put_right
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.results.lenses import usual_parameters
 from photogram.results.result import Result
 from photogram.show.ways import findings_of
 from photogram.statistics.evidence import Evidence
-from photogram.statistics.likelihood import judged
 
 __all__ = ["half_pixel", "lenses_estimated", "lenses_put_right"]
 
@@ -41,22 +41,10 @@ def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) 
     first = adjusted.tried(block)
     if first is not None and first.converged and _fits(first):
         return block
-    given = math.inf if first is None else first.sums_of_squares.total
-    tried = [(text, changed, adjusted.tried(changed)) for text, changed in _hypotheses(block, adjusted)]
-    left = [
-        math.inf if result is None or not result.converged else result.sums_of_squares.total
-        for *_, result in tried
-    ]
-    freedom = next((result.degrees_of_freedom for *_, result in tried if result is not None), 0)
-    if not np.isfinite(left).any() or freedom < 1:
+    found = put_right(first, _hypotheses(block, adjusted), adjusted)
+    if found is None:
         return block
-    # What cannot be adjusted as it is leaves more than anything that can be.
-    verdict = judged(
-        min(given, 1e6 * max(each for each in left if math.isfinite(each))), left, freedom, known_weight=True
-    )
-    if verdict is None or not verdict.accepted:
-        return block
-    text, changed, _ = tried[verdict.best[0]]
+    text, changed, verdict = found
     values = {"likelihood_ratio": verdict.likelihood, "times_smaller": verdict.fall}
     said = f"probably {text}: residuals would be {verdict.fall:.3g} times smaller"
     findings.append(Finding("lens", "grave", said, values=values))

@@ -17,6 +17,7 @@ from photogram.network.rays import Rays
 __all__ = [
     "LEAST",
     "MOST",
+    "UNKNOWN",
     "Regression",
     "control_misfit",
     "control_residuals",
@@ -24,6 +25,7 @@ __all__ = [
     "given_points",
     "misfits",
     "regressions",
+    "relative",
     "spread",
     "view",
 ]
@@ -34,7 +36,7 @@ MOST = 12
 """Photos that are looked at closely,"""
 SCANNED = 200
 """and those of a larger block among which one that does not fit is looked for."""
-_UNKNOWN = 1e6
+UNKNOWN = 1e6
 """The misfit of a photo of which nothing can be predicted."""
 
 
@@ -118,9 +120,9 @@ def control_misfit(block: Block) -> float:
     """M of all images of given points together; very large where there are too few."""
     rows = _control_rows(block)
     if len(rows) < LEAST:
-        return _UNKNOWN
-    found = _relative(block.image_xy[rows] - predictions(block)[rows], block.image_xy[rows])
-    return found if np.isfinite(found) else _UNKNOWN
+        return UNKNOWN
+    found = relative(block.image_xy[rows] - predictions(block)[rows], block.image_xy[rows])
+    return found if np.isfinite(found) else UNKNOWN
 
 
 def control_residuals(block: Block) -> Floats:
@@ -140,9 +142,9 @@ def _control_rows(block: Block) -> Indices:
 def _misfit(block: Block, predicted: Floats, photo: int) -> float:
     rows = _rows(block, predicted, photo)
     if len(rows) < LEAST:
-        return _UNKNOWN
-    found = _relative(block.image_xy[rows] - predicted[rows], block.image_xy[rows])
-    return found if np.isfinite(found) else _UNKNOWN
+        return UNKNOWN
+    found = relative(block.image_xy[rows] - predicted[rows], block.image_xy[rows])
+    return found if np.isfinite(found) else UNKNOWN
 
 
 def _rows(block: Block, predicted: Floats, photo: int) -> Indices:
@@ -150,8 +152,8 @@ def _rows(block: Block, predicted: Floats, photo: int) -> Indices:
     return found
 
 
-def _relative(residuals: Floats, observed: Floats) -> float:
-    """Rms of residuals in that of the observed about their mean; not finite where these are one."""
+def relative(residuals: Floats, observed: Floats) -> float:
+    """Return the rms of residuals in that of the observed about their mean; not finite without one."""
     return float(np.sqrt((residuals**2).sum() / ((observed - observed.mean(axis=0)) ** 2).sum()))
 
 
@@ -173,12 +175,12 @@ def regressions(block: Block, photos: Indices) -> Regression:
 def _regressed(observed: Floats, predicted: Floats) -> tuple[float, Floats, Floats, float]:
     """Return k, V, t and e."""
     if len(observed) < LEAST:
-        return np.nan, np.full((2, 2), np.nan), np.full(2, np.nan), _UNKNOWN
+        return np.nan, np.full((2, 2), np.nan), np.full(2, np.nan), UNKNOWN
     design = np.column_stack([predicted, np.ones(len(predicted))])
     solved = np.linalg.lstsq(design, observed, rcond=None)[0]
     linear = solved[:2].T
     left, _, right = np.linalg.svd(linear)
-    rest = _relative(observed - design @ solved, observed)
+    rest = relative(observed - design @ solved, observed)
     return float(np.sqrt(abs(np.linalg.det(linear)))), left @ right, solved[2], rest
 
 

@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from photogram.adjustment.adjustment import Progress
+from photogram.adjustment.adjustment import Progress, UnitVariance
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Outcome
 from photogram.distributed.files import alone
@@ -73,6 +73,7 @@ def adjusted_on_disk(
     folder: Path,
     division: Division,
     *,
+    unit_variance: UnitVariance | None = None,
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> OnDisk:
@@ -86,6 +87,8 @@ def adjusted_on_disk(
         Of the run, on a disk that all workers see: a run that died is taken up there.
     division
         Cluster, workers, parts and memory.
+    unit_variance
+        What the variance of unit weight is based on; None: as the project says.
     threads, progress
         As of :func:`photogram.adjust_in_parts`.
 
@@ -94,25 +97,39 @@ def adjusted_on_disk(
     RankError, AdjustmentError, OutOfMemoryError, InputError
         As of :func:`photogram.adjust_in_parts`, and as of projects that are read whole.
     """
-    with _run(path, wishes, folder, division, threads) as run:
+    with _run(path, wishes, folder, division, unit_variance, threads) as run:
         outcome = run.adjust(progress)
         found = [result_folder(folder, node) for node in range(len(run.manifest.tree))]
         return OnDisk(outcome, run.manifest, found)
 
 
-def planned_on_disk(path: Path, wishes: Wishes, folder: Path, division: Division) -> PartsPlan:
+def planned_on_disk(
+    path: Path,
+    wishes: Wishes,
+    folder: Path,
+    division: Division,
+    *,
+    unit_variance: UnitVariance | None = None,
+) -> PartsPlan:
     """Plan the same: its parts are written, and wait in the folder for the adjustment."""
-    with _run(path, wishes, folder, division, None) as run:
+    with _run(path, wishes, folder, division, unit_variance, None) as run:
         return run.plan()
 
 
 @contextmanager
-def _run(path: Path, wishes: Wishes, folder: Path, division: Division, threads: int | None) -> Iterator[Run]:
+def _run(
+    path: Path,
+    wishes: Wishes,
+    folder: Path,
+    division: Division,
+    unit_variance: UnitVariance | None,
+    threads: int | None,
+) -> Iterator[Run]:
     with ExitStack() as stack:
         stack.enter_context(alone(folder))
         streamed = Streamed(path, wishes, folder)
         stack.callback(streamed.close)
-        options = core_options(streamed.project.options.unit_variance)
+        options = core_options(unit_variance or streamed.project.options.unit_variance)
         source = streamed.source(options)
         with opened(
             folder,

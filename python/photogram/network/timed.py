@@ -305,6 +305,17 @@ class Timed:
         """The unknowns of its times."""
         return [each for each in (self.readout, self.offset) if each is not None]
 
+    def times(self, xy: Floats) -> Floats:
+        """Return the (n,) times of (n, 2) images, with what is given of offset, readout and rate."""
+        time, scale, _ = self.images(xy)
+        rate = 1.0 if self.readout is None else float(self.readout.position[0])
+        return time + self.delay + rate * scale
+
+    @property
+    def delay(self) -> float:
+        """What is given of the offset of its clock."""
+        return 0.0 if self.offset is None else float(self.offset.position[0])
+
     def images(self, xy: Floats) -> tuple[float, Floats, Floats]:
         """Return its time, and of (n, 2) images their times on its scale and coordinates for the core."""
         if self.lines is not None and self.line_sensor is not None:

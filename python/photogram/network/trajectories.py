@@ -391,9 +391,10 @@ class Trajectory:
         flight, across it (to the left) and radial, away from the origin of the axes; `flight`: along, across
         and up, the third axis of the table.
     angles
-        What rotation coefficients are: rotation `vector` about the axes of the photo, A = A0 Exp(r); or `zxz`,
-        in radians, added to the angles a1, a2, a3 of the table, M = [a3]_3 [a2]_1 [a1]_3 from its axes to those
-        of a camera that looks along +z, x right, y down.
+        What rotation coefficients are: `vector`, rotation vectors about the axes of the photo, A = A0 Exp(r);
+        or `zxz`, radians added to the angles a1, a2, a3 of the table, M = [a3]_3 [a2]_1 [a1]_3 from its axes
+        to those of a camera that looks along +z, x right, y down. Polynomials in the place of the table are
+        the same with a table that they are sampled to (`formats.csm.photos.with_polynomial_pointing`).
 
     Attributes
     ----------
@@ -445,9 +446,8 @@ class Trajectory:
             raise InputError(f"{what} of the trajectory {self.name} is no basis: {shown(basis)}")
         basis = basis.over(*self.table.span)
         self._set(what, basis)
-        shape = (basis.count, 3)
-        value = shaped(f"value of the {what} of {self.name}", basis.value, shape)
-        sd = shaped(f"sd of the {what} of {self.name}", basis.sd, shape)
+        value = _of_each(f"value of the {what} of {self.name}", basis.value, basis.count)
+        sd = _of_each(f"sd of the {what} of {self.name}", basis.sd, basis.count)
         return tuple(kind(f"{self.name} {what} {k}", value=value[k], sd=sd[k]) for k in range(basis.count))
 
     @property
@@ -485,6 +485,12 @@ class Trajectory:
         row = self.row({id(each): 0 for own in self.coefficients for each in own})
         c, r = np.reshape(position, (-1, 3)), np.reshape(rotation, (-1, 3))
         return _photocore.flown(row, c, r, (times - self.origin).tolist())
+
+
+def _of_each(name: str, given: ArrayLike, count: int) -> Floats:
+    """Return (count, 3) of what is given of every coefficient, or of each."""
+    found = numbers(name, given)
+    return shaped(name, np.tile(found, (count, 1)) if found.shape == (3,) else found, (count, 3))
 
 
 def _arrays(body: Sequence[Any]) -> tuple[Floats, Floats]:

@@ -28,10 +28,12 @@ __all__ = [
     "HELD",
     "SUSPECTED",
     "Held",
+    "as_adjusted",
     "held_remark",
     "held_tested",
     "held_tests",
     "is_suspected",
+    "station_partials",
 ]
 
 HELD = "held values"
@@ -60,7 +62,9 @@ def held_tested(result: Result) -> list[Tested]:
     """
     if not result.WHOLE:
         return []
-    return held_tests(result, lambda of_images: _suspected(result, of_images), lambda: _partials(result))
+    return held_tests(
+        result, lambda of_images: _suspected(result, of_images), lambda: station_partials(result)
+    )
 
 
 def held_tests(
@@ -168,13 +172,13 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
     return [each for _, each in rows[:SUSPECTED]]
 
 
-def _partials(result: Result) -> Floats:
+def station_partials(result: Result) -> Floats:
     """(6, m, 2) partials of the images by three coordinates and three small turns of their stations.
 
     Those by the coordinates of a point are the same with the other sign. NaN of scanners, which have no one
     station; photos with a rolling shutter are taken where they began.
     """
-    plain, seen = seen_without_lenses(_adjusted(result))
+    plain, seen = seen_without_lenses(as_adjusted(result))
     block = result.block
     if not seen.any():
         return np.full((6, len(block.image_xy), 2), np.nan)
@@ -200,7 +204,7 @@ def _partials(result: Result) -> Floats:
     return found
 
 
-def _adjusted(result: Result) -> Block:
+def as_adjusted(result: Result) -> Block:
     """Return a block whose photos are where its adjustment has put them."""
     changes: dict[str, Any] = {
         "photo_positions": result.photo_positions,

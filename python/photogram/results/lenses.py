@@ -13,7 +13,7 @@ from photogram.results.held import is_suspected
 from photogram.results.result import Result
 from photogram.results.scores import score
 
-__all__ = ["fall_by_lens", "how_to_calibrate", "usual_parameters"]
+__all__ = ["fall_by_lens", "how_to_calibrate", "lens_partials", "usual_parameters"]
 
 _USUAL = ("f", "fx", "fy", "c", "cx", "cy", "xp", "yp", "k", "k1", "k2", "p1", "p2", "a1", "a2")
 """Principal distance and point, two radial and two tangential terms, under the names of all models."""
@@ -36,6 +36,19 @@ def fall_by_lens(result: Result, images: Bools) -> float:
     if result.loss or not result.WHOLE or not is_suspected(result):
         return 0.0
     block, own = result.block, images & result.used_images
+    columns = lens_partials(result, own)
+    used = result.used_images[:, np.newaxis]
+    residuals: Floats = np.where(used, result.residuals / block.image_sd, 0.0)
+    factor = factored(result)
+    for count in (len(columns), 4, 2):
+        if (found := score(factor, columns[:count], residuals)) is not None:
+            return found
+    return 0.0
+
+
+def lens_partials(result: Result, own: Bools) -> Floats:
+    """(7, m, 2) partials of the images that are `own` by what a lens may have, in standard deviations."""
+    block = result.block
     xy = focal_images(block)[own]
     low, high = xy.min(axis=0), xy.max(axis=0)
     x, y = ((xy - (low + high) / 2) / max(float((high - low).max()) / 2, 1e-300)).T
@@ -47,13 +60,7 @@ def fall_by_lens(result: Result, images: Bools) -> float:
     ]
     columns = np.zeros((len(terms), *block.image_xy.shape))
     columns[:, own] = np.array(terms).transpose(0, 2, 1) / block.image_sd[own]
-    used = result.used_images[:, np.newaxis]
-    residuals: Floats = np.where(used, result.residuals / block.image_sd, 0.0)
-    factor = factored(result)
-    for count in (len(terms), 4, 2):
-        if (found := score(factor, columns[:count], residuals)) is not None:
-            return found
-    return 0.0
+    return columns
 
 
 def usual_parameters(camera: Camera) -> list[str]:

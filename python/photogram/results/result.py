@@ -31,6 +31,7 @@ from photogram.results.datum import (
 )
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
+from photogram.results.restarted import restarted_motion
 from photogram.results.selection import Adjusted, Things, photo_components, point_components
 from photogram.results.suspects import network_trial
 from photogram.results.trajectories import AdjustedTrajectory, adjusted_trajectories, project
@@ -225,7 +226,9 @@ class Result(AdjustedNetwork):
         return network_trial(self.block, core)
 
     def restarted(self) -> Block:
-        """Return the block as it was given, but with free photos and cameras where the adjustment has ended.
+        """Return the block as it was given, but with what is free where the adjustment has ended.
+
+        That are poses of photos, parameters of cameras, and coefficients of trajectories.
 
         What was observed or held is as it was given.
         `photogram.adjust(result.restarted())` goes on from there: with other options, or with other weights,
@@ -233,6 +236,8 @@ class Result(AdjustedNetwork):
         """
         block = self.block
         free = {name: np.isinf(getattr(block, f"photo_{name}_sd")) for name in ("position", "attitude")}
+        if block.all_trajectories:
+            block = restarted_motion(block, self.trajectories.values())
         return block.replace(
             cameras=[each.restarted() for each in self.cameras] or block.cameras,
             photo_positions=np.where(free["position"], self.photo_positions, block.photo_positions),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -92,6 +92,25 @@ class AdjustedTrajectory:
     def name(self) -> str:
         """Its name."""
         return self.given.name
+
+    def restarted(self, observed: Collection[int] = ()) -> Trajectory:
+        """Return the trajectory as it was given, but with adjusted values of free coefficients.
+
+        Parameters
+        ----------
+        observed
+            Identities of coefficients whose given values are observations all the same.
+        """
+        changes = {}
+        for name, values, own in zip(
+            ("position", "rotation"), (self.position, self.rotation), self.given.coefficients, strict=True
+        ):
+            free = np.array([np.isinf(each.deviations) & (id(each) not in observed) for each in own])
+            if free.any():
+                given = np.array([each.position for each in own])
+                basis = getattr(self.given, name)
+                changes[name] = replace(basis, value=np.where(free, values, given))
+        return replace(self.given, **changes) if changes else self.given
 
     def poses(self, times: ArrayLike) -> TrajectoryPoses:
         """Return poses at (n,) times in seconds: Q_pose = T Q T', T = diag(B I, Jr B I) (docs/moving.md).

@@ -1,5 +1,6 @@
 //! Where the unknowns of photos, cameras and common unknowns are among the retained ones.
 
+use super::in_block::InBlock;
 use super::{Network, Photo, Trajectory};
 use crate::geometry::POSE;
 
@@ -19,17 +20,6 @@ pub(super) struct Blocks {
     pub of_common: Vec<Option<InBlock>>,
     /// The common unknowns of each block after those of cameras, as they stand in it.
     pub commons: Vec<Vec<usize>>,
-}
-
-/// Where unknowns are: in a block, from one of its unknowns on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct InBlock {
-    /// The block.
-    pub block: usize,
-    /// The first of them.
-    pub first: usize,
-    /// How many unknowns the block has.
-    pub width: usize,
 }
 
 impl Blocks {
@@ -67,13 +57,6 @@ impl Blocks {
         let of_camera = |photo: &Photo| Some(photos + shared.binary_search(&photo.camera).ok()?);
         let of_camera = network.photos.iter().map(of_camera).collect();
         Self { of_camera, first, squares, shared, of_common, commons }
-    }
-}
-
-impl InBlock {
-    /// All unknowns of a block.
-    pub fn whole(block: usize, width: usize) -> Self {
-        Self { block, first: 0, width }
     }
 }
 

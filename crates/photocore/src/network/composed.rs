@@ -5,8 +5,8 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, Matrix6, Matrix6xX};
 use smallvec::SmallVec;
 
-use super::blocks::InBlock;
 use super::commons::CommonState;
+use super::in_block::InBlock;
 use super::model::Bundle;
 use super::mounts::{AT_PHOTO, Composed, Grounds, Moving};
 use super::stations::{Bent, Mounted, Station, Stations};

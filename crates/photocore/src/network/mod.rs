@@ -56,6 +56,7 @@ mod error;
 mod evaluated;
 mod group_tests;
 mod groups;
+mod in_block;
 mod in_lanes;
 mod intersection;
 mod layout;

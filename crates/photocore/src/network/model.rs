@@ -5,9 +5,10 @@ use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
 
-use super::blocks::{Blocks, InBlock};
+use super::blocks::Blocks;
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
+use super::in_block::InBlock;
 use super::mounts::{AT_PHOTO, Mounts};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::parts::Parts;

@@ -127,7 +127,11 @@ class _Label:
 
 
 def _label(data: bytes, path: Path) -> _Label:
-    text = data[:LABEL_BYTES].split(b"\0", 1)[0].decode("latin-1").removeprefix("\xef\xbb\xbf")
+    head = data[:LABEL_BYTES].split(b"\0", 1)[0]
+    try:
+        text = head.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = head.decode("latin-1")
     label = parsed(text, path, numbers=False)
     buffer = _only(label, "ProtoBuffer", path)
     core, info = (_only(buffer, name, path) for name in ("Core", "ControlNetworkInfo"))

@@ -1,6 +1,7 @@
 //! Text line by line: a key with its value, which may go on over further lines.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use super::fault::{Fault, Reason};
 
@@ -65,32 +66,31 @@ impl<'a> Statements<'a> {
         Self { text, at: 0, line: 0 }
     }
 
-    /// The rest of the line, and on to the next one.
-    fn next_line(&mut self) -> Option<&'a str> {
-        let rest = self.text.get(self.at..).filter(|rest| !rest.is_empty())?;
+    /// Where the next line stands.
+    fn next_line(&mut self) -> Option<Range<usize>> {
+        let start = self.at;
+        let rest = self.text.get(start..).filter(|rest| !rest.is_empty())?;
         let length = rest.find('\n').unwrap_or(rest.len());
-        self.at = (self.at + length + 1).min(self.text.len());
+        self.at = (start + length + 1).min(self.text.len());
         self.line += 1;
-        Some(&rest[..length])
+        Some(start..start + length)
     }
 
-    fn skip_comment(&mut self, mut line: &'a str) -> Result<(), Fault> {
+    fn skip_comment(&mut self, mut line: Range<usize>) -> Result<(), Fault> {
         let start = self.line;
-        while !line.trim_end().ends_with("*/") {
+        while !self.text[line].trim_end().ends_with("*/") {
             line = self.next_line().ok_or_else(|| Reason::Ends("a comment").on_line(start))?;
         }
         Ok(())
     }
 
-    fn statement(&mut self, first: &'a str) -> Result<Statement<'a>, Fault> {
-        let line = self.line;
-        let start = first.as_ptr() as usize - self.text.as_ptr() as usize;
-        let (mut open, mut last, mut end) = (Open::default(), first, start + first.len());
-        while !open.ends_with(last.trim_end().as_bytes()) {
+    fn statement(&mut self, first: Range<usize>) -> Result<Statement<'a>, Fault> {
+        let (line, start) = (self.line, first.start);
+        let (mut open, mut last) = (Open::default(), first);
+        while !open.ends_with(self.text[last.clone()].trim_end().as_bytes()) {
             last = self.next_line().ok_or_else(|| Reason::Ends("a value").on_line(line))?;
-            end = last.as_ptr() as usize - self.text.as_ptr() as usize + last.len();
         }
-        let text = self.text[start..end].trim();
+        let text = self.text[start..last.end].trim();
         let (key, value) = text.split_once('=').map_or((text, ""), |(key, value)| (key.trim(), value.trim()));
         Ok(Statement { line, text, key, value })
     }
@@ -102,13 +102,13 @@ impl<'a> Iterator for Statements<'a> {
     fn next(&mut self) -> Option<Self::Item> {
         loop {
             let line = self.next_line()?;
-            let trimmed = line.trim_start();
+            let trimmed = self.text[line.clone()].trim();
             if trimmed.starts_with("/*") {
-                if let Err(fault) = self.skip_comment(trimmed) {
+                if let Err(fault) = self.skip_comment(line) {
                     return Some(Err(fault));
                 }
-            } else if !trimmed.trim_end().is_empty() && !trimmed.starts_with('#') {
-                return Some(self.statement(trimmed));
+            } else if !trimmed.is_empty() && !trimmed.starts_with('#') {
+                return Some(self.statement(line));
             }
         }
     }

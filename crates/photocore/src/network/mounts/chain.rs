@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Matrix6xX, Vector6};
 use smallvec::{SmallVec, smallvec};
 
 use crate::geometry::{Matrix3, ObjectSpace, Orientation, POSE, Pose, Steps, Vector3};
-use crate::network::blocks::InBlock;
+use crate::network::in_block::InBlock;
 use crate::normals::GroupRows;
 
 /// Unknowns of retained blocks that step a pose alike, each up to a factor of its own: coefficients of a trajectory.

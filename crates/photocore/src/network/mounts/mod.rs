@@ -10,8 +10,8 @@ use std::ops::Deref;
 
 use nalgebra::{Matrix3xX, Matrix6};
 
-use super::blocks::InBlock;
 use super::commons::{Common, CommonKind, CommonState};
+use super::in_block::InBlock;
 use crate::geometry::{self, ObjectSpace, Orientation, POSE, Vector3};
 
 pub use chain::Chain;

@@ -9,8 +9,8 @@ use super::rows::{CommonSite, PhotoSite, PointSite};
 use super::tied::TiedModel;
 use super::{Named, Observation, TiedObservation};
 use crate::geometry::{Camera, Matrix3, ObjectSpace, Orientation, Perspective, Point, Vector3};
-use crate::network::blocks::InBlock;
 use crate::network::commons::{Common, CommonKind, CommonState, PlacedCommon};
+use crate::network::in_block::InBlock;
 use crate::network::mounts::tests::mounted;
 use crate::network::mounts::{AT_PHOTO, Grounds, OnFrame};
 

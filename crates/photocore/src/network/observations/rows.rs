@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, Matrix3xX, SMatrix};
 
 use crate::geometry::{Matrix3, ObjectSpace, Orientation, POSE, Point, Pose, Vector3, local_vertical};
-use crate::network::blocks::InBlock;
 use crate::network::commons::CommonState;
+use crate::network::in_block::InBlock;
 use crate::network::mounts::{Composed, Moving};
 
 /// The points, photos and common unknowns that an observation touches, each known by its place in [`super::Touches`], at given values

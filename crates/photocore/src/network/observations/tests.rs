@@ -8,8 +8,8 @@ use super::{Common, CommonKind, Fault, Observation, Precision, Quantity, TiedObs
 use crate::geometry::{
     Ellipsoid, Matrix3, ObjectSpace, Orientation, Point, PoseNumbers, RotationSense, rotation,
 };
-use crate::network::blocks::InBlock;
 use crate::network::commons::{CommonState, PlacedCommon};
+use crate::network::in_block::InBlock;
 use crate::network::mounts::tests::mounted;
 use crate::network::mounts::{AT_PHOTO, Composed, Grounds, OnFrame};
 

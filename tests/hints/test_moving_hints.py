@@ -1,0 +1,365 @@
+"""Hints on what moves: each mistake made on purpose in a good block, and good blocks that get none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import test_moving
+from moving_blocks import (
+    HEIGHT,
+    LINE,
+    SAMPLES,
+    WIDTH,
+    course,
+    exponential,
+    flown_frames,
+    place,
+    rolling,
+    scanned,
+)
+from photogram import AdjustmentError, Attitudes, adjust, diagnose, simulate
+from photogram.diagnosis.adjusted import diagnosed, errors_explained, explained, remarks
+from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.clocks import counted_lines
+from photogram.diagnosis.flown_hints import flown_hints
+from photogram.diagnosis.rolling import rolling_hints
+from photogram.network.observations import Attitude
+from photogram.network.timed import Lines
+from photogram.network.trajectories import Clock, Readout
+from photogram.network.unknowns import Boresight
+
+SCANNED = ("pushbroom_strips", "three_line", "planetary_pair", "jitter")
+
+
+# A rolling shutter taken for a global one
+
+
+@pytest.mark.parametrize("millimetres", [False, True])
+@pytest.mark.parametrize(
+    ("direction", "said"),
+    [
+        ("down", "its rows, from the upper edge to the lower"),
+        ("up", "its rows, from the lower edge to the upper"),
+        ("right", "its columns, from the left edge to the right"),
+    ],
+)
+def test_a_rolling_shutter(direction, said, millimetres):
+    """What its residuals were blamed for was the lens."""
+    result = adjust(flown_frames(direction=direction, millimetres=millimetres))
+    assert result.verdict.code in ("model", "gross-errors")
+    found = diagnosed(result)
+    (hint,) = found.hints
+    assert said in hint
+    assert found.verdict.code == "hint"
+    assert found.verdict.exit == 4
+    # 30 ms of the two seconds between two exposures.
+    share, sd = float(between(hint, ", in ", " %")), float(between(hint, "(sd ", ")"))
+    assert share == pytest.approx(1.5, abs=4 * sd)
+    assert float(between(hint, "would be ", " times")) > 1.2
+
+
+def between(text, before, after):
+    return text.split(before)[1].split(after)[0]
+
+
+def test_a_rolling_shutter_of_a_camera_that_turns_with_the_flight():
+    """It is always moved the same way: relief alone tells the readout from an image that is stretched."""
+    (hint,) = rolling_hints(adjust(flown_frames(turned=True, strips=4)))
+    assert "its rows, from the upper edge to the lower" in str(hint)
+    assert rolling_hints(adjust(flown_frames(turned=True, strips=4, relief=0.5))) == []
+
+
+def test_the_readout_time_is_not_put_too_exactly():
+    """Photos turn meanwhile: the standard deviation is from how they differ."""
+    told = [str(each) for seed in range(6) for each in rolling_hints(adjust(flown_frames(seed=seed)))]
+    assert len(told) == 6
+    shares = np.array(
+        [
+            [between(each, "in ", " %"), between(each, "(sd ", ")")]
+            for each in (each.split("lower, ")[1] for each in told)
+        ],
+        dtype=float,
+    )
+    assert shares[:, 0].mean() == pytest.approx(1.5, abs=0.25)
+    assert (np.abs(shares[:, 0] - 1.5) < 4 * shares[:, 1]).all()
+
+
+def test_the_check_names_a_rolling_shutter():
+    found = diagnose(flown_frames())
+    assert [each.kind for each in found.grave] == ["rolling-shutter"]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_other_mistakes_are_no_rolling_shutter(seed):
+    """A lens, a stretched image, films that shrink each its own way, gross errors, weights."""
+    given = simulate(
+        strips=3, photos_per_strip=7, seed=seed, control_spacing=2, blunders=4 * (seed % 2)
+    ).block
+    xy = given.image_xy
+    x, y = (xy / 115).T
+    films = np.random.default_rng(seed).normal(0, 3e-4, (len(given.photo_ids), 2))
+    changed = [
+        xy,
+        xy * (1 + 3e-3 * (x * x + y * y))[:, np.newaxis],
+        xy * [1.0003, 0.9997],
+        xy + 0.04 * np.column_stack([y, np.zeros_like(y)]),
+        xy * (1 + films[given.image_photos]),
+    ]
+    for each in changed:
+        result = adjust(given.replace(image_xy=each, image_sd=given.image_sd / 1.5))
+        assert result.global_test.rejected_high
+        assert rolling_hints(result) == []
+
+
+# What is given of a shutter
+
+
+def shuttered(block, **changes):
+    return block.replace(
+        timed=[replace(each, shutter=replace(each.shutter, **changes)) for each in block.timed]
+    )
+
+
+READOUTS = {"free": Readout("drone", 0.02), "weighted": Readout("drone", 0.03, sd=0.003), "known": 0.03}
+MISTAKES = {
+    "edge": ({"edges": (HEIGHT, 0.0), "direction": "up"}, "shutters read in the other direction"),
+    "columns": ({"edges": (0.0, WIDTH), "direction": "right"}, "shutters read rows, not columns"),
+}
+
+
+@pytest.mark.parametrize("readout", READOUTS)
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_readouts_in_a_wrong_direction(readout, mistake):
+    changes, said = MISTAKES[mistake]
+    result = adjust(shuttered(rolling(readout=READOUTS[readout]), **changes))
+    (hint,) = diagnosed(result).hints
+    assert hint.startswith(f"probably {said}")
+
+
+@pytest.mark.parametrize("readout", [30.0, Readout("drone", 30.0, sd=3.0), Readout("drone", 30.0)])
+def test_readout_times_in_milliseconds(readout):
+    result = adjust(rolling(readout=readout))
+    (hint,) = diagnosed(result).hints
+    assert hint.startswith("probably readout times are milliseconds, not seconds")
+
+
+def test_a_readout_time_that_comes_out_negative():
+    """It fits, and so it is no mistake that is tried: but the shutter reads the other way."""
+    right = rolling(readout=Readout("drone", 0.0))
+    result = adjust(shuttered(right, edges=(HEIGHT, 0.0)))
+    found = diagnosed(result)
+    assert found.hints == ()
+    assert str(found.messages[0]).startswith("readout drone is -0.03")
+    kinds = [each.kind for each in diagnose(result.block, result).findings]
+    assert kinds == ["moving"]
+    assert remarks(adjust(right)) == []
+
+
+# Tables and times of trajectories
+
+
+def on_tables(block, change):
+    """Return a block whose trajectories have other tables."""
+    known = {}
+
+    def meant(given):
+        return known.setdefault(id(given), replace(given, table=change(given.table)))
+
+    return block.replace(
+        timed=[replace(each, trajectory=meant(each.trajectory)) for each in block.timed],
+        observations=[replace(each, trajectory=meant(each.trajectory)) for each in block.observations],
+    )
+
+
+def rolled(table):
+    numbers = Attitudes(table.attitudes).values("quaternion")
+    return replace(table, attitudes=Attitudes.of("quaternion", np.roll(numbers, 1, axis=1)).matrices)
+
+
+TABLES = {
+    "attitudes of the trajectories are matrices from object to photo": lambda table: replace(
+        table, attitudes=np.swapaxes(table.attitudes, 1, 2)
+    ),
+    "quaternions were given in the order": rolled,
+    "positions of the trajectories are in kilometres": lambda table: replace(
+        table, positions=table.positions / 1000
+    ),
+    "positions of the trajectories are in metres, all else in kilometres": lambda table: replace(
+        table, positions=table.positions * 1000
+    ),
+}
+
+
+@pytest.mark.parametrize("photos", [False, True])
+@pytest.mark.parametrize("said", TABLES)
+def test_tables_of_trajectories(said, photos):
+    (hint,) = flown_hints(on_tables(scanned(photos=photos), TABLES[said]))
+    assert str(hint).startswith(f"probably {said}")
+
+
+def at_other_times(block, seconds):
+    """Return a block whose images are dated that much later."""
+
+    def later(own):
+        lines = None if own.lines is None else Lines(own.lines.table + np.array([0.0, seconds, 0.0]))
+        return replace(own, lines=lines, time=None if own.time is None else own.time + seconds)
+
+    return block.replace(timed=[later(each) for each in block.timed])
+
+
+def recorded_later(block, seconds):
+    return block.replace(
+        observations=[replace(each, time=each.time + seconds) for each in block.observations]
+    )
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [
+        (-18.0, "are UTC, those of the trajectories' tables GPS: they lack +18 s"),
+        (37.0, "are TAI, those of the trajectories' tables UTC: they lack -37 s"),
+        (69.184, "are ET, those of the trajectories' tables UTC: they lack -69.184 s"),
+        (-51.184, "are GPS, those of the trajectories' tables ET: they lack +51.184 s"),
+        (-19.0, "are GPS, those of the trajectories' tables TAI: they lack +19 s"),
+    ],
+)
+def test_scales_of_time(seconds, said):
+    for photos in (False, True):
+        moved = at_other_times(scanned(photos=photos), seconds)
+        (hint,) = flown_hints(moved)
+        assert str(hint).startswith(f"probably times of the images {said}")
+    (hint,) = flown_hints(recorded_later(scanned(), seconds))
+    assert str(hint).startswith(f"probably times of the observed positions {said}")
+    with pytest.raises(AdjustmentError, match="beyond the trajectory") as told, errors_explained(moved):
+        adjust(moved)
+    assert f"hint: probably times of the images {said}" in str(told.value)
+
+
+def test_another_shift_is_no_scale_of_time():
+    assert flown_hints(at_other_times(scanned(), 23.5)) == []
+
+
+def test_an_offset_of_a_clock_that_is_a_difference_of_scales():
+    block = scanned()
+    clock = Clock("receiver", value=17.9, sd=1.0)
+    late = recorded_later(block, -18.0 + 0.004)
+    late = late.replace(observations=[replace(each, clock=clock) for each in late.observations])
+    result = adjust(late)
+    assert result.converged
+    (said,) = remarks(result)
+    assert "clock receiver is 18.00" in str(said)
+    assert "the difference GPS - UTC (+18 s)" in str(said)
+    assert remarks(adjust(block)) == []
+
+
+# How lines are counted
+
+
+def scanned_lines(block, change):
+    """Return a block with other samples and lines of its scanners."""
+    xy, own = block.image_xy.copy(), np.isin(block.image_photos, [0, 1])
+    xy[own] = change(xy[own])
+    return block.replace(image_xy=xy)
+
+
+LAST = 8 / LINE
+COUNTED = {
+    "lines of the scanners are counted against the scan": lambda xy: np.abs([0.0, LAST] - xy),
+    "images of the scanners are turned by 180 degrees": lambda xy: [SAMPLES, LAST] - xy,
+    "samples of the scanners are counted from the other end": lambda xy: np.abs([SAMPLES, 0.0] - xy),
+}
+
+
+@pytest.mark.parametrize("said", COUNTED)
+def test_scans_that_are_turned(said):
+    (hint,) = flown_hints(scanned_lines(scanned(), COUNTED[said]))
+    # Of sensors along x the sign of the principal distance does the same.
+    rival = "it cannot be told which of these is so: the principal distance has the wrong sign; or "
+    assert str(hint).startswith(f"{rival if said.startswith('samples') else 'probably '}{said}")
+
+
+def of_a_better_unit(block):
+    """Return a block with a known clock and boresight and good attitudes.
+
+    Without them these take up where lines are along the track.
+    """
+    clock = Clock("receiver", value=0.004, sd=1e-6)
+    turn = exponential(np.array([0.01, -0.02, 0.015]))
+    boresight = Boresight("imu", turn, sd=0.0)
+
+    def better(each):
+        if each.KIND == "rate":
+            return replace(each, clock=clock, boresight=boresight)
+        if each.KIND != "attitude":
+            return replace(each, clock=clock)
+        strip = int(each.trajectory.name == "strip 2")
+        _, true = place(strip, each.time + 0.004 - course(strip)[0] - 4.0)
+        return Attitude(
+            None,
+            true @ turn,
+            sd=1e-5,
+            boresight=boresight,
+            trajectory=each.trajectory,
+            time=each.time,
+            clock=clock,
+        )
+
+    return block.replace(observations=[better(each) for each in block.observations])
+
+
+@pytest.mark.parametrize("off", [0.5, -0.5, 1.0])
+def test_lines_that_are_counted_otherwise(off):
+    block = of_a_better_unit(scanned())
+    assert counted_lines(block, Adjuster({})) == []
+    (found,) = counted_lines(scanned_lines(block, lambda xy: xy - [0.0, off]), Adjuster({}))
+    assert found.level == "look"
+    assert found.values["lines"] == pytest.approx(off, abs=0.1)
+    assert found.text.startswith(f"lines of S1, S2 are {found.values['lines']:+.2f} lines off")
+
+
+def test_the_check_names_what_is_wrong_with_a_scan():
+    turned = scanned_lines(scanned(), COUNTED["lines of the scanners are counted against the scan"])
+    found = diagnose(turned)
+    assert found.grave[0].kind in ("convention", "not-converged")
+    assert any("counted against the scan" in each.text for each in found.grave)
+
+
+# Good blocks
+
+
+def golden(case, monkeypatch):
+    """Return the result of a golden network that moves."""
+    found = {}
+
+    def keep(result, *_, **__):
+        found["result"] = result
+        raise InterruptedError
+
+    monkeypatch.setattr(test_moving, "agree", keep)
+    with pytest.raises(InterruptedError):
+        getattr(test_moving, f"test_{case}")()
+    return found["result"]
+
+
+@pytest.mark.parametrize("case", ["rolling_shutter", *SCANNED])
+def test_golden_blocks_get_no_hints(case, monkeypatch):
+    result = golden(case, monkeypatch)
+    assert flown_hints(result.block) == []
+    assert explained(result) == remarks(result) == []
+    assert counted_lines(result.block, Adjuster({})) == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_good_blocks_get_no_hints(seed):
+    for block in (
+        rolling(),
+        flown_frames(readout=0.0, seed=seed),
+        scanned(seed=seed),
+        scanned(photos=True, seed=seed),
+        scanned(records=False, seed=seed),
+    ):
+        assert flown_hints(block) == []
+        result = adjust(block)
+        assert explained(result) == remarks(result) == []
+        assert diagnosed(result) is result
