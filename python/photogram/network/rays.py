@@ -68,10 +68,12 @@ def local_axes(block: Block) -> LocalAxes:
 
 
 def _stations(block: Block) -> Floats:
-    """Return (k, 3) places amid which a block is: stations, or points where these are on trajectories."""
+    """Return (k, 3) places amid which a block is: stations, or points where these are on trajectories, if any is known."""
     own = ~on_shared(block) if block.timed else np.ones(len(block.photo_ids), dtype=bool)
     known = np.isfinite(block.point_positions).all(axis=1)
-    return block.photo_positions[own] if own.any() or not known.any() else block.point_positions[known]
+    if own.any():
+        return block.photo_positions[own]
+    return block.point_positions[known] if known.any() else block.photo_positions
 
 
 def frame_radius(block: Block) -> float:

@@ -218,7 +218,7 @@ def read_settings(text: str) -> Settings:
 
 def _said(text: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Yield names and values, and where they stand in a file."""
-    path = Path(text) if "=" not in text else None
+    path = Path(text) if text.strip() and "=" not in text else None
     lines = [text] if path is None else read_lines(path)
     for record, line in enumerate(lines, 1):
         where: dict[str, Any] = {} if path is None else {"file": path, "record": record, "text": line.strip()}

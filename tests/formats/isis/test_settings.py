@@ -1,0 +1,87 @@
+"""Settings by the names of jigsaw: what they mean, what is told, what is refused."""
+
+import numpy as np
+import pytest
+
+from photogram import InputError
+from photogram.formats.isis.settings import PARAMETERS, Settings, read_settings
+from photogram.formats.isis.solving import deviations
+
+
+def test_defaults_are_those_of_jigsaw():
+    own = read_settings("")
+    assert own == Settings()
+    assert (own.ck_degree, own.ck_solve_degree, own.spk_degree, own.spk_solve_degree) == (2, 2, 2, 2)
+    assert (own.angle_coefficients, own.position_coefficients) == (1, 0)
+    assert own.twist
+    assert not own.radius
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_every_setting_changes_its_field(name):
+    words = {"ck_degree": "5", "ck_solve_degree": "4", "spk_degree": "3", "spk_solve_degree": "6"}
+    words |= {"angles": "all", "positions": "all", "twist": "no", "axes": "rectangular", "held": "held.lis"}
+    own = PARAMETERS[name]
+    value = words.get(own.field, "7.5" if own.place is not None else "yes")
+    found = read_settings(f"{name.lower()} = {value}")
+    changed = [each for each in vars(found) if getattr(found, each) != getattr(Settings(), each)]
+    assert changed == [own.field]
+    if own.place is not None:
+        assert getattr(found, own.field)[own.place] == 7.5
+
+
+@pytest.mark.parametrize(
+    ("words", "angles", "positions"),
+    [
+        ("CAMSOLVE=none SPSOLVE=position", 0, 1),
+        ("CAMSOLVE=angles SPSOLVE=velocities", 1, 2),
+        ("camsolve=VELOCITIES spsolve=ACCELERATIONS", 2, 3),
+        ("CAMSOLVE=all CKSOLVEDEGREE=4 SPSOLVE=all SPKSOLVEDEGREE=0", 5, 1),
+    ],
+)
+def test_how_many_coefficients_are_unknown(words, angles, positions):
+    own = read_settings(words)
+    assert (own.angle_coefficients, own.position_coefficients) == (angles, positions)
+
+
+def test_coefficients_beyond_the_third_have_no_weight():
+    found = deviations((0.1, 0.2, None), 4, 5)
+    np.testing.assert_array_equal(found[:, 0], [0.1, 0.2, np.inf, np.inf, 0.0, 0.0])
+
+
+def test_a_command_line_of_jigsaw_is_read():
+    own = read_settings("jigsaw fromlist=cubes.lis cnet=in.net CAMSOLVE=all MaxIts=10 observations=no")
+    assert own.angles == "all"
+    assert [each.split(":")[0] for each in own.told] == ["FROMLIST", "CNET", "MAXITS"]
+
+
+def test_a_file_of_settings(tmp_path):
+    path = tmp_path / "settings.txt"
+    path.write_text("# of a colleague\nCAMSOLVE = velocities   # and drift\n\nTWIST=no\n")
+    own = read_settings(str(path))
+    assert (own.angles, own.twist) == ("second", False)
+    path.write_text("TWIST=no\nCAMSOLVE=sideways\n")
+    with pytest.raises(InputError, match="CAMSOLVE=sideways is none of VELOCITIES") as caught:
+        read_settings(str(path))
+    assert caught.value.record == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ("CAMSOLV=all", "CAMSOLV=all is no setting of jigsaw that is known; did you mean CAMSOLVE"),
+        ("CKDEGREE=9", "no degree from 0 to 8"),
+        ("CKDEGREE=2.5", "no degree"),
+        ("TWIST=perhaps", "neither yes nor no"),
+        ("POINT_RADIUS_SIGMA=-3", "no positive number"),
+        ("SPACECRAFT_POSITION_SIGMA=far", "no positive number"),
+        ("OBSERVATIONS=yes", "is not done: which images share"),
+        ("OUTLIER_REJECTION=yes", "--snoop"),
+        ("SOLVETARGETBODY=yes", "how the body turns"),
+        ("CAMSOLVE=all TWIST", "NAME=value, not TWIST"),
+        ('TWIST="yes', "No closing quotation"),
+    ],
+)
+def test_what_is_no_setting_is_refused(words, sentence):
+    with pytest.raises(InputError, match=sentence):
+        read_settings(words)
