@@ -1,4 +1,4 @@
-"""Two orbital line scanner images of one region of the Moon: support data, a control network, jigsaw's settings.
+"""Two orbital line scanner images of the Moon: support data, a control network, settings of jigsaw.
 
 The second image was taken an orbit later, rolled towards the strip of the first. What support data say of
 positions is wrong by some tens of metres, and of pointing by hundredths of a degree and its drift. Writes

@@ -21,6 +21,7 @@ class Pair:
 
     @property
     def network(self):
+        """Read the network."""
         return read_network(self.folder / "pair.net")
 
     def project(self, jigsaw="settings.txt", network=None, **own):

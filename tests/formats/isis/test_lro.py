@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from lro_pair import LRO, SERIAL, SIDES, WEIGHTED, answers, project, with_coordinates
+
 from photogram import adjust
 from photogram.formats.isis.contents import contents_of
 from photogram.formats.isis.outcome import Outcome

@@ -17,10 +17,12 @@ impl Network {
 
     /// A point near the photos: coordinates are counted from it while the network is adjusted, so that no digits are lost in
     /// large ones. Medians, so that a single photo with a wrong position does not move it. Geographic coordinates stay as they
-    /// are, differences being formed in geocentric space; so do poses in vectors, whose translations turn with the rotation.
+    /// are, differences being formed in geocentric space; so do poses in vectors, whose translations turn with the rotation, and
+    /// coordinates on a body that turns under inertial tables, which are counted from its centre.
     pub(super) fn origin(&self, middle: [f64; 3]) -> [f64; 3] {
+        let turns = self.trajectories.iter().any(|own| own.course.body.is_some());
         match (self.space, self.poses) {
-            (ObjectSpace::Rectangular, PoseNumbers::Angles(_)) => middle.map(f64::round),
+            (ObjectSpace::Rectangular, PoseNumbers::Angles(_)) if !turns => middle.map(f64::round),
             _ => [0.0; 3],
         }
     }
