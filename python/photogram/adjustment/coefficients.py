@@ -8,6 +8,7 @@ import numpy as np
 
 from photogram.messages import counted, listed
 from photogram.network.block import Block
+from photogram.network.flown import timed_images
 from photogram.network.observations import moments
 from photogram.network.trajectories import Coefficient, Spline, Trajectory
 from photogram.network.unknowns import Unknown
@@ -55,9 +56,7 @@ def _named(trajectory: Trajectory, part: int, wanted: set[int]) -> str:
 
 def outside(block: Block) -> str:
     """Say which photo, or record, is at a time that its trajectory does not reach; nothing where none is."""
-    photos = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
-    for own, trajectory in zip(block.timed, block.trajectories, strict=True):
-        rows = np.flatnonzero(block.image_photos == photos[own.photo])
+    for own, trajectory, _, rows in timed_images(block):
         times = own.times(block.image_xy[rows])
         begin = own.images(block.image_xy[rows])[0] + own.delay
         first, last = reach(trajectory)

@@ -13,6 +13,7 @@ from photogram.diagnosis.flown_images import flown_predictions
 from photogram.diagnosis.hypotheses import Change, Hypothesis, quaternion_readings
 from photogram.diagnosis.time_bases import differences
 from photogram.network.block import Block
+from photogram.network.flown import timed_images
 from photogram.network.observations import Position
 from photogram.network.timed import Lines, Timed
 from photogram.network.trajectories import Table, Trajectory
@@ -144,11 +145,9 @@ def _of_scanners(block: Block, photos: Indices) -> Iterator[Hypothesis]:
 
 def _counted_back(block: Block, predicted: Floats, axes: tuple[int, ...]) -> Block:
     xy = block.image_xy.copy()
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
-    for own in block.timed:
+    for own, _, _, images in timed_images(block):
         if own.lines is None or own.line_sensor is None:
             continue
-        images = np.flatnonzero(block.image_photos == rows[own.photo])
         known = images[np.isfinite(predicted[images]).all(axis=1)]
         if 0 in axes:
             xy[images, 0] = 2 * own.line_sensor.s0 - xy[images, 0]

@@ -17,6 +17,7 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.chosen import kept_images
 from photogram.network.directions import image_directions
+from photogram.network.flown import timed_images
 from photogram.network.geometry import geographic_to_geocentric
 from photogram.network.motion import timed_photos
 from photogram.network.projecting import projected
@@ -58,8 +59,9 @@ def flown_misfits(block: Block, photos: Indices) -> Floats:
     apart = np.linalg.norm(block.image_xy - predicted, axis=1)
     given = given_points(block)[block.image_points]
     found = np.full(len(photos), UNKNOWN)
+    images = {photo: own for _, _, photo, own in timed_images(block)}
     for k, photo in enumerate(photos.tolist()):
-        rows = np.flatnonzero(block.image_photos == photo)
+        rows = images[photo]
         xy = block.image_xy[rows]
         extent = float(np.sqrt(((xy - xy.mean(axis=0)) ** 2).sum(axis=1).mean()))
         parts = [own for own in (rows, rows[given[rows]]) if len(own)]
@@ -74,17 +76,13 @@ def flown_predictions(block: Block, photos: Indices) -> Floats:
     """(m, 2) images of some photos as they are predicted; NaN of others, and where a point is not seen."""
     places = _places(block)
     found = np.full(block.image_xy.shape, np.nan)
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
     wanted = set(photos.tolist())
-    for own, trajectory in zip(block.timed, block.trajectories, strict=True):
-        if rows[own.photo] not in wanted:
+    for own, trajectory, row, images in timed_images(block):
+        if row not in wanted:
             continue
-        images = np.flatnonzero(block.image_photos == rows[own.photo])
         images = images[np.isfinite(places[block.image_points[images]]).all(axis=1)]
         try:
-            seen = projected(
-                own, trajectory, _camera(block, rows[own.photo]), places[block.image_points[images]]
-            )
+            seen = projected(own, trajectory, _camera(block, row), places[block.image_points[images]])
         except InputError:
             # A scanner of whose trajectory there is one record.
             continue
@@ -125,9 +123,7 @@ def _rays(block: Block) -> tuple[Floats, Floats]:
     """(m, 3) where the rays of images come from, and their unit directions; NaN of photos at rest."""
     seen = image_directions(block)
     centres, directions = np.full(seen.shape, np.nan), np.full(seen.shape, np.nan)
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
-    for own, trajectory in zip(block.timed, block.trajectories, strict=True):
-        images = np.flatnonzero(block.image_photos == rows[own.photo])
+    for own, trajectory, _, images in timed_images(block):
         coefficients = (np.array([each.position for each in part]) for part in trajectory.coefficients)
         times = np.clip(own.times(block.image_xy[images]), *reach(trajectory))
         at, turned, *_ = trajectory.flown(times, *coefficients)

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.network.block import Block
 from photogram.network.observations import moments
-from photogram.network.timed import Moment
+from photogram.network.timed import Moment, Timed
+from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown
 
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["Flown", "flown"]
+__all__ = ["Flown", "flown", "timed_images"]
 
 TimedRow = tuple[int, int, float, int | None, int | None]
 """Indices of a photo and a trajectory, the time there, indices of rate and offset among the unknowns."""
@@ -58,10 +59,7 @@ def flown(block: Block, unknowns: Sequence[Unknown]) -> Flown:
     numbers = {id(each): number for number, each in enumerate(trajectories)}
     image_xy, image_times = block.image_xy.copy(), np.zeros(len(block.image_xy))
     timed: list[TimedRow] = []
-    photos = {name: row for row, name in enumerate(block.photo_ids)}
-    for own, trajectory in zip(block.timed, block.trajectories, strict=True):
-        photo = photos[own.photo]
-        rows = np.flatnonzero(block.image_photos == photo)
+    for own, trajectory, photo, rows in timed_images(block):
         time, image_times[rows], image_xy[rows] = own.images(block.image_xy[rows])
         rate, offset = (None if each is None else places[id(each)] for each in (own.readout, own.offset))
         timed.append((photo, numbers[id(trajectory)], time - trajectory.origin, rate, offset))
@@ -77,6 +75,19 @@ def flown(block: Block, unknowns: Sequence[Unknown]) -> Flown:
         len(records),
         np.array([_about(block, each) for each in records]).reshape(-1, 3),
     )
+
+
+def timed_images(block: Block) -> Iterator[tuple[Timed, Trajectory, int, Indices]]:
+    """Return the timed photos of a block: each with its trajectory, its index, and those of its images."""
+    if not block.timed:
+        return
+    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    order = np.argsort(block.image_photos, kind="stable")
+    ends = np.searchsorted(block.image_photos[order], np.arange(len(rows)), side="right")
+    starts = np.append(0, ends)
+    for own, trajectory in zip(block.timed, block.trajectories, strict=True):
+        row = rows[own.photo]
+        yield own, trajectory, row, order[starts[row] : ends[row]]
 
 
 def _about(block: Block, moment: Moment) -> Floats:

@@ -13,6 +13,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images, of_photos
+from photogram.network.flown import timed_images
 from photogram.network.given import Given
 from photogram.network.observations import Smoothness, moments
 
@@ -87,11 +88,9 @@ def focal_images(network: Given) -> Floats:
     if not isinstance(network, Block):
         return found
     block = network
-    rows = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
-    for each in block.timed:
+    for each, _, _, own in timed_images(block):
         if each.lines is not None:
             found = found.copy() if found is block.image_xy else found
-            own = np.flatnonzero(block.image_photos == rows[each.photo])
             found[own] = each.images(block.image_xy[own])[2]
     return found
 

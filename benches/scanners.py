@@ -1,0 +1,160 @@
+"""Line scanners in orbit, each image with a trajectory of its own, all covariances included: docs/performance.md.
+
+python benches/scanners.py 2000 50000     images; four images a point, 200 measures an image; Linux
+
+Corrections of 12 coefficients an image: degree 0 of the position, degree 2 of the rotation, all of them weighted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import time
+
+import numpy as np
+
+from peak import forget_peak, peak_memory
+from photogram import Block, Camera, adjust
+from photogram.arguments.types import Floats, Indices
+from photogram.memory import give_back, resident_memory
+from photogram.network.timed import Lines, LineSensor, Timed
+from photogram.network.trajectories import Polynomial, Table, Trajectory
+
+ALTITUDE, SPEED, APART, LENGTH = 100e3, 1.6e3, 10e3, 35e3
+"""Metres above the ground and in a second, between orbits, and of ground that an image covers along its own."""
+C, PITCH, LINE = -100.0, 0.007, 0.006
+"""Principal distance and pitch in millimetres, seconds a line."""
+ACROSS = 4
+"""Orbits from which a point is seen."""
+SD = {"image": 0.0035, "position": 20.0, "rotation": np.array([1e-4, 3e-5, 3e-5]), "control": 5.0}
+"""Millimetres, metres, radians by degree, metres."""
+
+
+def turned(r: Floats) -> Floats:
+    """Return (n, 3, 3) rotations by (n, 3) vectors."""
+    angle = np.linalg.norm(r, axis=1)[:, np.newaxis, np.newaxis]
+    k = np.zeros((len(r), 3, 3))
+    k[:, 0, 1], k[:, 0, 2], k[:, 1, 2] = -r[:, 2], r[:, 1], -r[:, 0]
+    k -= np.swapaxes(k, 1, 2).copy()
+    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * k + (1 - np.cos(angle)) / angle**2 * k @ k)
+
+
+def measured(images: Indices, points: Floats, begins: Floats, c: Floats, r: Floats) -> Floats:
+    """Return (n, 2) sample and line of (n, 3) points in images: the time at which each is on its line."""
+    half = LENGTH / SPEED / 2
+    times = (points[:, 1] - begins[images, 1]) / SPEED
+    for _ in range(4):
+        s = ((times - half) / half)[:, np.newaxis]
+        about = r[0][images] + r[1][images] * s + r[2][images] * s**2
+        at = begins[images] + c[images] + times[:, np.newaxis] * [0.0, SPEED, 0.0]
+        u = np.einsum("nji,nj->ni", turned(about), points - at)
+        times += u[:, 1] / SPEED
+    return np.column_stack([C * u[:, 0] / u[:, 2] / PITCH, times / LINE])
+
+
+def simulated(count: int, points_per_image: int = 50) -> tuple[Block, int]:
+    """Return a block of about so many images, and how many coefficients it has."""
+    random = np.random.default_rng(1)
+    orbits = max(ACROSS, round(np.sqrt(count / 2)))
+    along = -(-count // orbits)
+    orbit, number = (each.ravel() for each in np.indices((orbits, along)))
+    # Every other orbit begins half an image later, so that images along one hang together through the next.
+    begins = np.column_stack(
+        [orbit * APART, (number + orbit % 2 / 2) * LENGTH, np.full(orbits * along, ALTITUDE)]
+    )
+    n = orbits * along * points_per_image
+    ground = np.column_stack(
+        [
+            random.uniform((ACROSS / 2 - 1) * APART, (orbits - ACROSS / 2) * APART, n),
+            random.uniform(LENGTH / 2, along * LENGTH, n),
+            random.uniform(-1e3, 1e3, n),
+        ]
+    )
+    ground = ground[np.lexsort((ground[:, 0] // APART, ground[:, 1] // LENGTH))]
+    first = np.floor(ground[:, 0] / APART).astype(int) - ACROSS // 2 + 1
+    of = first[:, np.newaxis] + np.arange(ACROSS)
+    which = np.floor(ground[:, 1, np.newaxis] / LENGTH - of % 2 / 2).astype(int)
+    there = (of >= 0) & (of < orbits) & (which >= 0) & (which < along)
+    points = np.nonzero(there)[0]
+    images = (of * along + which)[there]
+    c = random.normal(0, SD["position"], (len(begins), 3))
+    r = random.normal(0, 1, (3, len(begins), 3)) * SD["rotation"][:, np.newaxis, np.newaxis]
+    xy = measured(images, ground[points], begins, c, r)
+    # An error in the focal plane, as lines: what the image moves by in one.
+    xy += random.normal(0, SD["image"], xy.shape) / [PITCH, -C / ALTITUDE * SPEED * LINE]
+    control = np.zeros(n, dtype=bool)
+    control[::500] = True
+    half, steps = LENGTH / SPEED / 2, np.linspace(0.0, LENGTH / SPEED, 4)
+    sensor = LineSensor((PITCH, 0.0), 0.0)
+    # Each image begins its own clock a minute after the one before.
+    lines = Lines([[0.0, 0.0, LINE]])
+    level = np.broadcast_to(np.eye(3), (4, 3, 3))
+    basis = Polynomial(2, half, half, sd=np.repeat(SD["rotation"][:, np.newaxis], 3, axis=1))
+    timed = [
+        Timed(
+            str(k),
+            Trajectory(
+                str(k),
+                Table(steps, begin + steps[:, np.newaxis] * [0.0, SPEED, 0.0], steps, level),
+                position=Polynomial(0, half, half, sd=SD["position"]),
+                rotation=basis,
+            ),
+            lines=lines,
+            line_sensor=sensor,
+        )
+        for k, begin in enumerate(begins)
+    ]
+    block = Block(
+        photo_ids=[each.photo for each in timed],
+        photo_positions=begins,
+        photo_attitudes=np.zeros((len(begins), 3)),
+        cameras=[Camera("perspective", {"c": C})],
+        photo_cameras=np.zeros(len(begins), dtype=int),
+        point_positions=np.where(control[:, np.newaxis], ground + random.normal(0, 5.0, (n, 3)), np.nan),
+        point_sd=np.where(control[:, np.newaxis], SD["control"], np.inf) * np.ones(3),
+        image_photos=images,
+        image_points=points,
+        image_xy=xy,
+        image_sd=SD["image"],
+        timed=timed,
+    )
+    return block, 12 * len(begins)
+
+
+def row(count: int) -> str:
+    """Adjust a block in this process, and return a row of the table."""
+    block, coefficients = simulated(count)
+    give_back()
+    before = resident_memory() or 0
+    forget_peak()
+    start, processor = time.perf_counter(), time.process_time()
+    result = adjust(block)
+    seconds, processor = time.perf_counter() - start, time.process_time() - processor
+    peak = (peak_memory() - before) / 2**30
+    print(result.seconds, file=sys.stderr)
+    sigma0 = np.sqrt(result.variance_of_unit_weight)
+    return (
+        f"| {len(block.photo_ids):,} | {len(block.image_xy):,} | {coefficients + 3 * len(block.point_ids):,}"
+        f" | {len(result.iterations)} | {sigma0:.3f} | {seconds:.1f} | {processor:.1f}"
+        f" | {peak:.2f} |"
+    )
+
+
+def main() -> None:
+    """Print the table, each row from a process of its own."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("images", nargs="+", type=int)
+    parser.add_argument("--row", action="store_true", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.row:
+        print(row(given.images[0]), flush=True)
+        return
+    print("| images | measures | unknowns | steps | sigma0 | s | cpu s | GiB |")
+    print("|---:|---:|---:|---:|---:|---:|---:|---:|", flush=True)
+    for images in given.images:
+        subprocess.run([sys.executable, __file__, "--row", str(images)], check=True)
+
+
+if __name__ == "__main__":
+    main()
