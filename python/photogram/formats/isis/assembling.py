@@ -13,7 +13,7 @@ from photogram.errors import InputError
 from photogram.formats.csm.lists import read_list, read_support
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.format import Wishes
-from photogram.formats.isis.contents import DETAILS, PITCHES, Contents, Image
+from photogram.formats.isis.contents import DETAILS, PITCHES, Contents, Image, rows_of_each
 from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.points import given_starts, known_points
 from photogram.formats.isis.reading import read_network
@@ -134,9 +134,10 @@ def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
         raise InputError(f"a measure of {point} has no Sample or no Line", file=path)
     points, image_points = np.unique(network.point_of_measure[rows], return_inverse=True)
     photos, xy, sd = np.zeros(len(rows), np.int64), np.zeros((len(rows), 2)), np.zeros(len(rows))
+    of_serial = dict(zip(own.serials, rows_of_each(own.serial[rows], len(own.serials)), strict=True))
     first = 0
     for each in images:
-        mine = np.flatnonzero(own.serial[rows] == own.serials.index(each.serial))
+        mine = of_serial[each.serial]
         which, xy[mine] = each.supported.coordinates(own.sample[rows[mine]], own.line[rows[mine]])
         photos[mine], sd[mine] = first + which, PITCHES * each.pitch
         first += len(each.supported.timed)
@@ -148,12 +149,13 @@ def _starts(network: ControlNetwork, images: list[Image], seen: _Seen, place: Pl
     starts = given_starts(network, seen.points, place)
     unknown = np.asarray(np.isnan(starts).any(axis=1))
     sums, counts = np.zeros_like(starts), np.zeros(len(starts))
-    of_measure = network.measures.serial[seen.measures]
-    for each in images if unknown.any() else []:
-        serial = network.measures.serials.index(each.serial)
-        rows = np.flatnonzero((of_measure == serial) & unknown[seen.image_points])
+    measures, asked = network.measures, np.flatnonzero(unknown[seen.image_points])
+    groups = rows_of_each(measures.serial[seen.measures[asked]], len(measures.serials))
+    of_serial = dict(zip(measures.serials, groups, strict=True))
+    for each in images:
+        rows = asked[of_serial[each.serial]]
         own = seen.measures[rows]
-        met = each.supported.to_ground(network.measures.line[own], network.measures.sample[own])
+        met = each.supported.to_ground(measures.line[own], measures.sample[own])
         np.add.at(sums, seen.image_points[rows], met)
         np.add.at(counts, seen.image_points[rows], 1.0)
     starts[unknown] = (sums / np.maximum(counts, 1.0)[:, np.newaxis])[unknown]

@@ -102,13 +102,13 @@ def _all(trajectory: Trajectory) -> list[Coefficient]:
 
 
 def _image_summary(outcome: Outcome) -> Iterator[str]:
-    used, photos = outcome.result.used_images, outcome.result.block.image_photos
+    used = outcome.result.used_images
     yield from _title("IMAGE MEASURES SUMMARY")
     yield f"{'Measures':>9}{'rms sample':>14}{'rms line':>14}{'rms':>14}  Image Serial Number"
     for image in outcome.contents.different:
-        mine = used & np.isin(photos, outcome.photos_of(image))
+        mine = outcome.rows[image][used[outcome.rows[image]]]
         sizes = "".join(f"{each:14.6f}" for each in rms(outcome.residuals[mine]))
-        yield f"{int(mine.sum()):9d}{sizes}  {image.serial}"
+        yield f"{len(mine):9d}{sizes}  {image.serial}"
 
 
 _PARAMETER = "{:>6} {:>14}{:>22}{:>22}{:>22}{:>18}{:>18}"

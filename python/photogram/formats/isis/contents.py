@@ -7,14 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from photogram.arguments.types import Floats
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.settings import Settings
 from photogram.formats.isis.solving import Solving
 
-__all__ = ["PITCHES", "Contents", "Image", "contents_of"]
+__all__ = ["PITCHES", "Contents", "Image", "contents_of", "rows_of_each"]
 
 DETAILS = "control network"
 PITCHES = 1.4
@@ -75,6 +78,12 @@ class Contents:
     def different(self) -> list[Image]:
         """The images, each once: a push frame camera has several photos in one."""
         return list(dict.fromkeys(self.images.values()))
+
+
+def rows_of_each(values: NDArray[np.integer[Any]], count: int) -> list[Indices]:
+    """Return where each of the whole numbers below `count` stands among values."""
+    order = np.argsort(values, kind="stable")
+    return np.split(order, np.searchsorted(values[order], np.arange(1, count)))
 
 
 def contents_of(details: Mapping[str, Any]) -> Contents:

@@ -46,7 +46,7 @@ def accuracy(value: float, unit: float = 1.0) -> str:
 
 
 def _images(outcome: Outcome) -> bytes:
-    used, photos = outcome.result.used_images, outcome.result.block.image_photos
+    used = outcome.result.used_images
     trajectories = outcome.result.trajectories
     found = {
         image: {
@@ -60,8 +60,8 @@ def _images(outcome: Outcome) -> bytes:
     names = max((list(own) for own in found.values()), key=len)
     rows = []
     for image, own in found.items():
-        mine = used & np.isin(photos, outcome.photos_of(image))
-        cells = [str(image.path), *rms(outcome.residuals[mine]).tolist()]
+        mine = outcome.rows[image]
+        cells = [str(image.path), *rms(outcome.residuals[mine[used[mine]]]).tolist()]
         rows.append(cells + [cell for name in names for cell in _cells(own.get(name))])
     heads = [("Image", "Filename"), *(("rms", f"{what} res") for what in ("sample", "line", "total"))]
     heads += [(f"{name}(t{power})", what) for name, power in names for what in _CELLS]

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.adjustment.known import Cartesian
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.formats.isis.contents import Contents, Image
+from photogram.formats.isis.contents import Contents, Image, rows_of_each
 from photogram.formats.isis.points import per_metre
 from photogram.network.geometry import local_frames
 from photogram.network.motion import focal_images
@@ -44,9 +44,19 @@ class Outcome:
         """The image that each photo of the block is of."""
         return [self.contents.images[name] for name in self.result.block.photo_ids]
 
-    def photos_of(self, image: Image) -> list[int]:
-        """Return the photos of the block that are of an image."""
-        return [row for row, each in enumerate(self.images) if each is image]
+    @cached_property
+    def rows(self) -> dict[Image, Indices]:
+        """The images of the block that are measures in each image of the network."""
+        different = self.contents.different
+        places = {image: place for place, image in enumerate(different)}
+        of_photo = np.array([places[image] for image in self.images], dtype=np.int64)
+        return dict(
+            zip(
+                different,
+                rows_of_each(of_photo[self.result.block.image_photos], len(different)),
+                strict=True,
+            )
+        )
 
     @cached_property
     def measure_rows(self) -> Indices:
@@ -74,9 +84,8 @@ class Outcome:
     @cached_property
     def residuals(self) -> Floats:
         """(m, 2) measured minus computed sample and line, at the instant of the measured line, in pixels."""
-        block, found = self.result.block, np.full((len(self.result.residuals), 2), np.nan)
-        for row, image in enumerate(self.images):
-            mine = block.image_photos == row
+        found = np.full((len(self.result.residuals), 2), np.nan)
+        for image, mine in self.rows.items():
             detector = image.supported.isd.detector
             turned = np.linalg.inv(detector.planes["isis"].matrix)
             found[mine] = (self.result.residuals[mine] * [1.0, -1.0]) @ turned.T / detector.summing
