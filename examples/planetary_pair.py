@@ -37,14 +37,16 @@ MEASURED, CONTROL = 0.4, 5.0
 """Standard deviations: pixels of measures, metres of control."""
 SIDES = {"left": (0.0, 1000.0), "right": (np.deg2rad(25.0), 8000.0)}
 """Roll, and the time of the first line in seconds."""
-SETTINGS = """
+PLACE, POINTING = 30.0, (0.02, 0.004, 0.001)
+"""Standard deviations of support data: metres; degrees, of coefficients by powers of scaled time."""
+SETTINGS = f"""
 camsolve = accelerations    # angles, their drift and its change
 twist = yes
-camera_angles_sigma = 0.05
-camera_angular_velocity_sigma = 0.01
-camera_angular_acceleration_sigma = 0.005
+camera_angles_sigma = {POINTING[0]}
+camera_angular_velocity_sigma = {POINTING[1]}
+camera_angular_acceleration_sigma = {POINTING[2]}
 spsolve = position
-spacecraft_position_sigma = 50
+spacecraft_position_sigma = {PLACE}
 radius = yes
 """
 
@@ -114,7 +116,7 @@ def ground(image: SupportedImage) -> np.ndarray:
     return geographic_to_geocentric(places, sphere)
 
 
-def simulate(folder: Path, seed: int = 4) -> np.ndarray:
+def simulate(folder: Path, seed: int = 3) -> np.ndarray:
     """Write the files of the pair, and return the true points."""
     random = np.random.default_rng(seed)
     folder.mkdir(parents=True, exist_ok=True)
@@ -123,8 +125,8 @@ def simulate(folder: Path, seed: int = 4) -> np.ndarray:
         path = folder / f"{side}.json"
         path.write_text(json.dumps(support(side)))
         images.append(SupportedImage(read_support(path), side, "isis", "isis"))
-        turn = random.normal(0.0, 1.0, (3, 3)) * [[0.02], [0.004], [0.001]]
-        path.write_text(json.dumps(support(side, random.normal(0.0, 30.0, 3), turn)))
+        turn = random.normal(0.0, 1.0, (3, 3)) * np.array(POINTING)[:, np.newaxis]
+        path.write_text(json.dumps(support(side, random.normal(0.0, PLACE, 3), turn)))
     points = ground(images[0])
     seen = np.stack([image.to_image(points) for image in images], axis=1)
     lines, samples = (seen + random.normal(0.0, MEASURED, seen.shape)).reshape(-1, 2).T

@@ -175,8 +175,8 @@ class Table:
 
     @property
     def span(self) -> tuple[float, float]:
-        """The first and the last time of its records."""
-        both = (self.times, self.attitude_times)
+        """The first and the last time of its records; one record alone is for all times."""
+        both = [each for each in (self.times, self.attitude_times) if len(each) > 1] or [self.times]
         return max(float(each[0]) for each in both), min(float(each[-1]) for each in both)
 
 

@@ -30,6 +30,7 @@ from photogram.network.whereabouts import about
 __all__ = ["TITLE", "read"]
 
 TITLE = "control network (ISIS)"
+_ASSUMED = f"{PITCHES} pixels of the detector are assumed, as jigsaw does"
 
 
 def read(path: Path, wishes: Wishes) -> Project:
@@ -199,7 +200,8 @@ def _project(contents: Contents, seen: _Seen, messages: list[Message]) -> Projec
         observations=known.controls,
         timed=timed,
         spheroid=spheroid,
-        messages=[*messages, *known.messages, *_settled(contents)],
+        lacks=[f"no standard deviations of image coordinates: {_ASSUMED} (--sd images=...)"],
+        messages=[*messages, *known.messages, *map(Message, contents.settings.told)],
         details={DETAILS: contents},
     )
 
@@ -253,9 +255,3 @@ def _left_out(network: ControlNetwork, unused: list[str], cubes: Path) -> list[M
     if unused:
         found.append(Message(f"images without measures, left out: {listed(unused, 3)}", cubes))
     return found
-
-
-def _settled(contents: Contents) -> list[Message]:
-    """Return what settings mean here."""
-    text = f"standard deviations of image coordinates: {PITCHES} pixels of the detector, as jigsaw has them"
-    return [Message(text), *(Message(each) for each in contents.settings.told)]

@@ -78,14 +78,13 @@ def _positions(isd: Isd, settings: Settings, count: int) -> tuple[Polynomial | N
     own, none = isd.position, np.zeros((3, 0))
     if not count:
         return None, isd, none
-    degree = max(settings.spk_solve_degree, count - 1)
     reference, scale = _scaled(own.times)
-    sd = deviations(settings.position_sigmas, count, degree)
-    basis = Polynomial(degree, reference, scale, sd=sd)
+    sd = deviations(settings.position_sigmas, count, count - 1)
+    basis = Polynomial(count - 1, reference, scale, sd=sd)
     if settings.over_hermite:
-        return basis, isd, np.zeros((3, degree + 1))
+        return basis, isd, np.zeros((3, count))
     fit = fitted(own.times, own.places, min(settings.spk_degree, len(own.times) - 1))
-    fit = _of_degree(fit, degree)
+    fit = _of_degree(fit, max(settings.spk_solve_degree, count - 1))
     if len(own.times) > 1:
         times, places = fit.sampled(float(own.times[0]), float(own.times[-1]))
         isd = replace(isd, position=Positions(times, places, None, "lagrange"))
@@ -101,7 +100,7 @@ def _angles(isd: Isd, settings: Settings, count: int) -> tuple[Polynomial | None
     own, none = isd.pointing, np.zeros((3, 0))
     if not count:
         return None, isd, none
-    degree = max(settings.ck_solve_degree, count - 1)
+    degree = count - 1 if settings.over_existing else max(settings.ck_solve_degree, count - 1)
     reference, scale = _scaled(own.times)
     sigmas = [None if each is None else float(np.deg2rad(each)) for each in settings.angle_sigmas]
     sd = deviations(sigmas, count, degree)

@@ -175,5 +175,6 @@ def _total(
     """Return adjusted polynomials; None where there are none."""
     if not isinstance(basis, Polynomial) or basis.reference is None or basis.scale is None:
         return None
-    change = adjusted - np.array([each.position for each in given])
-    return Polynomials(begun + change.T, basis.reference, basis.scale)
+    total = begun.copy()
+    total[:, : len(given)] += (adjusted - np.array([each.position for each in given])).T
+    return Polynomials(total, basis.reference, basis.scale)
