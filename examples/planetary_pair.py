@@ -83,8 +83,8 @@ def support(side: str, shift: Any = (0.0, 0.0, 0.0), turn: Any = ((0.0, 0.0, 0.0
     middle = SIDES[side][1] + LINES * RATE / 2
     return {
         "name_model": "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL",
-        "name_platform": "SIMULATED ORBITER",
-        "name_sensor": "NARROW ANGLE CAMERA",
+        "name_platform": "ORBITER",
+        "name_sensor": "NAC",
         "image_lines": LINES,
         "image_samples": SAMPLES,
         "radii": {"semimajor": RADIUS, "semiminor": RADIUS, "unit": "km"},
@@ -116,7 +116,7 @@ def ground(image: SupportedImage) -> np.ndarray:
     return geographic_to_geocentric(places, sphere)
 
 
-def simulate(folder: Path, seed: int = 3) -> np.ndarray:
+def simulate(folder: Path, seed: int = 7) -> np.ndarray:
     """Write the files of the pair, and return the true points."""
     random = np.random.default_rng(seed)
     folder.mkdir(parents=True, exist_ok=True)
