@@ -1,10 +1,13 @@
 """Settings by the names of jigsaw: what they mean, what is told, what is refused."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from photogram import InputError
-from photogram.formats.isis.settings import PARAMETERS, Settings, read_settings
+from photogram.formats.isis.settings import OTHERWISE, PARAMETERS, REFUSED, Settings, read_settings
 from photogram.formats.isis.solving import deviations
 
 
@@ -85,3 +88,10 @@ def test_a_file_of_settings(tmp_path):
 def test_what_is_no_setting_is_refused(words, sentence):
     with pytest.raises(InputError, match=sentence):
         read_settings(words)
+
+
+def test_the_page_tells_of_every_setting():
+    page = (Path(__file__).parents[3] / "docs" / "planetary.md").read_text(encoding="utf-8")
+    section = page[page.index("## Settings") : page.index("## Files")]
+    told = set(re.findall(r"`([A-Z][A-Z0-9_]+)`", section))
+    assert told == {*PARAMETERS, *OTHERWISE, *REFUSED}

@@ -14,7 +14,7 @@ from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.messages import nearest
 
-__all__ = ["PARAMETERS", "Settings", "Sigmas", "Solved", "read_settings"]
+__all__ = ["OTHERWISE", "PARAMETERS", "REFUSED", "Settings", "Sigmas", "Solved", "read_settings"]
 
 Solved = Literal["none", "first", "second", "third", "all"]
 """Which coefficients are unknown: none, that of degree 0, those to degree 1, to degree 2, all."""
@@ -181,7 +181,7 @@ OTHERWISE: Mapping[str, str] = {
     **dict.fromkeys(("FROMLIST", "CNET", "ONET", "FILE_PREFIX"), _FILES),
 }
 """What has another form here."""
-_ONLY_NO = {
+REFUSED = {
     "OBSERVATIONS": "which images share coefficients is a rule of each mission, which is not known here",
     "SOLVETARGETBODY": "how the body turns is taken as known",
     "OUTLIER_REJECTION": "--snoop takes measures out one by one instead",
@@ -250,9 +250,9 @@ def _elsewhere(name: str, value: str) -> dict[str, str]:
     """Return what is told of a setting that has another form here; nothing of one that asks for nothing."""
     if name in OTHERWISE:
         return {name: OTHERWISE[name]}
-    if name in _ONLY_NO:
+    if name in REFUSED:
         if _yes(value):
-            raise InputError(f"is not done: {_ONLY_NO[name]}")
+            raise InputError(f"is not done: {REFUSED[name]}")
         return {}
-    known = [*PARAMETERS, *OTHERWISE, *_ONLY_NO]
+    known = [*PARAMETERS, *OTHERWISE, *REFUSED]
     raise InputError(f"is no setting of jigsaw that is known{nearest(name, known)}")
