@@ -1,8 +1,8 @@
-"""Line scanners in orbit, each image with a trajectory of its own, all covariances included: docs/performance.md.
+"""Line scanners in orbit, each image with a trajectory of its own, all covariances: docs/performance.md.
 
 python benches/scanners.py 2000 50000     images; four images a point, 200 measures an image; Linux
 
-Corrections of 12 coefficients an image: degree 0 of the position, degree 2 of the rotation, all of them weighted.
+Corrections have 12 coefficients an image: degree 0 of the position, degree 2 of the rotation, all weighted.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from photogram.network.timed import Lines, LineSensor, Timed
 from photogram.network.trajectories import Polynomial, Table, Trajectory
 
 ALTITUDE, SPEED, APART, LENGTH = 100e3, 1.6e3, 10e3, 35e3
-"""Metres above the ground and in a second, between orbits, and of ground that an image covers along its own."""
+"""Metres above the ground and in a second, between orbits, and of ground that an image covers along one."""
 C, PITCH, LINE = -100.0, 0.007, 0.006
 """Principal distance and pitch in millimetres, seconds a line."""
 ACROSS = 4
