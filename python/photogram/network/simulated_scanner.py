@@ -17,7 +17,7 @@ from photogram.network.simulated_layout import Layout, grid, photo_ids, strip_id
 from photogram.network.simulated_motion import LineScanner, photo_angles, rotations_of
 from photogram.network.timed import Lines, LineSensor, Timed
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
-from photogram.network.whereabouts import about
+from photogram.network.whereabouts import about, given_poses
 
 __all__ = ["Flown", "Taken", "scanned"]
 
@@ -243,9 +243,7 @@ def _records(
     every = flown.scanner.every
     count = math.floor(each.seconds / every + 0.5)
     times = np.asarray(each.start + every * (np.arange(count) + 0.5), dtype=np.float64)
-    position, rotation = (np.array([own.position for own in part]) for part in both[0].coefficients)
-    places, matrices, *_ = both[0].flown(times, position, rotation)
-    axes = matrices.reshape(-1, 3, 3)
+    places, axes = given_poses(both[0], times)
     parts: tuple[list[Observation], list[Observation]] = ([], [])
     position_sd, attitude_sd = flown.sd
     draws = random.standard_normal((2, len(times), 3))

@@ -221,7 +221,8 @@ def simulate(
             "blunder_size": (0 <= blunder_size < math.inf, "finite and not negative"),
         }
     )
-    _check_motion(motion, plain=spheroid is None and refraction is None, cameras=len(cameras))
+    taking = checked_cameras(cameras)
+    _check_motion(motion, plain=spheroid is None and refraction is None, cameras=bool(taking))
     streams = _generator(seed).spawn(7)
     terrain_random, flight_random, initial_random, image_random, control_random, blunder_random = streams[:6]
     motion_random = streams[6].spawn(1)[0]
@@ -322,7 +323,7 @@ def simulate(
         **taken.given,
     )
     truth = truth.replace(**taken.true)
-    if taking := checked_cameras(cameras):
+    if taking:
         truth, block = photographed(truth, block, taking, start_cameras)
     if isinstance(motion, RollingShutter):
         frame = frame_size / abs(principal_distance)
@@ -363,7 +364,7 @@ def _check_types(arguments: Mapping[str, object]) -> None:
             raise InputError(f"{name} must be below {_HUGE:g}")
 
 
-def _check_motion(motion: object, *, plain: bool, cameras: int) -> None:
+def _check_motion(motion: object, *, plain: bool, cameras: bool) -> None:
     """Refuse what is no motion, and what it does not go with."""
     if motion is None:
         return
