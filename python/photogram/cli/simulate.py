@@ -36,12 +36,6 @@ def simulate(
     ],
     network: NetworkOptions,
     check_points: Annotated[int, typer.Option(help="Points with known positions that are not held.")] = 20,
-    position_error: Annotated[
-        float, typer.Option(help="Of the initial positions, standard deviation, m.")
-    ] = 30.0,
-    attitude_error: Annotated[
-        float, typer.Option(help="Of the initial attitudes, standard deviation, rad.")
-    ] = 0.01,
     blunders: Annotated[int, typer.Option(help="Image points with a gross error.")] = 0,
     blunder_size: Annotated[float, typer.Option(help="Size of the gross errors, mm.")] = 0.2,
     overwrite: Annotated[
@@ -67,8 +61,6 @@ def simulate(
 
         simulation = make(
             check_points=check_points,
-            position_error=position_error,
-            attitude_error=attitude_error,
             blunders=blunders,
             blunder_size=blunder_size,
             **network.arguments(),
@@ -78,7 +70,7 @@ def simulate(
         if block.timed:
             files = _tables(simulation, out, overwrite=overwrite)
         else:
-            block, common = _filed(block, position_error, attitude_error)
+            block, common = _filed(block, network.position_error, network.attitude_error)
             project = Project.from_block(block, common)
             files = project_files(project, out, overwrite=overwrite)
             remarks = project.messages

@@ -71,6 +71,14 @@ class NetworkOptions(MotionOptions):
         float,
         typer.Option(help="Of observed attitudes, standard deviation, rad; inf: none are observed."),
     ] = math.inf
+    position_error: Annotated[
+        float,
+        typer.Option(
+            help="Of the initial positions, standard deviation, m; of trajectories of a scanner it is their"
+            " weight."
+        ),
+    ] = 30.0
+    attitude_error: Annotated[float, typer.Option(help="The same of the initial attitudes, rad.")] = 0.01
     spheroid: Annotated[
         Ellipsoid, typer.Option(help="Geographic space on this spheroid; none: rectangular.")
     ] = Ellipsoid.NONE

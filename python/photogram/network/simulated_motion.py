@@ -209,8 +209,8 @@ def rolled(
     times = np.round(flown * layout.base / shutter.speed, 3) if shutter.speed else flown.astype(float)
     off = shutter.readout_sd * random.standard_normal() if math.isfinite(shutter.readout_sd) else None
     start = _STARTS * shutter.readout if off is None else shutter.readout + off
-    truth = _with_attitudes(truth, truth, np.zeros((count, 3)))
     block = _with_attitudes(block, truth, random.standard_normal((count, 3)))
+    truth = _with_attitudes(truth, truth, np.zeros((count, 3)))
     truth = _timed(truth, shutter, shutter.readout, frame, times, (velocities, rates))
     block = _timed(block, shutter, start, frame, times, known)
     images = projected_images(truth)

@@ -25,6 +25,8 @@ _BETWEEN = 60.0
 """Seconds between two passes, at least."""
 _PERIODS = 8.0, 30.0
 """Seconds, of the three waves that roll and pitch are made of."""
+_BEYOND = 2
+"""Lines beyond the first and the last, to which trajectories reach."""
 
 
 @dataclass(frozen=True)
@@ -221,12 +223,14 @@ def _trajectories(each: _Pass, flown: Flown, random: np.random.Generator) -> tup
     table = Table(times, places + flown.origin, times, axes)
     true: list[Polynomial | Spline | None] = [None, None]
     given = true.copy()
+    # Of a spline that goes on beyond the images nothing would show the last coefficients.
+    beyond = _BEYOND * flown.line
     for which, (basis, error, sd) in enumerate(
         zip((scanner.position, scanner.rotation), flown.errors, flown.sd, strict=True)
     ):
         # What is fixed at the truth, or has no error, has no corrections.
         if error and sd:
-            placed = basis.over(*table.span)
+            placed = basis.over(each.start - beyond, each.start + each.seconds + beyond)
             drawn = error * random.standard_normal((placed.count, 3))
             true[which] = replace(placed, value=drawn, sd=error)
             given[which] = replace(placed, value=0.0, sd=error)
