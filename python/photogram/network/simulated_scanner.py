@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,13 +12,14 @@ from photogram.arguments.types import Floats, Indices
 from photogram.network.cameras import Camera
 from photogram.network.observations import Attitude, Observation, Position
 from photogram.network.projecting import projected, standing
+from photogram.network.simulated_frames import Taken
 from photogram.network.simulated_layout import Layout, grid, photo_ids, strip_ids, window
 from photogram.network.simulated_motion import LineScanner, photo_angles, rotations_of
 from photogram.network.timed import Lines, LineSensor, Timed
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 from photogram.network.whereabouts import about, given_poses
 
-__all__ = ["Flown", "Taken", "scanned"]
+__all__ = ["Flown", "scanned"]
 
 _BETWEEN = 60.0
 """Seconds between two passes, at least."""
@@ -27,39 +27,6 @@ _PERIODS = 8.0, 30.0
 """Seconds, of the three waves that roll and pitch are made of."""
 _BEYOND = 2
 """Lines beyond the first and the last, to which trajectories reach."""
-
-
-@dataclass(frozen=True)
-class Taken:
-    """What cameras have taken of the ground.
-
-    Attributes
-    ----------
-    photo_ids, positions, attitudes
-        Of the P photos: names and true poses, of scanners those in the middle of their images.
-    image_photos, image_points, image_xy
-        (m,), (m,) and (m, 2) images of points, without errors; of scanners samples and lines.
-    per_error
-        (m, 2, 2) image coordinates by millimetres in the focal plane; None: these are the same.
-    true, given
-        Further arguments of the block: as they truly are, and as they are known.
-    """
-
-    photo_ids: list[str]
-    positions: Floats
-    attitudes: Floats
-    image_photos: Indices
-    image_points: Indices
-    image_xy: Floats
-    per_error: Floats | None = None
-    true: dict[str, Any] = field(default_factory=dict)
-    given: dict[str, Any] = field(default_factory=dict)
-
-    def in_images(self, errors: Floats, images: Indices) -> Floats:
-        """Return errors in image coordinates, of (k, 2) in the focal plane and the rows of their images."""
-        if self.per_error is None:
-            return errors
-        return np.asarray(np.einsum("mij,mj->mi", self.per_error[images], errors))
 
 
 @dataclass(frozen=True)

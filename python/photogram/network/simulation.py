@@ -19,19 +19,17 @@ from photogram.network.cameras import Camera, checked_cameras
 from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Refraction
 from photogram.network.simulated_cameras import photographed
+from photogram.network.simulated_frames import photograph, seen_side
 from photogram.network.simulated_layout import (
-    Layout,
-    candidates,
     control_pattern,
     flight,
     ground_points,
     into_object_space,
     laid_out,
-    photo_ids,
     point_ids,
 )
 from photogram.network.simulated_motion import LineScanner, RollingShutter, rolled
-from photogram.network.simulated_scanner import Flown, Taken, scanned
+from photogram.network.simulated_scanner import Flown, scanned
 
 __all__ = ["Blunders", "Simulation", "simulate"]
 
@@ -227,19 +225,8 @@ def simulate(
     terrain_random, flight_random, initial_random, image_random, control_random, blunder_random = streams[:6]
     motion_random = streams[6].spawn(1)[0]
 
-    spread = frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab))
-    steepest = 2 * tilt
-    if isinstance(motion, LineScanner):
-        spread += math.tan(motion.view_angle) * math.sin(crab)
-        steepest += 4 * attitude_error
-    half_angle = math.atan(spread)
-    if not _NARROWEST < half_angle < _WIDEST - steepest:
-        raise InputError("principal_distance and frame_size: the photos see too little, or to the horizon")
-    if steepest > _FAR_MORE * half_angle:
-        raise InputError(
-            f"tilt: photos that see {half_angle:.2g} rad to either side and look up to {steepest:.2g} rad"
-            " aside do not overlap"
-        )
+    angles = tilt, crab
+    half_angle, steepest = _looks(principal_distance, frame_size, angles, motion, attitude_error)
     reach = 1.02 * (flying_height + relief) * math.tan(half_angle + steepest)
     plan = laid_out(
         strips, photos_per_strip, forward_overlap, side_overlap, footprint, points_per_photo, reach
@@ -260,17 +247,14 @@ def simulate(
             photo_to_ground=photo_to_ground,
         )
         taken = scanned(plan, flown, ground, motion_random)
+        # They are those of trajectories.
         position_error = attitude_error = 0.0
         position_sd = attitude_sd = math.inf
     else:
         photos, rotations = flight(plan, flying_height, crab, tilt, flight_random)
         poses = into_object_space(photos, rotations, origin, spheroid, photo_to_ground)
-        seen = frame_size
-        if motion is not None:
-            seen -= 2 * abs(principal_distance) * motion.margin(flying_height - relief, half_angle)
-            if not seen > frame_size / 2:
-                raise InputError("readout: the photos move too far while they are read")
-        taken = _photograph(
+        seen = seen_side(frame_size, principal_distance, motion, flying_height - relief, half_angle)
+        taken = photograph(
             plan, ground, poses, principal_distance, seen, spheroid, photo_to_ground, refraction
         )
     if not len(taken.image_points):
@@ -331,6 +315,37 @@ def simulate(
     return Simulation(block, truth, faults)
 
 
+def _looks(
+    principal_distance: float,
+    frame_size: float,
+    angles: tuple[float, float],
+    motion: RollingShutter | LineScanner | None,
+    attitude_error: float,
+) -> tuple[float, float]:
+    """Return how far aside cameras see, and how far they may be inclined, of (tilt, crab); radians.
+
+    Raises
+    ------
+    InputError
+        Photos that see too little, or to the horizon, or past each other.
+    """
+    tilt, crab = angles
+    spread = frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab))
+    steepest = 2 * tilt
+    if isinstance(motion, LineScanner):
+        spread += math.tan(motion.view_angle) * math.sin(crab)
+        steepest += 4 * attitude_error
+    half_angle = math.atan(spread)
+    if not _NARROWEST < half_angle < _WIDEST - steepest:
+        raise InputError("principal_distance and frame_size: the photos see too little, or to the horizon")
+    if steepest > _FAR_MORE * half_angle:
+        raise InputError(
+            f"tilt: photos that see {half_angle:.2g} rad to either side and look up to {steepest:.2g} rad"
+            " aside do not overlap"
+        )
+    return half_angle, steepest
+
+
 def _observed(truth: Floats, sd: Floats, random: np.random.Generator) -> Floats | None:
     """Draw observations of the truth; None where nothing is observed."""
     draw = random.standard_normal(truth.shape)
@@ -389,36 +404,6 @@ def _check(ranges: dict[str, tuple[bool, str]]) -> None:
     for name, (fine, expected) in ranges.items():
         if not fine:
             raise InputError(f"{name} must be {expected}")
-
-
-def _photograph(
-    plan: Layout,
-    ground: Floats,
-    poses: tuple[Floats, Floats],
-    principal_distance: float,
-    frame_size: float,
-    spheroid: Spheroid | None,
-    photo_to_ground: bool,
-    refraction: Refraction | None,
-) -> Taken:
-    """Photos, points and coordinates of the images in the frame whose points are seen at least twice."""
-    found = []
-    positions, attitudes = poses
-    for photos, points in candidates(plan):
-        xy = geometry.project(
-            ground[points],
-            positions[photos],
-            attitudes[photos],
-            np.full(len(photos), principal_distance),
-            spheroid=spheroid,
-            photo_to_ground=photo_to_ground,
-            refraction=refraction,
-        )
-        seen = (np.abs(xy) <= frame_size / 2).all(axis=1)
-        found.append((photos[seen], points[seen], xy[seen]))
-    photos, points, xy = (np.concatenate(each) for each in zip(*found, strict=True))
-    seen = np.bincount(points)[points] >= 2
-    return Taken(photo_ids(plan), positions, attitudes, photos[seen], points[seen], xy[seen])
 
 
 def _blunders(images: int, count: int, size: float, random: np.random.Generator) -> Blunders:
