@@ -30,7 +30,7 @@ from photogram.network.observations import Distance, Position
 from photogram.network.projecting import projected_images
 from photogram.network.simulated_motion import LineScanner, RollingShutter
 from photogram.network.simulation import Simulation
-from photogram.network.trajectories import Polynomial, Spline
+from photogram.network.trajectories import Polynomial, Spline, Trajectory
 from photogram.results.result import Result
 
 DRONE: dict[str, Any] = {
@@ -240,6 +240,29 @@ def test_what_is_known_has_no_corrections():
         assert each.position is None
         assert each.rotation is None
     assert {each.KIND for each in known.observations} == {"attitude"}
+
+
+@pytest.mark.parametrize("origin", [(0.0, 0.0, 0.0), (5e5, 5.3e6, 140.0)])
+@pytest.mark.parametrize("make", ["rolling", "scanner"])
+def test_images_are_found_in_few_steps(make, origin, monkeypatch):
+    """Images of scenes went on for the most steps there are, their last digits being rounded."""
+    steps: list[int] = []
+    flown = Trajectory.flown
+
+    def counted(self, times, *coefficients):
+        steps.append(len(times))
+        return flown(self, times, *coefficients)
+
+    monkeypatch.setattr(Trajectory, "flown", counted)
+    if make == "rolling":
+        truth = simulate(**DRONE, origin=origin, motion=RollingShutter(0.03)).truth
+    else:
+        bases = {"position": Polynomial(0), "rotation": Polynomial(2)}
+        motion = LineScanner(lines=1, scenes=True, **bases)
+        truth = simulate(**AIRCRAFT, side_overlap=0.55, origin=origin, motion=motion).truth
+    assert len(steps) < 16 * len(truth.photo_ids)
+    monkeypatch.undo()
+    np.testing.assert_allclose(projected_images(truth), truth.image_xy, atol=1e-8)
 
 
 # What is refused

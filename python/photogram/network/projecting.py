@@ -27,6 +27,8 @@ Values = Callable[[Unknown], tuple[Floats, Floats]]
 STEPS = 200
 CLOSE, CLOSE_LINES = 1e-13, 1e-9
 """Of a whole readout; of a line, where times have as many digits."""
+ROUNDED = 1e-9
+"""Of a whole readout: what rounding alone may change."""
 
 
 def given(unknown: Unknown) -> tuple[Floats, Floats]:
@@ -79,13 +81,15 @@ def projected(
     times = np.full(len(places), (own.time or 0.0) + offset)
     if own.shutter is None:
         return seen(times)
-    rows = np.full(len(places), 0.5)
+    rows, before = np.full(len(places), 0.5), np.inf
     for _ in range(STEPS):
-        xy = seen(times + rate * rows)
-        now = own.shutter.times(xy)
-        if not (np.abs(now - rows) > CLOSE).any():
-            break
+        now = own.shutter.times(seen(times + rate * rows))
+        moved = float(np.fmax.reduce(np.abs(now - rows), initial=0.0))
         rows = now
+        # Large coordinates have rows with fewer digits, which go on to change by these.
+        if moved <= CLOSE or before <= moved < ROUNDED:
+            break
+        before = moved
     return seen(times + rate * rows)
 
 
