@@ -165,6 +165,20 @@ def test_cameras_with_distortion_in_pixels():
     assert result.variance_of_unit_weight == pytest.approx(1, abs=0.15)
 
 
+def test_edges_of_pictures_are_known_where_cameras_are_not():
+    cameras = [
+        Camera("simple_radial", {"f": f, "cx": 2050.0, "cy": 2040.0, "k": -0.03}, name=name)
+        for f, name in ((3600.0, "one"), (3700.0, "two"))
+    ]
+    start = [each.replace(parameters={**each.parameters, "f": 3650.0, "cy": 2000.0}) for each in cameras]
+    simulation = simulate(**DRONE, motion=RollingShutter(0.03), cameras=cameras, start_cameras=start)
+    for true, given in zip(simulation.truth.timed, simulation.block.timed, strict=True):
+        assert true.shutter.edges == given.shutter.edges
+    shutters = {id(each.shutter) for each in simulation.block.timed}
+    assert len(shutters) == 2
+    assert simulation.block.timed[0].shutter.edges[1] < simulation.block.timed[1].shutter.edges[1]
+
+
 def test_attitudes_of_photos_that_move_are_observed():
     simulation = simulate(**DRONE, attitude_sd=2e-3, motion=RollingShutter(0.03))
     assert len(simulation.block.observations) == 15

@@ -15,7 +15,7 @@ from typing import get_args
 import numpy as np
 
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network import geometry
 from photogram.network.attitudes import Attitudes
@@ -193,7 +193,7 @@ def rolled(
     The two blocks with photos that have motions of their own: in the first the true ones are given.
     """
     count = len(truth.photo_ids)
-    strip, number_ = np.divmod(np.arange(count), layout.photos_per_strip)
+    strip, along = np.divmod(np.arange(count), layout.photos_per_strip)
     sense = 1.0 - 2.0 * (strip % 2)
     velocities = _GUSTS * shutter.speed * random.standard_normal((count, 3))
     velocities[:, 0] += sense * shutter.speed
@@ -203,16 +203,16 @@ def rolled(
         _observed(velocities, nominal, shutter.speed_sd, random),
         _observed(rates, np.zeros((count, 3)), shutter.rate_sd, random),
     )
-    flown = strip * layout.photos_per_strip + np.where(
-        sense > 0, number_, layout.photos_per_strip - 1 - number_
-    )
+    along = np.where(sense > 0, along, layout.photos_per_strip - 1 - along)
+    flown = strip * layout.photos_per_strip + along
     times = np.round(flown * layout.base / shutter.speed, 3) if shutter.speed else flown.astype(float)
     off = shutter.readout_sd * random.standard_normal() if math.isfinite(shutter.readout_sd) else None
     start = _STARTS * shutter.readout if off is None else shutter.readout + off
     block = _with_attitudes(block, truth, random.standard_normal((count, 3)))
     truth = _with_attitudes(truth, truth, np.zeros((count, 3)))
-    truth = _timed(truth, shutter, shutter.readout, frame, times, (velocities, rates))
-    block = _timed(block, shutter, start, frame, times, known)
+    edges = _edges(truth, shutter.direction, frame)
+    truth = _timed(truth, shutter, shutter.readout, edges, times, (velocities, rates))
+    block = _timed(block, shutter, start, edges, times, known)
     images = projected_images(truth)
     return truth.replace(image_xy=images), block.replace(image_xy=images + block.image_xy - truth.image_xy)
 
@@ -249,20 +249,16 @@ def _timed(
     block: Block,
     shutter: RollingShutter,
     readout: float,
-    frame: float,
+    edges: list[tuple[float, float]],
     times: Floats,
     motions: tuple[Floats, Floats],
 ) -> Block:
-    """Return a block whose photos have motions of their own, and one shutter for each camera."""
-    cameras = block.photo_cameras if block.photo_cameras is not None else np.zeros(len(times), dtype=int)
+    """Return a block whose photos have motions of their own, and a shutter for each camera."""
+    cameras = _photo_cameras(block)
     names = block.camera_names if block.cameras else ["camera 1"]
     shutters = [
-        Shutter(
-            Readout(name, readout, shutter.readout_sd),
-            _edges(block, int(np.argmax(cameras == row)), shutter.direction, frame),
-            shutter.direction,
-        )
-        for row, name in enumerate(names)
+        Shutter(Readout(name, readout, shutter.readout_sd), own, shutter.direction)
+        for name, own in zip(names, edges, strict=True)
     ]
     timed = [
         Timed(
@@ -281,11 +277,20 @@ def _timed(
     return block.replace(timed=timed)
 
 
-def _edges(block: Block, photo: int, direction: Direction, frame: float) -> tuple[float, float]:
-    """Return the image coordinates of the edges of the frame where reading begins and ends."""
-    camera = camera_of(block, photo)
+def _photo_cameras(block: Block) -> Indices:
+    """Return (P,) which camera each photo has; the first where there are principal distances."""
+    given = block.photo_cameras
+    return np.zeros(len(block.photo_ids), dtype=np.int64) if given is None else given
+
+
+def _edges(block: Block, direction: Direction, frame: float) -> list[tuple[float, float]]:
+    """Return the image coordinates of the edges where reading begins and ends, for each camera."""
     axis = 1 if direction in ("down", "up") else 0
-    middle = float(camera.project(np.array([[0.0, 0.0, -1.0]]))[0, axis])
-    half = frame / 2 * camera.scale
-    ascending = (direction == "down") == (camera.image_y == "down") if axis else direction == "right"
-    return (middle - half, middle + half) if ascending else (middle + half, middle - half)
+    found = []
+    for photo in np.unique(_photo_cameras(block), return_index=True)[1].tolist():
+        camera = camera_of(block, photo)
+        middle = float(camera.project(np.array([[0.0, 0.0, -1.0]]))[0, axis])
+        half = frame / 2 * camera.scale
+        ascending = (direction == "down") == (camera.image_y == "down") if axis else direction == "right"
+        found.append((middle - half, middle + half) if ascending else (middle + half, middle - half))
+    return found

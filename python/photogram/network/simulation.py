@@ -70,7 +70,8 @@ class Simulation:
         positions and attitudes of the photos; besides their coarse initial values. Check points have their
         true positions, unheld and known without error; pass points have none.
     truth
-        The same block with true positions and attitudes everywhere and image coordinates free of errors.
+        The same block with true positions and attitudes everywhere and image coordinates free of errors; with
+        true readout times, motions and trajectories, which are weighted as in `block`.
     blunders
         The gross errors in `block`.
     """
