@@ -18,10 +18,11 @@ PACKAGE = [
     for path in (ROOT / "python" / "photogram").rglob("*.py*")
     if path.suffix in (".py", ".pyi")
     and path.parent.name != "stellar"
+    and path != ROOT / "python" / "photogram" / "network" / "lens.py"
     and ROOT / "python" / "photogram" / "formats" not in path.parents
 ]
-"""Without the calibration by stars, whose plots have a radial axis, and the files of other programs, which
-say what lenses and formats are called there."""
+"""Without the calibration by stars, whose plots have a radial axis, the known lenses of planetary cameras, of
+which one has that name, and the files of other programs, which say what lenses and formats are called."""
 CRATE = [path for path in (ROOT / "crates" / "photocore" / "src").rglob("*.rs") if path.name != "golden.rs"]
 BINDING = [*(ROOT / "crates" / "photogram-py" / "src").rglob("*.rs")]
 EXTENSIONS = {

@@ -8,6 +8,7 @@ import pytest
 from moving_blocks import rolling, scanned
 from photogram import InputError, adjust, adjust_in_parts, group_sums, read_result
 from photogram.distributed import Division, plan_in_parts
+from photogram.network.lens import Lens
 from photogram.network.observations import Smoothness
 from photogram.network.trajectories import Spline, Trajectory
 
@@ -22,11 +23,21 @@ def jittered():
     return block.replace(observations=[*block.observations, *own])
 
 
+def curved():
+    """Return a block of scanners whose lines of sensors are bent, and behind a lens that is known."""
+    block = scanned()
+    lens, bends = Lens("lrolrocnac", (1e-7,)), np.array([[0.0, 0.0, 1e-4], [3000.0, 1e-4, 0.0]])
+    own = [dataclasses.replace(each.line_sensor, lens=lens, bends=bends) for each in block.timed]
+    pairs = zip(block.timed, own, strict=True)
+    return block.replace(timed=[dataclasses.replace(each, line_sensor=line) for each, line in pairs])
+
+
 BLOCKS = {
     "rolling": rolling,
     "known readout": lambda: rolling(readout=0.03).replace(photo_position_sd=0.1),
     "scanned": lambda: scanned(photos=True, smooth=True),
     "jitter": jittered,
+    "curved": curved,
 }
 
 
@@ -47,6 +58,8 @@ def test_a_result_is_read_as_it_was_saved(name, tmp_path):
     some = [("unknown", result.unknowns[0].name), ("photo", result.block.photo_ids[-1])]
     np.testing.assert_array_equal(read.covariance(some), result.covariance(some))
     assert group_sums(read).report() == group_sums(result).report()
+    for each, own in zip(read.block.timed, result.block.timed, strict=True):
+        assert each.line_sensor == own.line_sensor
     again = adjust(read.block)
     assert again.sums_of_squares == result.sums_of_squares
     read.to_parquet(tmp_path / "again")

@@ -1,6 +1,7 @@
 """Photos on trajectories in the tables of the plain project."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from photogram import Attitudes, InputError, adjust, formats
 from photogram.formats import Wishes
 from photogram.formats.moving import motions
 from photogram.formats.plain.streamed import Streamed, streamable
+from photogram.network.lens import Lens
 from photogram.network.observations import Smoothness
 from photogram.network.timed import Timed
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
@@ -382,6 +384,10 @@ def test_what_tables_cannot_hold(tmp_path):
     own = project_of(lines.replace(observations=[*lines.observations, more]), tmp_path)
     assert formats.cannot_hold(own, "plain") == ["1 sums of coefficients that are no neighbours, or too many"]
     assert "smoothness.csv" not in formats.to_files(own, "plain")
+    lensed = replace(lines.timed[0].line_sensor, lens=Lens("lrolrocnac", (1e-5,)))
+    curved = lines.replace(timed=[replace(each, line_sensor=lensed) for each in lines.timed])
+    with pytest.raises(InputError, match="behind a lens lrolrocnac, which tables of cameras cannot say"):
+        formats.to_files(project_of(curved, tmp_path), "plain")
     with pytest.raises(InputError, match=r"COLMAP.*: the photo L1 is of a line scanner"):
         formats.to_files(own, "colmap")
     drone = project_of(block, tmp_path, sizes=((3000, 2000),))

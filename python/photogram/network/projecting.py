@@ -159,9 +159,8 @@ def _crossed(
 
     def past(times: Floats) -> tuple[Floats, Floats]:
         """Return how far the image of each point is from the line of sensors, and its sample."""
-        xy = seen(times)
-        samples = sensor.s0 + (xy[:, 0] - sensor.x0) / sensor.pitch[0]
-        return xy[:, 1] - sensor.places(samples)[:, 1], samples
+        samples, apart = sensor.abreast(seen(times))
+        return apart, samples
 
     low, high = (np.full(count, end) for end in ends)
     (below, _), (above, _) = past(low), past(high)

@@ -11,15 +11,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, number, numbers, one_of, shaped, shown
+from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.attitudes import Attitudes, Representation
+from photogram.network.lens import Lens
 from photogram.network.trajectories import Clock, Polynomial, Readout, Table, Trajectory
 from photogram.network.unknowns import Sensor, Unknown
 
 __all__ = ["LineSensor", "Lines", "Moment", "Poses", "Shutter", "Timed", "checked_timed", "own_trajectories"]
 
 Direction = Literal["down", "up", "right", "left"]
+
+STEPS = 100
+CLOSE = 1e-10
+"""Samples: where steps to the sample abreast of a place end."""
 
 
 @cache
@@ -99,9 +105,9 @@ class Lines:
         return np.asarray(own[..., 0] + (times - own[..., 1]) / own[..., 2])
 
 
-@dataclass(frozen=True)
-class LineSensor:
-    """Where a sample is in the focal plane: (x0, y0) + (sample - s0) (pitch_x, pitch_y).
+@dataclass(frozen=True, eq=False)
+class LineSensor(Valued):
+    """Where a sample is in the focal plane: (x0, y0) + (sample - s0) (pitch_x, pitch_y), behind a lens.
 
     Parameters
     ----------
@@ -111,16 +117,88 @@ class LineSensor:
         The sample at (x0, y0): half of all samples, from the edge of the first, where that is the middle.
     x0, y0
         Millimetres.
+    lens
+        What is known of the lens before it: it corrects the places before the camera does, and makes a line
+        of them that is curved. None: the camera alone corrects.
+    bends
+        (k, 3) samples, increasing, and x, y in millimetres by which the sensors there are off the straight
+        line; those between as if they were joined straight, those beyond as the last. None: it is straight.
+
+    Raises
+    ------
+    InputError
+        A line without a pitch, a lens that is none, bends that are none.
     """
 
     pitch: tuple[float, float]
     s0: float
     x0: float = 0.0
     y0: float = 0.0
+    lens: Lens | None = None
+    bends: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        pitch = shaped("pitch of a line of sensors", self.pitch, (2,))
+        if not (np.isfinite(pitch).all() and pitch.any()):
+            raise InputError(f"the pitch of a line of sensors is {shown(self.pitch)}")
+        object.__setattr__(self, "pitch", tuple(pitch.tolist()))
+        if self.lens is not None and not isinstance(self.lens, Lens):
+            raise InputError(f"the lens of a line of sensors is no Lens: {shown(self.lens)}")
+        if self.bends is not None:
+            rows = numbers("bends of a line of sensors", self.bends)
+            sound = rows.ndim == 2 and rows.shape[1] == 3 and len(rows) and np.isfinite(rows).all()
+            if not sound or not (np.diff(rows[:, 0]) > 0).all():
+                raise InputError(
+                    f"bends of a line of sensors are sample, x, y, ascending: {shown(self.bends)}"
+                )
+            object.__setattr__(self, "bends", rows)
+
+    @classmethod
+    def of_table(cls, table: ArrayLike, lens: Lens | None = None) -> LineSensor:
+        """Return the line that is told by (k, 3) samples, increasing, and their x, y in millimetres.
+
+        Raises
+        ------
+        InputError
+            Fewer than two samples, what is no such table, a last sample in the place of the first.
+        """
+        rows = numbers("table of a line of sensors", table)
+        if rows.ndim != 2 or rows.shape[1] != 3 or len(rows) < 2:
+            raise InputError(f"a table of a line of sensors has rows of sample, x, y: {shown(table)}")
+        (s0, x0, y0), across = rows[0], rows[-1] - rows[0]
+        if not across[0] > 0:
+            raise InputError(f"samples of a line of sensors do not ascend: {shown(table)}")
+        pitch = across[1:] / across[0]
+        bends = np.column_stack([rows[:, 0], rows[:, 1:] - [x0, y0] - (rows[:, [0]] - s0) * pitch])
+        return cls((float(pitch[0]), float(pitch[1])), float(s0), float(x0), float(y0), lens, bends)
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the places are what pitch, s0, x0 and y0 say."""
+        return self.lens is None and self.bends is None
 
     def places(self, samples: Floats) -> Floats:
-        """Return (n, 2) places of samples in the focal plane, in millimetres."""
-        return np.asarray([self.x0, self.y0] + (samples[:, np.newaxis] - self.s0) * np.array(self.pitch))
+        """Return (n, 2) places of samples in the focal plane, as the lens corrects them, in millimetres."""
+        straight = np.asarray([self.x0, self.y0] + (samples[:, np.newaxis] - self.s0) * np.array(self.pitch))
+        if self.bends is not None:
+            known, *off = np.asarray(self.bends).T
+            straight = straight + np.column_stack([np.interp(samples, known, each) for each in off])
+        return straight if self.lens is None else self.lens.corrected(straight)
+
+    def abreast(self, places: Floats) -> tuple[Floats, Floats]:
+        """Return the samples that are abreast of (n, 2) places, and how far these are from the line, in mm.
+
+        Of a curved line the sample is that at whose place the two are apart square to the pitch.
+        """
+        length = float(np.hypot(*self.pitch))
+        along = np.array(self.pitch) / length
+        samples = self.s0 + (places - [self.x0, self.y0]) @ along / length
+        for _ in range(0 if self.is_straight else STEPS):
+            step = (places - self.places(samples)) @ along / length
+            samples = samples + step
+            if not (np.abs(step) > CLOSE).any():
+                break
+        return samples, (places - self.places(samples)) @ np.array([-along[1], along[0]])
 
 
 _KINDS: dict[str, type] = {

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -56,6 +57,18 @@ def rotation(name: str, value: ArrayLike) -> Floats:
     if np.linalg.det(matrix) < 0:
         raise InputError(f"{name} is mirrored: its determinant is -1")
     return matrix
+
+
+@cache
+def _components(kind: str) -> tuple[str, ...]:
+    return tuple(name for name, _ in _UNKNOWNS[kind])
+
+
+@cache
+def _units(kind: str, linear_unit: str) -> tuple[str, ...]:
+    units = {"length": linear_unit, "speed": f"{linear_unit}/s", "angle": "rad", "ratio": ""}
+    units |= {"rate": "rad/s", "time": "s"}
+    return tuple(units[measure] for _, measure in _UNKNOWNS[kind])
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,13 +134,11 @@ class Unknown:
     @property
     def components(self) -> tuple[str, ...]:
         """The names of its k unknowns."""
-        return tuple(name for name, _ in _UNKNOWNS[self.KIND])
+        return _components(self.KIND)
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
         """Return the units of its unknowns; nothing for plain numbers."""
-        units = {"length": linear_unit, "speed": f"{linear_unit}/s", "angle": "rad", "ratio": ""}
-        units |= {"rate": "rad/s", "time": "s"}
-        return tuple(units[measure] for _, measure in _UNKNOWNS[self.KIND])
+        return _units(self.KIND, linear_unit)
 
     @property
     def is_held(self) -> bool:

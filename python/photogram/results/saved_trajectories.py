@@ -9,6 +9,7 @@ from typing import Any
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.structure import Stand
+from photogram.network.lens import Lens
 from photogram.network.timed import Lines, LineSensor, Shutter, Timed
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Spline, Table, Trajectory
 
@@ -53,7 +54,7 @@ class KeptTrajectory(Stand):
         return made
 
 
-CLASSES = (KeptTrajectory, Lines, LineSensor, Polynomial, Shutter, Spline, Table, Timed)
+CLASSES = (KeptTrajectory, Lens, Lines, LineSensor, Polynomial, Shutter, Spline, Table, Timed)
 """Classes that a document of a block with trajectories may name."""
 STANDS: dict[type, Callable[[Any], Stand]] = {Trajectory: KeptTrajectory.of}
 """What is written in the place of others."""

@@ -246,7 +246,7 @@ impl ObservationEquations<'_> {
 impl GroupRows<'_> {
     /// Gives the equations of a group unit weight.
     #[inline(always)]
-    fn weigh(&mut self, sd: &[f64]) {
+    pub(crate) fn weigh(&mut self, sd: &[f64]) {
         weigh(sd, self.constant, [&mut *self.local, &mut *self.retained, &mut *self.shared]);
     }
 }

@@ -64,7 +64,7 @@ pub use nearest::nearest;
 pub use orientation::{Orientation, PoseNumbers};
 pub use plate_lens::{PlateLens, Plated};
 pub use pointing::{pointing, pointing_angles, pointing_with_partials};
-pub use pose::{POSE, Pose, Steps, steps};
+pub use pose::{POSE, Pose, Steps};
 pub use projection::{Projection, Ray, View};
 pub use refraction::{AirModel, Refraction, Vertical, Water, WaterModel};
 pub use rotation::{nearest_turns, rotation, rotation_angles, rotation_with_partials};

@@ -1,6 +1,7 @@
 //! Where a photo stands and how it is turned: its pose, and the step of a pose.
 
-use nalgebra::{Matrix6xX, Vector6};
+use nalgebra::{Matrix6, Matrix6xX, Vector6};
+use smallvec::SmallVec;
 
 use super::angle_axis::angle_axis_rotation;
 use super::axes::{Matrix3, Vector3};
@@ -26,18 +27,39 @@ pub struct Pose {
     pub attitude: Matrix3,
 }
 
-/// How a pose steps (see [`Pose::step`]) with unknowns: dC, then rho, a column for each.
-pub type Steps = Matrix6xX<f64>;
+/// How a pose steps (see [`Pose::step`]) with unknowns: dC, then rho, a column for each; six at the most are kept in place.
+#[derive(Debug, Clone, Default)]
+pub struct Steps(SmallVec<[Vector6<f64>; POSE]>);
 
-/// Steps, dC and rho, as columns.
-pub fn steps(each: impl IntoIterator<Item = (Vector3, Vector3)>) -> Steps {
-    let columns: Vec<Vector6<f64>> = each.into_iter().map(|(shift, rho)| column(&shift, &rho)).collect();
-    Steps::from_columns(&columns)
-}
+impl Steps {
+    /// Those of other unknowns, dC and rho of each.
+    pub fn become_those(&mut self, each: impl IntoIterator<Item = (Vector3, Vector3)>) {
+        self.0.clear();
+        self.0.extend(each.into_iter().map(|(shift, rho)| column(&shift, &rho)));
+    }
 
-/// What becomes of each step.
-fn each(all: &Steps, step: impl Fn(Vector3, Vector3) -> (Vector3, Vector3)) -> Steps {
-    steps(all.column_iter().map(|own| step(own.fixed_rows::<3>(0).into(), own.fixed_rows::<3>(3).into())))
+    /// The steps, dC and rho, of the unknowns.
+    pub fn columns(&self) -> &[Vector6<f64>] {
+        &self.0
+    }
+
+    /// The same side by side.
+    pub fn matrix(&self) -> Matrix6xX<f64> {
+        Matrix6xX::from_columns(&self.0)
+    }
+
+    /// What becomes of each step.
+    pub fn map(&mut self, step: impl Fn(Vector3, Vector3) -> (Vector3, Vector3)) {
+        for own in &mut self.0 {
+            let (shift, rho) = step(own.fixed_rows::<3>(0).into(), own.fixed_rows::<3>(3).into());
+            *own = column(&shift, &rho);
+        }
+    }
+
+    /// The same by other unknowns of the pose.
+    pub fn lead_by(&mut self, unknowns: &Matrix6<f64>) {
+        self.0.iter_mut().for_each(|own| *own = unknowns * *own);
+    }
 }
 
 /// A step as a column.
@@ -90,13 +112,8 @@ impl Pose {
     }
 
     /// How that steps when this one does so: dC - `A [c]x rho` and `a^T rho`.
-    pub fn carried(&self, inner: &Self, steps: &Steps) -> Steps {
-        let moves = -self.attitude * inner.position.cross_matrix();
-        each(steps, |shift, rho| (shift + moves * rho, inner.attitude.tr_mul(&rho)))
-    }
-
-    /// How that steps when it does so in the axes of this one: `A dc` and rho.
-    pub fn carrying(&self, steps: &Steps) -> Steps {
-        each(steps, |shift, rho| (self.attitude * shift, rho))
+    pub fn carried(&self, inner: &Self) -> impl Fn(Vector3, Vector3) -> (Vector3, Vector3) {
+        let (moves, turned) = (-self.attitude * inner.position.cross_matrix(), inner.attitude);
+        move |shift, rho| (shift + moves * rho, turned.tr_mul(&rho))
     }
 }

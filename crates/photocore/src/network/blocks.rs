@@ -15,8 +15,21 @@ pub(super) struct Blocks {
     pub shared: Vec<usize>,
     /// The block of each photo's camera where that is shared.
     pub of_camera: Vec<Option<usize>>,
-    /// The block of each common unknown, unless it is known.
-    pub of_common: Vec<Option<usize>>,
+    /// Where each common unknown is, unless it is known.
+    pub of_common: Vec<Option<InBlock>>,
+    /// The common unknowns of each block after those of cameras, as they stand in it.
+    pub commons: Vec<Vec<usize>>,
+}
+
+/// Where unknowns are: in a block, from one of its unknowns on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InBlock {
+    /// The block.
+    pub block: usize,
+    /// The first of them.
+    pub first: usize,
+    /// How many unknowns the block has.
+    pub width: usize,
 }
 
 impl Blocks {
@@ -32,15 +45,52 @@ impl Blocks {
         shared.iter().for_each(|&camera| add(network.cameras[camera].sd.len()));
         let photos = network.photos.len();
         let mut of_common = vec![None; network.commons.len()];
-        let unknown = network.commons.iter().enumerate().filter(|(_, common)| !common.is_held());
-        for (block, (index, common)) in (photos + shared.len()..).zip(unknown) {
-            of_common[index] = Some(block);
-            add(common.sd.len());
+        let commons = network.commons_by_block();
+        for (block, together) in (photos + shared.len()..).zip(&commons) {
+            let ends: Vec<usize> = together
+                .iter()
+                .scan(0, |end, &common| {
+                    *end += network.commons[common].sd.len();
+                    Some(*end)
+                })
+                .collect();
+            let width = ends[ends.len() - 1];
+            for (&common, end) in together.iter().zip(ends) {
+                let first = end - network.commons[common].sd.len();
+                of_common[common] = Some(InBlock { block, first, width });
+            }
+            add(width);
         }
         let mut squares = vec![0];
         let widths = first.windows(2).map(|ends| ends[1] - ends[0]);
         widths.for_each(|width| squares.push(squares[squares.len() - 1] + width.pow(2)));
         let of_camera = |photo: &Photo| Some(photos + shared.binary_search(&photo.camera).ok()?);
-        Self { of_camera: network.photos.iter().map(of_camera).collect(), first, squares, shared, of_common }
+        let of_camera = network.photos.iter().map(of_camera).collect();
+        Self { of_camera, first, squares, shared, of_common, commons }
+    }
+}
+
+impl InBlock {
+    /// All unknowns of a block.
+    pub fn whole(block: usize, width: usize) -> Self {
+        Self { block, first: 0, width }
+    }
+}
+
+impl Network {
+    /// The common unknowns that are not known, together those that are one block: the coefficients of a trajectory by functions that are
+    /// never zero, all of which every image of it touches.
+    fn commons_by_block(&self) -> Vec<Vec<usize>> {
+        let mut leader: Vec<usize> = (0..self.commons.len()).collect();
+        for trajectory in &self.trajectories {
+            let unknown = |&common: &usize| !self.commons[common].is_held() && leader[common] == common;
+            let together: Vec<usize> = trajectory.everywhere().filter(unknown).collect();
+            together.iter().for_each(|&common| leader[common] = together[0]);
+        }
+        let mut members = vec![vec![]; self.commons.len()];
+        for (common, &leader) in leader.iter().enumerate().filter(|&(own, _)| !self.commons[own].is_held()) {
+            members[leader].push(common);
+        }
+        members.into_iter().filter(|own| !own.is_empty()).collect()
     }
 }

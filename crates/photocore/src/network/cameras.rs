@@ -111,8 +111,11 @@ impl Bundle {
                 points.chain(touches.photos.iter().map(|&photo| photos[photo])).collect();
             touches.commons.iter().for_each(|&(common, _)| of_commons[common].extend(&places));
         }
-        let own = of_commons.iter().zip(&self.blocks.of_common).filter(|(_, block)| block.is_some());
-        own.map(|(places, _)| middle(places)).collect()
+        let of_block = |all: &Vec<usize>| {
+            let places: Vec<[f64; 3]> = all.iter().flat_map(|&common| of_commons[common].clone()).collect();
+            middle(&places)
+        };
+        self.blocks.commons.iter().map(of_block).collect()
     }
 }
 

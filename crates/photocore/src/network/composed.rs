@@ -2,13 +2,15 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, Matrix6};
+use nalgebra::{DMatrix, Matrix6, Matrix6xX};
+use smallvec::SmallVec;
 
+use super::blocks::InBlock;
 use super::commons::CommonState;
 use super::model::Bundle;
 use super::mounts::{AT_PHOTO, Composed, Grounds, Moving};
 use super::stations::{Bent, Mounted, Station, Stations};
-use crate::geometry::{Orientation, POSE, Steps};
+use crate::geometry::{Orientation, POSE, Vector3};
 use crate::normals::{Cofactors, GroupRows, Layout};
 
 impl Bundle {
@@ -26,9 +28,18 @@ impl Bundle {
     pub(super) fn blocks_of_pose(&self, photo: usize, at: f64) -> impl Iterator<Item = usize> {
         let main = self.main_block_of_pose(photo);
         let commons = self.mounts.commons(photo, Some(at)).into_iter();
-        let others =
-            commons.filter_map(|common| self.blocks.of_common[common]).filter(move |&own| own != main);
-        std::iter::once(main).chain(others)
+        let others = commons
+            .filter_map(|common| Some(self.blocks.of_common[common]?.block))
+            .filter(move |&own| own != main);
+        let mut seen: SmallVec<[usize; 16]> = SmallVec::new();
+        let once = move |&own: &usize| {
+            let new = !seen.contains(&own);
+            if new {
+                seen.push(own);
+            }
+            new
+        };
+        std::iter::once(main).chain(others.filter(once))
     }
 
     /// The first of them, which is that of all poses of a photo.
@@ -39,7 +50,7 @@ impl Bundle {
     fn grounds<'a>(
         &'a self,
         photo: &'a dyn Fn(usize) -> Orientation,
-        common: &'a dyn Fn(usize) -> (Cow<'a, CommonState>, Option<usize>),
+        common: &'a dyn Fn(usize) -> (Cow<'a, CommonState>, Option<InBlock>),
     ) -> Grounds<'a> {
         Grounds { space: self.space, mounts: &self.mounts, photo, common }
     }
@@ -50,13 +61,8 @@ impl Bundle {
             let pose = &unknowns[self.blocks.first[photo]..][..POSE];
             self.orientation(photo, &std::array::from_fn(|k| pose[k]))
         };
-        let common = |common: usize| {
-            let block = self.blocks.of_common[common];
-            let own = block.map_or(&[] as &[f64], |block| {
-                &unknowns[self.blocks.first[block]..self.blocks.first[block + 1]]
-            });
-            (Cow::Owned(self.commons[common].at(own)), block)
-        };
+        let common =
+            |common: usize| (Cow::Owned(self.common_state(common, unknowns)), self.blocks.of_common[common]);
         self.grounds(&own, &common).composed(photo, AT_PHOTO)
     }
 
@@ -78,7 +84,8 @@ impl Bundle {
         Some(Mounted { own, composed })
     }
 
-    /// Writes the equations of an image that is not plain. Out of line, so that plain images do not pay for it.
+    /// Writes the equations of an image that is not plain. Out of line, so that plain images do not pay for it. Its pose is put in the
+    /// place of another.
     #[inline(never)]
     pub(super) fn observe_bent(
         &self,
@@ -86,21 +93,42 @@ impl Bundle {
         group: usize,
         local: usize,
         rows: &mut GroupRows<'_>,
+        own: &mut Composed,
     ) {
-        let image = &self.images[group];
-        let timed = bent.mounted.as_ref().and_then(|mounted| self.timed(mounted, &stations.commons, group));
-        bent.write(self.space, stations, timed.as_ref(), image, local, rows);
+        let timed = self.compose_timed((stations, bent), group, own);
+        bent.write(self.space, stations, timed.then_some(&*own), &self.images[group], local, rows);
     }
 
-    /// The pose of an image that has one of its own.
-    pub(super) fn timed(&self, mounted: &Mounted, commons: &[CommonState], image: usize) -> Option<Composed> {
-        let own = self.images[image].photo;
-        if !self.mounts.are_timed(own) {
-            return None;
-        }
+    /// The point of an image that is not plain, in the axes of its photo.
+    #[inline(never)]
+    pub(super) fn sight_bent(
+        &self,
+        (stations, bent): (&Stations, &Bent),
+        group: usize,
+        local: usize,
+    ) -> Vector3 {
+        let mut own = Composed::new(false);
+        let timed = self.compose_timed((stations, bent), group, &mut own);
+        let (timed, photo) = (timed.then_some(&own.orientation), self.images[group].photo);
+        bent.seen(self.space, stations, timed, photo, local, |orientation, point| orientation.sight(point))
+    }
+
+    fn compose_timed(&self, (stations, bent): (&Stations, &Bent), image: usize, own: &mut Composed) -> bool {
+        bent.mounted.as_ref().is_some_and(|mounted| self.compose(mounted, &stations.commons, image, own))
+    }
+
+    /// Puts the pose of an image that has one of its own in the place of another; false where it has none.
+    pub(super) fn compose(
+        &self,
+        mounted: &Mounted,
+        commons: &[CommonState],
+        image: usize,
+        own: &mut Composed,
+    ) -> bool {
+        let of = self.images[image].photo;
         let photo = |photo: usize| mounted.own[photo];
         let common = |common: usize| (Cow::Borrowed(&commons[common]), self.blocks.of_common[common]);
-        self.grounds(&photo, &common).composed(own, self.time_of(image))
+        self.mounts.are_timed(of) && self.grounds(&photo, &common).compose(of, self.time_of(image), own)
     }
 
     /// How a photo moves; None where it is on no trajectory.
@@ -136,10 +164,11 @@ impl Bundle {
     pub(super) fn mounted_cofactors(
         &self,
         layout: &Layout,
-        Composed { parts, .. }: &Composed,
+        composed: &Composed,
         all: &Cofactors,
     ) -> Matrix6<f64> {
-        let term = |(i, by_i): &(usize, Steps), (j, by_j): &(usize, Steps)| -> Matrix6<f64> {
+        type Part = (usize, Matrix6xX<f64>);
+        let term = |(i, by_i): &Part, (j, by_j): &Part| -> Matrix6<f64> {
             let (rows, columns) = (by_i.ncols(), by_j.ncols());
             let (width, numbers) = if i == j {
                 (self.of_block(*i).len(), Some(self.cofactors_of_block(all, *i)))
@@ -150,7 +179,7 @@ impl Bundle {
             let of = |r: usize, c: usize| numbers.map_or(f64::NAN, |numbers| numbers[width * r + c]);
             by_i * DMatrix::from_fn(rows, columns, of) * by_j.transpose()
         };
-        let mut parts: Vec<&(usize, Steps)> = parts.iter().collect();
+        let mut parts = composed.parts();
         parts.sort_by_key(|part| part.0);
         let mut sum = Matrix6::zeros();
         for (j, part) in parts.iter().enumerate() {

@@ -3,17 +3,16 @@
 use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::{DMatrix, Matrix6};
+use nalgebra::{DMatrix, Matrix6, Matrix6xX};
 
 use super::model::Owner;
-use super::mounts::Composed;
 use super::problem::Assembled;
 use super::state::{InnerConstraints, NetworkDatum, State};
 use super::suspects::Suspects;
 use super::{Network, NetworkError, Options, Solution};
 use crate::Threads;
 use crate::adjustment::{Adjusted, Adjustment, Classes, CofactorError, Datum, Event, Linearized, Phase};
-use crate::geometry::{AttitudeNumbers, Matrix3, POSE, PoseNumbers, Steps};
+use crate::geometry::{AttitudeNumbers, Matrix3, POSE, PoseNumbers};
 use crate::normals::Function;
 
 /// Shares that are more than rounding.
@@ -183,13 +182,12 @@ impl Network {
         let mut of_ties = vec![0; model.tied_images()];
         of_ties.extend(model.observations.iter().map(|tied| class_of(tied.observation.kind())));
         let mut of_unknowns = vec![1; assembled.problem.layout().unknowns()];
-        for block in 0..model.stations() {
-            let class = match model.owner(block) {
+        for (owner, unknowns) in (0..model.stations()).flat_map(|block| model.owners(block)) {
+            of_unknowns[unknowns].fill(match owner {
                 Owner::Photo(_) => 2,
                 Owner::Camera(_) => 3,
                 Owner::Common(_) => 4,
-            };
-            of_unknowns[model.of_block(block)].fill(class);
+            });
         }
         let classes = Classes { count: names.len(), of_ties: &of_ties, of_unknowns: &of_unknowns };
         let shares = assembled.problem.any().resistance(&state.unknowns, &classes, threads);
@@ -390,8 +388,7 @@ impl Covariances {
             Of::Common(common) => {
                 let own = model.commons.get(common).ok_or(NetworkError::NoCommon(common))?;
                 let width = own.kind.unknowns().len();
-                let Some(block) = model.blocks.of_common[common] else { return Ok(vec![vec![]; width]) };
-                let range = model.of_block(block);
+                let Some(range) = model.of_common(common) else { return Ok(vec![vec![]; width]) };
                 let by_unknowns = own.at(&self.linearized.values()[range.clone()]).about_own_axes();
                 let row = |i: usize| range.clone().zip(by_unknowns.row(i).iter().copied()).collect();
                 Ok((0..width).map(row).collect())
@@ -420,13 +417,14 @@ impl Covariances {
     fn mounted(&self, photo: usize, step: bool) -> Vec<Function> {
         let model = &self.assembled.problem.model;
         let unknowns = &self.linearized.values()[model.of_stations()];
-        let Some(Composed { orientation, parts }) = model.composed(photo, unknowns) else { return vec![] };
-        let reported = || model.reported(&orientation).1.unwrap_or_else(|| Matrix6::repeat(f64::NAN));
+        let Some(composed) = model.composed(photo, unknowns) else { return vec![] };
+        let reported =
+            || model.reported(&composed.orientation).1.unwrap_or_else(|| Matrix6::repeat(f64::NAN));
         let to = if step { Matrix6::identity() } else { reported() };
-        let parts: Vec<(usize, Steps)> =
-            parts.iter().map(|(block, by)| (model.of_block(*block).start, to * by)).collect();
+        let of_block = |(block, by): (usize, Matrix6xX<f64>)| (model.of_block(block).start, to * by);
+        let parts: Vec<(usize, Matrix6xX<f64>)> = composed.parts().into_iter().map(of_block).collect();
         let row = |k: usize| -> Function {
-            let of = |(first, by): &(usize, Steps)| -> Function {
+            let of = |(first, by): &(usize, Matrix6xX<f64>)| -> Function {
                 (*first..).zip(by.row(k).iter().copied()).collect()
             };
             parts.iter().flat_map(of).collect()

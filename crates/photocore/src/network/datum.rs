@@ -199,7 +199,7 @@ impl Bundle {
         moved: impl FnOnce(&mut [f64]),
     ) {
         let others = (0..self.commons.len()).filter(|&common| parts.of_common[common] != Some(part));
-        let ranges = others.filter_map(|common| Some(self.of_block(self.blocks.of_common[common]?)));
+        let ranges = others.filter_map(|common| self.of_common(common));
         let retained: Vec<_> = ranges.map(|range| (range.clone(), unknowns[range].to_vec())).collect();
         moved(unknowns);
         retained.into_iter().for_each(|(range, values)| unknowns[range].copy_from_slice(&values));

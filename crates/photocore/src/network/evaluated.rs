@@ -2,6 +2,7 @@
 
 use super::in_lanes::{FEWEST, Sight, write_in_lanes};
 use super::model::Bundle;
+use super::mounts::Composed;
 use super::parts::MOTIONS;
 use super::stations::{Station, Stations, write};
 use crate::adjustment::{Evaluated, Model, Motions, Term};
@@ -26,7 +27,7 @@ impl Bundle {
                 let point = &stations.points[local];
                 each_camera!(camera, camera => write(orientation, camera, point, image, rows));
             }
-            Some(bent) => self.observe_bent((stations, bent), group, local, rows),
+            Some(bent) => self.observe_bent((stations, bent), group, local, rows, &mut Composed::new(true)),
         }
     }
 
@@ -129,8 +130,17 @@ impl Evaluated for At<'_> {
             let (image, sd) = (&bundle.images[group], [sd[2 * group], sd[2 * group + 1]]);
             Sight { point: &stations.points[locals[t] as usize], image, sd }
         };
+        if let Some(bent) = &stations.bent {
+            let mut pose = Composed::new(true);
+            for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
+                let mut own = rows.part(t, locals.len());
+                bundle.observe_bent((stations, bent), group as usize, local as usize, &mut own, &mut pose);
+                own.weigh(&sd[2 * group as usize..][..2]);
+            }
+            return true;
+        }
         // The main block of an image that is not mounted is its photo.
-        stations.bent.is_none() && locals.len() >= FEWEST && {
+        locals.len() >= FEWEST && {
             let Station { orientation, camera } = &stations.photos[bundle.images[groups[0] as usize].photo];
             each_camera!(camera, camera => write_in_lanes(orientation, camera, locals.len(), &sight, rows))
         }
@@ -138,12 +148,12 @@ impl Evaluated for At<'_> {
 
     fn misclose(&self, local: usize, group: usize, constant: &mut [f64]) -> bool {
         let Self { bundle, stations } = self;
-        if stations.bent.is_some() {
-            return false;
-        }
         let image = &bundle.images[group];
         let Station { orientation, camera } = &stations.photos[image.photo];
-        let u = orientation.sight(&stations.points[local]);
+        let u = match &stations.bent {
+            None => orientation.sight(&stations.points[local]),
+            Some(bent) => bundle.sight_bent((stations, bent), group, local),
+        };
         constant.copy_from_slice(&each_camera!(camera, camera => camera.compare(&u, image.xy).0));
         true
     }

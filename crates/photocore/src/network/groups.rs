@@ -130,9 +130,9 @@ impl Covariances {
                 of[first + unknown] = group;
             }
         }
-        for block in 0..model.stations() {
-            let unknowns = model.of_block(block).map(|unknown| first + unknown);
-            match model.owner(block) {
+        for (owner, unknowns) in (0..model.stations()).flat_map(|block| model.owners(block)) {
+            let unknowns = unknowns.map(|unknown| first + unknown);
+            match owner {
                 Owner::Photo(photo) => {
                     let own = groups.photos[photo].into_iter();
                     let camera = groups.cameras[self.camera_of_photo[photo]];

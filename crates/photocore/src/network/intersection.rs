@@ -2,7 +2,8 @@
 
 use super::median::median;
 use super::model::Bundle;
-use super::stations::{Placed, Station};
+use super::mounts::Composed;
+use super::stations::{Mounted, Placed, Station};
 use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Point, Ray, Vector3};
 use crate::parallel;
@@ -53,9 +54,12 @@ impl Bundle {
         let Placed { photos, commons, mounted } = placed;
         let ray = move |image: usize| {
             let (own, photo) = (&self.images[image], &photos[self.images[image].photo]);
-            match mounted.as_ref().and_then(|mounted| self.timed(mounted, commons, image)) {
-                None => photo.ray(own.xy),
-                Some(composed) => Station { orientation: composed.orientation, ..*photo }.ray(own.xy),
+            let mut pose = Composed::new(false);
+            let compose = |mounted: &Mounted| self.compose(mounted, commons, image, &mut pose);
+            if mounted.as_ref().is_some_and(compose) {
+                Station { orientation: pose.orientation, ..*photo }.ray(own.xy)
+            } else {
+                photo.ray(own.xy)
             }
         };
         (self.point_images.start[point]..self.point_images.start[point + 1]).filter_map(ray)

@@ -41,7 +41,7 @@ impl Surroundings {
                 BlockOf::Camera(camera) => {
                     model.blocks.shared.binary_search(&camera).ok().map(|shared| photos + shared)
                 }
-                BlockOf::Common(common) => model.blocks.of_common[common],
+                BlockOf::Common(common) => model.blocks.of_common[common].map(|own| own.block),
                 BlockOf::Point(point) => {
                     tied.iter().position(|&own| own == point).map(|place| model.stations() + place)
                 }

@@ -3,7 +3,9 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use super::blocks::Blocks;
+use nalgebra::DMatrix;
+
+use super::blocks::{Blocks, InBlock};
 use super::camera_priors::CameraPrior;
 use super::commons::{CommonState, PlacedCommon};
 use super::mounts::{AT_PHOTO, Mounts};
@@ -171,7 +173,8 @@ impl Bundle {
     pub fn blocks_of(&self, touches: &Touches) -> Vec<usize> {
         let points = touches.points.iter().map(|&point| self.block_of_point(point));
         let photos = touches.photos.iter().flat_map(|&photo| self.blocks_of_pose(photo, AT_PHOTO));
-        let commons = touches.commons.iter().filter_map(|&(common, _)| self.blocks.of_common[common]);
+        let commons =
+            touches.commons.iter().filter_map(|&(common, _)| Some(self.blocks.of_common[common]?.block));
         let mut blocks: Vec<usize> = points.chain(photos).chain(commons).collect();
         blocks.sort_unstable();
         blocks.dedup();
@@ -214,15 +217,17 @@ impl Bundle {
         };
         let mounted = stations.bent.as_ref().and_then(|bent| bent.mounted.as_ref());
         let photo = |photo: usize| match mounted.and_then(|mounted| mounted.of(photo)) {
-            None => PhotoSite { orientation: &stations.photos[photo].orientation, block: photo, parts: &[] },
+            None => {
+                PhotoSite { orientation: &stations.photos[photo].orientation, block: photo, made_of: None }
+            }
             Some(own) => {
                 let block = self.main_block_of_pose(photo);
-                PhotoSite { orientation: &own.orientation, block, parts: &own.parts }
+                PhotoSite { orientation: &own.orientation, block, made_of: Some(own) }
             }
         };
         let common = |common: usize| CommonSite {
             state: &stations.commons[common],
-            block: self.blocks.of_common[common],
+            place: self.blocks.of_common[common],
         };
         let moving =
             |photo: usize| self.moving(stations.bent.as_ref()?.mounted.as_ref()?, &stations.commons, photo);
@@ -264,34 +269,57 @@ impl Bundle {
 
     /// The common unknowns at given values of the same unknowns.
     pub fn common_states(&self, unknowns: &[f64]) -> Vec<CommonState> {
-        let values = |block: Option<usize>| {
-            block.map_or(&[] as &[f64], |block| {
-                &unknowns[self.blocks.first[block]..self.blocks.first[block + 1]]
-            })
-        };
-        self.commons
-            .iter()
-            .zip(&self.blocks.of_common)
-            .map(|(common, &block)| common.at(values(block)))
-            .collect()
+        (0..self.commons.len()).map(|common| self.common_state(common, unknowns)).collect()
     }
 
-    /// What a photo's, shared camera's or common unknown's block belongs to.
-    pub fn owner(&self, block: usize) -> Owner {
+    /// One of them.
+    pub fn common_state(&self, common: usize, unknowns: &[f64]) -> CommonState {
+        let start = 3 * self.locals;
+        let own = self.of_common(common).map_or(0..0, |own| own.start - start..own.end - start);
+        self.commons[common].at(&unknowns[own])
+    }
+
+    /// The unknowns of a common unknown, of all; None where it is known.
+    pub fn of_common(&self, common: usize) -> Option<Range<usize>> {
+        let InBlock { block, first, .. } = self.blocks.of_common[common]?;
+        let start = self.of_block(block).start + first;
+        Some(start..start + self.commons[common].kind.unknowns().len())
+    }
+
+    /// What a block of photos, shared cameras and common unknowns belongs to, with the unknowns of each, of all.
+    pub fn owners(&self, block: usize) -> Vec<(Owner, Range<usize>)> {
         let (photos, cameras) = (self.cameras.len(), self.blocks.shared.len());
         if block < photos {
-            Owner::Photo(block)
+            vec![(Owner::Photo(block), self.of_block(block))]
         } else if block < photos + cameras {
-            Owner::Camera(self.blocks.shared[block - photos])
+            vec![(Owner::Camera(self.blocks.shared[block - photos]), self.of_block(block))]
         } else {
-            let own = self.blocks.of_common.iter().position(|&own| own == Some(block));
-            Owner::Common(own.unwrap_or_default())
+            let own = self.blocks.commons[block - photos - cameras].iter();
+            own.filter_map(|&common| Some((Owner::Common(common), self.of_common(common)?))).collect()
         }
+    }
+
+    /// What one of their unknowns, of all, belongs to, and its number there; None for those of points.
+    pub fn owner(&self, unknown: usize) -> Option<(Owner, usize)> {
+        let all = self.of_stations();
+        let retained = all.contains(&unknown).then(|| unknown - all.start)?;
+        let block = self.blocks.first.partition_point(|&start| start <= retained) - 1;
+        let own = self.owners(block).into_iter().find(|(_, range)| range.contains(&unknown));
+        own.map(|(owner, range)| (owner, unknown - range.start))
     }
 
     /// The cofactors of such a block.
     pub fn cofactors_of_block<'a>(&self, all: &'a Cofactors, block: usize) -> &'a [f64] {
         &all.retained[self.blocks.squares[block]..self.blocks.squares[block + 1]]
+    }
+
+    /// The cofactors of a common unknown; none where it is known.
+    pub fn cofactors_of_common(&self, all: &Cofactors, common: usize) -> DMatrix<f64> {
+        let Some(InBlock { block, first, width }) = self.blocks.of_common[common] else {
+            return DMatrix::zeros(0, 0);
+        };
+        let (own, count) = (self.cofactors_of_block(all, block), self.commons[common].kind.unknowns().len());
+        DMatrix::from_fn(count, count, |i, j| own[width * (first + i) + first + j])
     }
 
     /// The orientation of a photo, its pose given, with the columns of its unknowns.

@@ -37,10 +37,12 @@ impl NetworkError {
         let of_stations = |blocks: &Vec<usize>| {
             let mut found = Combination::default();
             for &block in blocks.iter().filter(|&&block| block < stations) {
-                match model.owner(block) {
-                    Owner::Photo(photo) => found.photos.push(photo),
-                    Owner::Camera(camera) => found.cameras.push(camera),
-                    Owner::Common(common) => found.commons.push(common),
+                for (owner, _) in model.owners(block) {
+                    match owner {
+                        Owner::Photo(photo) => found.photos.push(photo),
+                        Owner::Camera(camera) => found.cameras.push(camera),
+                        Owner::Common(common) => found.commons.push(common),
+                    }
                 }
             }
             (found != Combination::default()).then_some(found)

@@ -187,14 +187,13 @@ impl Trial {
     fn unknown(&self, unknown: usize) -> (UnknownOf, usize) {
         let (model, points) = (&self.assembled.problem.model, &self.assembled.points);
         let stations = model.of_stations();
-        if let Some(retained) = stations.contains(&unknown).then(|| unknown - stations.start) {
-            let block = model.blocks.first.partition_point(|&start| start <= retained) - 1;
-            let of = match model.owner(block) {
+        if let Some((owner, number)) = model.owner(unknown) {
+            let of = match owner {
                 Owner::Photo(photo) => UnknownOf::Photo(photo),
                 Owner::Camera(camera) => UnknownOf::Camera(camera),
                 Owner::Common(common) => UnknownOf::Common(common),
             };
-            return (of, retained - model.blocks.first[block]);
+            return (of, number);
         }
         let among = if unknown < stations.start { unknown } else { unknown - stations.len() };
         (UnknownOf::Point(points[among / 3]), among % 3)

@@ -276,10 +276,7 @@ fn of_common(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)
 
 /// What an unknown belongs to, and its number there; None for unknowns of points.
 fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(Owner, usize)> {
-    let all = model.of_stations();
-    let retained = all.contains(&unknown).then(|| unknown - all.start)?;
-    let block = model.blocks.first.partition_point(|&start| start <= retained) - 1;
-    Some((model.owner(block), retained - model.blocks.first[block]))
+    model.owner(unknown)
 }
 
 /// The observations beside images.

@@ -56,11 +56,9 @@ impl Network {
         for &camera in &model.blocks.shared {
             all.extend(self.cameras[camera].sd.iter().map(|&sd| if used[camera] { sd } else { 0.0 }));
         }
-        for (common, own) in
-            self.commons.iter().enumerate().filter(|&(i, _)| model.blocks.of_common[i].is_some())
-        {
+        for &common in model.blocks.commons.iter().flatten() {
             let is_used = model.commons[common].uses > 0 || elsewhere.contains(&common);
-            all.extend(own.sd.iter().map(|&sd| if is_used { sd } else { 0.0 }));
+            all.extend(self.commons[common].sd.iter().map(|&sd| if is_used { sd } else { 0.0 }));
         }
         all
     }

@@ -4,9 +4,7 @@ use super::Image;
 use super::commons::CommonState;
 use super::mounts::Composed;
 use crate::geometry::camera::each_camera;
-use crate::geometry::{
-    self, Camera, CameraModel, ObjectSpace, Orientation, POSE, Ray, Refraction, Steps, Vertical,
-};
+use crate::geometry::{self, Camera, CameraModel, ObjectSpace, Orientation, POSE, Ray, Refraction, Vertical};
 use crate::normals::GroupRows;
 
 /// Photos and points at given values of the unknowns.
@@ -84,52 +82,40 @@ impl Bent {
         local: usize,
         rows: &mut GroupRows<'_>,
     ) {
-        let Station { orientation, camera } = &stations.photos[image.photo];
         let composed = timed.or_else(|| self.mounted.as_ref()?.of(image.photo));
-        let mut orientation = composed.map_or(*orientation, |own| own.orientation);
-        let mut point = stations.points[local];
-        if let Some(Refracted { refraction, at_photos, at_points }) = &self.refracted {
-            let from = timed.map(|_| refraction.vertical(space, space.coordinates(orientation.centre())));
-            let from = from.as_ref().unwrap_or(&at_photos[image.photo]);
-            let lift = refraction.lift(&orientation, from, &point, &at_points[local]);
-            (orientation, point) = (orientation.under(&lift), point.lifted(&lift));
-        }
-        let write = |rows: &mut GroupRows<'_>| {
-            each_camera!(camera, camera => write(&orientation, camera, &point, image, rows));
-        };
-        match composed {
-            None => write(rows),
-            Some(composed) => composed.write(rows, write),
-        }
-    }
-}
-
-impl Composed {
-    /// Writes an image: `write` does so as if its photo had six unknowns of its own. They are those of the parts, of which the first is the
-    /// main block and the others the first of what is common with others; the camera is the last of that.
-    fn write(&self, rows: &mut GroupRows<'_>, write: impl FnOnce(&mut GroupRows<'_>)) {
-        let (main, common) = (rows.retained.len() / 2, rows.shared.len() / 2);
-        let parts: usize = self.parts[1..].iter().map(|(_, steps)| steps.ncols()).sum();
-        let (mut pose, mut camera) = ([0.0; 2 * POSE], vec![0.0; 2 * (common - parts)]);
-        let (constant, local) = (&mut *rows.constant, &mut *rows.local);
-        write(&mut GroupRows { constant, local, retained: &mut pose, shared: &mut camera });
-        rows.retained.fill(0.0);
-        for (row, pose) in pose.as_chunks::<POSE>().0.iter().enumerate() {
-            let by = |steps: &Steps, to: &mut [f64]| {
-                let columns = steps.column_iter();
-                to.iter_mut()
-                    .zip(columns)
-                    .for_each(|(to, by)| *to = pose.iter().zip(&by).map(|(a, b)| a * b).sum());
+        let camera = &stations.photos[image.photo].camera;
+        let timed = timed.map(|own| &own.orientation);
+        self.seen(space, stations, timed, image.photo, local, |orientation, point| {
+            let write = |rows: &mut GroupRows<'_>| {
+                each_camera!(camera, camera => write(orientation, camera, point, image, rows));
             };
-            by(&self.parts[0].1, &mut rows.retained[main * row..][..main]);
-            let mut rest = &mut rows.shared[common * row..][..common];
-            for (_, steps) in &self.parts[1..] {
-                let (own, after) = rest.split_at_mut(steps.ncols());
-                by(steps, own);
-                rest = after;
+            match composed {
+                None => write(rows),
+                Some(composed) => composed.write(rows, write),
             }
-            rest.copy_from_slice(&camera[rest.len() * row..][..rest.len()]);
-        }
+        });
+    }
+
+    /// Hands over what a photo sees of a point, and from where; `timed` is its pose where that is not the one at its time.
+    pub fn seen<T>(
+        &self,
+        space: ObjectSpace,
+        stations: &Stations,
+        timed: Option<&Orientation>,
+        photo: usize,
+        local: usize,
+        take: impl FnOnce(&Orientation, &geometry::Point) -> T,
+    ) -> T {
+        let at_photo = || Some(&self.mounted.as_ref()?.of(photo)?.orientation);
+        let orientation = timed.or_else(at_photo).unwrap_or(&stations.photos[photo].orientation);
+        let point = &stations.points[local];
+        let Some(Refracted { refraction, at_photos, at_points }) = &self.refracted else {
+            return take(orientation, point);
+        };
+        let from = timed.map(|_| refraction.vertical(space, space.coordinates(orientation.centre())));
+        let from = from.as_ref().unwrap_or(&at_photos[photo]);
+        let lift = refraction.lift(orientation, from, point, &at_points[local]);
+        take(&orientation.under(&lift), &point.lifted(&lift))
     }
 }
 

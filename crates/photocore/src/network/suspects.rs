@@ -161,13 +161,16 @@ fn of_blocks(assembled: &Assembled, camera_of_photo: &dyn Fn(usize) -> usize) ->
         let subject = Subject::Camera(camera_of_photo(photo));
         weighted(assembled, subject, Home::Block(photo), block.start + 6..block.end)
     });
-    let shared = (model.cameras.len()..model.stations()).filter_map(|block| {
-        let subject = match model.owner(block) {
-            Owner::Camera(camera) => Subject::Camera(camera),
-            Owner::Common(common) => Subject::Common(common),
-            Owner::Photo(_) => return None,
-        };
-        weighted(assembled, subject, Home::Block(block), model.of_block(block))
+    let shared = (model.cameras.len()..model.stations()).flat_map(|block| {
+        let all = model.owners(block).into_iter();
+        all.filter_map(move |(owner, unknowns)| {
+            let subject = match owner {
+                Owner::Camera(camera) => Subject::Camera(camera),
+                Owner::Common(common) => Subject::Common(common),
+                Owner::Photo(_) => return None,
+            };
+            weighted(assembled, subject, Home::Block(block), unknowns)
+        })
     });
     own.chain(shared).collect()
 }

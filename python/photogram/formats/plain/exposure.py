@@ -196,10 +196,16 @@ def exposure_columns(
     Raises
     ------
     InputError
-        A shutter whose edges are no image coordinates of tables.
+        A shutter whose edges are no image coordinates of tables, a line of sensors that is not straight.
     """
     lines = [each if isinstance(each, LineSensor) else None for each in exposures]
     own = [each if isinstance(each, Shutter) else None for each in exposures]
+    for camera, line in zip(cameras, lines, strict=True):
+        if line is not None and not line.is_straight:
+            what = "is bent" if line.lens is None else f"is behind a lens {line.lens.model}"
+            raise InputError(
+                f"the line of sensors of the camera {camera.title} {what}, which tables of cameras cannot say"
+            )
     found = _line_columns(lines) if any(lines) else {}
     return found | _shutter_columns(cameras, own, sizes, pixel_mm, image_y) if any(own) else found
 

@@ -1,5 +1,7 @@
 //! Functions of time.
 
+use std::ops::Range;
+
 use smallvec::SmallVec;
 
 use crate::geometry::Vector3;
@@ -18,8 +20,13 @@ pub trait BasisModel: Sized {
     /// How many functions there are.
     fn count(&self) -> usize;
 
-    /// Those that are not zero at a time, and how they change.
-    fn at(&self, time: f64) -> Active;
+    /// Puts those that are not zero at a time, and how they change, in the place of others.
+    fn put(&self, time: f64, all: &mut Active);
+
+    /// The numbers of those.
+    fn active(&self, _time: f64) -> Range<usize> {
+        0..self.count()
+    }
 
     /// Whether it is a basis at all: numbers that can be taken, knots that do not decrease.
     fn is_sound(&self) -> bool;

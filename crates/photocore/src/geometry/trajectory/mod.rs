@@ -18,7 +18,7 @@ use self::functions::ALWAYS;
 pub use functions::{Active, BasisModel};
 pub use table::{Attitudes, Interpolation, Positions};
 
-use super::angle_axis::{angle_axis_rotation, right_jacobian, right_jacobian_rate};
+use super::angle_axis::{angle_axis_with_jacobian, right_jacobian_rate};
 use super::{Matrix3, Pose, Vector3};
 
 macro_rules! bases {
@@ -53,11 +53,20 @@ macro_rules! bases {
                 }
             }
 
-            /// See [`BasisModel::at`].
+            /// Those functions that are not zero at a time.
             pub fn at(&self, time: f64) -> Active {
+                let mut all = Active::default();
                 match self {
-                    Self::None => Active::default(),
-                    $(Self::$name(own) => own.at(time),)*
+                    Self::None => {}
+                    $(Self::$name(own) => own.put(time, &mut all),)*
+                }
+                all
+            }
+
+            fn active(&self, time: f64) -> Range<usize> {
+                match self {
+                    Self::None => 0..0,
+                    $(Self::$name(own) => own.active(time),)*
                 }
             }
 
@@ -100,14 +109,9 @@ impl Basis {
 
     /// The numbers of the functions that are not zero at a time or, where that is not known exactly, near it.
     pub fn near(&self, time: f64, exactly: bool) -> Range<usize> {
-        let of = |time: f64| {
-            let found = self.at(time);
-            found.first..found.first + found.values.len()
-        };
         match self.reach() {
-            Some(reach) if !exactly => of(time - reach).start..of(time + reach).end,
-            Some(_) => of(time),
-            None => 0..self.count(),
+            Some(reach) if !exactly => self.active(time - reach).start..self.active(time + reach).end,
+            _ => self.active(time),
         }
     }
 }
@@ -143,8 +147,10 @@ pub struct Trajectory {
 pub struct Flight {
     /// Pose, velocity and rate.
     pub motion: Motion,
-    position: Active,
-    rotation: Active,
+    /// The functions that the position is made of.
+    pub position: Active,
+    /// The same of the rotation.
+    pub rotation: Active,
     /// The axes of the coefficients of positions, as columns: the identity, or those of the table in the body's.
     pub axes: Matrix3,
     /// How these turn.
@@ -163,7 +169,8 @@ impl Trajectory {
         let (turn, turn_rate) = rotation.sums(r);
         let (place, speed) = self.positions.at(time);
         let (attitude, rate) = self.attitudes.at(time);
-        let (exp, jacobian) = (angle_axis_rotation(&turn), right_jacobian(&turn));
+        let (exp, left) = angle_axis_with_jacobian(&turn);
+        let jacobian = left.transpose();
         let mut pose = Pose { position: place + shift, attitude: attitude * exp };
         let mut velocity = speed + drift;
         let mut rate = exp.tr_mul(&rate) + jacobian * turn_rate;
@@ -203,16 +210,6 @@ impl Trajectory {
 }
 
 impl Flight {
-    /// B_k and the partials of C by c_k.
-    pub fn by_position(&self, k: usize) -> Matrix3 {
-        self.position.value(k) * self.axes
-    }
-
-    /// The partials of rho by r_k: `B_k Jr(r)`.
-    pub fn by_rotation(&self, k: usize) -> Matrix3 {
-        self.rotation.value(k) * self.jacobian
-    }
-
     /// The partials of C' by c_k.
     pub fn velocity_by_position(&self, k: usize) -> Matrix3 {
         let still = Matrix3::from_diagonal_element(self.position.rate(k));

@@ -30,9 +30,8 @@ impl BasisModel for Polynomial {
         self.reference.is_finite() && self.scale.is_finite() && self.scale > 0.0
     }
 
-    fn at(&self, time: f64) -> Active {
+    fn put(&self, time: f64, all: &mut Active) {
         let s = (time - self.reference) / self.scale;
-        let mut all = Active::default();
         let (mut power, mut rate) = (1.0, 0.0);
         for k in 0..=self.degree {
             all.values.push(power);
@@ -40,6 +39,5 @@ impl BasisModel for Polynomial {
             rate = (k + 1) as f64 * power / self.scale;
             power *= s;
         }
-        all
     }
 }

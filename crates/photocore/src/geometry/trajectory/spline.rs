@@ -1,5 +1,7 @@
 //! Corrections that are splines in time.
 
+use std::ops::Range;
+
 use smallvec::{SmallVec, smallvec};
 
 use super::functions::{Active, BasisModel};
@@ -61,7 +63,7 @@ impl BasisModel for Spline {
             && knots[self.degree] < knots[self.count()]
     }
 
-    fn at(&self, time: f64) -> Active {
+    fn put(&self, time: f64, all: &mut Active) {
         let (p, interval) = (self.degree, self.interval(time));
         let before = self.lower(interval, p - 1, time);
         let mut rates: SmallVec<[f64; 6]> = smallvec![0.0; p + 1];
@@ -73,7 +75,12 @@ impl BasisModel for Spline {
                 rates[j + 1] += p as f64 * value / length;
             }
         }
-        Active { first: interval - p, values: self.lower(interval, p, time), rates }
+        *all = Active { first: interval - p, values: self.lower(interval, p, time), rates };
+    }
+
+    fn active(&self, time: f64) -> Range<usize> {
+        let interval = self.interval(time);
+        interval - self.degree..interval + 1
     }
 
     fn span(&self) -> (f64, f64) {

@@ -48,17 +48,15 @@ impl Network {
                 redundancy: vec![missing; width],
                 observations: model.commons[index].uses,
             };
-            let Some(block) = model.blocks.of_common[index] else { return found };
-            let range = model.of_block(block);
+            let Some(range) = model.of_common(index) else { return found };
             found.change = unknowns[range.clone()].to_vec();
             (found.position, found.attitude) = model.commons[index].reported(state);
             if found.observations == 0 {
                 return found;
             }
             if let Some(all) = &adjustment.cofactors {
-                let own = model.cofactors_of_block(all, block);
                 let steps = state.about_own_axes();
-                let own = &steps * DMatrix::from_row_slice(width, width, own) * steps.transpose();
+                let own = &steps * model.cofactors_of_common(all, index) * steps.transpose();
                 found.cofactors = (&own + own.transpose()) / 2.0;
             }
             if let Some(all) = &adjustment.prior_redundancy {

@@ -98,21 +98,20 @@ impl Bundle {
         each: impl Fn(&PlacedCommon, &CommonState) -> Vec<f64>,
         unknowns: &mut [f64],
     ) {
-        let all = self.commons.iter().zip(&placed.commons).zip(&self.blocks.of_common);
-        for ((common, state), &block) in all.filter(|((common, _), _)| !common.moves_against()) {
-            if let Some(block) = block {
-                unknowns[self.of_block(block)].copy_from_slice(&each(common, state));
+        let all = self.commons.iter().zip(&placed.commons).enumerate();
+        for (number, (common, state)) in all.filter(|(_, (common, _))| !common.moves_against()) {
+            if let Some(own) = self.of_common(number) {
+                unknowns[own].copy_from_slice(&each(common, state));
             }
         }
         for (pair, antennas) in self.antennas(placed) {
             let displaced = antennas.iter().map(|&(place, time)| ((motion.displacement)(&place), time));
             for (common, moved) in pair.into_iter().zip(line(displaced, pair.map(|own| own.is_some()))) {
-                let Some((common, block)) = common.and_then(|own| Some((own, self.blocks.of_common[own]?)))
-                else {
+                let Some((common, range)) = common.and_then(|own| Some((own, self.of_common(own)?))) else {
                     continue;
                 };
                 let own = placed.commons[common].attitude().tr_mul(&moved);
-                let values = &mut unknowns[self.of_block(block)];
+                let values = &mut unknowns[range];
                 values.iter_mut().zip(own.iter()).for_each(|(value, moved)| *value -= moved);
             }
         }

@@ -3,13 +3,19 @@
 //! Each kind is a file with a type that implements [`MountModel`], and a line of `kinds!` below. A pose is handed on from mount to mount
 //! with the list of the blocks that it is made of, and how it steps with the unknowns of each.
 
+mod chain;
+
 use std::borrow::Cow;
 use std::ops::Deref;
 
 use nalgebra::{Matrix3xX, Matrix6};
 
+use super::blocks::InBlock;
 use super::commons::{Common, CommonKind, CommonState};
-use crate::geometry::{self, ObjectSpace, Orientation, POSE, Pose, Steps, Vector3, steps};
+use crate::geometry::{self, ObjectSpace, Orientation, POSE, Vector3};
+
+pub use chain::Chain;
+pub(super) use chain::Composed;
 
 /// The photos themselves: the time of their images counts from theirs (see [`OnTrajectory`]).
 pub(super) const AT_PHOTO: f64 = 0.0;
@@ -23,6 +29,14 @@ pub struct Trajectory {
     pub position: Vec<usize>,
     /// The same of rotations.
     pub rotation: Vec<usize>,
+}
+
+impl Trajectory {
+    /// The common unknowns that are the coefficients of functions that are never zero.
+    pub fn everywhere(&self) -> impl Iterator<Item = usize> {
+        let own = [(&self.course.position, &self.position), (&self.course.rotation, &self.rotation)];
+        own.into_iter().filter(|(basis, _)| !basis.is_local()).flat_map(|(_, all)| all.iter().copied())
+    }
 }
 
 /// How the pose of a photo, or of its images, follows from another pose and from common unknowns.
@@ -56,9 +70,9 @@ pub trait MountModel {
         false
     }
 
-    /// Where it replaces: the common unknown that every pose begins with, and that no other is made of besides; None where there is none.
-    fn main(&self, _known: &Mounts) -> Option<usize> {
-        None
+    /// Where it replaces: the common unknowns that every pose is made of, and that stand in one block.
+    fn everywhere<'a>(&self, _known: &'a Mounts) -> Box<dyn Iterator<Item = usize> + 'a> {
+        Box::new(std::iter::empty())
     }
 
     /// Whether images of one photo have poses of their own.
@@ -184,10 +198,11 @@ impl Mounts {
 
     /// The main block of a pose, given those of common unknowns: that of its carrier, also where the six of that count for nothing and no
     /// common unknown stands for them.
-    pub(super) fn main_block(&self, photo: usize, block: &dyn Fn(usize) -> Option<usize>) -> usize {
+    pub(super) fn main_block(&self, photo: usize, block: &dyn Fn(usize) -> Option<InBlock>) -> usize {
         let carrier = self.carrier(photo);
         let replacing = self.of(carrier).iter().find(|mount| mount.replaces());
-        replacing.and_then(|mount| mount.main(self)).and_then(block).unwrap_or(carrier)
+        let own = replacing.and_then(|mount| mount.everywhere(self).find_map(block));
+        own.map_or(carrier, |own| own.block)
     }
 
     /// The common unknowns that a pose is made of, each once; None for all of a photo.
@@ -214,38 +229,6 @@ impl Mounts {
     }
 }
 
-/// A pose on the way from mount to mount.
-#[derive(Debug)]
-pub struct Chain {
-    pose: Pose,
-    /// The retained blocks that it is made of, and how it steps with the first unknowns of each.
-    steps: Vec<(usize, Steps)>,
-}
-
-impl Chain {
-    /// Goes on to a pose that is given in the axes of this one, and there steps so with unknowns of a block.
-    pub fn lead_to(&mut self, inner: &Pose, own: Option<(usize, Steps)>) {
-        self.steps.iter_mut().for_each(|(_, steps)| *steps = self.pose.carried(inner, steps));
-        if let Some((block, steps)) = own {
-            self.add(block, self.pose.carrying(&steps));
-        }
-        self.pose = self.pose.of_inner(inner);
-    }
-
-    /// Goes on from a pose that nothing before has made.
-    pub fn stand(&mut self, pose: Pose) {
-        *self = Self { pose, steps: vec![] };
-    }
-
-    /// Steps so with the first unknowns of a block, besides.
-    pub fn add(&mut self, block: usize, steps: Steps) {
-        match self.steps.iter_mut().find(|own| own.0 == block) {
-            Some((_, all)) => *all += steps,
-            None => self.steps.push((block, steps)),
-        }
-    }
-}
-
 /// How a photo on a trajectory moves, in the axes of the object space and about its own.
 #[derive(Debug, Clone)]
 pub struct Moving {
@@ -253,19 +236,10 @@ pub struct Moving {
     pub velocity: Vector3,
     /// w, in radians in a second.
     pub rate: Vector3,
-    /// The partials of C' by the first unknowns of retained blocks.
-    pub velocity_by: Vec<(usize, Matrix3xX<f64>)>,
+    /// The partials of C' by unknowns of retained blocks.
+    pub velocity_by: Vec<(InBlock, Matrix3xX<f64>)>,
     /// The same of w.
-    pub rate_by: Vec<(usize, Matrix3xX<f64>)>,
-}
-
-/// A pose that is made of the unknowns of several blocks.
-#[derive(Debug, Clone)]
-pub(super) struct Composed {
-    /// With six unknowns of its own: its coordinates and a rotation about its axes.
-    pub orientation: Orientation,
-    /// The retained blocks, and how these six step with the first unknowns of each: the main one, then those of common unknowns.
-    pub parts: Vec<(usize, Steps)>,
+    pub rate_by: Vec<(InBlock, Matrix3xX<f64>)>,
 }
 
 /// What poses are composed of, at given values of the unknowns.
@@ -274,8 +248,8 @@ pub struct Grounds<'a> {
     pub(super) mounts: &'a Mounts,
     /// Photos as their own six unknowns have them.
     pub(super) photo: &'a dyn Fn(usize) -> Orientation,
-    /// Common unknowns, and the block of each unless it is known.
-    pub(super) common: &'a dyn Fn(usize) -> (Cow<'a, CommonState>, Option<usize>),
+    /// Common unknowns, and where each is unless it is known.
+    pub(super) common: &'a dyn Fn(usize) -> (Cow<'a, CommonState>, Option<InBlock>),
 }
 
 impl Grounds<'_> {
@@ -284,29 +258,33 @@ impl Grounds<'_> {
         self.mounts
     }
 
-    /// A common unknown, and its block unless it is known.
-    pub fn common(&self, common: usize) -> (Cow<'_, CommonState>, Option<usize>) {
+    /// A common unknown, and where it is unless it is known.
+    pub fn common(&self, common: usize) -> (Cow<'_, CommonState>, Option<InBlock>) {
         (self.common)(common)
     }
 
     /// A pose of a photo; None where nothing but its six unknowns counts.
     pub(super) fn composed(&self, photo: usize, at: f64) -> Option<Composed> {
+        let mut own = Composed::new(true);
+        self.compose(photo, at, &mut own).then_some(own)
+    }
+
+    /// The same put in the place of another; false where nothing but its six unknowns counts.
+    pub(super) fn compose(&self, photo: usize, at: f64, own: &mut Composed) -> bool {
         if self.mounts.of(photo).is_empty() {
-            return None;
+            return false;
         }
-        let Chain { pose, steps } = self.chain(photo, at);
-        let orientation = Orientation::of_pose(self.space, &pose);
-        let mut parts = steps;
-        // In rectangular space they step as the pose does.
-        if orientation.stepping_pose().is_none() {
-            let unknowns = orientation.unknowns_by_step().unwrap_or_else(|| Matrix6::repeat(f64::NAN));
-            parts.iter_mut().for_each(|(_, steps)| *steps = unknowns * &*steps);
+        let Composed { orientation, chain, .. } = own;
+        self.lead(photo, at, chain);
+        *orientation = Orientation::of_pose(self.space, chain.pose());
+        if chain.steps() {
+            // In rectangular space its unknowns step as the pose does.
+            if orientation.stepping_pose().is_none() {
+                chain.lead_by(&orientation.unknowns_by_step().unwrap_or_else(|| Matrix6::repeat(f64::NAN)));
+            }
+            own.number(self.mounts.main_block(photo, &|common| (self.common)(common).1));
         }
-        let main = self.mounts.main_block(photo, &|common| (self.common)(common).1);
-        if parts.first().map(|part| part.0) != Some(main) {
-            parts.insert(0, (main, Steps::zeros(POSE)));
-        }
-        Some(Composed { orientation, parts })
+        true
     }
 
     /// How a photo moves; None where it is on no trajectory, or on a frame that is.
@@ -317,16 +295,19 @@ impl Grounds<'_> {
         }
     }
 
-    fn chain(&self, photo: usize, at: f64) -> Chain {
+    /// Leads from mount to mount to a pose.
+    fn lead(&self, photo: usize, at: f64, chain: &mut Chain) {
         let carrier = self.mounts.carrier(photo);
-        let mut chain = if carrier == photo {
+        if carrier != photo {
+            self.lead(carrier, at, chain);
+        } else if !self.mounts.is_replaced(photo) {
             let own = (self.photo)(photo);
-            Chain { pose: *own.pose(), steps: vec![(photo, steps(own.steps()))] }
-        } else {
-            self.chain(carrier, at)
-        };
-        self.mounts.of(photo).iter().for_each(|mount| mount.compose(at, self, &mut chain));
-        chain
+            chain.stand(*own.pose());
+            if chain.steps() {
+                chain.add([(InBlock::whole(photo, POSE), 1.0)].into_iter(), own.steps());
+            }
+        }
+        self.mounts.of(photo).iter().for_each(|mount| mount.compose(at, self, chain));
     }
 }
 

@@ -1,7 +1,6 @@
 //! Rigs: photos on a frame with others, each in a pose of its own there.
 
 use super::{Chain, Grounds, MountModel, Mounts};
-use crate::geometry::steps;
 use crate::network::commons::CommonKind;
 
 /// That a photo was taken by a sensor on a frame. Its pose follows from those of the frame, which is that of the photo of the first
@@ -39,7 +38,8 @@ impl MountModel for OnFrame {
 
     fn compose(&self, _: f64, grounds: &Grounds<'_>, pose: &mut Chain) {
         let (sensor, block) = grounds.common(self.sensor);
-        pose.lead_to(&sensor.pose(), block.map(|block| (block, steps(sensor.steps()))));
+        let own = block.filter(|_| pose.steps()).map(|block| (block, sensor.steps()));
+        pose.lead_to(&sensor.pose(), own);
     }
 }
 

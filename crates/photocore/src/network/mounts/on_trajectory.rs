@@ -3,9 +3,10 @@
 
 use nalgebra::Matrix3xX;
 
+use super::chain::{shifting, turning};
 use super::{Chain, Grounds, MountModel, Mounts, Moving, Trajectory};
-use crate::geometry::trajectory::{Basis, Flight, Motion};
-use crate::geometry::{Matrix3, Steps, Vector3, steps};
+use crate::geometry::trajectory::{Flight, Motion};
+use crate::geometry::{Matrix3, Vector3};
 use crate::network::commons::CommonKind;
 
 /// That a photo is on a trajectory: an image has the pose of its time
@@ -45,10 +46,9 @@ impl OnTrajectory {
         [course.position.near(time, exactly), course.rotation.near(time, exactly)]
     }
 
-    /// The trajectory at the time of an image, and that time.
-    fn flown(&self, at: f64, grounds: &Grounds<'_>) -> (f64, Flight) {
-        let time = self.time_of(at, |common| grounds.common(common).0.vector().x);
-        (time, self.flown_at(time, grounds))
+    /// The time of an image.
+    fn time(&self, at: f64, grounds: &Grounds<'_>) -> f64 {
+        self.time_of(at, |common| grounds.common(common).0.vector().x)
     }
 
     fn flown_at(&self, time: f64, grounds: &Grounds<'_>) -> Flight {
@@ -95,14 +95,8 @@ impl MountModel for OnTrajectory {
         true
     }
 
-    /// The first of functions that are never zero.
-    fn main(&self, known: &Mounts) -> Option<usize> {
-        let Trajectory { course, position, rotation } = known.trajectory(self.trajectory);
-        let first = |basis: &Basis, all: &[usize]| if basis.is_local() { None } else { all.first().copied() };
-        match position.len() {
-            0 => first(&course.rotation, rotation),
-            _ => first(&course.position, position),
-        }
+    fn everywhere<'a>(&self, known: &'a Mounts) -> Box<dyn Iterator<Item = usize> + 'a> {
+        Box::new(known.trajectory(self.trajectory).everywhere())
     }
 
     fn is_timed(&self) -> bool {
@@ -114,7 +108,8 @@ impl MountModel for OnTrajectory {
         const HALF: f64 = 5e-4;
         let known = grounds.known();
         let Trajectory { position, rotation, .. } = known.trajectory(self.trajectory);
-        let (time, flight) = self.flown(at, grounds);
+        let time = self.time(at, grounds);
+        let flight = self.flown_at(time, grounds);
         let mut found = Moving {
             velocity: flight.motion.velocity,
             rate: flight.motion.rate,
@@ -143,32 +138,21 @@ impl MountModel for OnTrajectory {
     fn compose(&self, at: f64, grounds: &Grounds<'_>, pose: &mut Chain) {
         let known = grounds.known();
         let Trajectory { position, rotation, .. } = known.trajectory(self.trajectory);
-        let (_, flight) = self.flown(at, grounds);
-        pose.stand(flight.motion.pose);
-        let mut add = |common: usize, own: &dyn Fn() -> Steps| {
-            if let Some(block) = grounds.common(common).1 {
-                pose.add(block, own());
-            }
-        };
+        let flight = self.flown_at(self.time(at, grounds), grounds);
+        let Motion { velocity, rate, pose: reached } = flight.motion;
+        pose.stand(reached);
+        if !pose.steps() {
+            return;
+        }
+        let block = |common: usize| grounds.common(common).1;
         let [p, r] = self.active(at, known);
-        for k in p {
-            add(position[k], &|| columns(0, &flight.by_position(k)));
-        }
-        for k in r {
-            add(rotation[k], &|| columns(3, &flight.by_rotation(k)));
-        }
-        let Motion { velocity, rate, .. } = flight.motion;
-        for (common, times) in self.scaled(at) {
-            add(common, &|| steps([(times * velocity, times * rate)]));
-        }
+        let of = |k: usize| Some((block(position[k])?, flight.position.value(k)));
+        pose.add(p.filter_map(of), shifting(&flight.axes));
+        let of = |k: usize| Some((block(rotation[k])?, flight.rotation.value(k)));
+        pose.add(r.filter_map(of), turning(&flight.jacobian));
+        let of = |(common, times): (usize, f64)| Some((block(common)?, times));
+        pose.add(self.scaled(at).filter_map(of), [(velocity, rate)]);
     }
-}
-
-/// Steps by three unknowns: dC where `first` is 0, rho where it is 3.
-fn columns(first: usize, partials: &Matrix3) -> Steps {
-    let mut steps = Steps::zeros(3);
-    steps.fixed_rows_mut::<3>(first).copy_from(partials);
-    steps
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::{
     Ellipsoid, Matrix3, ObjectSpace, Orientation, PoseNumbers, RotationSense, Vector3, rotation,
 };
+use crate::network::blocks::InBlock;
 use crate::network::commons::{Common, CommonKind, PlacedCommon};
 
 /// One mount, of so many photos.
@@ -55,11 +56,15 @@ fn agrees_at(
             |photo: usize| Orientation::new(poses, space, &std::array::from_fn(|k| values[6 * photo + k]));
         let common = |common: usize| {
             let block = 2 + common;
-            (Cow::Owned(commons[common].at(&values[first(block)..][..widths[block]])), Some(block))
+            (
+                Cow::Owned(commons[common].at(&values[first(block)..][..widths[block]])),
+                Some(InBlock::whole(block, widths[block])),
+            )
         };
         Grounds { space, mounts: &mounts, photo: &photo, common: &common }.composed(0, at).unwrap()
     };
-    let Composed { orientation, parts } = composed(&values);
+    let found = composed(&values);
+    let (orientation, parts) = (found.orientation, found.parts());
     let (pose, unknowns) = (orientation.pose(), orientation.unknowns_by_step().unwrap());
     for (block, steps) in &parts {
         for (k, step) in steps.column_iter().enumerate() {
@@ -79,7 +84,7 @@ fn agrees_at(
         }
     }
     let columns: usize = parts.iter().map(|(_, steps)| steps.ncols()).sum();
-    let main = mounts.main_block(0, &|common| Some(2 + common));
+    let main = mounts.main_block(0, &|common| Some(InBlock::whole(2 + common, widths[2 + common])));
     let own = if main < 2 { 6 } else { 0 };
     let of_commons = mounts.commons(0, Some(at)).into_iter().map(|common| widths[2 + common]);
     assert_eq!(columns, own + of_commons.sum::<usize>(), "all that it is made of");

@@ -9,9 +9,10 @@ use super::rows::{CommonSite, PhotoSite, PointSite};
 use super::tied::TiedModel;
 use super::{Named, Observation, TiedObservation};
 use crate::geometry::{Camera, Matrix3, ObjectSpace, Orientation, Perspective, Point, Vector3};
+use crate::network::blocks::InBlock;
 use crate::network::commons::{Common, CommonKind, CommonState, PlacedCommon};
 use crate::network::mounts::tests::mounted;
-use crate::network::mounts::{AT_PHOTO, Composed, Grounds, OnFrame};
+use crate::network::mounts::{AT_PHOTO, Grounds, OnFrame};
 
 #[path = "../../../tests/golden/mod.rs"]
 mod data;
@@ -135,9 +136,9 @@ fn assert_case(case: &Value) -> bool {
         space: SPACE,
         origin: [0.0; 3],
         point: &|i| PointSite { point: Point::new(SPACE, points[i]), coordinates: points[i], block: i },
-        photo: &|i| PhotoSite { orientation: &photos[i], block: 100 + i, parts: &[] },
+        photo: &|i| PhotoSite { orientation: &photos[i], block: 100 + i, made_of: None },
         moving: &|_| None,
-        common: &|i| CommonSite { state: &commons[i].0, block: Some(200 + i) },
+        common: &|i| CommonSite { state: &commons[i].0, place: Some(InBlock::whole(200 + i, 0)) },
         width: &width,
     };
     let all: usize = ours.iter().map(|&block| width(block)).sum();
@@ -174,9 +175,10 @@ fn assert_rig(case: &Value) {
     let in_frame = list(&blocks[1]["position"]).try_into().unwrap();
     let sensor = state(CommonKind::Sensor, in_frame, matrix(&blocks[1]["matrix_photo_to_object"]));
     let mounts = mounted(OnFrame { photo: 1, frame: 0, sensor: 0 }.into(), 2);
-    let common = |_| (std::borrow::Cow::Borrowed(&sensor), Some(2));
+    let common = |_| (std::borrow::Cow::Borrowed(&sensor), Some(InBlock::whole(2, 6)));
     let grounds = Grounds { space: SPACE, mounts: &mounts, photo: &|_| frame, common: &common };
-    let Composed { orientation: photo, parts } = grounds.composed(1, AT_PHOTO).unwrap();
+    let composed = grounds.composed(1, AT_PHOTO).unwrap();
+    let (photo, parts) = (composed.orientation, composed.parts());
     let point = Point::new(SPACE, list(&blocks[2]["value"]).try_into().unwrap());
     let camera = Camera::from(Perspective { principal_distance: case["c"].as_f64().unwrap() });
     let u = photo.sight(&point);

@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, Matrix3xX, SMatrix};
 
-use crate::geometry::{Matrix3, ObjectSpace, Orientation, POSE, Point, Pose, Steps, Vector3, local_vertical};
+use crate::geometry::{Matrix3, ObjectSpace, Orientation, POSE, Point, Pose, Vector3, local_vertical};
+use crate::network::blocks::InBlock;
 use crate::network::commons::CommonState;
-use crate::network::mounts::Moving;
+use crate::network::mounts::{Composed, Moving};
 
 /// The points, photos and common unknowns that an observation touches, each known by its place in [`super::Touches`], at given values
 /// of the unknowns. Cartesian positions are counted from an origin amid the network.
@@ -27,19 +28,19 @@ pub(in crate::network) struct PointSite {
     pub block: usize,
 }
 
-/// A pose, the block of its unknowns and, where it is made of several blocks, how its six step with the first unknowns of each.
+/// A pose, the block of its unknowns and, where it is made of several blocks, how its six step with these.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::network) struct PhotoSite<'a> {
     pub orientation: &'a Orientation,
     pub block: usize,
-    pub parts: &'a [(usize, Steps)],
+    pub made_of: Option<&'a Composed>,
 }
 
-/// A common unknown, and its block unless it is known.
+/// A common unknown, and where it is unless it is known.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::network) struct CommonSite<'a> {
     pub state: &'a CommonState,
-    pub block: Option<usize>,
+    pub place: Option<InBlock>,
 }
 
 impl Sites<'_> {
@@ -171,8 +172,8 @@ impl Rows<'_> {
 
     /// The partials of rows that are the unknowns of a common one themselves, as they are counted.
     pub fn by_itself(&mut self, row: usize, common: usize, count: usize) {
-        let Some(block) = self.sites.commons[common].block else { return };
-        (0..count).for_each(|k| self.add(row + k, block, k, [1.0].iter()));
+        let Some(InBlock { block, first, .. }) = self.sites.commons[common].place else { return };
+        (0..count).for_each(|k| self.add(row + k, block, first + k, [1.0].iter()));
     }
 
     fn by_common<const N: usize>(
@@ -181,9 +182,9 @@ impl Rows<'_> {
         common: usize,
         partials: impl Fn((Vector3, Vector3)) -> SMatrix<f64, N, 1>,
     ) {
-        let CommonSite { state, block } = self.sites.commons[common];
-        let Some(block) = block else { return };
-        for (k, step) in state.steps().enumerate() {
+        let CommonSite { state, place } = self.sites.commons[common];
+        let Some(InBlock { block, first, .. }) = place else { return };
+        for (k, step) in (first..).zip(state.steps()) {
             self.add(row, block, k, partials(step).iter());
         }
     }
@@ -201,28 +202,27 @@ impl Rows<'_> {
     fn by_motion<const N: usize>(
         &mut self,
         row: usize,
-        by: Option<&Vec<(usize, Matrix3xX<f64>)>>,
+        by: Option<&Vec<(InBlock, Matrix3xX<f64>)>>,
         partials: &SMatrix<f64, N, 3>,
     ) {
-        for (block, columns) in by.into_iter().flatten() {
-            for (k, column) in columns.column_iter().enumerate() {
+        for (InBlock { block, first, .. }, columns) in by.into_iter().flatten() {
+            for (k, column) in (*first..).zip(columns.column_iter()) {
                 self.add(row, *block, k, (partials * column).iter());
             }
         }
     }
 
     fn by_pose<const N: usize>(&mut self, row: usize, photo: usize, partials: [SMatrix<f64, N, 1>; POSE]) {
-        let PhotoSite { block, parts, .. } = self.sites.photos[photo];
-        if parts.is_empty() {
+        let PhotoSite { block, made_of, .. } = self.sites.photos[photo];
+        let Some(composed) = made_of else {
             for (k, partials) in partials.iter().enumerate() {
                 self.add(row, block, k, partials.iter());
             }
-        }
+            return;
+        };
         let all = SMatrix::<f64, N, POSE>::from_columns(&partials);
-        for (block, steps) in parts {
-            for (k, step) in steps.column_iter().enumerate() {
-                self.add(row, *block, k, (all * step).iter());
-            }
+        for (block, k, step) in composed.columns() {
+            self.add(row, block, k, (all * step).iter());
         }
     }
 

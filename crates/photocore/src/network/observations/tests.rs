@@ -8,6 +8,7 @@ use super::{Common, CommonKind, Fault, Observation, Precision, Quantity, TiedObs
 use crate::geometry::{
     Ellipsoid, Matrix3, ObjectSpace, Orientation, Point, PoseNumbers, RotationSense, rotation,
 };
+use crate::network::blocks::InBlock;
 use crate::network::commons::{CommonState, PlacedCommon};
 use crate::network::mounts::tests::mounted;
 use crate::network::mounts::{AT_PHOTO, Composed, Grounds, OnFrame};
@@ -113,12 +114,17 @@ impl Scene {
         starts[block]..starts[block + 1]
     }
 
+    fn in_block(&self, common: usize) -> InBlock {
+        InBlock::whole(BLOCKS + common, width(&self.commons[common]))
+    }
+
     fn orientations(&self, unknowns: &[f64]) -> ([Orientation; 2], Option<Composed>) {
         let pose = |k: usize| std::array::from_fn(|i| unknowns[6 + PHOTO * k + i]);
         let [first, second] = [0, 1].map(|k| Orientation::new(self.poses, self.space, &pose(k)));
         let mounts = mounted(OnFrame { photo: 3, frame: 2, sensor: SENSORS[0] }.into(), BLOCKS);
         let states = self.states(unknowns);
-        let common = |common: usize| (std::borrow::Cow::Borrowed(&states[common]), Some(BLOCKS + common));
+        let common =
+            |common: usize| (std::borrow::Cow::Borrowed(&states[common]), Some(self.in_block(common)));
         let grounds = Grounds { space: self.space, mounts: &mounts, photo: &|_| first, common: &common };
         let mounted = grounds.composed(3, AT_PHOTO).filter(|_| self.rig);
         ([first, mounted.as_ref().map_or(second, |own| own.orientation)], mounted)
@@ -145,15 +151,15 @@ impl Scene {
             PointSite { point: Point::new(self.space, coordinates), coordinates, block: i }
         };
         let photo = |i: usize| {
-            let parts = mounted.as_ref().filter(|_| i == 1).map_or(&[][..], |own| &own.parts);
-            PhotoSite { orientation: &orientations[i], block: 2 + i, parts }
+            let made_of = mounted.as_ref().filter(|_| i == 1);
+            PhotoSite { orientation: &orientations[i], block: 2 + i, made_of }
         };
         let model = TiedModel {
             space: self.space,
             origin: [0.0; 3],
             point: &point,
             photo: &photo,
-            common: &|i| CommonSite { state: &states[i], block: Some(BLOCKS + i) },
+            common: &|i| CommonSite { state: &states[i], place: Some(self.in_block(i)) },
             moving: &|_| None,
             width: &|block| self.of_block(block).len(),
         };

@@ -1,0 +1,90 @@
+"""Rotations as quaternions and as the three angles of ISIS: about the axes 3, 1 and 3 again."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+
+__all__ = ["Polynomials", "fitted_angles", "of_angles", "of_quaternions", "to_angles"]
+
+RECORDS = 64
+"""Parts of a span that polynomials are sampled in: eight neighbours give them to the last digits."""
+BEYOND = 4
+"""Records beyond either end: as many as count on a side."""
+
+
+def of_quaternions(quaternions: Floats) -> Floats:
+    """Return the (n, 3, 3) matrices of (n, 4) quaternions w, x, y, z of any length, applied as C v."""
+    w, x, y, z = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
+    rows = [
+        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def of_angles(angles: Floats) -> Floats:
+    """Return the (n, 3, 3) matrices [a3]_3 [a2]_1 [a1]_3 of (n, 3) angles a1, a2, a3 in radians."""
+    (c1, c2, c3), (s1, s2, s3) = np.cos(angles).T, np.sin(angles).T
+    rows = [
+        [c3 * c1 - s3 * c2 * s1, c3 * s1 + s3 * c2 * c1, s3 * s2],
+        [-s3 * c1 - c3 * c2 * s1, -s3 * s1 + c3 * c2 * c1, c3 * s2],
+        [s2 * s1, -s2 * c1, c2],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def to_angles(matrices: Floats) -> Floats:
+    """Return the (n, 3) angles of (n, 3, 3) matrices that follow each other, without jumps of a turn."""
+    m = matrices
+    a1 = np.arctan2(m[:, 2, 0], -m[:, 2, 1])
+    a2 = np.arctan2(np.hypot(m[:, 2, 0], m[:, 2, 1]), m[:, 2, 2])
+    a3 = np.arctan2(m[:, 0, 2], m[:, 1, 2])
+    return np.unwrap(np.column_stack([a1, a2, a3]), axis=0)
+
+
+class Polynomials(NamedTuple):
+    """Three angles, or coordinates, as polynomials of (t - reference) / scale.
+
+    Attributes
+    ----------
+    coefficients
+        (3, degree + 1), powers from 0 on.
+    reference, scale
+        Seconds.
+    """
+
+    coefficients: Floats
+    reference: float
+    scale: float
+
+    def at(self, times: Floats) -> Floats:
+        """Return (n, 3) values at (n,) times."""
+        powers = np.vander((times - self.reference) / self.scale, self.coefficients.shape[1], increasing=True)
+        return np.asarray(powers @ self.coefficients.T)
+
+    def sampled(self, first: float, last: float) -> tuple[Floats, Floats]:
+        """Return (k,) times and (k, 3) values that `lagrange` joins without loss between two times."""
+        steps = np.arange(-BEYOND, RECORDS + BEYOND + 1, dtype=float)
+        times: Floats = first + (last - first) / RECORDS * steps
+        return times, self.at(times)
+
+
+def fitted_angles(times: Floats, matrices: Floats, degree: int) -> Polynomials:
+    """Return polynomials that fit the angles of records, all of one weight, as the program jigsaw does.
+
+    Parameters
+    ----------
+    times, matrices
+        (k,) seconds and (k, 3, 3) matrices from inertial axes to those of the camera.
+    degree
+        Of the polynomials; time is scaled by the middle and half of the records.
+    """
+    reference, scale = (times[0] + times[-1]) / 2, (times[-1] - times[0]) / 2 or 1.0
+    powers = np.vander((times - reference) / scale, degree + 1, increasing=True)
+    solved = np.linalg.lstsq(powers, to_angles(matrices), rcond=None)[0]
+    return Polynomials(np.asarray(solved.T), float(reference), float(scale))

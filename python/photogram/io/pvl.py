@@ -1,0 +1,274 @@
+"""Labels in PVL (parameter value language), as ISIS and the archives of planetary images write them.
+
+Read by hand: a hundred lines, where the package `pvl` were one more dependency of every installation.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple, TypeAlias
+
+from photogram.errors import InputError
+from photogram.messages import quoted
+
+__all__ = ["Group", "Quantity", "Value", "label_text", "parsed"]
+
+
+class Quantity(NamedTuple):
+    """A value with the unit that stands behind it, between angle brackets."""
+
+    value: Value
+    unit: str
+
+
+Value: TypeAlias = str | int | float | list["Value"] | Quantity
+"""What a key may have: a text, a number, a list (in parentheses or braces), any of them with a unit."""
+
+
+@dataclass
+class Group:
+    """A group or an object of a label.
+
+    Parameters
+    ----------
+    name
+        What it is called; the label itself has no name.
+    kind
+        `group`, `object`, or `label`.
+    line
+        The line of the file on which it begins, from 1.
+    items
+        Its keys with their values, in the order of the file; a key may be there more than once.
+    inside
+        The groups and objects in it, in the order of the file.
+    """
+
+    name: str
+    kind: str
+    line: int = 1
+    items: list[tuple[str, Value]] = field(default_factory=list)
+    inside: list[Group] = field(default_factory=list)
+
+    def get(self, key: str) -> Value | None:
+        """Return the first value of a key, None where there is none. Capitals are all one."""
+        return next((value for own, value in self.items if own.lower() == key.lower()), None)
+
+    def groups(self, name: str) -> list[Group]:
+        """Return the groups and objects of a name that are directly in it. Capitals are all one."""
+        return [each for each in self.inside if each.name.lower() == name.lower()]
+
+
+_TOKEN = re.compile(
+    r"""(?P<space>(?:\s|\#[^\n]*|/\*(?s:.*?)\*/)+)
+    |"(?P<double>[^"]*)"|'(?P<single>[^']*)'
+    |<(?P<unit>[^<>\n]*)>
+    |(?P<sign>[=(){},;])
+    |(?P<word>(?:[^\s=(){},;"'<>/-]|/(?!\*)|-(?:\r?\n\s*)?)+)""",
+    re.VERBOSE,
+)
+_CONTINUED = re.compile(r"-\r?\n\s*")
+"""A hyphen at the end of a line: the text goes on without it."""
+_FOLDED = re.compile(r"\s*\n\s*")
+_WHOLE = re.compile(r"[-+]?(?:0|[1-9]\d{0,17})")
+"""Whole numbers. What begins with zeros is a name that digits make up."""
+_DECIMAL = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_BASED = re.compile(r"(2|8|16)#([-+]?[0-9A-Fa-f]{1,16})#")
+_PLAIN = re.compile(r"[^\s=(){},;\"'<>#/-](?:[^\s=(){},;\"'<>#/-]|/(?!\*)|-(?!$))*")
+"""Words that need no marks of quotation."""
+_DEEPEST = 32
+_OPENING = {"(": ")", "{": "}"}
+_SHOWN = 40
+_BEGINS = {"group": "group", "begin_group": "group", "object": "object", "begin_object": "object"}
+_ENDS = {"end_group": "group", "endgroup": "group", "end_object": "object", "endobject": "object"}
+
+
+class _Token(NamedTuple):
+    kind: str
+    text: str
+    start: int
+
+
+class _Reader:
+    """The tokens of a label, one after the other."""
+
+    def __init__(self, text: str, file: Path, numbers: bool) -> None:
+        self.text, self.file, self.at, self.numbers = text, file, 0, numbers
+        self.token = self._next()
+
+    def line(self, at: int) -> int:
+        return self.text.count("\n", 0, at) + 1
+
+    def error(self, message: str, at: int | None = None) -> InputError:
+        return InputError(message, file=self.file, record=self.line(self.token.start if at is None else at))
+
+    def take(self) -> _Token:
+        """Return this token, and go to the next."""
+        taken = self.token
+        self.token = self._next()
+        return taken
+
+    def is_sign(self, sign: str) -> bool:
+        return self.token.kind == "sign" and self.token.text == sign
+
+    def _next(self) -> _Token:
+        while (found := _TOKEN.match(self.text, self.at)) is not None:
+            start, self.at = self.at, found.end()
+            kind = str(found.lastgroup)
+            if kind != "space":
+                return _Token(kind, found[kind], start)
+        if self.at < len(self.text):
+            raise InputError(
+                f"is no label of PVL from {self.text[self.at : self.at + _SHOWN]!r} on",
+                file=self.file,
+                record=self.line(self.at),
+            )
+        return _Token("end", "", self.at)
+
+
+def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
+    """Return what a label says, up to its `End` or the end of the text.
+
+    Parameters
+    ----------
+    text
+        The label.
+    file
+        Where it comes from, for errors.
+    numbers
+        Whether words that are numbers become numbers; if not, all values are texts as they stand there.
+
+    Raises
+    ------
+    InputError
+        The text is no label; the error has the number of the line.
+    """
+    reader = _Reader(text, file, numbers)
+    label = Group("", "label")
+    open_groups = [label]
+    while reader.token.kind == "word" and reader.token.text.lower() != "end":
+        start, key = reader.token.start, reader.take().text
+        if (ended := _ENDS.get(key.lower())) is not None:
+            _close(reader, open_groups, ended, key, start)
+            continue
+        if not reader.is_sign("="):
+            raise reader.error(f"{key[:_SHOWN]} has no value", start)
+        reader.take()
+        if (kind := _BEGINS.get(key.lower())) is None:
+            open_groups[-1].items.append((key, _value(reader, key)))
+        else:
+            begun = Group(str(_scalar(reader, key)), kind, reader.line(start))
+            open_groups[-1].inside.append(begun)
+            open_groups.append(begun)
+        if reader.is_sign(";"):
+            reader.take()
+        if reader.is_sign("="):
+            raise reader.error(f"{key[:_SHOWN]} has no value", start)
+    if reader.token.kind not in ("word", "end"):
+        raise reader.error(f"has {reader.token.text[:_SHOWN]!r} where a key should be")
+    if len(open_groups) > 1:
+        raise reader.error(f"has no end of the {open_groups[-1].kind} {open_groups[-1].name}")
+    return label
+
+
+def _close(reader: _Reader, open_groups: list[Group], kind: str, key: str, start: int) -> None:
+    """End the innermost group; its name may be said again."""
+    if len(open_groups) == 1 or open_groups[-1].kind != kind:
+        raise reader.error(f"{key} ends nothing that is open", start)
+    ended = open_groups.pop()
+    if reader.is_sign("="):
+        reader.take()
+        if (said := str(_scalar(reader, key))).lower() != ended.name.lower():
+            raise reader.error(f"ends the {kind} {said[:_SHOWN]}, but {ended.name} is open", start)
+    if reader.is_sign(";"):
+        reader.take()
+
+
+def _value(reader: _Reader, key: str, depth: int = 0) -> Value:
+    """Read a value, with its unit if it has one."""
+    value = _list(reader, key, depth) if reader.token.text in _OPENING else _scalar(reader, key)
+    return Quantity(value, reader.take().text.strip()) if reader.token.kind == "unit" else value
+
+
+def _list(reader: _Reader, key: str, depth: int) -> list[Value]:
+    if depth == _DEEPEST:
+        raise reader.error("lists are nested too deeply")
+    start = reader.token.start
+    closing = _OPENING[reader.take().text]
+    values: list[Value] = []
+    while not reader.is_sign(closing):
+        if values:
+            if not reader.is_sign(","):
+                raise reader.error(f"the list of {key[:_SHOWN]} has no end", start)
+            reader.take()
+        values.append(_value(reader, key, depth + 1))
+    reader.take()
+    return values
+
+
+def _scalar(reader: _Reader, key: str) -> str | int | float:
+    kind, text, start = reader.token
+    if kind not in ("word", "double", "single"):
+        raise reader.error(f"{key[:_SHOWN]} has no value", start)
+    reader.take()
+    text = _CONTINUED.sub("", text)
+    if kind != "word":
+        return _FOLDED.sub(" ", text)
+    return _number(text) if reader.numbers else text
+
+
+def _number(word: str) -> str | int | float:
+    """Return the number that a word is; the word itself where it is none that is finite."""
+    if _WHOLE.fullmatch(word):
+        return int(word)
+    if (based := _BASED.fullmatch(word)) is not None:
+        try:
+            return int(based[2], int(based[1]))
+        except ValueError:
+            return word
+    if _DECIMAL.fullmatch(word) and not word.isdigit() and math.isfinite(float(word)):
+        return float(word)
+    return word
+
+
+def label_text(label: Group) -> str:
+    """Return a label as text, which :func:`parsed` reads as it was.
+
+    Raises
+    ------
+    InputError
+        A text that no marks of quotation can hold: it has both kinds, or several lines.
+    """
+    return "\n".join([*_lines(label, ""), "End", ""])
+
+
+def _lines(group: Group, indent: str) -> list[str]:
+    width = max((len(key) for key, _ in group.items), default=0)
+    lines = [f"{indent}{key:{width}} = {_value_text(value)}" for key, value in group.items]
+    for each in group.inside:
+        kind = each.kind.capitalize()
+        lines += [
+            f"{indent}{kind} = {_value_text(each.name)}",
+            *_lines(each, f"{indent}  "),
+            f"{indent}End_{kind}",
+        ]
+    return lines
+
+
+def _value_text(value: Value) -> str:
+    if isinstance(value, Quantity):
+        return f"{_value_text(value.value)} <{value.unit}>"
+    if isinstance(value, list):
+        return f"({', '.join(map(_value_text, value))})"
+    if not isinstance(value, str):
+        return repr(value)
+    if _PLAIN.fullmatch(value) and value == _number(value):
+        return value
+    mark = "'" if '"' in value else '"'
+    if mark in value or "\n" in value:
+        raise InputError(
+            f"{quoted(value)} cannot stand in a label: it has several lines, or both quotation marks"
+        )
+    return f"{mark}{value}{mark}"

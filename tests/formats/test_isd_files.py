@@ -1,0 +1,222 @@
+"""Support data in JSON: what is read of all three kinds of cameras, and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+from support_data import RADIUS, START, document, written
+
+from photogram import InputError
+from photogram.formats.csm.photos import SupportedImage
+from photogram.formats.csm.reading import read_isd
+from photogram.network.projecting import projected
+from photogram.network.trajectories import Polynomial
+
+PLACES = np.array([[10.0, 20.0], [150.0, 200.5], [290.0, 399.0], [0.5, 0.5]])
+"""Samples and lines."""
+
+
+def image(tmp_path, data, **how):
+    return SupportedImage(read_isd(written(tmp_path, data)), "I", **how)
+
+
+@pytest.mark.parametrize("kind", ["LINE_SCANNER", "FRAME", "PUSH_FRAME"])
+@pytest.mark.parametrize("pixels", ["csm", "isis"])
+@pytest.mark.parametrize("interpolation", ["csm", "isis"])
+def test_every_camera_finds_its_pixels_on_the_ground(tmp_path, kind, pixels, interpolation):
+    own = image(tmp_path, document(kind), pixels=pixels, interpolation=interpolation)
+    ground = own.to_ground(PLACES[:, 1], PLACES[:, 0], 50.0)
+    np.testing.assert_allclose(np.linalg.norm(ground, axis=1), 1000 * RADIUS + 50.0, rtol=1e-12)
+    np.testing.assert_allclose(own.to_image(ground), PLACES[:, ::-1], rtol=0, atol=1e-7)
+    # As photos of a block: each point is where its photo has it.
+    photos, xy = own.coordinates(*PLACES.T)
+    for row, (photo, place) in enumerate(zip(photos, xy, strict=True)):
+        seen = projected(own.timed[photo], own.flown, own.camera, ground[[row]])[0]
+        np.testing.assert_allclose(seen, place, rtol=0, atol=1e-7)
+
+
+def test_framelets_have_times_of_their_own(tmp_path):
+    data = document("PUSH_FRAME")
+    data |= {"framelet_order_reversed": True, "framelets_flipped": True}
+    own = image(tmp_path, data)
+    assert len(own.timed) == 25
+    assert [own.timed[k].time for k in (24, 0)] == pytest.approx([START + 0.005, START + 0.005 + 24 * 0.16])
+    photos, xy = own.coordinates([100.0, 100.0], [17.0, 15.0])
+    assert photos.tolist() == [1, 0]
+    # Both are one row from an edge that is not the same.
+    assert abs(xy[0, 0] - xy[1, 0]) == pytest.approx(14 / 50, rel=0.01)
+    ground = own.to_ground(PLACES[:, 1], PLACES[:, 0])
+    np.testing.assert_allclose(own.to_image(ground), PLACES[:, ::-1], rtol=0, atol=1e-7)
+
+
+def test_rows_of_line_scan_rate_follow_each_other(tmp_path):
+    data = document()
+    data["line_scan_rate"] = [[0.5, -2.0, 0.01], [200.5, 0.1, 0.009]]
+    lines = read_isd(written(tmp_path, data)).lines
+    # Line 200 from the upper edge is 200.5 as ISIS counts.
+    assert lines.times([0.0, 199.5, 200.0, 300.0]) == pytest.approx(START + np.array([0.0, 1.995, 2.1, 3.0]))
+
+
+def test_a_summed_image_lies_on_the_same_detector(tmp_path):
+    plain, summed = document("FRAME"), document("FRAME", lines=200, samples=150)
+    summed |= {"detector_line_summing": 2, "detector_sample_summing": 2}
+    for pixels in ("csm", "isis"):
+        corner = 0.5 if pixels == "isis" else 0.0
+        one, other = (image(tmp_path, data, pixels=pixels) for data in (plain, summed))
+        xy = one.coordinates([100.0 + corner], [60.0 + corner])[1]
+        np.testing.assert_allclose(other.coordinates([50.0 + corner], [30.0 + corner])[1], xy, atol=1e-12)
+
+
+def test_corrections_are_of_the_trajectory_that_is_given(tmp_path):
+    own = image(tmp_path, document())
+    moved = image(tmp_path, document(), trajectory=own.flown)
+    assert moved.timed[0].trajectory is own.flown
+    shift = Polynomial(0, value=[[0.0, 30.0, 0.0]], sd=0.0)
+    on = type(own.flown)("t", own.flown.table, shift, None, own.flown.body)
+    there = image(tmp_path, document(), trajectory=on).to_ground([200.0], [150.0])
+    apart = there - own.to_ground([200.0], [150.0])
+    assert np.linalg.norm(apart) == pytest.approx(30.0, rel=0.01)
+
+
+LENSES = {
+    "transverse": {"x": [0, 1, *[0] * 8], "y": [0, 0, 1, *[0] * 7]},
+    "lrolrocnac": {"coefficients": 1.8e-5},
+    "kaguyalism": {"boresight_x": 0.07, "x": [0, 1e-5, 0, 0], "boresight_y": 0.02, "y": [0, 1e-5, 0, 0]},
+    "cahvor": {"coefficients": [1e-4, 0, 0, 0.1, 0.2]},
+    "radtan": {"coefficients": [-0.1, 0.01, 0, 0, 0]},
+}
+
+
+@pytest.mark.parametrize("model", LENSES)
+def test_lenses_are_read_by_their_names(tmp_path, model):
+    own = image(tmp_path, document() | {"optical_distortion": {model: LENSES[model]}})
+    assert own.isd.lens.model == model
+    ground = own.to_ground(PLACES[:, 1], PLACES[:, 0])
+    np.testing.assert_allclose(own.to_image(ground), PLACES[:, ::-1], rtol=0, atol=1e-6)
+
+
+def without(*keys):
+    def change(data):
+        for key in keys[:-1]:
+            data = data[key]
+        del data[keys[-1]]
+
+    return change
+
+
+def setting(value, *keys):
+    def change(data):
+        for key in keys[:-1]:
+            data = data[key]
+        data[keys[-1]] = value
+
+    return change
+
+
+FAULTS = [
+    (without("name_model"), "name_model is missing"),
+    (setting("USGS_ASTRO_SAR_SENSOR_MODEL", "name_model"), "name_model: the sensor model .*SAR"),
+    (without("image_lines"), "image_lines is missing"),
+    (setting(0, "image_samples"), "image_samples: is no whole number from 1"),
+    (setting("x", "focal_length_model", "focal_length"), "focal_length_model/focal_length: is no number"),
+    (setting(0, "focal_length_model", "focal_length"), "focal_length: is zero"),
+    (without("detector_center", "line"), "detector_center: line is missing"),
+    (
+        setting([0.0, 0.0, 0.0], "focal2pixel_lines"),
+        "focal2pixel_samples: has no inverse, together with /focal2pixel_lines",
+    ),
+    (setting([0.0, 1.0], "focal2pixel_lines"), "focal2pixel_lines: has 2 numbers, not 3"),
+    (setting(0, "detector_sample_summing"), "detector_sample_summing: is not positive"),
+    (
+        setting({"fisheye": {}}, "optical_distortion"),
+        "optical_distortion: the lens .?fisheye.? is none of radial",
+    ),
+    (setting({}, "optical_distortion"), "optical_distortion: has 0 models"),
+    (setting([1.0], "optical_distortion", "radial", "coefficients"), "radial: .*has 3 coefficients"),
+    (setting({"lineExposureTimes": [1.0]}, "jitter"), "jitter: is known of frames alone"),
+    (setting([], "line_scan_rate"), "line_scan_rate: is empty"),
+    (setting([[0.5, -2.0, 0.0]], "line_scan_rate"), "line_scan_rate: lines are first line"),
+    (setting([[0.5, -2.0]], "line_scan_rate"), "line_scan_rate/0: has 2 numbers"),
+    (setting("miles", "radii", "unit"), "radii/unit: the unit .?miles.? is none of m, km"),
+    (setting(2e9, "radii", "semiminor"), "radii: are no semi-axes"),
+    (without("instrument_position", "positions"), "instrument_position: positions is missing"),
+    (
+        setting([1.0, 2.0], "instrument_position", "positions", 3),
+        "instrument_position/positions/3: has 2 numbers",
+    ),
+    (setting([[0, 0, 0]], "instrument_position", "velocities"), "velocities: has 1 records, positions 21"),
+    (setting(8, "instrument_position", "reference_frame"), "instrument_position: reference_frame .* 1, 8"),
+    (
+        setting([0, 0, 0, 2], "instrument_pointing", "quaternions", 1),
+        "quaternions: record 1 has the length 2",
+    ),
+    (
+        setting([1.0] * 9, "body_rotation", "constant_rotation"),
+        "body_rotation/constant_rotation: .*no rotation",
+    ),
+    (setting(1e9, "body_rotation", "ephemeris_times", 4), "body_rotation/ephemeris_times: .*do not increase"),
+]
+
+
+@pytest.mark.parametrize(("change", "said"), FAULTS, ids=[said for _, said in FAULTS])
+def test_what_is_wrong_is_named(tmp_path, change, said):
+    data = json.loads(json.dumps(document()))
+    change(data)
+    path = written(tmp_path, data)
+    with pytest.raises(InputError, match=said) as caught:
+        read_isd(path)
+    assert caught.value.file == path
+
+
+def test_lines_that_the_tables_do_not_reach_are_named(tmp_path):
+    data = document()
+    data["line_scan_rate"] = [[0.5, -2.0, 0.02]]
+    own = image(tmp_path, data)
+    assert own.isd.remarks == (
+        "the 400 lines take 8 s by line_scan_rate, the table of instrument_pointing 4 s: the table is short"
+        " by 50.0 %",
+    )
+    with pytest.raises(InputError, match=r"line 300 of I is at 1006.0 s, the tables reach from .* to 1004.1"):
+        own.to_ground([100.0, 300.0], [1.0, 1.0])
+
+
+def test_ways_to_count_and_to_join_have_names(tmp_path):
+    for how in ({"pixels": "corner"}, {"interpolation": "cubic"}):
+        with pytest.raises(InputError, match="is one of isis, csm"):
+            image(tmp_path, document(), **how)
+    with pytest.raises(InputError, match="shapes"):
+        image(tmp_path, document()).coordinates([1.0, 2.0], [1.0])
+
+
+def places(value, at=()):
+    """Yield where things stand in a document; of lists the first and the last."""
+    if at:
+        yield at
+    inside = value.items() if isinstance(value, dict) else []
+    if isinstance(value, list):
+        inside = {k: value[k] for k in (0, len(value) - 1)}.items() if value else []
+    for key, each in inside:
+        yield from places(each, (*at, key))
+
+
+HOSTILE = [None, True, "x", "", [], {}, [None], [[]], {"a": 1}, -1, 0, 0.5, 1e15, -1e299, [1e299] * 3, 10**30]
+
+
+@pytest.mark.parametrize("kind", ["LINE_SCANNER", "FRAME", "PUSH_FRAME"])
+def test_whatever_stands_in_a_document_is_understood_or_refused(tmp_path, kind):
+    plain = json.dumps(document(kind, records=9) | {"naif_keywords": {}})
+    known = 0
+    for at in list(places(json.loads(plain))):
+        for hostile in HOSTILE:
+            data = json.loads(plain)
+            setting(hostile, *at)(data)
+            try:
+                with np.errstate(all="ignore"):
+                    own = image(tmp_path, data)
+                    own.to_image(own.to_ground([100.0], [100.0]))
+                known += 1
+            except InputError:
+                continue
+            except Exception as error:
+                raise AssertionError(f"{at} = {hostile}: {error!r}") from error
+    assert known > 20
