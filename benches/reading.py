@@ -1,4 +1,4 @@
-"""How long a million image records take to be read: from CSV, from Parquet, and from COLMAP's binary files.
+"""How long a million image records take to be read: CSV, Parquet, binary files of COLMAP, control networks.
 
 python benches/reading.py [RECORDS]
 """
@@ -16,6 +16,10 @@ import numpy as np
 from photogram import formats
 from photogram.formats.colmap.binary import binary_files, read_binary
 from photogram.formats.colmap.content import Camera, Images, Model, Points
+from photogram.formats.isis.columns import measures_of, points_of
+from photogram.formats.isis.network import ControlNetwork
+from photogram.formats.isis.reading import read_network
+from photogram.formats.isis.writing import binary_network, network_text
 from photogram.io.delimited import read_columns
 from photogram.io.places import Place
 
@@ -66,6 +70,7 @@ def main(records: int) -> None:
             (place / name).write_bytes(content)
         timed("COLMAP, binary", lambda: read_binary(place))
         timed("  the whole project", lambda: formats.read(place, "colmap"))
+        _control_network(place / "network.net", photos, points, xy)
 
 
 def _parquet(path: Path, photos: np.ndarray, points: np.ndarray, xy: np.ndarray) -> None:
@@ -83,6 +88,25 @@ def _parquet(path: Path, photos: np.ndarray, points: np.ndarray, xy: np.ndarray)
     pyarrow.parquet.write_table(pyarrow.table(columns), path, compression="zstd")
     timed("Parquet", lambda: table(path))
     timed("  the whole project", lambda: formats.read(path.parent))
+
+
+def _control_network(path: Path, photos: np.ndarray, points: np.ndarray, xy: np.ndarray) -> None:
+    """Read the records as measures of a control network, binary and as text."""
+    order = np.argsort(points, kind="stable")
+    counts = np.bincount(points)
+    measured = {
+        "serial": (photos[order].astype(np.int32), [f"LRO/{k}/NACL" for k in range(int(photos.max()) + 1)]),
+        "types": np.full(len(points), 3, dtype=np.int8),
+        "sample": xy[order, 0],
+        "line": xy[order, 1],
+    }
+    named = {"ids": [f"T{k:06d}" for k in range(len(counts))], "types": np.full(len(counts), 2, np.int8)}
+    firsts = np.concatenate([[0], np.cumsum(counts)])
+    network = ControlNetwork(points_of(named), measures_of(measured), firsts)
+    path.write_bytes(binary_network(network))
+    timed("Control network, binary", lambda: read_network(path))
+    path.write_bytes(network_text(network))
+    timed("Control network, text", lambda: read_network(path))
 
 
 def _model(photos: np.ndarray, points: np.ndarray, xy: np.ndarray) -> Model:

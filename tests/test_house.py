@@ -86,6 +86,7 @@ KNOWS = {
     "adjustment": {"normals"},
     "normals": set(),
     "geometry": set(),
+    "files": set(),
 }
 """What a folder of the crate may know of the others."""
 

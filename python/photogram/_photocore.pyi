@@ -5,6 +5,7 @@ space. All functions release the GIL.
 """
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, TypedDict, final
 
 import numpy as np
@@ -59,6 +60,8 @@ class TrajectoryRow(TypedDict):
     position: list[int]
     rotation: list[int]
     body: tuple[list[float], _Floats, str] | None
+    axes: str
+    rotations: str
 
 __version__: str
 
@@ -2358,6 +2361,101 @@ def csv_rows(columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str
     ------
     ValueError
         Columns that differ in length.
+    """
+
+_ControlColumns = dict[str, Any]
+
+def control_header(
+    data: bytes, start: int, stop: int, file: Path | None
+) -> tuple[list[str | None], int | None, list[int], list[float], bytes]:
+    """Read the header of a binary control network.
+
+    Parameters
+    ----------
+    data
+        The file.
+    start, stop
+        Where the header stands in it.
+    file
+        Its name, for errors.
+
+    Returns
+    -------
+    Network, target, created, modified, description and user, None where they are not said; the number of
+    points, if said; version 2: the lengths of the points' messages; radii in metres; fields that nobody
+    knows, byte for byte.
+
+    Raises
+    ------
+    InputError
+        The header is damaged.
+    """
+
+def control_header_message(
+    texts: Sequence[str | None], points: int, radii: Sequence[float], rest: bytes
+) -> bytes:
+    """Write the header of a binary control network of version 5: what :func:`control_header` returns."""
+
+def control_points(
+    data: bytes, start: int, stop: int, lengths: Sequence[int] | None, file: Path | None
+) -> tuple[_ControlColumns, _ControlColumns, _Indices]:
+    """Read the points of a binary control network.
+
+    Parameters
+    ----------
+    data
+        The file.
+    start, stop
+        Where the points stand in it.
+    lengths
+        The lengths of their messages; None where each stands before its message.
+    file
+        Its name, for errors.
+
+    Returns
+    -------
+    Columns of points, columns of measures, the first measure of each point and the number of all (n + 1).
+    Columns are arrays by their names, `ids` a list of texts, `serial` indices and the texts that they mean; a
+    column in which nothing stands is left out. `rest` holds what has no column: fields of messages, byte for
+    byte, and where those of each row begin.
+
+    Raises
+    ------
+    InputError
+        The points are damaged; it has the number of the point, from 1, as its record.
+    """
+
+def control_points_of_text(
+    data: bytes, file: Path | None
+) -> tuple[tuple[_ControlColumns, _ControlColumns, _Indices], str]:
+    """Read the points of a control network in text (UTF-8).
+
+    Returns
+    -------
+    What :func:`control_points` returns, and the text without its points, on the same lines.
+
+    Raises
+    ------
+    InputError
+        The text is no control network; it has the number of the line, from 1, as its record.
+    """
+
+def control_point_messages(points: _ControlColumns, measures: _ControlColumns, firsts: _Indices) -> bytes:
+    """Write points as messages of version 5, each behind its length: what :func:`control_points` returns.
+
+    Raises
+    ------
+    InputError
+        Columns that do not agree, or something kept that only text can hold.
+    """
+
+def control_point_text(points: _ControlColumns, measures: _ControlColumns, firsts: _Indices) -> bytes:
+    """Write points as text, as it stands in the object of their network: what :func:`control_points` returns.
+
+    Raises
+    ------
+    InputError
+        Columns that do not agree, or something kept that only messages can hold.
     """
 
 UNKNOWNS: list[tuple[str, list[tuple[str, str]]]]

@@ -5,7 +5,7 @@
 use photocore::Threads;
 use photocore::adjustment::Status;
 use photocore::geometry::trajectory::{
-    Attitudes, Basis, Interpolation, Polynomial, Positions, Trajectory as Course,
+    Attitudes, Axes, Basis, Interpolation, Polynomial, Positions, Rotations, Trajectory as Course,
 };
 use photocore::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Perspective, Pose, PoseNumbers, RotationSense, Vector3,
@@ -106,6 +106,8 @@ fn network(seed: u64) -> Network {
                 attitudes: Attitudes::new(vec![0.0], vec![attitude], Interpolation::Linear).unwrap(),
                 position: line(),
                 rotation: line(),
+                axes: Axes::Table,
+                rotations: Rotations::Vector,
                 body: None,
             },
             position: vec![MOTIONS.len() * 2 + 2 * k, 2 * (k / 4)],

@@ -5,6 +5,7 @@ mod attitude;
 mod camera;
 mod commons;
 mod comparator;
+mod control_networks;
 mod distributions;
 mod features;
 mod geometry;
@@ -40,6 +41,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     commons::register(module)?;
     network::register(module)?;
     comparator::register(module)?;
+    control_networks::register(module)?;
     resection::register(module)?;
     similarity::register(module)?;
     matching::register(module)?;

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray2, PyReadonlyArrayDyn};
 use photocore::geometry::trajectory::{
-    Attitudes, Basis, Flight, Interpolation, Positions, Trajectory as Course,
+    Attitudes, Axes, Basis, Flight, Interpolation, Positions, Rotations, Trajectory as Course,
 };
 use photocore::geometry::{Matrix3, Vector3};
 use photocore::network::Trajectory;
@@ -34,6 +34,8 @@ pub struct TrajectoryRow<'py> {
     position: Vec<usize>,
     rotation: Vec<usize>,
     body: Option<AttitudesRow<'py>>,
+    axes: String,
+    rotations: String,
 }
 
 /// Indices of a photo and a trajectory, the time there, indices of its rate and offset among the unknowns.
@@ -61,6 +63,17 @@ pub fn trajectory(row: TrajectoryRow<'_>) -> PyResult<Trajectory> {
         position: basis(row.position_basis)?,
         rotation: basis(row.rotation_basis)?,
         body: row.body.map(|own| attitudes(own)?.ok_or_else(refused)).transpose()?,
+        axes: match row.axes.as_str() {
+            "table" => Axes::Table,
+            "orbit" => Axes::Orbit(Vector3::zeros()),
+            "flight" => Axes::Flight,
+            other => return Err(unknown("position_axes", other)),
+        },
+        rotations: match row.rotations.as_str() {
+            "vector" => Rotations::Vector,
+            "zxz" => Rotations::Zxz,
+            other => return Err(unknown("angles", other)),
+        },
     };
     Ok(Trajectory { course, position: row.position, rotation: row.rotation })
 }

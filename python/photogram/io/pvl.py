@@ -48,7 +48,7 @@ class Group:
 
     name: str
     kind: str
-    line: int = 1
+    line: int = field(default=1, compare=False)
     items: list[tuple[str, Value]] = field(default_factory=list)
     inside: list[Group] = field(default_factory=list)
 
@@ -62,7 +62,7 @@ class Group:
 
 
 _TOKEN = re.compile(
-    r"""(?P<space>(?:\s|\#[^\n]*|/\*(?s:.*?)\*/)+)
+    r"""(?P<space>(?:\s+|\#[^\n]*|/\*(?s:.*?)\*/)+)
     |"(?P<double>[^"]*)"|'(?P<single>[^']*)'
     |<(?P<unit>[^<>\n]*)>
     |(?P<sign>[=(){},;])
@@ -96,10 +96,14 @@ class _Reader:
 
     def __init__(self, text: str, file: Path, numbers: bool) -> None:
         self.text, self.file, self.at, self.numbers = text, file, 0, numbers
+        self.known = 0, 1
         self.token = self._next()
 
     def line(self, at: int) -> int:
-        return self.text.count("\n", 0, at) + 1
+        """Return the number of a line; those before the one that was asked for last are not counted again."""
+        known, line = self.known if self.known[0] <= at else (0, 1)
+        self.known = at, line + self.text.count("\n", known, at)
+        return self.known[1]
 
     def error(self, message: str, at: int | None = None) -> InputError:
         return InputError(message, file=self.file, record=self.line(self.token.start if at is None else at))

@@ -35,6 +35,8 @@ __all__ = [
 ]
 
 Interpolation = Literal["linear", "hermite", "lagrange"]
+PositionAxes = Literal["table", "orbit", "flight"]
+Angles = Literal["vector", "zxz"]
 BasisRow = tuple[str, int, list[float]]
 """Name, degree, and reference and scale of a polynomial, or the knots of a spline."""
 
@@ -384,6 +386,15 @@ class Trajectory:
         What its corrections are made of; None for none.
     body
         (m,) times and (m, 3, 3) matrices, inertial to body, of a body that turns under an inertial table.
+    position_axes
+        What the components of position coefficients are along: the axes of the `table`; `orbit`: along the
+        flight, across it (to the left) and radial, away from the origin of the axes; `flight`: along, across
+        and up, the third axis of the table.
+    angles
+        What rotation coefficients are: `vector`, rotation vectors about the axes of the photo, A = A0 Exp(r);
+        or `zxz`, radians added to the angles a1, a2, a3 of the table, M = [a3]_3 [a2]_1 [a1]_3 from its axes
+        to those of a camera that looks along +z, x right, y down. Polynomials in the place of the table are
+        the same with a table that they are sampled to (`formats.csm.photos.with_polynomial_pointing`).
 
     Attributes
     ----------
@@ -401,12 +412,18 @@ class Trajectory:
     position: Basis | None = None
     rotation: Basis | None = None
     body: tuple[ArrayLike, ArrayLike] | None = None
+    position_axes: PositionAxes = "table"
+    angles: Angles = "vector"
     coefficients: tuple[tuple[Coefficient, ...], tuple[Coefficient, ...]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._set("name", names("name of a trajectory", [self.name])[0])
         if not isinstance(self.table, Table):
             raise InputError(f"the table of the trajectory {self.name} is no Table: {shown(self.table)}")
+        one_of(f"position_axes of the trajectory {self.name}", self.position_axes, get_args(PositionAxes))
+        one_of(f"angles of the trajectory {self.name}", self.angles, get_args(Angles))
+        if self.position_axes != "table" and len(self.table.times) < 2:
+            raise InputError(f"the trajectory {self.name} has one position, which is along no flight")
         kinds = (("position", PositionCoefficient), ("rotation", RotationCoefficient))
         self._set("coefficients", tuple(self._coefficients(name, kind) for name, kind in kinds))
         if self.body is not None:
@@ -459,6 +476,8 @@ class Trajectory:
             "position": position,
             "rotation": rotation,
             "body": None if self.body is None else attitudes(*_arrays(self.body), "linear"),
+            "axes": self.position_axes,
+            "rotations": self.angles,
         }
 
     def flown(self, times: Floats, position: Floats, rotation: Floats) -> _photocore.FlownRow:

@@ -11,7 +11,16 @@ from photogram.errors import InputError
 from photogram.io.structure import Stand
 from photogram.network.lens import Lens
 from photogram.network.timed import Lines, LineSensor, Shutter, Timed
-from photogram.network.trajectories import Basis, Coefficient, Polynomial, Spline, Table, Trajectory
+from photogram.network.trajectories import (
+    Angles,
+    Basis,
+    Coefficient,
+    Polynomial,
+    PositionAxes,
+    Spline,
+    Table,
+    Trajectory,
+)
 
 __all__ = ["CLASSES", "STANDS"]
 
@@ -28,12 +37,15 @@ class KeptTrajectory(Stand):
     position: Basis | None
     rotation: Basis | None
     body: tuple[Floats, Floats] | None
+    position_axes: PositionAxes
+    angles: Angles
     coefficients: tuple[tuple[Coefficient, ...], tuple[Coefficient, ...]]
 
     @classmethod
     def of(cls, given: Any) -> KeptTrajectory:
         """Return what stands for a trajectory."""
-        return cls(given.name, given.table, given.position, given.rotation, given.body, given.coefficients)
+        own = (given.name, given.table, given.position, given.rotation, given.body)
+        return cls(*own, given.position_axes, given.angles, given.coefficients)
 
     def original(self) -> Trajectory:
         """Return the trajectory.
@@ -43,7 +55,8 @@ class KeptTrajectory(Stand):
         InputError
             Others than its coefficients.
         """
-        made = Trajectory(self.name, self.table, self.position, self.rotation, self.body)
+        own_parts = (self.table, self.position, self.rotation, self.body)
+        made = Trajectory(self.name, *own_parts, self.position_axes, self.angles)
         own, kept = (
             [[each.title for each in part] for part in both]
             for both in (made.coefficients, self.coefficients)

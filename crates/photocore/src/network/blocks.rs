@@ -1,6 +1,6 @@
 //! Where the unknowns of photos, cameras and common unknowns are among the retained ones.
 
-use super::{Network, Photo};
+use super::{Network, Photo, Trajectory};
 use crate::geometry::POSE;
 
 /// The retained blocks before those of points: photos (six of the pose, then those of a camera of their own; six that are held where it is
@@ -78,13 +78,15 @@ impl InBlock {
 }
 
 impl Network {
-    /// The common unknowns that are not known, together those that are one block: the coefficients of a trajectory by functions that are
+    /// The common unknowns that are not known, together those that are one block: the coefficients of one trajectory by functions that are
     /// never zero, all of which every image of it touches.
     fn commons_by_block(&self) -> Vec<Vec<usize>> {
         let mut leader: Vec<usize> = (0..self.commons.len()).collect();
+        let mut uses = vec![0; self.commons.len()];
+        self.trajectories.iter().flat_map(Trajectory::everywhere).for_each(|common| uses[common] += 1);
         for trajectory in &self.trajectories {
-            let unknown = |&common: &usize| !self.commons[common].is_held() && leader[common] == common;
-            let together: Vec<usize> = trajectory.everywhere().filter(unknown).collect();
+            let alone = |&common: &usize| !self.commons[common].is_held() && uses[common] == 1;
+            let together: Vec<usize> = trajectory.everywhere().filter(alone).collect();
             together.iter().for_each(|&common| leader[common] = together[0]);
         }
         let mut members = vec![vec![]; self.commons.len()];

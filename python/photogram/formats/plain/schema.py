@@ -274,12 +274,13 @@ TABLES: Mapping[str, Schema] = {
     ),
     "trajectories": Schema(
         ("trajectory",),
-        ("trajectory", *BASES, "interpolation", "attitude_interpolation"),
+        ("trajectory", *BASES, "interpolation", "attitude_interpolation", "position_axes", "angles"),
         _OF_BASES,
         "`trajectory`; `position`, `rotation`: what its corrections are (`polynomial`, `spline`, `none`);"
         " `interpolation` of positions (`linear`, `hermite`, `lagrange`), `attitude_interpolation` (`linear`,"
-        " `lagrange`); and for each of both, as `position_degree`, `rotation_degree`: `_degree` (0, of"
-        " splines 3), `_every` (s between knots), `_reference`, `_scale` (s, of polynomials; default: middle"
+        " `lagrange`); `position_axes` of its corrections (`table`; `orbit`: along, across, radial;"
+        " `flight`: along, across, up), `angles` of its corrections (`vector`, `zxz`); and for each of both, as `position_degree`,"
+        " `rotation_degree`: `_degree` (0, of splines 3), `_every` (s between knots), `_reference`, `_scale` (s, of polynomials; default: middle"
         " and half of the records), `_smooth` (1, 2, 3: differences of this order are 0), `_correlation` (s,"
         " of a process of Gauss and Markov); `sd_position` (unit of length), `sd_rotation` (angle) of every"
         " coefficient (0: known; empty: free, or `[sd] trajectories`), `sd_position_smooth`,"

@@ -17,7 +17,16 @@ from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import Tables, indices_of, vectors_of
 from photogram.io.delimited import ColumnTable
 from photogram.messages import quoted
-from photogram.network.trajectories import Basis, Interpolation, Polynomial, Spline, Table, Trajectory
+from photogram.network.trajectories import (
+    Angles,
+    Basis,
+    Interpolation,
+    Polynomial,
+    PositionAxes,
+    Spline,
+    Table,
+    Trajectory,
+)
 
 __all__ = ["read_trajectories", "trajectory_rows"]
 
@@ -50,6 +59,8 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
     records = _Records.read(tables, table, places)
     bases = [_Bases.read(tables, table, of, places) for of in BASES]
     bodies = _turned(tables, "body_rotations", places, tables.flip)
+    along = cast("list[PositionAxes]", _words(table, "position_axes", get_args(PositionAxes)))
+    angles = cast("list[Angles]", _words(table, "angles", get_args(Angles)))
     found: dict[str, Trajectory] = {}
     for row, name in enumerate(names):
         own = records.of(row, name)
@@ -58,7 +69,8 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
         if body is not None:
             # The matrix of a body leads from inertial axes to its own, that of an attitude the other way.
             body = body[0], np.swapaxes(body[1], 1, 2)
-        found[name] = made(table, row, partial(Trajectory, name, own, position, rotation, body))
+        make = partial(Trajectory, name, own, position, rotation, body, along[row], angles[row])
+        found[name] = made(table, row, make)
     return found
 
 
@@ -144,7 +156,10 @@ class _Records:
             own.check_given(values, AXES)
             values = np.column_stack([values, vectors_of(own, VELOCITY)])
             found = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
-        joined, turned = (_words(table, f"{of}interpolation") for of in ("", "attitude_"))
+        joined, turned = (
+            cast("list[Interpolation]", _words(table, f"{of}interpolation", get_args(Interpolation)))
+            for of in ("", "attitude_")
+        )
         return cls(table, found, _turned(tables, "trajectory_attitudes", places), joined, turned)
 
     def of(self, row: int, name: str) -> Table:
@@ -171,13 +186,13 @@ class _Records:
         return made(self.table, row, make)
 
 
-def _words(table: ColumnTable, column: str) -> list[Interpolation]:
-    words = get_args(Interpolation)
+def _words(table: ColumnTable, column: str, words: Sequence[str]) -> list[str]:
+    """Return what a column says, which is one of some words; the first where there is none."""
     found = [each.lower() for each in table.texts(column, words[0])]
     for row, word in enumerate(found):
         if word not in words:
             raise table.error(row, f"column {column}: {quoted(word)} is none of {', '.join(words)}")
-    return cast("list[Interpolation]", found)
+    return found
 
 
 _COLUMNS = {
@@ -199,7 +214,7 @@ class _Bases:
     table, kind
         Of trajectories, and which corrections these are.
     unit, signs
-        What a number of the tables is in that of the coefficients, and (3,) which way their axes point.
+        What a number of the tables is in that of the coefficients, and (rows, 3) which way their axes point.
     words, numbers
         (rows,) which basis it is, and what the columns say of it; `sd` of coefficients.
     knots
@@ -235,7 +250,10 @@ class _Bases:
             knots = {name: values[rows] for (name, of), rows in groups.items() if of == kind}
         coefficients = tables.read("trajectory_coefficients")
         rows = {} if coefficients is None else trajectory_rows(coefficients, places, bases=True)
-        signs = np.diag(tables.flip) if kind == "rotation" else np.ones(3)
+        signs = np.ones((len(table.texts(kind, "none")), 3))
+        if kind == "rotation":
+            about_photo = [each != "zxz" for each in _words(table, "angles", get_args(Angles))]
+            signs[about_photo] = np.diag(tables.flip)
         words = [each.lower() for each in table.texts(kind, "none")]
         return cls(table, kind, unit, signs, words, numbers, knots, coefficients, rows)
 
@@ -251,6 +269,7 @@ class _Bases:
         if rows is None:
             return replace(basis, sd=sd)
         values, deviations = self._coefficients(rows, basis.count, sd)
+        values = values * self.signs[row]
         return replace(basis, value=values, sd=deviations)
 
     def _check(self, row: int, name: str, word: str, rows: Indices | None) -> None:
@@ -315,6 +334,6 @@ class _Bases:
             if (each < 0).any():
                 raise table.error(row, f"column {_SD[int(np.argmax(each < 0))]}: is negative")
             seen.add(number)
-            values[int(number)] = value * self.signs * self.unit
+            values[int(number)] = value * self.unit
             deviations[int(number)] = np.where(np.isnan(each), sd, each * self.unit)
         return values, deviations

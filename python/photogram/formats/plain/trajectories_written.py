@@ -55,6 +55,9 @@ def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
         "interpolation": [each.interpolation for each in tables],
         "attitude_interpolation": [each.attitude_interpolation for each in tables],
     }
+    for name, usual in (("position_axes", "table"), ("angles", "vector")):
+        words = [getattr(each, name) for each in own]
+        columns[name] = words if set(words) != {usual} else [""] * len(own)
     coefficients: list[dict[str, Any]] = []
     for k, kind in enumerate(BASES):
         bases = [each.position if k == 0 else each.rotation for each in own]

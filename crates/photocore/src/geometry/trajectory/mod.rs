@@ -4,21 +4,25 @@
 //! C(t) = C0(t) + sum B_k(t) c_k        A(t) = A0(t) Exp(r(t)),  r(t) = sum B_k(t) r_k
 //! ```
 //!
-//! C0, A0 are the table. c_k, in the axes of the table, and the rotation vectors r_k, in those of the photo, are the coefficients. A frame is
-//! the case of one record and degree 0. Continuous-time splines: Furgale and others 2012; line scanners: Poli 2007.
+//! C0, A0 are the table. c_k, in the axes of the table, and the rotation vectors r_k, in those of the photo, are the coefficients. Others are
+//! [`Axes`] and [`Rotations`]. A frame is the case of one record and degree 0. Continuous-time splines: Furgale and others 2012; line scanners: Poli 2007.
 
+mod axes;
 mod functions;
 mod lagrange;
+mod rotations;
 mod table;
 
 use std::ops::Range;
 
 use self::functions::ALWAYS;
 
+pub use axes::Axes;
 pub use functions::{Active, BasisModel};
+pub use rotations::Rotations;
 pub use table::{Attitudes, Interpolation, Positions};
 
-use super::angle_axis::{angle_axis_with_jacobian, right_jacobian_rate};
+use self::rotations::Corrected;
 use super::{Matrix3, Pose, Vector3};
 
 macro_rules! bases {
@@ -138,6 +142,10 @@ pub struct Trajectory {
     pub position: Basis,
     /// The same of attitudes.
     pub rotation: Basis,
+    /// The axes of the corrections of positions.
+    pub axes: Axes,
+    /// What the corrections of attitudes are.
+    pub rotations: Rotations,
     /// Where the table is inertial, and the object space a body that turns: inertial to body.
     pub body: Option<Attitudes>,
 }
@@ -151,13 +159,14 @@ pub struct Flight {
     pub position: Active,
     /// The same of the rotation.
     pub rotation: Active,
-    /// The axes of the coefficients of positions, as columns: the identity, or those of the table in the body's.
+    /// The axes of the coefficients of positions, as columns in those of the object space.
     pub axes: Matrix3,
-    /// How these turn.
-    turning: Vector3,
-    /// Jr(r).
+    /// How these change in a second.
+    axes_rate: Matrix3,
+    /// The turn about the axes of the photo by a unit of each correction of the attitude, as columns: Jr(r) of rotation vectors.
     pub jacobian: Matrix3,
-    /// r and r'.
+    /// How that changes.
+    rotations: Rotations,
     turn: [Vector3; 2],
 }
 
@@ -166,36 +175,38 @@ impl Trajectory {
     pub fn at(&self, time: f64, c: &dyn Fn(usize) -> Vector3, r: &dyn Fn(usize) -> Vector3) -> Flight {
         let (position, rotation) = (self.position.at(time), self.rotation.at(time));
         let (shift, drift) = position.sums(c);
-        let (turn, turn_rate) = rotation.sums(r);
+        let turn = rotation.sums(r);
         let (place, speed) = self.positions.at(time);
-        let (attitude, rate) = self.attitudes.at(time);
-        let (exp, left) = angle_axis_with_jacobian(&turn);
-        let jacobian = left.transpose();
-        let mut pose = Pose { position: place + shift, attitude: attitude * exp };
-        let mut velocity = speed + drift;
-        let mut rate = exp.tr_mul(&rate) + jacobian * turn_rate;
-        let (mut axes, mut turning) = (Matrix3::identity(), Vector3::zeros());
+        let Corrected { attitude, mut rate, jacobian, turn } =
+            self.rotations.corrected(self.attitudes.at(time), turn.into());
+        let (mut axes, mut axes_rate) = self.axes.at(&self.positions, time);
+        let mut pose = Pose { position: place + axes * shift, attitude };
+        let mut velocity = speed + axes * drift + axes_rate * shift;
         if let Some(body) = &self.body {
-            (axes, turning) = body.at(time);
-            velocity = axes * (velocity + turning.cross(&pose.position));
+            let (to_body, turning) = body.at(time);
+            velocity = to_body * (velocity + turning.cross(&pose.position));
             rate += pose.attitude.tr_mul(&turning);
-            pose = Pose { position: axes * pose.position, attitude: axes * pose.attitude };
+            pose = Pose { position: to_body * pose.position, attitude: to_body * pose.attitude };
+            axes_rate = to_body * (axes_rate + turning.cross_matrix() * axes);
+            axes = to_body * axes;
         }
         Flight {
             motion: Motion { pose, velocity, rate },
             position,
             rotation,
             axes,
-            turning,
+            axes_rate,
             jacobian,
-            turn: [turn, turn_rate],
+            rotations: self.rotations,
+            turn,
         }
     }
 
     /// The same with its coordinates counted from an origin.
     #[must_use]
     pub fn counted_from(&self, origin: [f64; 3]) -> Self {
-        Self { positions: self.positions.counted_from(origin), ..self.clone() }
+        let (positions, axes) = (self.positions.counted_from(origin), self.axes.counted_from(origin));
+        Self { positions, axes, ..self.clone() }
     }
 
     /// The times that it may be asked for: those of the table and half a record beyond, within the knots of splines.
@@ -212,17 +223,16 @@ impl Trajectory {
 impl Flight {
     /// The partials of C' by c_k.
     pub fn velocity_by_position(&self, k: usize) -> Matrix3 {
-        let still = Matrix3::from_diagonal_element(self.position.rate(k));
-        self.axes * (still + self.position.value(k) * self.turning.cross_matrix())
+        self.position.rate(k) * self.axes + self.position.value(k) * self.axes_rate
     }
 
     /// The partials of w by r_k: `W_k = B_k' Jr + B_k (Jr' + [w]x Jr)`.
     pub fn rate_by_rotation(&self, k: usize) -> Matrix3 {
         let (value, rate) = (self.rotation.value(k), self.rotation.rate(k));
-        let [turn, turn_rate] = &self.turn;
         // The turning of the body, which is in w, steps as it is seen in the photo's axes.
         rate * self.jacobian
-            + value * (right_jacobian_rate(turn, turn_rate) + self.motion.rate.cross_matrix() * self.jacobian)
+            + value
+                * (self.rotations.jacobian_rate(&self.turn) + self.motion.rate.cross_matrix() * self.jacobian)
     }
 }
 

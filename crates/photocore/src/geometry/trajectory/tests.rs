@@ -3,7 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 use super::{
-    Active, Attitudes, Basis, BasisModel, Flight, Interpolation, Polynomial, Positions, Spline, Trajectory,
+    Active, Attitudes, Axes, Basis, BasisModel, Flight, Interpolation, Polynomial, Positions, Rotations,
+    Spline, Trajectory,
 };
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::{Matrix3, Vector3, angle_axis_rotation, rotation};
@@ -38,18 +39,36 @@ fn all() -> Vec<Trajectory> {
     let spline = |degree, from: f64, every: f64| {
         Basis::Spline(Spline { degree, knots: (0..20).map(|k| from + every * f64::from(k)).collect() })
     };
+    let centre = Vector3::new(100.0, -40.0, -900.0);
     let body = || Some(attitudes(Interpolation::Linear));
     [
-        (Interpolation::Linear, polynomial(0), Basis::None, None),
-        (Interpolation::Hermite, polynomial(2), polynomial(3), None),
-        (Interpolation::Lagrange, spline(3, -3.0, 1.1), spline(1, -2.0, 0.9), None),
-        (Interpolation::Hermite, spline(2, -3.0, 1.1), spline(5, -6.0, 1.0), body()),
+        (Interpolation::Linear, polynomial(0), Basis::None, None, Axes::Table, Rotations::Vector),
+        (Interpolation::Hermite, polynomial(2), polynomial(3), None, Axes::Flight, Rotations::Zxz),
+        (
+            Interpolation::Lagrange,
+            spline(3, -3.0, 1.1),
+            spline(1, -2.0, 0.9),
+            None,
+            Axes::Orbit(centre),
+            Rotations::Vector,
+        ),
+        (
+            Interpolation::Hermite,
+            spline(2, -3.0, 1.1),
+            spline(5, -6.0, 1.0),
+            body(),
+            Axes::Table,
+            Rotations::Vector,
+        ),
+        (Interpolation::Lagrange, polynomial(2), polynomial(2), body(), Axes::Orbit(centre), Rotations::Zxz),
     ]
-    .map(|(interpolation, position, rotation, body)| Trajectory {
+    .map(|(interpolation, position, rotation, body, axes, rotations)| Trajectory {
         positions: positions(interpolation),
         attitudes: attitudes(interpolation),
         position,
         rotation,
+        axes,
+        rotations,
         body,
     })
     .into()

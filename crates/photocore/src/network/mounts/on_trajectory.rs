@@ -162,7 +162,9 @@ mod tests {
     use super::super::tests::agrees;
     use super::{CommonKind, OnTrajectory, Trajectory, Vector3};
     use crate::geometry::rotation;
-    use crate::geometry::trajectory::{self, Attitudes, Basis, Interpolation, Polynomial, Positions, Spline};
+    use crate::geometry::trajectory::{
+        self, Attitudes, Axes, Basis, Interpolation, Polynomial, Positions, Rotations, Spline,
+    };
 
     /// A curve, corrected by a straight line and a spline; body and table apart where they are asked to be.
     fn trajectory(turning: bool) -> Trajectory {
@@ -175,7 +177,15 @@ mod tests {
         let knots = (0..9).map(|k| -7.0 + 1.9 * f64::from(k)).collect();
         let rotation = Basis::Spline(Spline { degree: 3, knots });
         let body = turning.then(|| attitudes.clone());
-        let course = trajectory::Trajectory { positions, attitudes, position, rotation, body };
+        let course = trajectory::Trajectory {
+            positions,
+            attitudes,
+            position,
+            rotation,
+            body,
+            axes: Axes::Flight,
+            rotations: if turning { Rotations::Zxz } else { Rotations::Vector },
+        };
         Trajectory { course, position: vec![0, 1], rotation: vec![2, 3, 4, 5, 6] }
     }
 

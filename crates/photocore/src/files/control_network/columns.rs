@@ -1,0 +1,394 @@
+//! Points and measures as columns.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+
+use crate::Stopped;
+
+use super::fault::Reason;
+use super::fields::{Field, Kind, MEASURES, POINT};
+
+/// A value of a column that may be absent.
+pub trait Value: Copy {
+    /// What stands for none.
+    const ABSENT: Self;
+    /// Whether there is none.
+    fn is_absent(&self) -> bool;
+}
+
+macro_rules! values {
+    ($($of:ty: $absent:expr, $is:expr;)+) => {$(
+        impl Value for $of {
+            const ABSENT: Self = $absent;
+            fn is_absent(&self) -> bool {
+                $is(self)
+            }
+        }
+    )+};
+}
+
+values! {
+    f64: f64::NAN, |value: &f64| value.is_nan();
+    [f64; 6]: [f64::NAN; 6], |value: &[f64; 6]| value[0].is_nan();
+    bool: false, |value: &bool| !value;
+    i8: -1, |value: &i8| *value < 0;
+    i32: -1, |value: &i32| *value < 0;
+}
+
+/// A column that is as long as its last value that is there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sparse<'a, T: Value>(pub Cow<'a, [T]>);
+
+impl<T: Value> Default for Sparse<'_, T> {
+    fn default() -> Self {
+        Self(Cow::Owned(vec![]))
+    }
+}
+
+impl<T: Value> Sparse<'_, T> {
+    /// The value of a row.
+    pub fn get(&self, row: usize) -> T {
+        self.0.get(row).copied().unwrap_or(T::ABSENT)
+    }
+
+    /// Sets the value of the last row so far, and says whether it had one.
+    fn set(&mut self, row: usize, value: T) -> Result<bool, Stopped> {
+        let had = !self.get(row).is_absent();
+        if value.is_absent() && !had {
+            return Ok(had);
+        }
+        let own = self.0.to_mut();
+        own.truncate(row);
+        reserve(own, row + 1 - own.len())?;
+        own.resize(row, T::ABSENT);
+        own.push(value);
+        Ok(had)
+    }
+
+    /// The whole column of so many rows; None where nothing is in it.
+    pub fn whole(self, rows: usize) -> Option<Vec<T>> {
+        let mut own = self.0.into_owned();
+        (!own.is_empty()).then(|| {
+            own.resize(rows, T::ABSENT);
+            own
+        })
+    }
+}
+
+fn reserve<T>(values: &mut Vec<T>, more: usize) -> Result<(), Stopped> {
+    values.try_reserve(more).map_err(|_| Stopped::OutOfMemory((values.len() + more) * size_of::<T>()))
+}
+
+/// A text in every row.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Texts {
+    text: String,
+    ends: Vec<usize>,
+}
+
+impl Texts {
+    /// The text of a row.
+    pub fn get(&self, row: usize) -> &str {
+        let start = if row == 0 { 0 } else { self.ends[row - 1] };
+        &self.text[start..self.ends[row]]
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &str> {
+        (0..self.ends.len()).map(|row| self.get(row))
+    }
+
+    fn set(&mut self, row: usize, text: &str) -> bool {
+        let had = self.ends.len() > row;
+        if had {
+            self.ends.truncate(row);
+            self.text.truncate(self.ends.last().copied().unwrap_or(0));
+        }
+        self.text.push_str(text);
+        self.ends.push(self.text.len());
+        had
+    }
+}
+
+impl<S: AsRef<str>> FromIterator<S> for Texts {
+    fn from_iter<I: IntoIterator<Item = S>>(texts: I) -> Self {
+        let mut own = Self::default();
+        for (row, text) in texts.into_iter().enumerate() {
+            own.set(row, text.as_ref());
+        }
+        own
+    }
+}
+
+/// Texts that many rows have in common: their indices, and each of them once.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Names<'a> {
+    /// Which one a row has.
+    pub indices: Sparse<'a, i32>,
+    /// The texts, in the order in which they came up.
+    pub names: Vec<String>,
+    known: HashMap<String, i32>,
+}
+
+impl<'a> Names<'a> {
+    /// Names that are known, with their indices.
+    pub fn of(indices: Sparse<'a, i32>, names: Vec<String>) -> Self {
+        Self { indices, names, known: HashMap::new() }
+    }
+
+    fn set(&mut self, row: usize, name: &str) -> Result<bool, Stopped> {
+        let index = match self.known.get(name) {
+            Some(&index) => index,
+            None => {
+                let index = self.names.len() as i32;
+                self.names.push(name.to_owned());
+                self.known.insert(name.to_owned(), index);
+                index
+            }
+        };
+        self.indices.set(row, index)
+    }
+}
+
+/// A column of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Column<'a> {
+    /// Of [`Kind::Text`].
+    Texts(Texts),
+    /// Of [`Kind::Name`].
+    Names(Names<'a>),
+    /// Of [`Kind::Code`].
+    Codes(Sparse<'a, i8>),
+    /// Of [`Kind::Truth`].
+    Truths(Sparse<'a, bool>),
+    /// Of [`Kind::Number`].
+    Numbers(Sparse<'a, f64>),
+    /// Of [`Kind::Covariance`].
+    Covariances(Sparse<'a, [f64; 6]>),
+    /// Of [`Kind::Index`].
+    Indices(Sparse<'a, i32>),
+    /// What has none.
+    Kept,
+}
+
+impl Column<'_> {
+    /// An empty column.
+    pub fn empty(kind: Kind) -> Self {
+        match kind {
+            Kind::Text => Self::Texts(Texts::default()),
+            Kind::Name => Self::Names(Names::default()),
+            Kind::Code(_) => Self::Codes(Sparse::default()),
+            Kind::Truth => Self::Truths(Sparse::default()),
+            Kind::Number(_) => Self::Numbers(Sparse::default()),
+            Kind::Covariance => Self::Covariances(Sparse::default()),
+            Kind::Index => Self::Indices(Sparse::default()),
+            Kind::Kept | Kind::Log => Self::Kept,
+        }
+    }
+
+    /// Whether a row has a value.
+    pub fn has(&self, row: usize) -> bool {
+        match self {
+            Self::Texts(own) => own.ends.len() > row,
+            Self::Names(own) => !own.indices.get(row).is_absent(),
+            Self::Codes(own) => !own.get(row).is_absent(),
+            Self::Truths(own) => !own.get(row).is_absent(),
+            Self::Numbers(own) => !own.get(row).is_absent(),
+            Self::Covariances(own) => !own.get(row).is_absent(),
+            Self::Indices(own) => !own.get(row).is_absent(),
+            Self::Kept => false,
+        }
+    }
+
+    /// Sets the value of the last row so far, and says whether it had one; a value of another kind is none.
+    pub(super) fn set(&mut self, row: usize, cell: Cell<'_>) -> Result<bool, Stopped> {
+        match (self, cell) {
+            (Self::Texts(own), Cell::Text(text)) => Ok(own.set(row, text)),
+            (Self::Names(own), Cell::Text(text)) => own.set(row, text),
+            (Self::Codes(own), Cell::Code(code)) => own.set(row, code),
+            (Self::Truths(own), Cell::Truth(truth)) => own.set(row, truth),
+            (Self::Numbers(own), Cell::Number(number)) => own.set(row, number),
+            (Self::Covariances(own), Cell::Covariance(values)) => own.set(row, values),
+            (Self::Indices(own), Cell::Index(index)) => own.set(row, index),
+            _ => Ok(false),
+        }
+    }
+
+    /// Whether it is no longer than so many rows, and holds only what its field can have.
+    fn agrees(&self, field: &Field, rows: usize) -> bool {
+        let fits = |length: usize| length <= rows;
+        match (self, field.kind) {
+            (Self::Texts(own), _) => own.ends.len() == rows,
+            (Self::Names(own), _) => {
+                let all = own.names.len() as i64;
+                own.indices.0.len() == rows
+                    && own.indices.0.iter().all(|&index| (0..all).contains(&index.into()))
+            }
+            (Self::Codes(own), Kind::Code(words)) => {
+                fits(own.0.len()) && own.0.iter().all(|&code| i64::from(code) < words.len() as i64)
+            }
+            (Self::Truths(own), _) => fits(own.0.len()),
+            (Self::Numbers(own), _) => fits(own.0.len()),
+            (Self::Covariances(own), _) => fits(own.0.len()),
+            (Self::Indices(own), _) => fits(own.0.len()),
+            (Self::Kept, _) => true,
+            (Self::Codes(_), _) => false,
+        }
+    }
+}
+
+/// A value on its way into a column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Cell<'a> {
+    Text(&'a str),
+    Code(i8),
+    Truth(bool),
+    Number(f64),
+    Covariance([f64; 6]),
+    Index(i32),
+}
+
+/// What has no column: fields of messages, byte for byte, of each row.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rest<'a> {
+    /// Of all rows.
+    pub bytes: Cow<'a, [u8]>,
+    /// Where those of a row begin, and where the last ones end.
+    pub starts: Cow<'a, [i64]>,
+}
+
+impl Default for Rest<'_> {
+    fn default() -> Self {
+        Self { bytes: Cow::Owned(vec![]), starts: Cow::Owned(vec![0]) }
+    }
+}
+
+impl Rest<'_> {
+    /// What is kept of a row.
+    pub fn row(&self, row: usize) -> &[u8] {
+        &self.bytes[self.starts[row] as usize..self.starts[row + 1] as usize]
+    }
+
+    pub(super) fn keep(&mut self, raw: &[u8]) -> Result<(), Stopped> {
+        let own = self.bytes.to_mut();
+        reserve(own, raw.len())?;
+        own.extend_from_slice(raw);
+        Ok(())
+    }
+}
+
+/// Points or measures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table<'a> {
+    /// What they consist of: what every row has to have comes first.
+    pub fields: &'static [Field],
+    /// A column for each field.
+    pub columns: Vec<Column<'a>>,
+    /// What has no column.
+    pub rest: Rest<'a>,
+    /// How many there are.
+    pub rows: usize,
+}
+
+/// Fields that every point and measure has: what it is called, and its type.
+const REQUIRED: usize = 2;
+
+impl<'a> Table<'a> {
+    fn empty(fields: &'static [Field]) -> Self {
+        let columns = fields.iter().map(|field| Column::empty(field.kind)).collect();
+        Self { fields, columns, rest: Rest::default(), rows: 0 }
+    }
+
+    /// Ends the row that was filled.
+    pub(super) fn end_row(&mut self) -> Result<(), Reason> {
+        let missing = (0..REQUIRED).find(|&slot| !self.columns[slot].has(self.rows));
+        if let Some(slot) = missing {
+            return Err(Reason::Missing(self.fields[slot].key));
+        }
+        self.rest.starts.to_mut().push(self.rest.bytes.len() as i64);
+        self.rows += 1;
+        Ok(())
+    }
+
+    /// Where the column of a field of messages stands.
+    pub(super) fn slot_of_number(&self, number: u64) -> Option<usize> {
+        self.fields.iter().position(|field| u64::from(field.number) == number)
+    }
+
+    fn agrees(&self) -> bool {
+        let starts = &self.rest.starts;
+        let inside = starts.first() == Some(&0)
+            && starts.is_sorted()
+            && starts.last().is_some_and(|&last| last as usize <= self.rest.bytes.len());
+        inside
+            && starts.len() == self.rows + 1
+            && self.columns.iter().zip(self.fields).all(|(column, field)| column.agrees(field, self.rows))
+            && (0..REQUIRED).all(|slot| (0..self.rows).all(|row| self.columns[slot].has(row)))
+    }
+}
+
+/// The points of a network with their measures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Points<'a> {
+    /// The points.
+    pub points: Table<'a>,
+    /// The measures, those of a point one after the other.
+    pub measures: Table<'a>,
+    /// The first measure of each point, and the number of all.
+    pub firsts: Cow<'a, [i64]>,
+}
+
+impl Default for Points<'_> {
+    fn default() -> Self {
+        Self { points: Table::empty(POINT), measures: Table::empty(MEASURES), firsts: Cow::Owned(vec![0]) }
+    }
+}
+
+impl Points<'_> {
+    /// Ends the point that was filled.
+    pub(super) fn end_point(&mut self) -> Result<(), Reason> {
+        let first = self.firsts.last().map_or(0, |&first| first as usize);
+        self.check_reference(self.points.rows, self.measures.rows - first)?;
+        self.points.end_row()?;
+        self.firsts.to_mut().push(self.measures.rows as i64);
+        Ok(())
+    }
+
+    fn check_reference(&self, point: usize, measures: usize) -> Result<(), Reason> {
+        match self.reference(point) {
+            Some(reference) if reference as usize >= measures => {
+                Err(Reason::Reference { reference, measures })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The measure of a point that is its reference, counted from its first one.
+    pub fn reference(&self, point: usize) -> Option<i32> {
+        self.points.columns.iter().find_map(|column| match column {
+            Column::Indices(own) => Some(own.get(point)).filter(|index| !index.is_absent()),
+            _ => None,
+        })
+    }
+
+    /// The measures of a point.
+    pub fn measures_of(&self, point: usize) -> std::ops::Range<usize> {
+        self.firsts[point] as usize..self.firsts[point + 1] as usize
+    }
+
+    /// Refuses columns that do not agree, before any of them is written.
+    pub(super) fn check(&self) -> Result<(), Reason> {
+        let firsts = &self.firsts;
+        let sound = firsts.first() == Some(&0)
+            && firsts.is_sorted()
+            && firsts.last() == Some(&(self.measures.rows as i64))
+            && firsts.len() == self.points.rows + 1;
+        match (sound, self.points.agrees(), self.measures.agrees()) {
+            (false, ..) => Err(Reason::Columns("the first measures of points")),
+            (_, false, _) => Err(Reason::Columns("those of points")),
+            (.., false) => Err(Reason::Columns("those of measures")),
+            _ => (0..self.points.rows)
+                .try_for_each(|point| self.check_reference(point, self.measures_of(point).len())),
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! Text line by line: a key with its value, which may go on over further lines.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use super::fault::{Fault, Reason};
+
+/// Characters of a line that an error shows.
+const SHOWN: usize = 60;
+
+/// A statement: a line, or several where its value goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Statement<'a> {
+    /// The number of its first line, from 1.
+    pub line: usize,
+    /// What stands there.
+    pub text: &'a str,
+    /// Its key, or what ends a group.
+    pub key: &'a str,
+    /// What stands behind the equals sign.
+    pub value: &'a str,
+}
+
+/// The statements of a text, without comments.
+#[derive(Debug, Clone)]
+pub struct Statements<'a> {
+    text: &'a str,
+    at: usize,
+    line: usize,
+}
+
+/// What a statement has open at the end of a line.
+#[derive(Debug, Default)]
+struct Open {
+    quote: Option<u8>,
+    lists: usize,
+    hyphen: bool,
+}
+
+impl Open {
+    /// Goes over a line, and says whether the statement ends with it.
+    fn ends_with(&mut self, line: &[u8]) -> bool {
+        let mut before = b' ';
+        for &byte in line {
+            match (self.quote, byte) {
+                (Some(quote), _) if byte == quote => self.quote = None,
+                (Some(_), _) => {}
+                (None, b'#') if before.is_ascii_whitespace() => break,
+                (None, b'"' | b'\'') if before.is_ascii_whitespace() || b"=(,{".contains(&before) => {
+                    self.quote = Some(byte);
+                }
+                (None, b'(' | b'{') => self.lists += 1,
+                (None, b')' | b'}') => self.lists = self.lists.saturating_sub(1),
+                _ => {}
+            }
+            before = byte;
+        }
+        self.hyphen = self.quote.is_none() && before == b'-';
+        self.quote.is_none() && self.lists == 0 && !self.hyphen
+    }
+}
+
+impl<'a> Statements<'a> {
+    /// Those of a text.
+    pub fn new(text: &'a str) -> Self {
+        Self { text, at: 0, line: 0 }
+    }
+
+    /// Where the next line stands.
+    fn next_line(&mut self) -> Option<Range<usize>> {
+        let start = self.at;
+        let rest = self.text.get(start..).filter(|rest| !rest.is_empty())?;
+        let length = rest.find('\n').unwrap_or(rest.len());
+        self.at = (start + length + 1).min(self.text.len());
+        self.line += 1;
+        Some(start..start + length)
+    }
+
+    fn skip_comment(&mut self, mut line: Range<usize>) -> Result<(), Fault> {
+        let start = self.line;
+        while !self.text[line].trim_end().ends_with("*/") {
+            line = self.next_line().ok_or_else(|| Reason::Ends("a comment").on_line(start))?;
+        }
+        Ok(())
+    }
+
+    fn statement(&mut self, first: Range<usize>) -> Result<Statement<'a>, Fault> {
+        let (line, start) = (self.line, first.start);
+        let (mut open, mut last) = (Open::default(), first);
+        while !open.ends_with(self.text[last.clone()].trim_end().as_bytes()) {
+            last = self.next_line().ok_or_else(|| Reason::Ends("a value").on_line(line))?;
+        }
+        let text = self.text[start..last.end].trim();
+        let (key, value) = text.split_once('=').map_or((text, ""), |(key, value)| (key.trim(), value.trim()));
+        Ok(Statement { line, text, key, value })
+    }
+}
+
+impl<'a> Iterator for Statements<'a> {
+    type Item = Result<Statement<'a>, Fault>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let line = self.next_line()?;
+            let trimmed = self.text[line.clone()].trim();
+            if trimmed.starts_with("/*") {
+                if let Err(fault) = self.skip_comment(line) {
+                    return Some(Err(fault));
+                }
+            } else if !trimmed.is_empty() && !trimmed.starts_with('#') {
+                return Some(self.statement(line));
+            }
+        }
+    }
+}
+
+/// What has an end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// `Object` .. `End_Object`.
+    Object,
+    /// `Group` .. `End_Group`.
+    Group,
+}
+
+/// What a statement does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Act {
+    /// Begins a group or object.
+    Begin(Kind),
+    /// Ends one.
+    End(Kind),
+    /// Ends the text.
+    Stop,
+    /// Gives a key its value.
+    Give,
+}
+
+/// A value of text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Read<'a> {
+    /// The text, or what stands between the parentheses of a list.
+    pub text: Cow<'a, str>,
+    /// Its unit.
+    pub unit: Option<Cow<'a, str>>,
+}
+
+impl<'a> Statement<'a> {
+    /// What it does.
+    pub fn act(&self) -> Act {
+        let is = |words: &[&str]| words.iter().any(|word| self.key.eq_ignore_ascii_case(word));
+        // Few keys begin so.
+        match self.key.as_bytes().first().map(u8::to_ascii_lowercase) {
+            Some(b'o' | b'b') if is(&["Object", "Begin_Object"]) => Act::Begin(Kind::Object),
+            Some(b'g' | b'b') if is(&["Group", "Begin_Group"]) => Act::Begin(Kind::Group),
+            Some(b'e') if is(&["End_Object", "EndObject"]) => Act::End(Kind::Object),
+            Some(b'e') if is(&["End_Group", "EndGroup"]) => Act::End(Kind::Group),
+            Some(b'e') if self.value.is_empty() && is(&["End"]) => Act::Stop,
+            _ => Act::Give,
+        }
+    }
+
+    /// Whether it begins a thing of this kind and name.
+    pub fn begins(&self, kind: Kind, name: &str) -> bool {
+        self.act() == Act::Begin(kind) && self.value.eq_ignore_ascii_case(name)
+    }
+
+    /// The fault of a statement that is not understood.
+    pub fn fault(&self) -> Fault {
+        Reason::Line(self.text.chars().take(SHOWN).collect()).on_line(self.line)
+    }
+
+    /// Its value: without marks of quotation, lines that go on put together.
+    pub fn read(&self) -> Result<Read<'a>, Fault> {
+        let is_word = !self.value.starts_with(['"', '\'', '(', '{']);
+        let read = match self.value.contains('\n') && is_word {
+            true => parts(&put_together(self.value, "-", "")).map(|(text, unit)| Read {
+                text: text.to_owned().into(),
+                unit: unit.map(|unit| unit.to_owned().into()),
+            }),
+            false => parts(self.value)
+                .map(|(text, unit)| Read { text: unfolded(text), unit: unit.map(Cow::Borrowed) }),
+        };
+        read.filter(|_| !self.key.is_empty()).ok_or_else(|| self.fault())
+    }
+}
+
+/// A value without marks of quotation or parentheses, and its unit; None where something else stands behind it.
+fn parts(value: &str) -> Option<(&str, Option<&str>)> {
+    let (text, rest) = match value.as_bytes().first()? {
+        quote @ (b'"' | b'\'') => value[1..].split_once(char::from(*quote))?,
+        b'(' => value[1..].split_once(')')?,
+        b'{' => value[1..].split_once('}')?,
+        b'<' => return None,
+        _ => value.split_at(value.find(|c: char| c.is_whitespace() || c == '<').unwrap_or(value.len())),
+    };
+    let rest = rest.trim();
+    let (unit, behind) = match rest.strip_prefix('<') {
+        Some(rest) => rest.split_once('>').map(|(unit, behind)| (Some(unit.trim()), behind.trim()))?,
+        None => (None, rest),
+    };
+    (behind.is_empty() || behind.starts_with('#')).then_some((text, unit))
+}
+
+/// A quoted text in one line: what goes on after a hyphen without it, other lines after a space.
+fn unfolded(text: &str) -> Cow<'_, str> {
+    match text.contains('\n') {
+        true => put_together(&put_together(text, "-", ""), "", " ").into(),
+        false => text.into(),
+    }
+}
+
+/// Lines as one: `mark` stands where they end, `between` comes in its place.
+fn put_together(text: &str, mark: &str, between: &str) -> String {
+    let mut lines = text.split('\n').map(|line| line.trim_end_matches('\r')).peekable();
+    let (mut all, mut joined) = (String::new(), false);
+    while let Some(line) = lines.next() {
+        let line = if joined { line.trim_start() } else { line };
+        let ended = lines.peek().and_then(|_| line.trim_end().strip_suffix(mark));
+        all.push_str(ended.unwrap_or(line));
+        joined = ended.is_some();
+        all.push_str(match (joined, lines.peek()) {
+            (true, _) => between,
+            (false, Some(_)) => "\n",
+            (false, None) => "",
+        });
+    }
+    all
+}

@@ -1,0 +1,1 @@
+"""Control networks of ISIS, the planetary mapping system of the U.S. Geological Survey."""

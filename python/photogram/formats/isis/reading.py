@@ -1,0 +1,206 @@
+"""Reading control networks: binary ones of versions 2 and 5, text of versions 3 to 5."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.isis.columns import measures_of, points_of
+from photogram.formats.isis.network import MESSAGE, ControlNetwork
+from photogram.io.files import read_bytes
+from photogram.io.pvl import Group, Quantity, Value, parsed
+
+__all__ = ["is_network", "read_network"]
+
+LABEL_BYTES = 65536
+"""Bytes of the label of a binary network; zeros follow what it says."""
+_FIRST_OBJECT = re.compile(rb"\s*(?:(?:#|/\*)[^\n]*\n\s*)*object\s*=\s*(\w+)", re.IGNORECASE)
+_BINARY, _TEXT = "protobuffer", "controlnetwork"
+_BINARY_VERSIONS = ("2", "5")
+_TEXT_VERSIONS = ("3", "4", "5")
+_OLDEST = "1"
+"""The version of a network that does not say it."""
+
+_HEADER = {
+    "networkid": "network_id",
+    "targetname": "target",
+    "username": "user",
+    "created": "created",
+    "lastmodified": "modified",
+    "description": "description",
+}
+
+
+def _kind(data: bytes) -> str:
+    """Return what the first object of a label is called, in small letters; nothing where there is none."""
+    found = _FIRST_OBJECT.match(data[:LABEL_BYTES].removeprefix(b"\xef\xbb\xbf"))
+    return found[1].decode().lower() if found else ""
+
+
+def is_network(head: bytes) -> bool:
+    """Return whether a file that begins so is a control network."""
+    return _kind(head) in (_BINARY, _TEXT)
+
+
+def read_network(path: Path) -> ControlNetwork:
+    """Read a control network.
+
+    Comments of text are not read: ISIS writes there what it has computed from the rest.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, is no control network, or of a version that is not known; parts of it are damaged:
+        the error has the number of the point (binary networks) or the line (text).
+    """
+    data = read_bytes(path)
+    kind = _kind(data)
+    if kind == _BINARY:
+        network = _binary(data, path)
+    elif kind == _TEXT:
+        network = _text(data, path)
+    else:
+        raise InputError(
+            "is no control network: its first object is no ProtoBuffer or ControlNetwork", file=path
+        )
+    _check_names(network.points.ids, path)
+    return network
+
+
+def _check_names(ids: Sequence[str], path: Path) -> None:
+    if len(set(ids)) == len(ids):
+        return
+    first: dict[str, int] = {}
+    for number, name in enumerate(ids, 1):
+        if first.setdefault(name, number) != number:
+            raise InputError(
+                f"point {number} has the name {name}, as point {first[name]} has", file=path, record=number
+            )
+
+
+def _check_version(version: str, known: tuple[str, ...], what: str, path: Path) -> None:
+    if version not in known:
+        raise InputError(
+            f"is a control network of version {version}; {what} ones are read in version "
+            f"{', '.join(known[:-1])} or {known[-1]}",
+            file=path,
+        )
+
+
+@dataclass
+class _Label:
+    """What the label of a binary network says."""
+
+    core: Group
+    info: Group
+    others: Group
+    path: Path
+
+    def whole(self, group: Group, key: str) -> int | None:
+        """Return a whole number that is not negative; None where the key is not there."""
+        value = group.get(key)
+        if value is None:
+            return None
+        if not isinstance(value, str) or re.fullmatch(r"\d{1,18}", value) is None:
+            raise InputError(f"{key} is no whole number", file=self.path, record=group.line)
+        return int(value)
+
+    def place(self, key: str) -> int:
+        """Return a place or a number of bytes of the core."""
+        if (place := self.whole(self.core, key)) is None:
+            raise InputError(f"its label has no {key}", file=self.path, record=self.core.line)
+        return place
+
+
+def _label(data: bytes, path: Path) -> _Label:
+    head = data[:LABEL_BYTES].split(b"\0", 1)[0]
+    try:
+        text = head.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = head.decode("latin-1")
+    label = parsed(text, path, numbers=False)
+    buffer = _only(label, "ProtoBuffer", path)
+    core, info = (_only(buffer, name, path) for name in ("Core", "ControlNetworkInfo"))
+    known = {*_HEADER, "numberofpoints", "numberofmeasures", "version"}
+    others = Group("", "label", items=[item for item in info.items if item[0].lower() not in known])
+    others.items += label.items + buffer.items
+    read = {id(buffer), id(core), id(info)}
+    others.inside = [each for each in label.inside + buffer.inside if id(each) not in read]
+    return _Label(core, info, others, path)
+
+
+def _only(group: Group, name: str, path: Path) -> Group:
+    if not (found := group.groups(name)):
+        raise InputError(f"its label has no {name}", file=path, record=group.line)
+    return found[0]
+
+
+def _binary(data: bytes, path: Path) -> ControlNetwork:
+    label = _label(data, path)
+    version = str(label.info.get("Version") or _OLDEST)
+    _check_version(version, _BINARY_VERSIONS, "binary", path)
+    start, points = label.place("HeaderStartByte"), label.place("PointsStartByte")
+    texts, count, lengths, radii, rest = _photocore.control_header(
+        data, start, start + label.place("HeaderBytes"), path
+    )
+    listed = lengths if version == "2" else None
+    read = _photocore.control_points(data, points, points + label.place("PointsBytes"), listed, path)
+    header: dict[str, Any] = dict(zip(MESSAGE, texts, strict=True))
+    network = _network(
+        *read, **header, radii=np.array(radii), header_rest=rest, version=int(version), others=label.others
+    )
+    for said, found, what in (
+        (count, len(network.points), "points"),
+        (label.whole(label.info, "NumberOfPoints"), len(network.points), "points"),
+        (label.whole(label.info, "NumberOfMeasures"), len(network.measures), "measures"),
+    ):
+        if said is not None and said != found:
+            raise InputError(f"says that it has {said} {what}, and has {found}", file=path)
+    return network
+
+
+def _network(points: dict[str, Any], measures: dict[str, Any], firsts: Any, **header: Any) -> ControlNetwork:
+    return ControlNetwork(points_of(points), measures_of(measures), firsts, **header)
+
+
+def _text(data: bytes, path: Path) -> ControlNetwork:
+    read, around = _photocore.control_points_of_text(data.removeprefix(b"\xef\xbb\xbf"), path)
+    label = parsed(around, path, numbers=False)
+    network = _only(label, "ControlNetwork", path)
+    _check_version(str(network.get("Version") or _OLDEST), _TEXT_VERSIONS, "text", path)
+    header: dict[str, Any] = {}
+    others = Group("", "label", items=[*label.items])
+    others.inside = network.inside + [each for each in label.inside if each is not network]
+    for key, value in network.items:
+        if (name := _HEADER.get(key.lower())) is not None:
+            if not isinstance(value, str):
+                raise InputError(f"{key} is no text", file=path, record=network.line)
+            header[name] = value
+        elif key.lower() == "targetradii":
+            header["radii"] = _radii(value, network, path)
+        elif key.lower() != "version":
+            others.items.append((key, value))
+    return _network(*read, **header, version=int(str(network.get("Version"))), others=others)
+
+
+def _radii(value: Value, network: Group, path: Path) -> Floats:
+    """Return radii in metres."""
+    try:
+        if isinstance(value, Quantity):
+            if value.unit.lower() != "meters":
+                raise ValueError
+            value = value.value
+        radii = np.array([float(str(each)) for each in (value if isinstance(value, list) else [value])])
+        if not np.isfinite(radii).all():
+            raise ValueError
+    except ValueError:
+        raise InputError("TargetRadii are no metres", file=path, record=network.line) from None
+    return radii

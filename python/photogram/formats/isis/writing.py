@@ -1,0 +1,91 @@
+"""Writing control networks: binary ones of version 5, and text."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from photogram import _photocore
+from photogram.errors import InputError
+from photogram.formats.isis.columns import columns_of_measures, columns_of_points
+from photogram.formats.isis.network import MESSAGE, ControlNetwork
+from photogram.io.pvl import Group, Value, label_text
+
+__all__ = ["binary_network", "network_text"]
+
+_LABEL_BYTES = 65536
+_VERSION = 5
+_END = "End_Object\nEnd\n"
+
+
+def _header(network: ControlNetwork) -> list[tuple[str, Value]]:
+    """Return what a network says of itself, in the order of ISIS."""
+    texts = {
+        "NetworkId": network.network_id,
+        "TargetName": network.target,
+        "UserName": network.user,
+        "Created": network.created,
+        "LastModified": network.modified,
+        "Description": network.description,
+    }
+    return [(key, text) for key, text in texts.items() if text is not None]
+
+
+def binary_network(network: ControlNetwork) -> bytes:
+    """Return a network as a binary file of version 5.
+
+    Every field of every point and measure stands there as it was read, but for those whose columns have other
+    values now.
+
+    Raises
+    ------
+    InputError
+        Columns that do not agree; something that was read from text and has no place in a binary network: the
+        message names it, and the point.
+    """
+    columns = columns_of_points(network.points), columns_of_measures(network.measures)
+    points = _photocore.control_point_messages(*columns, network.firsts)
+    texts = [getattr(network, name) for name in MESSAGE]
+    radii = network.radii.tolist()
+    header = _photocore.control_header_message(texts, len(network.points), radii, network.header_rest)
+    counts: list[tuple[str, Value]] = [
+        ("NumberOfPoints", len(network.points)),
+        ("NumberOfMeasures", len(network.measures)),
+        ("Version", _VERSION),
+    ]
+    places: list[tuple[str, Value]] = [
+        ("HeaderStartByte", _LABEL_BYTES),
+        ("HeaderBytes", len(header)),
+        ("PointsStartByte", _LABEL_BYTES + len(header)),
+        ("PointsBytes", len(points)),
+    ]
+    info = [*_header(network), *counts, *network.others.items]
+    inside = [Group("Core", "object", items=places), Group("ControlNetworkInfo", "group", items=info)]
+    buffer = Group("ProtoBuffer", "object", inside=[*inside, *network.others.inside])
+    label = label_text(Group("", "label", inside=[buffer])).encode()
+    if len(label) > _LABEL_BYTES:
+        raise InputError(
+            f"the header has {len(label)} bytes, and a binary network has room for {_LABEL_BYTES}"
+        )
+    return label.ljust(_LABEL_BYTES, b"\0") + header + points
+
+
+def network_text(network: ControlNetwork) -> bytes:
+    """Return a network as text of version 5.
+
+    Raises
+    ------
+    InputError
+        Columns that do not agree; something that was read from a binary network and has no key in text: the
+        message names it, and the point.
+    """
+    if network.header_rest:
+        raise InputError("the header has fields of a binary network that have no key in text")
+    columns = columns_of_points(network.points), columns_of_measures(network.measures)
+    points = _photocore.control_point_text(*columns, network.firsts)
+    items = _header(network)
+    if network.radii.size:
+        items.append(("TargetRadii", list[Value](network.radii.tolist())))
+    items += [("Version", _VERSION), *network.others.items]
+    own = replace(network.others, name="ControlNetwork", kind="object", items=items)
+    head = label_text(Group("", "label", inside=[own])).removesuffix(_END)
+    return head.encode() + points + _END.encode()

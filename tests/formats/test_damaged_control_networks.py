@@ -1,0 +1,181 @@
+"""Control networks of ISIS that are damaged, old, or do not agree are refused, each with its place."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from control_networks import (
+    LABEL,
+    MEASURE,
+    POINT,
+    POINT_TEXT,
+    binary,
+    full_message,
+    in_text,
+    packed,
+    read_again,
+    small,
+    varint,
+)
+
+from photogram.errors import InputError
+from photogram.formats.isis.network import ControlMeasures, ControlPoints
+from photogram.formats.isis.writing import binary_network, network_text
+from photogram.io.pvl import Group
+
+
+@pytest.mark.parametrize(
+    ("point", "record", "said"),
+    [
+        (POINT_TEXT.replace("PointId   = P1", ""), 5, "point 1 has no PointId"),
+        (POINT_TEXT.replace("MeasureType  = Manual", ""), 9, "point 1 has no MeasureType"),
+        (POINT_TEXT.replace("= 1.5", "= 1.5 <mm>"), 12, "has .* for Sample, which is pixels"),
+        (POINT_TEXT.replace("= 1.5", "= one"), 12, 'has "one" for Sample, which is a number'),
+        (POINT_TEXT.replace("= 1.5", "= inf"), 12, 'has "inf" for Sample, which is a number'),
+        (POINT_TEXT.replace("= 1.5", "= 1.5 2"), 12, "no part of a control network"),
+        (POINT_TEXT.replace("= 1.5", "= 1.5\n  Sample = 1.5"), 13, "has Sample twice"),
+        (POINT_TEXT.replace("= Manual", "= Guessed"), 11, 'has "Guessed" for MeasureType'),
+        (POINT_TEXT.replace("PointType = Free", "AprioriX = 1 <km>"), 6, "for AprioriX, which is meters"),
+        (POINT_TEXT.replace("PointType = Free", "Ignore = maybe"), 6, "which is True or False"),
+        (POINT_TEXT.replace("PointType = Free", "AprioriCovarianceMatrix = (1, 2)"), 6, "six numbers"),
+        (
+            POINT_TEXT.replace("PointType = Free", "ReferenceIndex = 1\n PointType = Free"),
+            5,
+            "measure 1.* and has 1",
+        ),
+        (POINT_TEXT.replace("PointType = Free", 'ChooserName = "open'), 6, "ends within a value"),
+        (POINT_TEXT.replace("End_Group", ""), 16, 'no part of a control network: "End_Object"'),
+        (POINT_TEXT + POINT_TEXT, 2, "point 2 has the name P1, as point 1 has"),
+        ("\n  Object = ControlPoint\n /* open", 6, "ends within a comment"),
+    ],
+)
+def test_text_that_is_wrong_is_refused_with_its_line(point, record, said, tmp_path):
+    with pytest.raises(InputError, match=said) as caught:
+        read_again(in_text(point), tmp_path)
+    assert (caught.value.record, caught.value.file) == (record, tmp_path / "again.net")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (
+            binary(POINT, version=1),
+            "is a control network of version 1; binary ones are read in version 2 or 5",
+        ),
+        (binary(POINT, version=3), "version 3"),
+        (binary(POINT, version=4), "version 4"),
+        (in_text(POINT_TEXT, head="Version = 2"), "version 2; text ones are read in version 3, 4 or 5"),
+        (in_text(POINT_TEXT, head=""), "version 1"),
+        (binary(POINT, info="NumberOfPoints = 2"), "says that it has 2 points, and has 1"),
+        (binary(POINT, info="NumberOfMeasures = 7"), "says that it has 7 measures, and has 0"),
+        (binary(POINT, header=packed(7, 3)), "says that it has 3 points, and has 1"),
+        (binary(packed(2, 2)), r"record 1: has no PointId \(byte 65551\)"),
+        (binary(POINT, packed(1, "Q")), r"record 2: has no PointType"),
+        (binary(POINT + packed(25, packed(2, 1))), "has no SerialNumber"),
+        (binary(packed(1, "P1") + packed(2, 5)), 'has "5" for PointType'),
+        (binary(packed(1, b"\xff") + packed(2, 2)), "has a text in PointId that is not UTF-8"),
+        (binary(POINT + packed(16, 7)), "has field 16 in the wire type 0"),
+        (binary(POINT + packed(19, bytes(40))), "40 bytes.*six numbers"),
+        (binary(POINT + packed(8, 0)), "refers to its measure 0, counted from 0, and has 0"),
+        (binary(POINT + b"\x0b"), "has field 1 in the wire type 3"),
+        (binary(POINT + b"\x02\x00"), "impossible number 0"),
+        (binary(POINT + b"\x08" + b"\xff" * 10), "more than 64 bits"),
+        (binary(POINT + packed(25, MEASURE)[:-3]), "ends within a field"),
+        (binary(POINT)[:-1], "ends within a point"),
+        (
+            binary(POINT).replace(b"PointsBytes = 10", b"PointsBytes = 99"),
+            "ends within the points",
+        ),
+        (binary(POINT)[:LABEL], "ends within the header"),
+        (binary(POINT).replace(b"HeaderBytes", b"HeaderBits_"), "its label has no HeaderBytes"),
+        (binary(POINT).replace(b"HeaderBytes = 11", b"HeaderBytes = -1"), "HeaderBytes is no whole number"),
+        (binary(POINT, version=2, lengths=True, header=packed(7, b"\x7f")), "ends within a point"),
+        (
+            binary(POINT, version=2, lengths=True, header=packed(7, b"\x00")),
+            "has no PointType|has no PointId",
+        ),
+        (binary(POINT, version=2, lengths=True), "more bytes than the lengths of all points"),
+        (b"Object = IsisCube\nEnd_Object\nEnd\n", "is no control network"),
+        (b"", "is no control network"),
+    ],
+)
+def test_networks_that_are_wrong_are_refused(content, said, tmp_path):
+    with pytest.raises(InputError, match=said):
+        read_again(content, tmp_path)
+
+
+def damages(data, random, count):
+    """Yield data that are cut, or have bytes changed."""
+    body = [at for at in range(len(data)) if at >= LABEL or data[at]]
+    for _ in range(count):
+        yield data[: body[random.integers(len(body))]]
+        spoilt = bytearray(data)
+        for _ in range(random.integers(1, 4)):
+            spoilt[body[random.integers(len(body))]] = random.integers(256)
+        yield bytes(spoilt)
+
+
+@pytest.mark.parametrize("form", ["binary", "version 2", "text"])
+def test_damage_is_refused_or_read_but_never_ends_otherwise(form, tmp_path):
+    other = POINT.replace(b"P1", b"P2") + packed(25, MEASURE)
+    lengths = packed(7, varint(len(full_message())) + varint(len(other)))
+    data = {
+        "binary": binary(full_message(), other),
+        "version 2": binary(full_message(), other, version=2, lengths=True, header=lengths),
+        "text": in_text(POINT_TEXT + POINT_TEXT.replace("P1", "P2")),
+    }[form]
+    assert len(read_again(data, tmp_path).points) == 2
+    refused = 0
+    for damaged in damages(data, np.random.default_rng(5), 400):
+        try:
+            network = read_again(damaged, tmp_path)
+        except InputError:
+            refused += 1
+        else:
+            assert network.firsts[-1] == len(network.measures)
+    assert 100 < refused < 800
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"firsts": np.array([0, 2, 1])}, "the first measures of points"),
+        ({"firsts": np.array([0, 1, 2])}, "the first measures of points"),
+        ({"points": {"types": np.array([2, 5], np.int8)}}, "those of points"),
+        ({"measures": {"serial": np.array([0, 1, 0], np.int32)}}, "those of measures"),
+        ({"points": {"reference": np.array([0, 2], np.int32)}}, "refers to its measure 2"),
+        ({"points": {"rest": (np.zeros(3, np.uint8), np.array([0, 3, 3]))}}, "impossible number 0"),
+        ({"points": {"rest": (np.zeros(3, np.uint8), np.array([0, 9, 9]))}}, "those of points"),
+    ],
+)
+def test_columns_that_do_not_agree_are_not_written(change, said):
+    network = small()
+    parts = {
+        name: replace(getattr(network, name), **value) if isinstance(value, dict) else value
+        for name, value in change.items()
+    }
+    for write in (binary_network, network_text):
+        with pytest.raises(InputError, match=said):
+            write(replace(network, **parts))
+
+
+def test_columns_of_another_shape_are_refused():
+    network = small()
+    with pytest.raises(InputError, match=r"adjusted has the shape \(2, 2\), not \(2, 3\)"):
+        replace(network.points, adjusted=np.zeros((2, 2)))
+    with pytest.raises(InputError, match="rest begins in 2 places, not 4"):
+        replace(network.measures, rest=(np.zeros(0, np.uint8), np.zeros(2, np.int64)))
+    with pytest.raises(InputError, match="firsts has the shape"):
+        replace(network, firsts=np.zeros(1, np.int64))
+    assert {type(network.points), type(network.measures)} == {ControlPoints, ControlMeasures}
+
+
+def test_a_header_without_room_or_marks_is_refused(tmp_path):
+    network = small()
+    with pytest.raises(InputError, match="has room for 65536"):
+        binary_network(replace(network, description="x" * LABEL))
+    with pytest.raises(InputError, match="cannot stand in a label"):
+        network_text(replace(network, description="two\nlines"))
+    others = Group("", "label", items=[("Own", "it's")])
+    assert read_again(binary_network(replace(network, others=others)), tmp_path).others == others
+    assert (tmp_path / "again.net").stat().st_size > LABEL
