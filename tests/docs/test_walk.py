@@ -12,6 +12,7 @@ COMMANDS = {
     "tutorials/aerial-block.md": 6,
     "tutorials/drone.md": 7,
     "tutorials/metrology.md": 5,
+    "tutorials/rolling-shutter.md": 14,
     "tutorials/statement.md": 8,
     "tutorials/vision.md": 6,
 }
