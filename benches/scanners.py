@@ -11,6 +11,7 @@ import argparse
 import subprocess
 import sys
 import time
+from typing import Any
 
 import numpy as np
 
@@ -122,20 +123,20 @@ def simulated(count: int, points_per_image: int = 50) -> tuple[Block, int]:
     return block, 12 * len(begins)
 
 
-def row(count: int) -> str:
+def row(count: int, ordering: Any) -> str:
     """Adjust a block in this process, and return a row of the table."""
     block, coefficients = simulated(count)
     give_back()
     before = resident_memory() or 0
     forget_peak()
     start, processor = time.perf_counter(), time.process_time()
-    result = adjust(block)
+    result = adjust(block, ordering=ordering)
     seconds, processor = time.perf_counter() - start, time.process_time() - processor
     peak = (peak_memory() - before) / 2**30
     print(result.seconds, file=sys.stderr)
-    sigma0 = np.sqrt(result.variance_of_unit_weight)
+    sigma0, unknowns = np.sqrt(result.variance_of_unit_weight), coefficients + 3 * len(block.point_ids)
     return (
-        f"| {len(block.photo_ids):,} | {len(block.image_xy):,} | {coefficients + 3 * len(block.point_ids):,}"
+        f"| {ordering} | {len(block.photo_ids):,} | {len(block.image_xy):,} | {unknowns:,}"
         f" | {len(result.iterations)} | {sigma0:.3f} | {seconds:.1f} | {processor:.1f}"
         f" | {peak:.2f} |"
     )
@@ -145,15 +146,17 @@ def main() -> None:
     """Print the table, each row from a process of its own."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("images", nargs="+", type=int)
+    parser.add_argument("--ordering", default="auto", help="of the images; see photogram.adjust")
     parser.add_argument("--row", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.row:
-        print(row(given.images[0]), flush=True)
+        print(row(given.images[0], given.ordering), flush=True)
         return
-    print("| images | measures | unknowns | steps | sigma0 | s | cpu s | GiB |")
-    print("|---:|---:|---:|---:|---:|---:|---:|---:|", flush=True)
+    print("| ordering | images | measures | unknowns | steps | sigma0 | s | cpu s | GiB |")
+    print("|---|---:|---:|---:|---:|---:|---:|---:|---:|", flush=True)
     for images in given.images:
-        subprocess.run([sys.executable, __file__, "--row", str(images)], check=True)
+        options = ["--row", str(images), "--ordering", given.ordering]
+        subprocess.run([sys.executable, __file__, *options], check=True)
 
 
 if __name__ == "__main__":
