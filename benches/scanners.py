@@ -1,8 +1,8 @@
-"""Line scanners in orbit, each image with a trajectory of its own, all covariances included: docs/performance.md.
+"""Line scanners in orbit, each image with a trajectory of its own, all covariances: docs/performance.md.
 
 python benches/scanners.py 2000 50000     images; four images a point, 200 measures an image; Linux
 
-Corrections of 12 coefficients an image: degree 0 of the position, degree 2 of the rotation, all of them weighted.
+Corrections have 12 coefficients an image: degree 0 of the position, degree 2 of the rotation, all weighted.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import argparse
 import subprocess
 import sys
 import time
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from photogram.network.timed import Lines, LineSensor, Timed
 from photogram.network.trajectories import Polynomial, Table, Trajectory
 
 ALTITUDE, SPEED, APART, LENGTH = 100e3, 1.6e3, 10e3, 35e3
-"""Metres above the ground and in a second, between orbits, and of ground that an image covers along its own."""
+"""Metres above the ground and in a second, between orbits, and of ground that an image covers along one."""
 C, PITCH, LINE = -100.0, 0.007, 0.006
 """Principal distance and pitch in millimetres, seconds a line."""
 ACROSS = 4
@@ -122,20 +123,20 @@ def simulated(count: int, points_per_image: int = 50) -> tuple[Block, int]:
     return block, 12 * len(begins)
 
 
-def row(count: int) -> str:
+def row(count: int, ordering: Any) -> str:
     """Adjust a block in this process, and return a row of the table."""
     block, coefficients = simulated(count)
     give_back()
     before = resident_memory() or 0
     forget_peak()
     start, processor = time.perf_counter(), time.process_time()
-    result = adjust(block)
+    result = adjust(block, ordering=ordering)
     seconds, processor = time.perf_counter() - start, time.process_time() - processor
     peak = (peak_memory() - before) / 2**30
     print(result.seconds, file=sys.stderr)
-    sigma0 = np.sqrt(result.variance_of_unit_weight)
+    sigma0, unknowns = np.sqrt(result.variance_of_unit_weight), coefficients + 3 * len(block.point_ids)
     return (
-        f"| {len(block.photo_ids):,} | {len(block.image_xy):,} | {coefficients + 3 * len(block.point_ids):,}"
+        f"| {ordering} | {len(block.photo_ids):,} | {len(block.image_xy):,} | {unknowns:,}"
         f" | {len(result.iterations)} | {sigma0:.3f} | {seconds:.1f} | {processor:.1f}"
         f" | {peak:.2f} |"
     )
@@ -145,15 +146,17 @@ def main() -> None:
     """Print the table, each row from a process of its own."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("images", nargs="+", type=int)
+    parser.add_argument("--ordering", default="auto", help="of the images; see photogram.adjust")
     parser.add_argument("--row", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.row:
-        print(row(given.images[0]), flush=True)
+        print(row(given.images[0], given.ordering), flush=True)
         return
-    print("| images | measures | unknowns | steps | sigma0 | s | cpu s | GiB |")
-    print("|---:|---:|---:|---:|---:|---:|---:|---:|", flush=True)
+    print("| ordering | images | measures | unknowns | steps | sigma0 | s | cpu s | GiB |")
+    print("|---|---:|---:|---:|---:|---:|---:|---:|---:|", flush=True)
     for images in given.images:
-        subprocess.run([sys.executable, __file__, "--row", str(images)], check=True)
+        options = ["--row", str(images), "--ordering", given.ordering]
+        subprocess.run([sys.executable, __file__, *options], check=True)
 
 
 if __name__ == "__main__":

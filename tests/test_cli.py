@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from rich.markup import render
 import photogram
 from photogram.cli.commands import app, application
 from photogram.cli.simulate import simulate as simulate_command
+from photogram.cli.simulated_motion import MotionOptions
 from photogram.giant import read_project
 from photogram.network.simulation import simulate as simulate_function
 
@@ -315,9 +317,10 @@ def test_the_options_of_simulate_are_the_arguments_of_the_function():
     arguments = inspect.signature(simulate_function).parameters
     options = inspect.signature(simulate_command).parameters
     refraction = {"air_refraction", "water_refraction", "water_level", "water_index"}
-    assert set(options) - set(arguments) == {"out", "overwrite", "quiet", *refraction}
+    motion = {each.name for each in fields(MotionOptions)}
+    assert set(options) - set(arguments) == {"out", "overwrite", "quiet", *refraction, *motion}
     # GIANT files hold no lenses.
-    of_python = {"refraction", "cameras", "start_cameras"}
+    of_python = {"refraction", "cameras", "start_cameras", "motion"}
     assert set(arguments) - set(options) == of_python
     for name in set(arguments) - {"spheroid", *of_python}:
         assert options[name].default == arguments[name].default

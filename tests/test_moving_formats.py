@@ -55,7 +55,7 @@ def test_other_formats_lose_motion_and_say_so(name, tmp_path):
 def test_giant_takes_pictures_alone(tmp_path):
     with pytest.raises(InputError, match="GIANT files: the photo IMG_1 is on a trajectory"):
         to_files(project_of(rolling(), tmp_path), "giant")
-    with pytest.raises(InputError, match="predict: the photo S1 is on a trajectory"):
+    with pytest.raises(InputError, match="a prediction needs positions for all points"):
         predict(scanned())
     with pytest.raises(InputError, match="beside images"):
         of_images_alone(scanned().replace(timed=()), "predict")

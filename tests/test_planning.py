@@ -408,7 +408,7 @@ def test_plan_takes_the_options_of_simulate(run):
     assert {"strips", "control", "seed", "spheroid"} < shared
     assert all(ours[name].default == theirs[name].default for name in shared)
     assert set(theirs) - shared == {
-        "out", "overwrite", "check_points", "position_error", "attitude_error", "blunders", "blunder_size",
+        "out", "overwrite", "check_points", "blunders", "blunder_size",
     }  # fmt: skip
     assert "--against-position-sd" in run("plan", "--help").output
 

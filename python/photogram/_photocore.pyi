@@ -627,7 +627,7 @@ def block_network(
     mounts: list[tuple[int, int, int]],
     trajectories: list[TrajectoryRow],
     timed: list[tuple[int, int, float, int | None, int | None]],
-    image_times: list[float],
+    image_times: _Floats,
     records: int,
     spheroid: tuple[float, float] | None,
     photo_to_ground: bool,

@@ -105,6 +105,7 @@ SENTENCES = {
     "tutorials/aerial-block.md": 4,
     "tutorials/drone.md": 3,
     "tutorials/metrology.md": 5,
+    "tutorials/rolling-shutter.md": 6,
     "tutorials/statement.md": 3,
     "tutorials/vision.md": 3,
 }

@@ -13,6 +13,7 @@ COMMANDS = {
     "tutorials/drone.md": 7,
     "tutorials/metrology.md": 5,
     "tutorials/planetary.md": 11,
+    "tutorials/rolling-shutter.md": 14,
     "tutorials/statement.md": 8,
     "tutorials/vision.md": 6,
 }

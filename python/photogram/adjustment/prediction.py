@@ -19,9 +19,16 @@ from photogram.messages import Message, listed
 from photogram.network import geometry
 from photogram.network.block import Block, checked, of_images_alone
 from photogram.network.cameras import images_of
+from photogram.network.motion import on_shared, refuse_trajectories, timed_photos
+from photogram.network.observations import Attitude, Position, Rate, Smoothness, Velocity
+from photogram.network.projecting import projected_images
 from photogram.results.result import Result
 
 __all__ = ["at_adjusted", "computed_images", "image_depths", "predict"]
+
+_OF_POSES = (Attitude, Position, Rate, Velocity)
+_AGREES = 1e-3
+"""Standard deviations by which an observation of a trajectory may differ from it."""
 
 
 def predict(
@@ -41,7 +48,8 @@ def predict(
     ----------
     block
         The planned block. Every point that has images needs its three coordinates; the standard deviations
-        say what of them is control.
+        say what of them is control. Photos may be on trajectories, which are taken as they are given, with
+        observations of these, which must agree with them: the truth of :func:`photogram.simulate`.
     ordering, threads, progress
         As for :func:`photogram.adjust`.
 
@@ -53,14 +61,15 @@ def predict(
     Raises
     ------
     InputError
-        Points with images but without coordinates, or behind a photo that shows them, named; observations
-        beside images.
+        Points with images but without coordinates, or behind a photo that shows them, or where it never
+        looks, named; observations beside images, but those of trajectories; of these what does not agree with
+        the given values.
     RankError
         The network does not determine all unknowns; names the photos and points concerned.
     AdjustmentError
         There is nothing to adjust, or rays are so nearly parallel that their points cannot be found.
     """
-    _check_positions(of_images_alone(checked(block), "predict"))
+    _check_positions(_check_observations(checked(block)))
     result = adjust(
         block.replace(
             image_xy=computed_images(block), photo_positions_observed=None, photo_attitudes_observed=None
@@ -72,12 +81,21 @@ def predict(
     )
     if not result.converged:
         raise AdjustmentError(f"the adjustment of computed image coordinates has {result.status}")
+    _check_agreement(result)
     remark = Message("predicted: image coordinates are computed, not observed; residuals mean nothing")
     return replace(result, messages=[remark, *result.messages])
 
 
 def computed_images(block: Block) -> Floats:
     """Return (m, 2) the image coordinates that the given positions, attitudes and cameras of a block have."""
+    if not block.timed:
+        return _frame_images(block)
+    moving = timed_photos(block)[block.image_photos][:, np.newaxis]
+    return np.where(moving, projected_images(block), _frame_images(block))
+
+
+def _frame_images(block: Block) -> Floats:
+    """Return (m, 2) the same of photos that are taken at once."""
     photos, points = block.image_photos, block.image_points
     distances = block.principal_distances
     ideal = geometry.project(
@@ -106,10 +124,13 @@ def at_adjusted(result: Result) -> Block:
     ------
     AdjustmentError
         The adjustment has not converged.
+    InputError
+        Photos on trajectories.
     """
     if not result.converged:
         raise AdjustmentError(f"the adjustment has {result.status}: its positions are no plan")
     block, used = result.block, result.used_images
+    refuse_trajectories(block, "the plan of an adjusted block")
     return block.replace(
         photo_positions=result.photo_positions,
         photo_attitudes=result.photo_attitudes,
@@ -129,7 +150,8 @@ def at_adjusted(result: Result) -> Block:
 def image_depths(block: Block) -> Floats:
     """Return how far the points of image observations are in front of the planes of their photos, (m,).
 
-    In the linear unit, along the axes of the photos: divided by the principal distance, the scale.
+    In the linear unit, along the axes of the photos: divided by the principal distance, the scale. Photos on
+    trajectories that are given are where they are said to be about.
     """
     points, photos = block.point_positions, block.photo_positions
     directions = geometry.viewing_directions(
@@ -143,6 +165,30 @@ def image_depths(block: Block) -> Floats:
     return depths
 
 
+def _check_observations(block: Block) -> Block:
+    """Refuse observations that are not those of trajectories, and photos on frames."""
+    if not block.timed:
+        return of_images_alone(block, "predict")
+    if block.mounts:
+        raise InputError("predict: the block has photos on frames, which are not taken there")
+    moving = {each.photo for each in block.timed}
+    for each in block.observations:
+        photos = each.photos
+        of_motion = each.moment is not None or isinstance(each, Smoothness)
+        if not (of_motion or (isinstance(each, _OF_POSES) and moving.issuperset(photos))):
+            raise InputError(f"predict: the {each.KIND} is of no trajectory, which is not taken there")
+    return block
+
+
+def _check_agreement(result: Result) -> None:
+    """Refuse observations that do not agree with what is given: their residuals are none of the network's."""
+    for kind in result.kinds.values():
+        tests = np.abs(kind.residuals / kind.sd)
+        if (tests > _AGREES).any():
+            name = kind.names[int(np.argwhere(tests > _AGREES)[0][0])]
+            raise InputError(f"predict: the {kind.kind} of {name} does not agree with what is given")
+
+
 def _check_positions(block: Block) -> None:
     """Refuse points that cannot be projected: unknown, or behind a photo (collinearity knows no behind)."""
     unknown = np.isnan(block.point_positions[block.image_points]).any(axis=1)
@@ -151,7 +197,12 @@ def _check_positions(block: Block) -> None:
         raise InputError(
             f"a prediction needs positions for all points with images; there are none for {points}"
         )
-    behind = ~(image_depths(block) > 0)
+    shared = on_shared(block)[block.image_photos]
+    if block.timed and (unseen := ~np.isfinite(computed_images(block)).all(axis=1)).any():
+        photos = _names(block.photo_ids, block.image_photos[unseen])
+        points = _names(block.point_ids, block.image_points[unseen])
+        raise InputError(f"never seen by the photos that show them ({photos}): {points}")
+    behind = ~(image_depths(block) > 0) & ~shared
     if behind.any():
         points = _names(block.point_ids, block.image_points[behind])
         photos = _names(block.photo_ids, block.image_photos[behind])

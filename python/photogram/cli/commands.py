@@ -72,7 +72,7 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "plan.plan",
     ),
     "simulate": (
-        "Write a simulated block as a GIANT project, and the truth behind it as truth.json.",
+        "Write a simulated block as a GIANT project, or as tables if it moves, and its truth as truth.json.",
         "simulate.simulate",
     ),
     "giant": (

@@ -29,6 +29,8 @@ PANELS = {
     " flying_height relief points_per_photo crab tilt control_spacing control_sd image_sd"
     " position_sd attitude_sd spheroid origin photo_to_ground check_points position_error"
     " attitude_error blunders blunder_size seed",
+    "Motion": "readout readout_sd readout_direction speed speed_sd rate rate_sd scanner view_angle pitch"
+    " every knots scenes",
     "Run": "ordering threads strict quiet help",
 }
 """Options by the names of their parameters; what is in none is under `Options`."""

@@ -1,4 +1,4 @@
-"""`photogram simulate`: write a simulated block as a GIANT project."""
+"""`photogram simulate`: write a simulated block as a GIANT project, or as tables where it moves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from photogram.cli.options import Quiet
 from photogram.cli.simulated import NetworkOptions, takes_network
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from photogram.giant.common import Common
+    from photogram.messages import Message
     from photogram.network.block import Block
     from photogram.network.simulation import Simulation
 
@@ -33,12 +36,6 @@ def simulate(
     ],
     network: NetworkOptions,
     check_points: Annotated[int, typer.Option(help="Points with known positions that are not held.")] = 20,
-    position_error: Annotated[
-        float, typer.Option(help="Of the initial positions, standard deviation, m.")
-    ] = 30.0,
-    attitude_error: Annotated[
-        float, typer.Option(help="Of the initial attitudes, standard deviation, rad.")
-    ] = 0.01,
     blunders: Annotated[int, typer.Option(help="Image points with a gross error.")] = 0,
     blunder_size: Annotated[float, typer.Option(help="Size of the gross errors, mm.")] = 0.2,
     overwrite: Annotated[
@@ -46,13 +43,16 @@ def simulate(
     ] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a simulated block as a GIANT project, and the truth behind it as truth.json.
+    """Write a simulated block as a GIANT project, or as tables if it moves, and its truth as truth.json.
 
     The GIANT files hold what would have been measured; truth.json holds the true positions and attitudes
     (rad) of the photographs, the true positions of the points, and the gross errors. FRAMES has one set of
     stations: with --position-sd or --attitude-sd the observed ones, and for what is not observed then the
     initial ones with their errors as standard deviations; every weight counts in the unit variance (COMMON
     column 12). Without, the initial ones with the weak default standard deviations of the files.
+
+    With --readout or --scanner the cameras move while they look, which GIANT files cannot say: tables for
+    `photogram adjust DIR`, and true motions and trajectories in truth.json.
     """
     with job:
         from photogram.giant import Project
@@ -61,21 +61,26 @@ def simulate(
 
         simulation = make(
             check_points=check_points,
-            position_error=position_error,
-            attitude_error=attitude_error,
             blunders=blunders,
             blunder_size=blunder_size,
             **network.arguments(),
         )
-        block, common = _filed(simulation.block, position_error, attitude_error)
-        project = Project.from_block(block, common)
-        written = {**project_files(project, out, overwrite=overwrite), out / "truth.json": _truth(simulation)}
+        block = simulation.block
+        remarks: Sequence[Message] = ()
+        if block.timed:
+            files = _tables(simulation, out, overwrite=overwrite)
+        else:
+            block, common = _filed(block, network.position_error, network.attitude_error)
+            project = Project.from_block(block, common)
+            files = project_files(project, out, overwrite=overwrite)
+            remarks = project.messages
+        written = {**files, out / "truth.json": _truth(simulation)}
         size = (
             f"{out}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"
             f" {len(block.image_xy)} image points"
         )
         if not quiet:
-            for message in project.messages:
+            for message in remarks:
                 print_remark(message)
         job.finish(written, summary=lambda: output.print(escape(size)))
 
@@ -98,6 +103,27 @@ def _filed(block: Block, position_error: float, attitude_error: float) -> tuple[
     return block, Common(error_propagation=True, unit_variance="constrained")
 
 
+def _tables(simulation: Simulation, out: Path, *, overwrite: bool) -> dict[Path, bytes]:
+    """Return the tables of a block that moves."""
+    from photogram.errors import InputError
+    from photogram.formats.plain.writing import write
+    from photogram.formats.project import Project
+
+    if (out / "project.toml").exists() and not overwrite:
+        raise InputError("holds a project; --overwrite allows it to be replaced", file=out)
+    block = simulation.block
+    unknown = (None,) * max(1, len(block.cameras))
+    project = Project(
+        block=block,
+        path=out,
+        title="simulated",
+        sizes=unknown,
+        pixel_mm=unknown,
+        starts=block.point_positions,
+    )
+    return {out / name: content for name, content in write(project).items()}
+
+
 def _truth(simulation: Simulation) -> bytes:
     """Make the document of what is true in a simulated block."""
     import numpy as np
@@ -114,6 +140,7 @@ def _truth(simulation: Simulation) -> bytes:
             "attitude_rad": "omega, phi, kappa, "
             + ("photo-to-ground" if truth.photo_to_ground else "ground-to-photo"),
             "error_mm": "what was added to x and y",
+            **({"motion": "s, m/s, rad/s; axes of the photo as columns"} if truth.timed else {}),
         },
         "photos": [
             {"id": name, "position": position, "attitude_rad": attitude}
@@ -130,6 +157,7 @@ def _truth(simulation: Simulation) -> bytes:
                 truth.point_ids, (truth.point_positions * degrees).tolist(), strict=True
             )
         ],
+        **_true_motion(truth),
         "blunders": [
             {
                 "photo": truth.photo_ids[truth.image_photos[row]],
@@ -140,3 +168,32 @@ def _truth(simulation: Simulation) -> bytes:
         ],
     }
     return json.to_json(document)
+
+
+def _true_motion(truth: Block) -> dict[str, object]:
+    """Return readout times, motions and trajectories of a simulated block; nothing where nothing moves."""
+    import numpy as np
+
+    from photogram.network.trajectories import Readout
+    from photogram.network.whereabouts import given_poses
+
+    if not truth.timed:
+        return {}
+    motions, trajectories = [], []
+    for own in truth.timed:
+        if own.trajectory is None:
+            velocity, rate = (np.asarray(each).tolist() for each in (own.velocity, own.rotation_rate))
+            motions.append({"photo": own.photo, "velocity": velocity, "rate": rate})
+    shared = {id(each.trajectory): each.trajectory for each in truth.timed if each.trajectory is not None}
+    for each in shared.values():
+        times = each.table.times
+        places, axes = given_poses(each, times)
+        poses = {"times": times.tolist(), "positions": places.tolist(), "axes": axes.tolist()}
+        trajectories.append({"trajectory": each.name, **poses})
+    readouts = [each for each in truth.unknowns if isinstance(each, Readout)]
+    found = {
+        "readouts": [{"shutter": each.name, "seconds": each.value} for each in readouts],
+        "motions": motions,
+        "trajectories": trajectories,
+    }
+    return {name: rows for name, rows in found.items() if rows}

@@ -13,6 +13,7 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from photogram.cli.refraction import AirModel, WaterModel
+from photogram.cli.simulated_motion import MotionOptions
 
 __all__ = ["Control", "Ellipsoid", "NetworkOptions", "takes_network"]
 
@@ -34,7 +35,7 @@ class Ellipsoid(StrEnum):
 
 
 @dataclass(frozen=True)
-class NetworkOptions:
+class NetworkOptions(MotionOptions):
     """The network of a simulated block: names and defaults are those of :func:`photogram.simulate`."""
 
     strips: Annotated[int, typer.Option(help="Number of strips.")] = 4
@@ -70,6 +71,14 @@ class NetworkOptions:
         float,
         typer.Option(help="Of observed attitudes, standard deviation, rad; inf: none are observed."),
     ] = math.inf
+    position_error: Annotated[
+        float,
+        typer.Option(
+            help="Of the initial positions, standard deviation, m; of trajectories of a scanner it is their"
+            " weight."
+        ),
+    ] = 30.0
+    attitude_error: Annotated[float, typer.Option(help="The same of the initial attitudes, rad.")] = 0.01
     spheroid: Annotated[
         Ellipsoid, typer.Option(help="Geographic space on this spheroid; none: rectangular.")
     ] = Ellipsoid.NONE
@@ -110,6 +119,10 @@ class NetworkOptions:
         asked = arguments.pop("air_refraction"), arguments.pop("water_refraction")
         air, water = (None if model in (None, "none") else model.value for model in asked)
         level, index = arguments.pop("water_level"), arguments.pop("water_index")
+        for each in fields(MotionOptions):
+            del arguments[each.name]
+        if moving := self.motion():
+            arguments["motion"] = moving
         if air or water:
             arguments["refraction"] = Refraction(air, water, level, index)
         return arguments
@@ -122,9 +135,11 @@ def takes_network(command: Callable[..., None]) -> Callable[..., None]:
     command gets them as one value.
     """
     hints = get_type_hints(NetworkOptions, include_extras=True)
+    # What moves stands below the rest.
+    moving = {field.name for field in fields(MotionOptions)}
     options = [
         Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default, annotation=hints[field.name])
-        for field in fields(NetworkOptions)
+        for field in sorted(fields(NetworkOptions), key=lambda field: field.name in moving)
     ]
     own = [
         parameter.replace(kind=Parameter.KEYWORD_ONLY)

@@ -11,8 +11,12 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project
 from photogram.messages import Message
+from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
 from photogram.network.motion import on_shared
+from photogram.network.timed import Timed
+from photogram.network.trajectories import Trajectory
+from photogram.network.whereabouts import given_poses, reach
 
 __all__ = ["Agreement", "agreement", "doubts"]
 
@@ -68,24 +72,47 @@ def _sample(project: Project) -> _Sample:
     block = project.block
     points, matrices = project.positions(), attitude_matrices(block)
     poses = np.column_stack([matrices.reshape(-1, 9), block.photo_positions])
-    posed: Bools = np.asarray(np.isfinite(poses).all(axis=1))
+    # On a trajectory the pose of a photo only tells where it is about.
+    posed: Bools = np.asarray(np.isfinite(poses).all(axis=1)) | on_shared(block)
     placed: Bools = np.asarray(np.isfinite(points).all(axis=1))
     good = posed[block.image_photos] & placed[block.image_points]
-    # On a trajectory the pose of a photo only tells where it is about.
-    good &= ~on_shared(block)[block.image_photos]
     if block.geographic:
         good = np.zeros_like(good)
     rows = np.flatnonzero(good)
     rows = rows[:: max(1, len(rows) // MOST)]
     photos = block.image_photos[rows]
     cameras, photo_cameras = known_cameras(block)
+    by_photo = _rows_of_photos(block, photos) if block.timed else {}
+    places, axes, xy = block.photo_positions[photos], matrices[photos], block.image_xy[rows]
+    for own, trajectory in zip(block.timed, block.trajectories, strict=True):
+        of_photo = by_photo[own.photo]
+        if len(of_photo):
+            places[of_photo], axes[of_photo], xy[of_photo] = _moving(own, trajectory, xy[of_photo])
     return _Sample(
         cameras,
         np.asarray(photo_cameras, dtype=np.int64)[photos],
-        points[block.image_points[rows]] - block.photo_positions[photos],
-        matrices[photos].transpose(0, 2, 1),
-        block.image_xy[rows],
+        points[block.image_points[rows]] - places,
+        axes.transpose(0, 2, 1),
+        xy,
     )
+
+
+def _rows_of_photos(block: Block, photos: Indices) -> dict[str, Indices]:
+    """Return which of (m,) images are of each photo, by its name."""
+    order = np.argsort(photos, kind="stable")
+    bounds = np.searchsorted(photos[order], np.arange(len(block.photo_ids) + 1)).tolist()
+    return {name: order[bounds[row] : bounds[row + 1]] for row, name in enumerate(block.photo_ids)}
+
+
+def _moving(own: Timed, trajectory: Trajectory, xy: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the places and axes of a photo at the times of its images, and these in the focal plane."""
+    time, since, there = own.images(xy)
+    scale = 1.0 if own.readout is None else float(own.readout.position[0])
+    offset = 0.0 if own.offset is None else float(own.offset.position[0])
+    places, axes = given_poses(trajectory, np.clip(time + offset + scale * since, *reach(trajectory)))
+    if own.sensor is not None:
+        places, axes = places + axes @ own.sensor.position, axes @ own.sensor.attitude
+    return places, axes, there
 
 
 def agreement(project: Project) -> Agreement:

@@ -44,7 +44,7 @@ class Flown:
     trajectories: list[_photocore.TrajectoryRow]
     timed: list[TimedRow]
     image_xy: Floats
-    image_times: list[float]
+    image_times: Floats
     records: int
     positions: Floats
 
@@ -53,7 +53,7 @@ def flown(block: Block, unknowns: Sequence[Unknown]) -> Flown:
     """Return what the core is given of the trajectories of a block, whose common unknowns are these."""
     records = moments(block.observations)
     if not block.timed and not records:
-        return Flown([], [], block.image_xy, [], 0, np.zeros((0, 3)))
+        return Flown([], [], block.image_xy, np.zeros(0), 0, np.zeros((0, 3)))
     places = {id(each): row for row, each in enumerate(unknowns)}
     trajectories = block.all_trajectories
     numbers = {id(each): number for number, each in enumerate(trajectories)}
@@ -71,7 +71,7 @@ def flown(block: Block, unknowns: Sequence[Unknown]) -> Flown:
         [each.row(places) for each in trajectories],
         timed,
         image_xy,
-        image_times.tolist(),
+        image_times,
         len(records),
         np.array([_about(block, each) for each in records]).reshape(-1, 3),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,20 +11,24 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.network.geometry import geographic_to_geocentric
 from photogram.network.timed import Timed
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown
 from photogram.network.whereabouts import reach
 
-__all__ = ["projected"]
+__all__ = ["camera_of", "projected", "projected_images", "standing"]
 
 Values = Callable[[Unknown], tuple[Floats, Floats]]
 """Position and rotation of a common unknown."""
 
 STEPS = 200
-CLOSE = 1e-13
-"""Of a whole readout, or of the time between two records that enclose a line."""
+CLOSE, CLOSE_LINES = 1e-13, 1e-9
+"""Of a whole readout; of a line, where times have as many digits."""
+ROUNDED = 1e-9
+"""Of a whole readout: what rounding alone may change."""
 
 
 def given(unknown: Unknown) -> tuple[Floats, Floats]:
@@ -61,18 +66,7 @@ def projected(
         A scanner on a trajectory that has one record, or with a factor of line rates and no time.
     """
     places = shaped("points", points, (len(np.asarray(points)), 3))
-    coefficients = [np.array([values(each)[0] for each in part]) for part in trajectory.coefficients]
-
-    def seen(times: Floats) -> Floats:
-        """Return the images of the points in a camera that stands still at (n,) times."""
-        at, turned, *_ = trajectory.flown(times, *coefficients)
-        turned = turned.reshape(-1, 3, 3)
-        if own.sensor is not None:
-            arm, mount = values(own.sensor)
-            at, turned = at + turned @ arm, turned @ mount
-        u = np.einsum("nji,nj->ni", turned, places - at)
-        return np.where((u[:, 2] < 0)[:, np.newaxis], camera.project(u), np.nan)
-
+    seen = partial(standing, own, trajectory, camera, places, values=values)
     offset = 0.0 if own.offset is None else float(values(own.offset)[0][0])
     rate = 1.0 if own.readout is None else float(values(own.readout)[0][0])
     if own.rate is not None and own.time is None:
@@ -87,22 +81,80 @@ def projected(
     times = np.full(len(places), (own.time or 0.0) + offset)
     if own.shutter is None:
         return seen(times)
-    rows = np.full(len(places), 0.5)
+    rows, before = np.full(len(places), 0.5), np.inf
     for _ in range(STEPS):
-        xy = seen(times + rate * rows)
-        now = own.shutter.times(xy)
-        if not (np.abs(now - rows) > CLOSE).any():
-            break
+        now = own.shutter.times(seen(times + rate * rows))
+        moved = float(np.fmax.reduce(np.abs(now - rows), initial=0.0))
         rows = now
+        # Large coordinates have rows with fewer digits, which go on to change by these.
+        if moved <= CLOSE or before <= moved < ROUNDED:
+            break
+        before = moved
     return seen(times + rate * rows)
+
+
+def standing(
+    own: Timed,
+    trajectory: Trajectory,
+    camera: Camera,
+    points: Floats,
+    times: Floats,
+    *,
+    values: Values = given,
+) -> Floats:
+    """Return the (n, 2) images of (n, 3) points in a camera that stands still at (n,) times; NaN behind it.
+
+    Of scanners they are in the focal plane; all else is as for :func:`projected`.
+    """
+    coefficients = [np.array([values(each)[0] for each in part]) for part in trajectory.coefficients]
+    at, turned, *_ = trajectory.flown(times, *coefficients)
+    turned = turned.reshape(-1, 3, 3)
+    if own.sensor is not None:
+        arm, mount = values(own.sensor)
+        at, turned = at + turned @ arm, turned @ mount
+    u = np.einsum("nji,nj->ni", turned, points - at)
+    return np.where((u[:, 2] < 0)[:, np.newaxis], camera.project(u), np.nan)
+
+
+def projected_images(block: Block) -> Floats:
+    """Return (m, 2) the images of a block, all of whose photos are on trajectories, by what is given in it.
+
+    Raises
+    ------
+    InputError
+        Refraction, by which images on trajectories are not projected; as :func:`projected`.
+    """
+    if block.refraction is not None:
+        raise InputError("images of photos on trajectories are computed without refraction, which is given")
+    order = np.argsort(block.image_photos, kind="stable")
+    bounds = np.searchsorted(block.image_photos[order], np.arange(len(block.photo_ids) + 1)).tolist()
+    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    points = block.point_positions
+    if block.spheroid is not None:
+        points = geographic_to_geocentric(points, block.spheroid)
+    found = np.full(block.image_xy.shape, np.nan)
+    for own, trajectory in zip(block.timed, block.trajectories, strict=True):
+        row = rows[own.photo]
+        images = order[bounds[row] : bounds[row + 1]]
+        if len(images):
+            places = points[block.image_points[images]]
+            found[images] = projected(own, trajectory, camera_of(block, row), places)
+    return found
+
+
+def camera_of(block: Block, photo: int) -> Camera:
+    """Return the camera of a photo as it is given: also where the block has principal distances."""
+    if block.cameras and block.photo_cameras is not None:
+        return block.cameras[int(block.photo_cameras[photo])]
+    return Camera("perspective", {"c": float(block.known_distances("the projection")[photo])})
 
 
 def _crossed(
     own: Timed, ends: tuple[float, float], seen: Callable[[Floats], Floats], count: int
 ) -> tuple[Floats, Floats]:
     """Return the times at which images of points cross the line of sensors, and their samples there."""
-    sensor = own.line_sensor
-    if sensor is None or not np.isfinite(ends).all():
+    sensor, lines = own.line_sensor, own.lines
+    if sensor is None or lines is None or not np.isfinite(ends).all():
         raise InputError(f"the scanner {own.photo} needs a trajectory with more than one record")
 
     def past(times: Floats) -> tuple[Floats, Floats]:
@@ -113,6 +165,8 @@ def _crossed(
     low, high = (np.full(count, end) for end in ends)
     (below, _), (above, _) = past(low), past(high)
     crossed = below * above <= 0
+    seconds = np.abs(np.asarray(lines.table)[:, 2]).min()
+    close = max(CLOSE_LINES * seconds, 4 * np.spacing(np.abs(ends).max()))
     for _ in range(STEPS):
         with np.errstate(divide="ignore", invalid="ignore"):
             middle = high - above * (high - low) / (above - below)
@@ -124,6 +178,6 @@ def _crossed(
         low = np.where(left, low, high)
         moved = np.abs(middle - high)
         high, above = middle, found
-        if not (moved[crossed] > CLOSE * (ends[1] - ends[0])).any():
+        if not (moved[crossed] > close).any():
             break
     return np.where(crossed, high, np.nan), np.where(crossed, samples, np.nan)

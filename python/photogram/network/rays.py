@@ -68,7 +68,7 @@ def local_axes(block: Block) -> LocalAxes:
 
 
 def _stations(block: Block) -> Floats:
-    """Return (k, 3) places amid which a block is: stations, or points where these are on trajectories, if any is known."""
+    """Return (k, 3) places amid which a block is: stations, or known points where these are flown."""
     own = ~on_shared(block) if block.timed else np.ones(len(block.photo_ids), dtype=bool)
     known = np.isfinite(block.point_positions).all(axis=1)
     if own.any():

@@ -18,10 +18,10 @@ from photogram.arguments.arrays import number, shaped, whole_number
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network import geometry
-from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.observations import Attitude, Distance, Observation, Position
 from photogram.network.rigs import Mount
+from photogram.network.simulated_motion import photo_angles, photo_axes, rotations_of
 from photogram.network.simulation import Simulation
 from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, Sensor, Shift
 
@@ -135,9 +135,9 @@ def with_inertial(
     """
     _positive(sd=sd)
     random, truth = np.random.default_rng(seed), simulation.truth
-    turn = _rotations(shaped("boresight", boresight, (3,))[np.newaxis])[0]
-    local = _local(truth) @ turn
-    errors = _rotations(sd * random.standard_normal((len(local), 3)))
+    turn = rotations_of(shaped("boresight", boresight, (3,))[np.newaxis])[0]
+    local = photo_axes(truth) @ turn
+    errors = rotations_of(sd * random.standard_normal((len(local), 3)))
     known, unknown = Boresight("inertial unit", turn, 0.0), Boresight("inertial unit")
     exact, noisy = (
         [
@@ -251,8 +251,8 @@ def with_rig(
     ids = list(truth.photo_ids)
     mounts: tuple[list[Mount], list[Mount]] = ([], [])
     added: dict[str, list[Any]] = {"positions": [], "attitudes": [], "photos": [], "points": [], "xy": []}
-    for k, (offset, turn) in enumerate(zip(offsets, _rotations(turns), strict=True)):
-        start = _rotations(rotation_error * random.standard_normal((1, 3)))[0]
+    for k, (offset, turn) in enumerate(zip(offsets, rotations_of(turns), strict=True)):
+        start = rotations_of(rotation_error * random.standard_normal((1, 3)))[0]
         sensors = (
             Sensor(f"sensor {k + 2}", offset, turn, 0.0),
             Sensor(f"sensor {k + 2}", offset + position_error * random.standard_normal(3), turn @ start),
@@ -342,10 +342,6 @@ def _strips(block: Block) -> Indices:
     return np.array([places[name] for name in names], dtype=np.int64)
 
 
-def _rotations(vectors: Floats) -> Floats:
-    return np.asarray(Attitudes.of("rotation_vector", vectors).matrices)
-
-
 def _cartesian(block: Block, coordinates: Floats) -> Floats:
     if block.spheroid is None:
         return coordinates
@@ -370,24 +366,17 @@ def _middle(block: Block) -> Floats:
     return np.asarray(_frames(block, np.median(block.photo_positions, axis=0)[np.newaxis])[0])
 
 
-def _local(block: Block) -> Floats:
-    """Return (P, 3, 3) the axes of the photos, as columns, in local axes."""
-    matrices = geometry.rotation_matrix(block.photo_attitudes)
-    return matrices if block.photo_to_ground else matrices.transpose(0, 2, 1)
-
-
 def _geocentric(block: Block) -> tuple[Floats, Floats, Floats]:
     """Return the cartesian positions of the photos, their axes there as columns, and local axes as rows."""
     frames = _frames(block, block.photo_positions)
-    turned = frames.transpose(0, 2, 1) @ _local(block)
+    turned = frames.transpose(0, 2, 1) @ photo_axes(block)
     return _cartesian(block, block.photo_positions), turned, frames
 
 
 def _angles(block: Block, positions: Floats, turned: Floats) -> Floats:
     """Return the angles of photos with given axes in cartesian space."""
     local = _frames(block, positions) @ turned
-    matrices = local if block.photo_to_ground else local.transpose(0, 2, 1)
-    return geometry.rotation_angles(matrices)
+    return photo_angles(local, block.photo_to_ground)
 
 
 def _seen(

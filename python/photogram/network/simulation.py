@@ -1,25 +1,17 @@
-"""Simulated blocks: vertical photographs in strips over gentle relief.
-
-The block is laid out in a plane: x along the strips, y across them, z up, the origin in its centre on the
-mean terrain. Ground points stand on a grid locked to the photographs, a column under every projection centre
-and a row in the middle of every side overlap, so that neighbouring photographs and strips are tied, and so
-that the points a photograph may see are known beforehand.
-"""
+"""Simulated blocks: vertical photographs, or strips of a line scanner, over gentle relief."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram.arguments.arrays import number, one_of, shaped, shown, truth_value, whole_number
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
-from photogram.memory import available_memory
 from photogram.messages import counted
 from photogram.network import geometry
 from photogram.network.block import Block
@@ -27,6 +19,17 @@ from photogram.network.cameras import Camera, checked_cameras
 from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Refraction
 from photogram.network.simulated_cameras import photographed
+from photogram.network.simulated_frames import photograph, seen_side
+from photogram.network.simulated_layout import (
+    control_pattern,
+    flight,
+    ground_points,
+    into_object_space,
+    laid_out,
+    point_ids,
+)
+from photogram.network.simulated_motion import LineScanner, RollingShutter, rolled
+from photogram.network.simulated_scanner import Flown, scanned
 
 __all__ = ["Blunders", "Simulation", "simulate"]
 
@@ -37,12 +40,7 @@ _TINY = 1e-3
 _NARROWEST, _WIDEST = 1e-6, 1.4
 """Radians from the vertical: what photos show beyond it is too far away to simulate."""
 _FAR_MORE = 10.0
-"""Times as many points as were asked for are too many."""
-_AT_ONCE = 2**22
-"""Pairs of photo and point that may see each other, that are looked at together."""
-_CANDIDATE_BYTES, _IMAGE_BYTES = 300, 240
-"""Memory for such a pair, and for an image of the block, at the peak."""
-_JITTER = 0.15  # of a grid cell, either way: small enough to keep the middle of an overlap in the overlap
+"""Times as far aside as photos see is too far."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,8 @@ class Simulation:
         positions and attitudes of the photos; besides their coarse initial values. Check points have their
         true positions, unheld and known without error; pass points have none.
     truth
-        The same block with true positions and attitudes everywhere and image coordinates free of errors.
+        The same block with true positions and attitudes everywhere and image coordinates free of errors; with
+        true readout times, motions and trajectories, which are weighted as in `block`.
     blunders
         The gross errors in `block`.
     """
@@ -80,31 +79,6 @@ class Simulation:
     block: Block
     truth: Block
     blunders: Blunders
-
-
-@dataclass(frozen=True)
-class _Plan:
-    """The plan of the flight: metres, counts and the point grid."""
-
-    strips: int
-    photos_per_strip: int
-    base: float  # between photographs of a strip
-    separation: float  # of neighbouring strips
-    columns_per_base: int
-    rows_per_strip: int
-    reach: float  # how far from the point below it a photograph may see, in x or y
-
-    @property
-    def length(self) -> float:
-        return (self.photos_per_strip - 1) * self.base
-
-    @property
-    def width(self) -> float:
-        return (self.strips - 1) * self.separation
-
-    @property
-    def cell(self) -> tuple[float, float]:
-        return self.base / self.columns_per_base, self.separation / self.rows_per_strip
 
 
 def simulate(
@@ -137,6 +111,7 @@ def simulate(
     refraction: Refraction | None = None,
     cameras: Sequence[Camera] = (),
     start_cameras: Sequence[Camera] | None = None,
+    motion: RollingShutter | LineScanner | None = None,
     seed: int | np.random.Generator = 0,
 ) -> Simulation:
     """Simulate a block of vertical photographs.
@@ -195,6 +170,10 @@ def simulate(
     start_cameras
         What the block knows of them: where it starts from, and which parameters are free or weighted. None:
         they are known.
+    motion
+        How the cameras move while they look: with a rolling shutter, or as line scanners whose trajectories
+        have errors of `position_error` and `attitude_error`, which are weighted, and records of `position_sd`
+        and `attitude_sd`. In rectangular space and without refraction alone. None: they stand still.
     seed
         Equal seeds and equal arguments give equal blocks.
 
@@ -241,58 +220,68 @@ def simulate(
             "blunder_size": (0 <= blunder_size < math.inf, "finite and not negative"),
         }
     )
+    taking = checked_cameras(cameras)
+    _check_motion(motion, plain=spheroid is None and refraction is None, cameras=bool(taking))
     streams = _generator(seed).spawn(7)
     terrain_random, flight_random, initial_random, image_random, control_random, blunder_random = streams[:6]
+    motion_random = streams[6].spawn(1)[0]
 
-    half_angle = math.atan(frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab)))
-    if not _NARROWEST < half_angle < _WIDEST - 2 * tilt:
-        raise InputError("principal_distance and frame_size: the photos see too little, or to the horizon")
-    if 2 * tilt > _FAR_MORE * half_angle:
-        raise InputError(
-            f"tilt: photos that see {half_angle:.2g} rad to either side and look up to {2 * tilt:.2g} rad"
-            " aside do not overlap"
-        )
-    reach = 1.02 * (flying_height + relief) * math.tan(half_angle + 2 * tilt)
-    plan = _plan(strips, photos_per_strip, forward_overlap, side_overlap, footprint, points_per_photo, reach)
-    terrain = _terrain(plan, relief, footprint, terrain_random)
-    photos, rotations = _flight(plan, flying_height, crab, tilt, flight_random)
-    positions, attitudes = _into_object_space(photos, rotations, origin, spheroid, photo_to_ground)
-    ground, _ = _into_object_space(terrain, None, origin, spheroid, photo_to_ground)
-
-    image_photos, image_points, xy = _photograph(
-        plan,
-        ground,
-        positions,
-        attitudes,
-        principal_distance,
-        frame_size,
-        spheroid,
-        photo_to_ground,
-        refraction,
+    angles = tilt, crab
+    half_angle, steepest = _looks(principal_distance, frame_size, angles, motion, attitude_error)
+    reach = 1.02 * (flying_height + relief) * math.tan(half_angle + steepest)
+    plan = laid_out(
+        strips, photos_per_strip, forward_overlap, side_overlap, footprint, points_per_photo, reach
     )
-    if not len(image_points):
+    terrain = ground_points(plan, relief, footprint, terrain_random)
+    ground, _ = into_object_space(terrain, None, origin, spheroid, photo_to_ground)
+    if isinstance(motion, LineScanner):
+        flown = Flown(
+            scanner=motion,
+            principal_distance=principal_distance,
+            frame_size=frame_size,
+            height=flying_height,
+            crab=crab,
+            tilt=tilt,
+            errors=(position_error, attitude_error),
+            sd=(position_sd, attitude_sd),
+            origin=centre,
+            photo_to_ground=photo_to_ground,
+        )
+        taken = scanned(plan, flown, ground, motion_random)
+        # They are those of trajectories.
+        position_error = attitude_error = 0.0
+        position_sd = attitude_sd = math.inf
+    else:
+        photos, rotations = flight(plan, flying_height, crab, tilt, flight_random)
+        poses = into_object_space(photos, rotations, origin, spheroid, photo_to_ground)
+        seen = seen_side(frame_size, principal_distance, motion, flying_height - relief, half_angle)
+        taken = photograph(
+            plan, ground, poses, principal_distance, seen, spheroid, photo_to_ground, refraction
+        )
+    if not len(taken.image_points):
         raise InputError("no point is seen on two photos")
-    used, image_points = np.unique(image_points, return_inverse=True)
+    used, image_points = np.unique(taken.image_points, return_inverse=True)
     ground, terrain = ground[used], terrain[used]
 
-    held = _control(plan, terrain, control, control_spacing)
+    held = control_pattern(plan, terrain, control, control_spacing)
     free = np.flatnonzero(~held.any(axis=1))
     checks = control_random.choice(free, min(check_points, len(free)), replace=False)
-    known = held.copy()
+    known: Bools = held.copy()
     known[checks] = True
     metres = geometry.lengths_of_units(ground, spheroid)
     point_sd = np.where(held, control_sd / metres, np.inf)
     control_noise = control_sd / metres * control_random.standard_normal(ground.shape)
 
+    positions, attitudes, xy = taken.positions, taken.attitudes, taken.image_xy
     metres = geometry.lengths_of_units(positions, spheroid)
     truth = Block(
-        photo_ids=_photo_ids(plan),
+        photo_ids=taken.photo_ids,
         photo_positions=positions,
         photo_attitudes=attitudes,
         principal_distances=np.full(len(positions), principal_distance),
-        point_ids=_point_ids(held, checks),
+        point_ids=point_ids(held, checks),
         point_positions=ground,
-        image_photos=image_photos,
+        image_photos=taken.image_photos,
         image_points=image_points,
         image_xy=xy,
         image_sd=np.array(image_sd),
@@ -302,11 +291,11 @@ def simulate(
         spheroid=spheroid,
         photo_to_ground=photo_to_ground,
         refraction=refraction,
-        title=f"simulated block, {counted(strips, 'strip')} of {counted(photos_per_strip, 'photograph')}",
+        title=_title(strips, photos_per_strip, motion),
     )
     faults = _blunders(len(xy), blunders, blunder_size, blunder_random)
-    measured = xy + image_sd * image_random.standard_normal(xy.shape)
-    measured[faults.images] += faults.amounts
+    measured = xy + taken.in_images(image_sd * image_random.standard_normal(xy.shape), np.arange(len(xy)))
+    measured[faults.images] += taken.in_images(faults.amounts, faults.images)
     position_draw, attitude_draw = (initial_random.standard_normal(positions.shape) for _ in range(2))
     block = truth.replace(
         photo_positions=positions + (position_error if position_sd else 0.0) / metres * position_draw,
@@ -316,10 +305,46 @@ def simulate(
         point_positions=np.where(known, ground + np.where(held, control_noise, 0.0), np.nan),
         point_check_sd=np.where(known & ~held, 0.0, np.nan) if len(checks) else None,
         image_xy=measured,
+        **taken.given,
     )
-    if taking := checked_cameras(cameras):
+    truth = truth.replace(**taken.true)
+    if taking:
         truth, block = photographed(truth, block, taking, start_cameras)
+    if isinstance(motion, RollingShutter):
+        frame = frame_size / abs(principal_distance)
+        truth, block = rolled(truth, block, motion, plan, frame, motion_random)
     return Simulation(block, truth, faults)
+
+
+def _looks(
+    principal_distance: float,
+    frame_size: float,
+    angles: tuple[float, float],
+    motion: RollingShutter | LineScanner | None,
+    attitude_error: float,
+) -> tuple[float, float]:
+    """Return how far aside cameras see, and how far they may be inclined, of (tilt, crab); radians.
+
+    Raises
+    ------
+    InputError
+        Photos that see too little, or to the horizon, or past each other.
+    """
+    tilt, crab = angles
+    spread = frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab))
+    steepest = 2 * tilt
+    if isinstance(motion, LineScanner):
+        spread += math.tan(motion.view_angle) * math.sin(crab)
+        steepest += 4 * attitude_error
+    half_angle = math.atan(spread)
+    if not _NARROWEST < half_angle < _WIDEST - steepest:
+        raise InputError("principal_distance and frame_size: the photos see too little, or to the horizon")
+    if steepest > _FAR_MORE * half_angle:
+        raise InputError(
+            f"tilt: photos that see {half_angle:.2g} rad to either side and look up to {steepest:.2g} rad"
+            " aside do not overlap"
+        )
+    return half_angle, steepest
 
 
 def _observed(truth: Floats, sd: Floats, random: np.random.Generator) -> Floats | None:
@@ -328,9 +353,19 @@ def _observed(truth: Floats, sd: Floats, random: np.random.Generator) -> Floats 
     return truth + sd * draw if np.isfinite(sd).all() else None
 
 
+def _title(strips: int, photos_per_strip: int, motion: RollingShutter | LineScanner | None) -> str:
+    """Return what a simulated block is."""
+    of = counted(photos_per_strip, "photograph")
+    if isinstance(motion, LineScanner):
+        of = counted(motion.lines, "line")
+        if motion.scenes:
+            of = f"{counted(photos_per_strip, 'scene')} of {of}"
+    return f"simulated block, {counted(strips, 'strip')} of {of}"
+
+
 _WHOLE_NUMBERS = ("strips", "photos_per_strip", "control_spacing", "check_points", "blunders")
 _CLASSES = {"spheroid": Spheroid, "refraction": Refraction}
-_OTHERS = ("control", "origin", "photo_to_ground", "cameras", "start_cameras", "seed")
+_OTHERS = ("control", "origin", "photo_to_ground", "cameras", "start_cameras", "motion", "seed")
 
 
 def _check_types(arguments: Mapping[str, object]) -> None:
@@ -343,6 +378,20 @@ def _check_types(arguments: Mapping[str, object]) -> None:
                 raise InputError(f"{name} is a {_CLASSES[name].__name__} or None, not {shown(value)}")
         elif name not in _OTHERS and _HUGE < abs(number(name, value)) < math.inf:
             raise InputError(f"{name} must be below {_HUGE:g}")
+
+
+def _check_motion(motion: object, *, plain: bool, cameras: bool) -> None:
+    """Refuse what is no motion, and what it does not go with."""
+    if motion is None:
+        return
+    if not isinstance(motion, RollingShutter | LineScanner):
+        raise InputError(f"motion is a RollingShutter, a LineScanner or None, not {shown(motion)}")
+    if not plain:
+        raise InputError(
+            "motion is simulated in rectangular space, without refraction: it goes without these"
+        )
+    if isinstance(motion, LineScanner) and cameras:
+        raise InputError("motion is that of a line scanner, which has a lens without distortion: no cameras")
 
 
 def _generator(seed: int | np.random.Generator) -> np.random.Generator:
@@ -358,215 +407,8 @@ def _check(ranges: dict[str, tuple[bool, str]]) -> None:
             raise InputError(f"{name} must be {expected}")
 
 
-def _plan(
-    strips: int,
-    photos_per_strip: int,
-    forward_overlap: float,
-    side_overlap: float,
-    footprint: float,
-    points_per_photo: float,
-    reach: float,
-) -> _Plan:
-    base, separation = (1 - forward_overlap) * footprint, (1 - side_overlap) * footprint
-    # Points on one photo are left out: where one photo of one strip sees, the images are lost.
-    photos = strips * photos_per_strip
-    lost = _covered_once(photos_per_strip, base, footprint) * _covered_once(strips, separation, footprint)
-    density = points_per_photo * photos / (photos * footprint**2 - lost)
-    columns = max(1, round(base * math.sqrt(density)))
-    rows = max(1, round(density * base * separation / columns))
-    plan = _Plan(strips, photos_per_strip, base, separation, columns, rows, reach)
-    _check_size(plan, footprint, points_per_photo)
-    return plan
-
-
-def _check_size(plan: _Plan, footprint: float, points_per_photo: float) -> None:
-    """Refuse a plan with far more image points than were asked for, or than there is memory for."""
-    dx, dy = plan.cell
-    fewest = footprint**2 / (dx * dy)
-    if fewest > _FAR_MORE * points_per_photo:
-        raise InputError(
-            "forward_overlap and side_overlap: with a column of points under every photo and a row in every"
-            f" side overlap a photo shows about {fewest:.0f} points, not {points_per_photo:g}"
-        )
-    photos = plan.strips * plan.photos_per_strip
-    needed, available = _CANDIDATE_BYTES * _AT_ONCE + _IMAGE_BYTES * photos * fewest, available_memory()
-    if available is not None and needed > available:
-        gib = [f"{size / 2**30:.1f} GiB" for size in (needed, available)]
-        raise InputError(f"the simulation takes {gib[0]} of memory, and {gib[1]} are free")
-
-
-def _covered_once(count: int, step: float, length: float) -> float:
-    """How much of a line only one of `count` overlapping intervals covers, their starts a step apart."""
-    if count == 1:
-        return length
-    return 2 * step + (count - 2) * max(0.0, 2 * step - length)
-
-
-def _window(plan: _Plan) -> tuple[Indices, Indices]:
-    """Grid columns and rows a photograph may see, counted from the column and half-strip below it."""
-    dx, dy = plan.cell
-    columns = math.ceil(plan.reach / dx + _JITTER)
-    middle, rows = -plan.rows_per_strip / 2, plan.reach / dy + _JITTER
-    return np.arange(-columns, columns + 1), np.arange(
-        math.floor(middle - rows), math.ceil(middle + rows) + 1
-    )
-
-
-def _grid(plan: _Plan) -> tuple[Indices, Indices]:
-    """All grid columns and rows: those of the first photograph to those of the last."""
-    columns, rows = _window(plan)
-    last_column = (plan.photos_per_strip - 1) * plan.columns_per_base + columns[-1]
-    last_row = (plan.strips - 1) * plan.rows_per_strip + rows[-1]
-    return np.arange(columns[0], last_column + 1), np.arange(rows[0], last_row + 1)
-
-
-def _candidates(plan: _Plan) -> Iterator[tuple[Indices, Indices]]:
-    """Pairs of photo and grid point that may see each other, by photo, then point: some photos at a time."""
-    columns, rows = _window(plan)
-    _, all_rows = _grid(plan)
-    step = max(1, _AT_ONCE // (len(columns) * len(rows)))
-    count = plan.strips * plan.photos_per_strip
-    for first in range(0, count, step):
-        some = np.arange(first, min(first + step, count))
-        strip, number = np.divmod(some, plan.photos_per_strip)
-        column = (number * plan.columns_per_base)[:, None, None] + (columns - columns[0])[:, None]
-        row = (strip * plan.rows_per_strip)[:, None, None] + (rows - rows[0])
-        points = column * len(all_rows) + row
-        yield np.broadcast_to(some[:, None, None], points.shape).ravel(), points.ravel()
-
-
-def _photograph(
-    plan: _Plan,
-    ground: Floats,
-    positions: Floats,
-    attitudes: Floats,
-    principal_distance: float,
-    frame_size: float,
-    spheroid: Spheroid | None,
-    photo_to_ground: bool,
-    refraction: Refraction | None,
-) -> tuple[Indices, Indices, Floats]:
-    """Photos, points and coordinates of the images in the frame whose points are seen at least twice."""
-    found = []
-    for photos, points in _candidates(plan):
-        xy = geometry.project(
-            ground[points],
-            positions[photos],
-            attitudes[photos],
-            np.full(len(photos), principal_distance),
-            spheroid=spheroid,
-            photo_to_ground=photo_to_ground,
-            refraction=refraction,
-        )
-        seen = (np.abs(xy) <= frame_size / 2).all(axis=1)
-        found.append((photos[seen], points[seen], xy[seen]))
-    photos, points, xy = (np.concatenate(each) for each in zip(*found, strict=True))
-    seen = np.bincount(points)[points] >= 2
-    return photos[seen], points[seen], xy[seen]
-
-
-def _terrain(plan: _Plan, relief: float, footprint: float, random: np.random.Generator) -> Floats:
-    """Ground points in the plan, (n, 3), column by column: a jittered grid on long waves."""
-    dx, dy = plan.cell
-    columns, rows = _grid(plan)
-    x, y = np.meshgrid(
-        columns * dx - plan.length / 2, (rows + plan.rows_per_strip / 2) * dy - plan.width / 2, indexing="ij"
-    )
-    jitter = random.uniform(-_JITTER, _JITTER, (2, *x.shape))
-    x, y = x + dx * jitter[0], y + dy * jitter[1]
-    waves = 8
-    heading, phase = random.uniform(0, 2 * math.pi, (2, waves))
-    wave_number = 2 * math.pi / (footprint * random.uniform(1.0, 5.0, waves))
-    z = np.zeros_like(x)
-    for h, k, p in zip(heading, wave_number, phase, strict=True):
-        z += relief / waves * np.sin(k * (math.cos(h) * x + math.sin(h) * y) + p)
-    return np.stack([x, y, z], axis=-1).reshape(-1, 3)
-
-
-def _flight(
-    plan: _Plan, flying_height: float, crab: float, tilt: float, random: np.random.Generator
-) -> tuple[Floats, Floats]:
-    """Projection centres in the plan and rotations from the plan to the photos."""
-    strip, number = np.divmod(np.arange(plan.strips * plan.photos_per_strip), plan.photos_per_strip)
-    x, y = number * plan.base - plan.length / 2, strip * plan.separation - plan.width / 2
-    deviation = random.uniform(-1.0, 1.0, (len(strip), 3)) * [tilt, tilt, crab]
-    deviation[:, 2] += math.pi * (strip % 2)
-    return np.stack([x, y, np.full(len(x), flying_height)], axis=1), geometry.rotation_matrix(deviation)
-
-
-def _into_object_space(
-    plan_positions: Floats,
-    rotations: Floats | None,
-    origin: tuple[float, float, float],
-    spheroid: Spheroid | None,
-    photo_to_ground: bool,
-) -> tuple[Floats, Floats]:
-    """Positions and, given the rotations from the plan to the photos, attitudes in the object space."""
-    positions = plan_positions + np.asarray(origin)
-    if spheroid is not None:
-        tangent_point = np.array([[origin[0], origin[1], 0.0]])
-        frame = geometry.local_frames(tangent_point)[0]
-        plane = plan_positions * [1.0, 1.0, 0.0]
-        xyz = geometry.geographic_to_geocentric(tangent_point, spheroid) + plane @ frame
-        positions = geometry.geocentric_to_geographic(xyz, spheroid)
-        positions[:, 2] = plan_positions[:, 2] + origin[2]
-    if rotations is None:
-        return positions, np.empty((0, 3))
-    if spheroid is not None:
-        # East at the station, seen from the plan: turned about the vertical by the convergence of the
-        # meridians.
-        in_plan = geometry.local_frames(positions)[:, 0] @ frame.T
-        convergence = np.zeros_like(positions)
-        convergence[:, 2] = -np.arctan2(in_plan[:, 1], in_plan[:, 0])
-        rotations = rotations @ geometry.rotation_matrix(convergence)
-    return positions, geometry.rotation_angles(rotations.transpose(0, 2, 1) if photo_to_ground else rotations)
-
-
-def _control(plan: _Plan, terrain: Floats, pattern: str, spacing: int) -> NDArray[np.bool_]:
-    """Which components of which points are held, (n, 3)."""
-    held = np.zeros(terrain.shape, dtype=bool)
-    if pattern == "none":
-        return held
-    right, top = plan.length / 2, (plan.width + plan.separation) / 2
-    along, across = 2, 2
-    if pattern == "perimeter":
-        along = max(2, round(2 * right / (spacing * plan.base)) + 1)
-        across = max(2, round(2 * top / (spacing * plan.base)) + 1)
-    xs, ys = np.linspace(-right, right, along), np.linspace(-top, top, across)
-    full = [(x, y) for x in xs for y in (-top, top)] + [(x, y) for x in (-right, right) for y in ys[1:-1]]
-    height = []
-    if pattern == "perimeter":
-        overlaps = np.linspace(-top, top, plan.strips + 1)[1:-1]
-        height = [(x, y) for x in xs[1:-1] for y in overlaps]
-    # Along the longer side few points are near a place.
-    axis = int(top > right)
-    order = np.argsort(terrain[:, axis])
-    along_axis = terrain[order, axis]
-    for places, components in ((height, slice(2, 3)), (full, slice(0, 3))):
-        for place in places:
-            low, high = np.searchsorted(along_axis, [place[axis] - plan.reach, place[axis] + plan.reach])
-            near = order[low:high]
-            held[near[np.argmin(((terrain[near, :2] - place) ** 2).sum(axis=1))], components] = True
-    return held
-
-
 def _blunders(images: int, count: int, size: float, random: np.random.Generator) -> Blunders:
     rows = np.sort(random.choice(images, min(count, images), replace=False))
     amounts = np.zeros((len(rows), 2))
     amounts[np.arange(len(rows)), random.integers(0, 2, len(rows))] = size * random.choice([-1, 1], len(rows))
     return Blunders(rows.astype(np.int64), amounts)
-
-
-def _photo_ids(plan: _Plan) -> list[str]:
-    strip_digits, number_digits = (max(2, len(str(count))) for count in (plan.strips, plan.photos_per_strip))
-    return [
-        f"{strip:0{strip_digits}d}{number:0{number_digits}d}"
-        for strip in range(1, plan.strips + 1)
-        for number in range(1, plan.photos_per_strip + 1)
-    ]
-
-
-def _point_ids(held: NDArray[np.bool_], checks: Indices) -> list[str]:
-    kind = np.where(held.any(axis=1), "C", "P")
-    kind[checks] = "K"
-    return [f"{letter}{number:06d}" for number, letter in enumerate(kind, start=1)]

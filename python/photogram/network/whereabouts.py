@@ -7,7 +7,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.network.trajectories import Spline, Trajectory
 
-__all__ = ["about", "reach"]
+__all__ = ["about", "given_poses", "reach"]
 
 
 def reach(trajectory: Trajectory) -> tuple[float, float]:
@@ -48,6 +48,12 @@ def about(trajectory: Trajectory, time: float) -> tuple[Floats, Floats]:
     -------
     (3,) X, Y, Z, geocentric where the object space is geographic, and (3, 3) the axes of the photo in these.
     """
-    given = (np.array([each.position for each in own]) for own in trajectory.coefficients)
-    places, matrices, *_ = trajectory.flown(np.clip([time], *reach(trajectory)), *given)
-    return places[0], matrices[0].reshape(3, 3)
+    places, matrices = given_poses(trajectory, np.clip([time], *reach(trajectory)))
+    return places[0], matrices[0]
+
+
+def given_poses(trajectory: Trajectory, times: Floats) -> tuple[Floats, Floats]:
+    """Return (n, 3) places and (n, 3, 3) axes at (n,) times that the trajectory reaches, as :func:`about`."""
+    position, rotation = (np.array([each.position for each in own]) for own in trajectory.coefficients)
+    places, matrices, *_ = trajectory.flown(times, position, rotation)
+    return places, matrices.reshape(-1, 3, 3)

@@ -15,6 +15,8 @@ from photogram.arguments.annotations import check_arguments
 from photogram.errors import InputError, RankError
 from photogram.io import json
 from photogram.network.block import Block
+from photogram.network.motion import on_shared
+from photogram.planning.motion import with_known_readout
 from photogram.planning.pattern import Pattern
 from photogram.planning.text import report, what_next
 from photogram.show.ways import Paged
@@ -96,6 +98,7 @@ class Plan(Paged):
                 "points": f"standard deviations {linear}, detectable mm, effect standard deviations",
                 "photos": f"positions {linear}, angles rad",
                 "control": f"sd and detectable {linear}, effect standard deviations",
+                **({"motion": "as each says"} if any(each.motion for each in self.patterns) else {}),
             },
             "noncentrality": noncentrality(),
             "unchecked_below": TESTABLE,
@@ -133,7 +136,9 @@ def plan(
         raise InputError("a plan needs one block, or several with the same linear unit and kind of space")
     made = []
     for name, block in patterns.items():
-        if not (np.isfinite(block.point_sd).any() or np.isfinite(block.photo_position_sd).any()):
+        tied = np.isfinite(block.point_sd).any() or np.isfinite(block.photo_position_sd).any()
+        # Of trajectories, what is given of them.
+        if not (tied or on_shared(block).any()):
             raise RankError(
                 f"{name}: the observations leave position and scale open: a plan needs control, or standard"
                 " deviations for the positions of photos",
@@ -141,7 +146,10 @@ def plan(
                 [],
             )
         try:
-            made.append(Pattern(name, predict(block, threads=threads, progress=progress)))
+            result = predict(block, threads=threads, progress=progress)
+            other = with_known_readout(block)
+            known = None if other is None else predict(other, threads=threads, progress=progress)
+            made.append(Pattern(name, result, known))
         except RankError as error:
             raise RankError(f"{name}: {error}", error.photos, error.points) from None
     return Plan(tuple(made))
@@ -160,6 +168,8 @@ def _pattern(pattern: Pattern) -> dict[str, Any]:
         "points": [asdict(quality) for quality in pattern.points if quality.points],
         "photos": [asdict(quality) for quality in pattern.photos],
         "control": [asdict(quality) for quality in pattern.control],
+        **({"motion": [asdict(quality) for quality in pattern.motion]} if pattern.motion else {}),
+        **({"rms_sd_known_readout": known} if (known := pattern.known_rms_sd) else {}),
     }
 
 

@@ -9,7 +9,7 @@ from photogram.planning.networks import Plan
 from photogram.planning.pattern import Pattern
 from photogram.planning.plot import figure
 from photogram.planning.statistics import PointQuality
-from photogram.planning.text import remarks, what_next
+from photogram.planning.text import motion_shown, remarks, what_next
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
 from photogram.show.page import (
@@ -43,6 +43,7 @@ def plan_page(made: Plan) -> Page:
         Section("size", "How much", [_size(patterns)]),
         _layers("points", "New points", patterns, _points, _POINTS),
         _layers("photos", "Photos", patterns, _photos, ""),
+        _layers("motion", "Motion", patterns, _motion, ""),
         _layers("control", "Control", patterns, _control, _CONTROL),
         remarks_section(remarks(patterns)),
     ]
@@ -213,6 +214,20 @@ def _photos(pattern: Pattern) -> Table:
         Column("Largest sd", figures=3),
         Column("Mean redundancy of given values", decimals=3),
     ]
+    return Table(pattern.name, columns, rows)
+
+
+def _motion(pattern: Pattern) -> Table | None:
+    if not pattern.motion:
+        return None
+    rows: list[Row] = []
+    for each in pattern.motion:
+        factor, unit = motion_shown(each.unit)
+        rows.append([f"{each.unknown}, {unit}", each.rms_sd / factor, each.max_sd / factor])
+    for axis, sd in zip(pattern.axes, pattern.known_rms_sd or (), strict=False):
+        what = f"{axis} of new points were the readout time known, {pattern.block.linear_unit}"
+        rows.append([what, sd, None])
+    columns = [Column("Unknown", text=True), Column("rms sd", figures=3), Column("Largest sd", figures=3)]
     return Table(pattern.name, columns, rows)
 
 

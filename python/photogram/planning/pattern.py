@@ -12,7 +12,9 @@ from photogram.adjustment.prediction import image_depths
 from photogram.arguments.types import Floats
 from photogram.network import geometry
 from photogram.network.block import Block
+from photogram.network.motion import on_shared
 from photogram.planning.locations import locations
+from photogram.planning.motion import MotionQuality, motion_quality
 from photogram.planning.statistics import (
     ControlQuality,
     PhotoQuality,
@@ -36,10 +38,13 @@ class Pattern:
         Of the pattern, for tables.
     result
         The predicted block (a priori unit weight).
+    known
+        The same if its readout times were known; None where they are, or where there are none.
     """
 
     name: str
     result: Result
+    known: Result | None = None
 
     @property
     def block(self) -> Block:
@@ -93,7 +98,12 @@ class Pattern:
     @cached_property
     def point_locations(self) -> NDArray[np.str_]:
         """(n,) `corner`, `edge` or `interior`, as :func:`photogram.planning.locations.locations` has them."""
-        return locations(self.point_plan, self.photo_plan)
+        stations = [self.photo_plan]
+        if on_shared(self.block).any():
+            # A strip of a scanner is as long as its trajectory.
+            flown = {id(each): each for each in self.block.all_trajectories}
+            stations += [self._cartesian_plan(each.table.positions) for each in flown.values()]
+        return locations(self.point_plan, np.concatenate(stations))
 
     @cached_property
     def scale(self) -> float:
@@ -117,6 +127,21 @@ class Pattern:
         return photo_quality(self.result, self.photo_sd, self.axes)
 
     @cached_property
+    def motion(self) -> list[MotionQuality]:
+        """Readout times, velocities and rates of photos, trajectories; nothing where nothing moves."""
+        return motion_quality(self.result)
+
+    @property
+    def known_rms_sd(self) -> tuple[float, float, float] | None:
+        """What `rms_sd` of all new points would be, were the readout times known; None where they are."""
+        if self.known is None or not self.new_points.any():
+            return None
+        lengths = geometry.lengths_of_units(self.result.point_positions, self.block.spheroid)
+        sd = (self.known.point_sd * lengths)[self.new_points]
+        x, y, z = np.sqrt((sd**2).mean(axis=0)).tolist()
+        return x, y, z
+
+    @cached_property
     def control(self) -> list[ControlQuality]:
         """Held components of control, by axis."""
         return control_quality(self.result, self.control_sd, self.axes)
@@ -132,10 +157,16 @@ class Pattern:
         spheroid = self.block.spheroid
         if spheroid is None:
             return positions[:, :2]
+        return self._cartesian_plan(geometry.geographic_to_geocentric(positions, spheroid))
+
+    def _cartesian_plan(self, xyz: Floats) -> Floats:
+        """Return the plan of places in X, Y, Z, geocentric where the space is geographic."""
+        spheroid = self.block.spheroid
+        if spheroid is None:
+            return xyz[:, :2]
         # The mean of geocentric coordinates knows no antimeridian.
         stations = geometry.geographic_to_geocentric(self.result.photo_positions, spheroid)
         centre = stations.mean(axis=0)
         frame = geometry.local_frames(geometry.geocentric_to_geographic(centre[np.newaxis], spheroid))[0]
-        xyz = geometry.geographic_to_geocentric(positions, spheroid)
         plan: Floats = (xyz - centre) @ frame[:2].T
         return plan

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats
 from photogram.planning.locations import LOCATIONS
+from photogram.planning.motion import photo_redundancy
 from photogram.results.result import Result
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 
@@ -163,12 +164,13 @@ def photo_quality(result: Result, photo_sd: Floats, axes: tuple[str, str, str]) 
     """Return the quality of the photos in each unknown; `photo_sd` is (P, 6), linear unit and radians."""
     given_sd = np.hstack([result.block.photo_position_sd, result.block.photo_attitude_sd])
     weighted = np.isfinite(given_sd) & (given_sd > 0)
+    redundancy = photo_redundancy(result)
     return [
         PhotoQuality(
             unknown=name,
             rms_sd=_rms(photo_sd[:, k]),
             max_sd=_largest(photo_sd[:, k]),
-            redundancy=_mean(result.photo_redundancy[weighted[:, k], k]),
+            redundancy=_mean(redundancy[weighted[:, k], k]),
         )
         for k, name in enumerate((*axes, "omega", "phi", "kappa"))
     ]

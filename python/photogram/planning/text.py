@@ -15,10 +15,12 @@ from photogram.show.sections import composed, headline
 if TYPE_CHECKING:
     from photogram.planning.pattern import Pattern
 
-__all__ = ["remarks", "report", "what_next"]
+__all__ = ["motion_shown", "remarks", "report", "what_next"]
 
 _NOTICED = 1.005
 """Ratio of standard deviations that two decimals show."""
+_MUCH = 1.1
+"""Times that points would be better for it to be told."""
 _HEAD = 3
 """Lines of a block before its first row: its name, headings, units."""
 _WIDEST = 108
@@ -39,6 +41,8 @@ def report(patterns: Sequence[Pattern]) -> str:
         ("New points: the same, divided by the sd of image coordinates on the ground", _multiples(patterns)),
         ("Image coordinates of new points: reliability", _reliability(patterns)),
         ("Photos: expected standard deviations", _photos(patterns)),
+        ("Motion: expected standard deviations", _motion(patterns)),
+        ("New points: expected standard deviations were the readout time known", _known(patterns)),
         ("Control: reliability", _control(patterns)),
         ("Comparison: expected standard deviations of all new points", _comparison(patterns)),
     ]
@@ -81,7 +85,23 @@ def what_next(patterns: Sequence[Pattern]) -> list[str]:
                 " check points"
                 " beside it, would show its errors."
             )
+        readout = [each for each in pattern.motion if each.unit == "s"]
+        times = _times_better(pattern)
+        if readout and max(times) > _MUCH:
+            found.append(
+                f"“{pattern.name}”: the readout time is left open by {1e3 * readout[0].rms_sd:.2g} ms, and"
+                f" points would be up to {max(times):.1f} times better were it known: give what is known of"
+                " it, or fly strips across, faster or at another height."
+            )
     return found
+
+
+def _times_better(pattern: Pattern) -> list[float]:
+    """Return by how many times new points would be better in each axis, were the readout time known."""
+    known = pattern.known_rms_sd
+    if known is None:
+        return [1.0]
+    return [sd / own for sd, own in zip(pattern.points[-1].rms_sd, known, strict=True)]
 
 
 def remarks(patterns: Sequence[Pattern]) -> list[str]:
@@ -163,6 +183,44 @@ def _photos(patterns: Sequence[Pattern]) -> list[str]:
         blocks.append(_aligned(pattern.name, rows))
     names = [f"{q.unknown}, {linear if k < 3 else 'arcsec'}" for k, q in enumerate(patterns[0].photos)]
     return _labelled(["", "", *names], blocks)
+
+
+def motion_shown(unit: str) -> tuple[float, str]:
+    """Return by what a motion in a unit is divided to be shown, and the unit that it is shown in."""
+    return {"s": (1e-3, "ms"), "rad/s": (1e-3, "mrad/s"), "rad": (ARCSEC, "arcsec")}.get(unit, (1.0, unit))
+
+
+def _motion(patterns: Sequence[Pattern]) -> list[str]:
+    units = {each.unknown: each.unit for pattern in patterns for each in pattern.motion}
+    if not units:
+        return []
+    blocks = []
+    for pattern in patterns:
+        own = {each.unknown: each for each in pattern.motion}
+        rows = [["rms", "max"]]
+        for name, unit in units.items():
+            factor, _ = motion_shown(unit)
+            values = (own[name].rms_sd, own[name].max_sd) if name in own else (math.nan, math.nan)
+            rows.append([_fixed(sd / factor, 3) for sd in values])
+        blocks.append(_aligned(pattern.name, rows))
+    names = [f"{name}, {motion_shown(unit)[1]}" for name, unit in units.items()]
+    return _labelled(["", "", *names], blocks)
+
+
+def _known(patterns: Sequence[Pattern]) -> list[str]:
+    """Say what points would be, were the readout time known."""
+    decimals = _decimals(patterns)
+    linear = patterns[0].block.linear_unit
+    if all(pattern.known_rms_sd is None for pattern in patterns):
+        return []
+    blocks = []
+    for pattern in patterns:
+        known = pattern.known_rms_sd or (math.nan,) * 3
+        rows = [["rms", "times better"]]
+        for sd, times in zip(known, _times_better(pattern) if pattern.known else known, strict=True):
+            rows.append([_fixed(sd, decimals), _fixed(times, 2)])
+        blocks.append(_aligned(pattern.name, rows))
+    return _labelled(["", "", *(f"{axis}, {linear}" for axis in patterns[0].axes)], blocks)
 
 
 def _control(patterns: Sequence[Pattern]) -> list[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.arrays import freeze_fields, standard_deviations
+from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.types import Floats
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
@@ -70,7 +70,16 @@ class AdjustedUnknown:
     observations: int
 
     def __post_init__(self) -> None:
-        freeze_fields(self)
+        # There may be as many as four times the photos: their fields are not looked for in each.
+        for array in (
+            self.change,
+            self.position,
+            self.attitude,
+            self.cofactors,
+            self.covariance,
+            self.redundancy,
+        ):
+            array.flags.writeable = False
 
     @property
     def name(self) -> str:

@@ -61,7 +61,7 @@ def test_weights_of_all_points_in_metres(pair):
     words = "radius=yes POINT_LATITUDE_SIGMA=200 POINT_LONGITUDE_SIGMA=300 POINT_RADIUS_SIGMA=400"
     project = pair.project(words)
     free = ~contents_of(project.details).network.points.is_constrained
-    longitude, latitude, height = project.starts[free].T
+    _, latitude, height = project.starts[free].T
     radius = height + project.block.spheroid.a
     expected = np.column_stack([300 / radius / np.cos(latitude), 200 / radius, np.full(len(radius), 400.0)])
     np.testing.assert_allclose(project.block.point_sd[free], expected, rtol=1e-12)

@@ -209,7 +209,7 @@ def test_all_else_of_support_data_stays(pair):
 
 def test_quaternions_and_angles_come_back():
     random = np.random.default_rng(2)
-    angles = np.cumsum(random.normal(0, 0.05, (50, 3)), axis=0) + [1.0, 1.2, -2.0]
+    angles = np.array([1.0, 1.2, -2.0]) + np.cumsum(random.normal(0, 0.05, (50, 3)), axis=0)
     matrices = of_angles(angles)
     np.testing.assert_allclose(to_angles(matrices), angles, atol=1e-12)
     found = to_quaternions(matrices)

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use super::block_network::BlockNetwork;
 use super::{images, points};
-use crate::arrays::{check_lengths, indices, rows};
+use crate::arrays::{check_lengths, indices, numbers, rows};
 use crate::camera::named;
 use crate::commons::{CommonRow, MountRow, common, mount};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
@@ -60,7 +60,7 @@ fn block_network(
     mounts: Vec<MountRow>,
     trajectories: Vec<TrajectoryRow<'_>>,
     timed: Vec<TimedRow>,
-    image_times: Vec<f64>,
+    image_times: PyReadonlyArrayDyn<'_, f64>,
     records: usize,
     spheroid: Option<(f64, f64)>,
     photo_to_ground: bool,
@@ -118,7 +118,7 @@ fn block_network(
             .chain(mounts.into_iter().map(mount))
             .collect(),
         trajectories: trajectories.into_iter().map(trajectory).collect::<PyResult<_>>()?,
-        image_times,
+        image_times: numbers("image_times", &image_times)?,
     };
     let method = match criterion {
         "fraction" => Method::Damped(Stop::Fraction(limit)),

@@ -1,0 +1,117 @@
+"""What frames take of the ground of a simulated block."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.network import geometry
+from photogram.network.geometry import Spheroid
+from photogram.network.refraction import Refraction
+from photogram.network.simulated_layout import Layout, candidates, photo_ids
+from photogram.network.simulated_motion import RollingShutter
+
+__all__ = ["Taken", "photograph", "seen_side"]
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What cameras have taken of the ground.
+
+    Attributes
+    ----------
+    photo_ids, positions, attitudes
+        Of the P photos: names and true poses, of scanners those in the middle of their images.
+    image_photos, image_points, image_xy
+        (m,), (m,) and (m, 2) images of points, without errors; of scanners samples and lines.
+    per_error
+        (m, 2, 2) image coordinates by millimetres in the focal plane; None: these are the same.
+    true, given
+        Further arguments of the block: as they truly are, and as they are known.
+    """
+
+    photo_ids: list[str]
+    positions: Floats
+    attitudes: Floats
+    image_photos: Indices
+    image_points: Indices
+    image_xy: Floats
+    per_error: Floats | None = None
+    true: dict[str, Any] = field(default_factory=dict)
+    given: dict[str, Any] = field(default_factory=dict)
+
+    def in_images(self, errors: Floats, images: Indices) -> Floats:
+        """Return errors in image coordinates, of (k, 2) in the focal plane and the rows of their images."""
+        if self.per_error is None:
+            return errors
+        return np.asarray(np.einsum("mij,mj->mi", self.per_error[images], errors))
+
+
+def photograph(
+    plan: Layout,
+    ground: Floats,
+    poses: tuple[Floats, Floats],
+    principal_distance: float,
+    frame_size: float,
+    spheroid: Spheroid | None,
+    photo_to_ground: bool,
+    refraction: Refraction | None,
+) -> Taken:
+    """Take the ground by frames of one side, in the unit of the principal distance.
+
+    Parameters
+    ----------
+    plan
+        The strips, with a grid of points.
+    ground
+        (n, 3) these, in the object space.
+    poses
+        (P, 3) positions and attitudes of the photos.
+
+    Returns
+    -------
+    The images of points that are seen at least twice.
+    """
+    found = []
+    positions, attitudes = poses
+    for photos, points in candidates(plan):
+        xy = geometry.project(
+            ground[points],
+            positions[photos],
+            attitudes[photos],
+            np.full(len(photos), principal_distance),
+            spheroid=spheroid,
+            photo_to_ground=photo_to_ground,
+            refraction=refraction,
+        )
+        seen = (np.abs(xy) <= frame_size / 2).all(axis=1)
+        found.append((photos[seen], points[seen], xy[seen]))
+    photos, points, xy = (np.concatenate(each) for each in zip(*found, strict=True))
+    seen = np.bincount(points)[points] >= 2
+    return Taken(photo_ids(plan), positions, attitudes, photos[seen], points[seen], xy[seen])
+
+
+def seen_side(
+    frame_size: float,
+    principal_distance: float,
+    motion: RollingShutter | None,
+    height: float,
+    half_angle: float,
+) -> float:
+    """Return the side of the part of the frame whose images stay in it while photos are read.
+
+    Raises
+    ------
+    InputError
+        That is less than half of it.
+    """
+    if motion is None:
+        return frame_size
+    side = frame_size - 2 * abs(principal_distance) * motion.margin(height, half_angle)
+    if not side > frame_size / 2:
+        raise InputError("readout: the photos move too far while they are read")
+    return side

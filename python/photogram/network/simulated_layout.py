@@ -1,0 +1,265 @@
+"""The layout of simulated blocks: strips over gentle relief, a grid of points below them, where control is.
+
+The block is laid out in a plane: x along the strips, y across them, z up, the origin in its centre on the
+mean terrain. Ground points stand on a grid locked to the photographs, a column under every projection centre
+and a row in the middle of every side overlap, so that neighbouring photographs and strips are tied, and so
+that the points a photograph may see are known beforehand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.memory import available_memory
+from photogram.network import geometry
+from photogram.network.geometry import Spheroid
+
+__all__ = [
+    "Layout",
+    "candidates",
+    "control_pattern",
+    "flight",
+    "grid",
+    "ground_points",
+    "into_object_space",
+    "laid_out",
+    "photo_ids",
+    "point_ids",
+    "strip_ids",
+    "window",
+]
+
+_FAR_MORE = 10.0
+"""Times as many points as were asked for are too many."""
+_AT_ONCE = 2**22
+"""Pairs of photo and point that may see each other, that are looked at together."""
+_CANDIDATE_BYTES, _IMAGE_BYTES = 300, 240
+"""Memory for such a pair, and for an image of the block, at the peak."""
+_JITTER = 0.15  # of a grid cell, either way: small enough to keep the middle of an overlap in the overlap
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The plan of the flight: metres, counts and the point grid."""
+
+    strips: int
+    photos_per_strip: int
+    base: float  # between photographs of a strip
+    separation: float  # of neighbouring strips
+    columns_per_base: int
+    rows_per_strip: int
+    reach: float  # how far from the point below it a photograph may see, in x or y
+
+    @property
+    def length(self) -> float:
+        """Of a strip, from the first photograph to the last."""
+        return (self.photos_per_strip - 1) * self.base
+
+    @property
+    def width(self) -> float:
+        """From the first strip to the last."""
+        return (self.strips - 1) * self.separation
+
+    @property
+    def cell(self) -> tuple[float, float]:
+        """From column to column and from row to row of the grid."""
+        return self.base / self.columns_per_base, self.separation / self.rows_per_strip
+
+
+def laid_out(
+    strips: int,
+    photos_per_strip: int,
+    forward_overlap: float,
+    side_overlap: float,
+    footprint: float,
+    points_per_photo: float,
+    reach: float,
+) -> Layout:
+    """Lay out strips: lengths in metres, `footprint` the side of a frame on the mean terrain.
+
+    Raises
+    ------
+    InputError
+        Many more image points than were asked for, or than there is memory for.
+    """
+    base, separation = (1 - forward_overlap) * footprint, (1 - side_overlap) * footprint
+    # Points on one photo are left out: where one photo of one strip sees, the images are lost.
+    photos = strips * photos_per_strip
+    lost = _covered_once(photos_per_strip, base, footprint) * _covered_once(strips, separation, footprint)
+    density = points_per_photo * photos / (photos * footprint**2 - lost)
+    columns = max(1, round(base * math.sqrt(density)))
+    rows = max(1, round(density * base * separation / columns))
+    plan = Layout(strips, photos_per_strip, base, separation, columns, rows, reach)
+    _check_size(plan, footprint, points_per_photo)
+    return plan
+
+
+def _check_size(plan: Layout, footprint: float, points_per_photo: float) -> None:
+    """Refuse a plan with far more image points than were asked for, or than there is memory for."""
+    dx, dy = plan.cell
+    fewest = footprint**2 / (dx * dy)
+    if fewest > _FAR_MORE * points_per_photo:
+        raise InputError(
+            "forward_overlap and side_overlap: with a column of points under every photo and a row in every"
+            f" side overlap a photo shows about {fewest:.0f} points, not {points_per_photo:g}"
+        )
+    photos = plan.strips * plan.photos_per_strip
+    needed, available = _CANDIDATE_BYTES * _AT_ONCE + _IMAGE_BYTES * photos * fewest, available_memory()
+    if available is not None and needed > available:
+        gib = [f"{size / 2**30:.1f} GiB" for size in (needed, available)]
+        raise InputError(f"the simulation takes {gib[0]} of memory, and {gib[1]} are free")
+
+
+def _covered_once(count: int, step: float, length: float) -> float:
+    """How much of a line only one of `count` overlapping intervals covers, their starts a step apart."""
+    if count == 1:
+        return length
+    return 2 * step + (count - 2) * max(0.0, 2 * step - length)
+
+
+def window(plan: Layout) -> tuple[Indices, Indices]:
+    """Grid columns and rows a photograph may see, counted from the column and half-strip below it."""
+    dx, dy = plan.cell
+    columns = math.ceil(plan.reach / dx + _JITTER)
+    middle, rows = -plan.rows_per_strip / 2, plan.reach / dy + _JITTER
+    return np.arange(-columns, columns + 1), np.arange(
+        math.floor(middle - rows), math.ceil(middle + rows) + 1
+    )
+
+
+def grid(plan: Layout) -> tuple[Indices, Indices]:
+    """All grid columns and rows: those of the first photograph to those of the last."""
+    columns, rows = window(plan)
+    last_column = (plan.photos_per_strip - 1) * plan.columns_per_base + columns[-1]
+    last_row = (plan.strips - 1) * plan.rows_per_strip + rows[-1]
+    return np.arange(columns[0], last_column + 1), np.arange(rows[0], last_row + 1)
+
+
+def candidates(plan: Layout) -> Iterator[tuple[Indices, Indices]]:
+    """Pairs of photo and grid point that may see each other, by photo, then point: some photos at a time."""
+    columns, rows = window(plan)
+    _, all_rows = grid(plan)
+    step = max(1, _AT_ONCE // (len(columns) * len(rows)))
+    count = plan.strips * plan.photos_per_strip
+    for first in range(0, count, step):
+        some = np.arange(first, min(first + step, count))
+        strip, number = np.divmod(some, plan.photos_per_strip)
+        column = (number * plan.columns_per_base)[:, None, None] + (columns - columns[0])[:, None]
+        row = (strip * plan.rows_per_strip)[:, None, None] + (rows - rows[0])
+        points = column * len(all_rows) + row
+        yield np.broadcast_to(some[:, None, None], points.shape).ravel(), points.ravel()
+
+
+def ground_points(plan: Layout, relief: float, footprint: float, random: np.random.Generator) -> Floats:
+    """Ground points in the plan, (n, 3), column by column: a jittered grid on long waves."""
+    dx, dy = plan.cell
+    columns, rows = grid(plan)
+    x, y = np.meshgrid(
+        columns * dx - plan.length / 2, (rows + plan.rows_per_strip / 2) * dy - plan.width / 2, indexing="ij"
+    )
+    jitter = random.uniform(-_JITTER, _JITTER, (2, *x.shape))
+    x, y = x + dx * jitter[0], y + dy * jitter[1]
+    waves = 8
+    heading, phase = random.uniform(0, 2 * math.pi, (2, waves))
+    wave_number = 2 * math.pi / (footprint * random.uniform(1.0, 5.0, waves))
+    z = np.zeros_like(x)
+    for h, k, p in zip(heading, wave_number, phase, strict=True):
+        z += relief / waves * np.sin(k * (math.cos(h) * x + math.sin(h) * y) + p)
+    return np.stack([x, y, z], axis=-1).reshape(-1, 3)
+
+
+def flight(
+    plan: Layout, flying_height: float, crab: float, tilt: float, random: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Projection centres in the plan and rotations from the plan to the photos."""
+    strip, number = np.divmod(np.arange(plan.strips * plan.photos_per_strip), plan.photos_per_strip)
+    x, y = number * plan.base - plan.length / 2, strip * plan.separation - plan.width / 2
+    deviation = random.uniform(-1.0, 1.0, (len(strip), 3)) * [tilt, tilt, crab]
+    deviation[:, 2] += math.pi * (strip % 2)
+    return np.stack([x, y, np.full(len(x), flying_height)], axis=1), geometry.rotation_matrix(deviation)
+
+
+def into_object_space(
+    plan_positions: Floats,
+    rotations: Floats | None,
+    origin: tuple[float, float, float],
+    spheroid: Spheroid | None,
+    photo_to_ground: bool,
+) -> tuple[Floats, Floats]:
+    """Positions and, given the rotations from the plan to the photos, attitudes in the object space."""
+    positions = plan_positions + np.asarray(origin)
+    if spheroid is not None:
+        tangent_point = np.array([[origin[0], origin[1], 0.0]])
+        frame = geometry.local_frames(tangent_point)[0]
+        plane = plan_positions * [1.0, 1.0, 0.0]
+        xyz = geometry.geographic_to_geocentric(tangent_point, spheroid) + plane @ frame
+        positions = geometry.geocentric_to_geographic(xyz, spheroid)
+        positions[:, 2] = plan_positions[:, 2] + origin[2]
+    if rotations is None:
+        return positions, np.empty((0, 3))
+    if spheroid is not None:
+        # East at the station, seen from the plan: turned about the vertical by the convergence of the
+        # meridians.
+        in_plan = geometry.local_frames(positions)[:, 0] @ frame.T
+        convergence = np.zeros_like(positions)
+        convergence[:, 2] = -np.arctan2(in_plan[:, 1], in_plan[:, 0])
+        rotations = rotations @ geometry.rotation_matrix(convergence)
+    return positions, geometry.rotation_angles(rotations.transpose(0, 2, 1) if photo_to_ground else rotations)
+
+
+def control_pattern(plan: Layout, terrain: Floats, pattern: str, spacing: int) -> NDArray[np.bool_]:
+    """Which components of which points are held, (n, 3)."""
+    held = np.zeros(terrain.shape, dtype=bool)
+    if pattern == "none":
+        return held
+    right, top = plan.length / 2, (plan.width + plan.separation) / 2
+    along, across = 2, 2
+    if pattern == "perimeter":
+        along = max(2, round(2 * right / (spacing * plan.base)) + 1)
+        across = max(2, round(2 * top / (spacing * plan.base)) + 1)
+    xs, ys = np.linspace(-right, right, along), np.linspace(-top, top, across)
+    full = [(x, y) for x in xs for y in (-top, top)] + [(x, y) for x in (-right, right) for y in ys[1:-1]]
+    height = []
+    if pattern == "perimeter":
+        overlaps = np.linspace(-top, top, plan.strips + 1)[1:-1]
+        height = [(x, y) for x in xs[1:-1] for y in overlaps]
+    # Along the longer side few points are near a place.
+    axis = int(top > right)
+    order = np.argsort(terrain[:, axis])
+    along_axis = terrain[order, axis]
+    for places, components in ((height, slice(2, 3)), (full, slice(0, 3))):
+        for place in places:
+            low, high = np.searchsorted(along_axis, [place[axis] - plan.reach, place[axis] + plan.reach])
+            near = order[low:high]
+            held[near[np.argmin(((terrain[near, :2] - place) ** 2).sum(axis=1))], components] = True
+    return held
+
+
+def strip_ids(plan: Layout) -> list[str]:
+    """Return the names of the strips."""
+    digits = max(2, len(str(plan.strips)))
+    return [f"{strip:0{digits}d}" for strip in range(1, plan.strips + 1)]
+
+
+def photo_ids(plan: Layout) -> list[str]:
+    """Return the names of the photographs, by strip and number."""
+    strip_digits, number_digits = (max(2, len(str(count))) for count in (plan.strips, plan.photos_per_strip))
+    return [
+        f"{strip:0{strip_digits}d}{number:0{number_digits}d}"
+        for strip in range(1, plan.strips + 1)
+        for number in range(1, plan.photos_per_strip + 1)
+    ]
+
+
+def point_ids(held: NDArray[np.bool_], checks: Indices) -> list[str]:
+    """Return the names of points: C of control, K of check points, P of pass points."""
+    kind = np.where(held.any(axis=1), "C", "P")
+    kind[checks] = "K"
+    return [f"{letter}{number:06d}" for number, letter in enumerate(kind, start=1)]

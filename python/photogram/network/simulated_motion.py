@@ -1,0 +1,296 @@
+"""How the cameras of simulated blocks move while they look: rolling shutters, line scanners.
+
+The truth of a rolling shutter is uniform motion of each photo, that of a scanner a table with corrections
+drawn from what is known of them: the model of the adjustment, so that errors agree with their covariance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import partial
+from typing import get_args
+
+import numpy as np
+
+from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.network import geometry
+from photogram.network.attitudes import Attitudes
+from photogram.network.block import Block
+from photogram.network.observations import Attitude
+from photogram.network.projecting import camera_of, projected_images
+from photogram.network.simulated_layout import Layout
+from photogram.network.timed import Direction, Shutter, Timed
+from photogram.network.trajectories import Polynomial, Readout, Spline
+
+__all__ = ["LineScanner", "RollingShutter", "photo_angles", "photo_axes", "rolled", "rotations_of"]
+
+_GUSTS = 0.03
+"""Standard deviation of a component of a velocity, as part of the speed."""
+_STARTS = 0.5
+"""Where a readout time starts of which nothing is known, as part of the true one."""
+
+
+@dataclass(frozen=True)
+class RollingShutter:
+    """Photos whose rows are exposed one after the other while the camera flies on and turns.
+
+    Parameters
+    ----------
+    readout
+        From the first row to the last, seconds.
+    speed
+        Of the flight along the strips, metres a second; velocities of photos differ from it by some percent.
+    rate
+        Standard deviation of the true rate of a photo about each of its axes, radians a second.
+    readout_sd
+        How well the readout time is known, seconds: it starts so far off. Infinite: not at all, and it starts
+        at half of the true one; 0: it is known.
+    speed_sd, rate_sd
+        Standard deviations of a component of the observed velocities (GNSS), metres a second, and rates
+        (gyroscope), radians a second, of the photos: of their noise and in the block. Infinite: none are
+        observed.
+    direction
+        In which rows or columns are read. Strips are flown along x of the photos: `right` and `left` read
+        along and against the flight, `down` and `up` across it.
+    """
+
+    readout: float
+    speed: float = 9.0
+    rate: float = 0.1
+    readout_sd: float = math.inf
+    speed_sd: float = 0.05
+    rate_sd: float = 0.02
+    direction: Direction = "down"
+
+    def __post_init__(self) -> None:
+        one_of("direction", self.direction, get_args(Direction))
+        within = {"readout": (0, 10), "speed": (0, 1e5), "rate": (0, 10)}
+        _check_numbers(self, within, ("readout_sd", "speed_sd", "rate_sd"))
+
+    @property
+    def turned(self) -> float:
+        """Angle by which hardly a photo turns more while it is read, radians."""
+        return 5 * self.rate * self.readout
+
+    def margin(self, height: float, half_angle: float) -> float:
+        """Return how far an image may move while it is read, in principal distances."""
+        flown = (1 + 5 * _GUSTS) * self.speed * self.readout / height
+        return (flown + self.turned) * (1 + math.tan(half_angle) ** 2)
+
+
+@dataclass(frozen=True)
+class LineScanner:
+    """Lines of sensors across the flight in the focal plane of one lens, in the place of frames.
+
+    Parameters
+    ----------
+    lines
+        1 looks down, 2 ahead and back, 3 ahead, down and back: so many images of a strip, on one trajectory.
+    view_angle
+        Between looking down and looking ahead or back, radians.
+    pitch
+        Millimetres from sample to sample. Lines are as far apart on the ground.
+    speed
+        Of the flight, metres a second.
+    every
+        Seconds between the records of trajectories, and between those of GNSS and inertial unit.
+    position, rotation
+        What the errors of trajectories are made of; their coefficients are drawn, and weighted.
+    scenes
+        True: each photo of the layout is a scene, as long as a frame would be, on a trajectory of its own (as
+        from orbits); False: each strip is one.
+    """
+
+    lines: int = 3
+    view_angle: float = 0.35
+    pitch: float = 0.01
+    speed: float = 70.0
+    every: float = 1.0
+    position: Polynomial | Spline = field(default_factory=partial(Spline, every=4.0))
+    rotation: Polynomial | Spline = field(default_factory=partial(Spline, every=4.0))
+    scenes: bool = False
+
+    def __post_init__(self) -> None:
+        if whole_number("lines", self.lines) not in (1, 2, 3):
+            raise InputError(f"lines of a scanner are 1, 2 or 3, not {self.lines}")
+        truth_value("scenes", self.scenes)
+        within = {"view_angle": (0, 1.2), "pitch": (1e-6, 10), "speed": (1e-3, 1e5), "every": (1e-6, 1e6)}
+        _check_numbers(self, within, ())
+        for name in ("position", "rotation"):
+            basis = getattr(self, name)
+            if not isinstance(basis, Polynomial | Spline):
+                raise InputError(f"{name} of a scanner is a Polynomial or a Spline, not {shown(basis)}")
+            if isinstance(basis, Spline) and (basis.smooth or basis.correlation):
+                raise InputError(f"{name} of a scanner: coefficients are drawn one by one, not smooth")
+
+    @property
+    def views(self) -> dict[str, float]:
+        """The lines by name, and the angles ahead of looking down, radians."""
+        ahead = {"forward": self.view_angle, "nadir": 0.0, "backward": -self.view_angle}
+        chosen = {1: ["nadir"], 2: ["forward", "backward"], 3: list(ahead)}[self.lines]
+        return {name: ahead[name] for name in chosen}
+
+
+def _check_numbers(
+    given: RollingShutter | LineScanner,
+    within: Mapping[str, tuple[float, float]],
+    deviations: tuple[str, ...],
+) -> None:
+    """Refuse numbers outside their limits, and what is no standard deviation."""
+    for name in (each.name for each in fields(given)):
+        value = getattr(given, name)
+        if name in within:
+            low, high = within[name]
+            if not low <= number(name, value) <= high:
+                raise InputError(f"{name} must be between {low:g} and {high:g}")
+        elif name in deviations and not number(name, value) >= 0:
+            raise InputError(f"{name} must not be negative")
+
+
+def photo_axes(block: Block) -> Floats:
+    """Return (P, 3, 3) the axes of the photos, as columns, in X, Y, Z or in east, north, up there."""
+    matrices = geometry.rotation_matrix(block.photo_attitudes)
+    return matrices if block.photo_to_ground else matrices.transpose(0, 2, 1)
+
+
+def photo_angles(axes: Floats, photo_to_ground: bool) -> Floats:
+    """Return (P, 3) omega, phi, kappa of photos with (P, 3, 3) axes as columns."""
+    return geometry.rotation_angles(axes if photo_to_ground else axes.transpose(0, 2, 1))
+
+
+def rotations_of(vectors: Floats) -> Floats:
+    """Return (n, 3, 3) the rotations by (n, 3) rotation vectors."""
+    return Attitudes.of("rotation_vector", vectors).matrices
+
+
+def rolled(
+    truth: Block,
+    block: Block,
+    shutter: RollingShutter,
+    layout: Layout,
+    frame: float,
+    random: np.random.Generator,
+) -> tuple[Block, Block]:
+    """Let the photos of a simulated block be read row by row while they move.
+
+    Parameters
+    ----------
+    truth, block
+        The block without errors and the one with them, in rectangular space.
+    shutter
+        How they are read, and how they move.
+    layout
+        The strips, which are flown in opposite directions.
+    frame
+        Its side, in principal distances.
+
+    Returns
+    -------
+    The two blocks with photos that have motions of their own: in the first the true ones are given.
+    """
+    count = len(truth.photo_ids)
+    strip, along = np.divmod(np.arange(count), layout.photos_per_strip)
+    sense = 1.0 - 2.0 * (strip % 2)
+    velocities = _GUSTS * shutter.speed * random.standard_normal((count, 3))
+    velocities[:, 0] += sense * shutter.speed
+    rates = shutter.rate * random.standard_normal((count, 3))
+    nominal = np.column_stack([sense * shutter.speed, np.zeros((count, 2))])
+    known = (
+        _observed(velocities, nominal, shutter.speed_sd, random),
+        _observed(rates, np.zeros((count, 3)), shutter.rate_sd, random),
+    )
+    along = np.where(sense > 0, along, layout.photos_per_strip - 1 - along)
+    flown = strip * layout.photos_per_strip + along
+    times = np.round(flown * layout.base / shutter.speed, 3) if shutter.speed else flown.astype(float)
+    off = shutter.readout_sd * random.standard_normal() if math.isfinite(shutter.readout_sd) else None
+    start = _STARTS * shutter.readout if off is None else shutter.readout + off
+    block = _with_attitudes(block, truth, random.standard_normal((count, 3)))
+    truth = _with_attitudes(truth, truth, np.zeros((count, 3)))
+    edges = _edges(truth, shutter.direction, frame)
+    truth = _timed(truth, shutter, shutter.readout, edges, times, (velocities, rates))
+    block = _timed(block, shutter, start, edges, times, known)
+    images = projected_images(truth)
+    return truth.replace(image_xy=images), block.replace(image_xy=images + block.image_xy - truth.image_xy)
+
+
+def _observed(true: Floats, nominal: Floats, sd: float, random: np.random.Generator) -> Floats:
+    """Return what is given of true values: observed, or nominal where nothing is."""
+    draw = random.standard_normal(true.shape)
+    return true + sd * draw if math.isfinite(sd) else nominal
+
+
+def _with_attitudes(block: Block, truth: Block, draw: Floats) -> Block:
+    """Return a block whose weighted attitudes are observations: those of photos that move are none of theirs.
+
+    `truth` has the true attitudes, `draw` is of the errors.
+    """
+    sd = truth.photo_attitude_sd
+    if not ((sd > 0) & np.isfinite(sd)).any():
+        return block
+    observed = photo_axes(truth) @ rotations_of(sd * draw)
+    return block.replace(
+        photo_attitude_sd=np.inf,
+        photo_attitudes_observed=None,
+        observations=[
+            *block.observations,
+            *(
+                Attitude(name, matrix, sd=own)
+                for name, matrix, own in zip(truth.photo_ids, observed, sd, strict=True)
+            ),
+        ],
+    )
+
+
+def _timed(
+    block: Block,
+    shutter: RollingShutter,
+    readout: float,
+    edges: list[tuple[float, float]],
+    times: Floats,
+    motions: tuple[Floats, Floats],
+) -> Block:
+    """Return a block whose photos have motions of their own, and a shutter for each camera."""
+    cameras = _photo_cameras(block)
+    names = block.camera_names if block.cameras else ["camera 1"]
+    shutters = [
+        Shutter(Readout(name, readout, shutter.readout_sd), own, shutter.direction)
+        for name, own in zip(names, edges, strict=True)
+    ]
+    timed = [
+        Timed(
+            name,
+            time=time,
+            shutter=shutters[camera],
+            velocity=velocity,
+            rotation_rate=rate,
+            sd_velocity=shutter.speed_sd,
+            sd_rate=shutter.rate_sd,
+        )
+        for name, time, camera, velocity, rate in zip(
+            block.photo_ids, times.tolist(), cameras.tolist(), *motions, strict=True
+        )
+    ]
+    return block.replace(timed=timed)
+
+
+def _photo_cameras(block: Block) -> Indices:
+    """Return (P,) which camera each photo has; the first where there are principal distances."""
+    given = block.photo_cameras
+    return np.zeros(len(block.photo_ids), dtype=np.int64) if given is None else given
+
+
+def _edges(block: Block, direction: Direction, frame: float) -> list[tuple[float, float]]:
+    """Return the image coordinates of the edges where reading begins and ends, for each camera."""
+    axis = 1 if direction in ("down", "up") else 0
+    found = []
+    for photo in np.unique(_photo_cameras(block), return_index=True)[1].tolist():
+        camera = camera_of(block, photo)
+        middle = float(camera.project(np.array([[0.0, 0.0, -1.0]]))[0, axis])
+        half = frame / 2 * camera.scale
+        ascending = (direction == "down") == (camera.image_y == "down") if axis else direction == "right"
+        found.append((middle - half, middle + half) if ascending else (middle + half, middle - half))
+    return found

@@ -1,0 +1,254 @@
+"""Simulated strips of a line scanner: trajectories with errors, images line by line, records beside them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.network.cameras import Camera
+from photogram.network.observations import Attitude, Observation, Position
+from photogram.network.projecting import projected, standing
+from photogram.network.simulated_frames import Taken
+from photogram.network.simulated_layout import Layout, grid, photo_ids, strip_ids, window
+from photogram.network.simulated_motion import LineScanner, photo_angles, rotations_of
+from photogram.network.timed import Lines, LineSensor, Timed
+from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
+from photogram.network.whereabouts import about, given_poses
+
+__all__ = ["Flown", "scanned"]
+
+_BETWEEN = 60.0
+"""Seconds between two passes, at least."""
+_PERIODS = 8.0, 30.0
+"""Seconds, of the three waves that roll and pitch are made of."""
+_BEYOND = 2
+"""Lines beyond the first and the last, to which trajectories reach."""
+
+
+@dataclass(frozen=True)
+class Flown:
+    """How a scanner is flown.
+
+    Attributes
+    ----------
+    scanner, principal_distance, frame_size
+        The camera: its lines of sensors are as long as the frame; millimetres.
+    height, crab, tilt
+        Above the mean terrain, metres; largest deviations from the heading and from the vertical, radians.
+    errors, sd
+        Standard deviations of the coefficients of positions and rotations, and of their observations, in
+        metres and radians.
+    origin
+        (3,) of the plan in the object space.
+    photo_to_ground
+        The sense of the attitude angles.
+    """
+
+    scanner: LineScanner
+    principal_distance: float
+    frame_size: float
+    height: float
+    crab: float
+    tilt: float
+    errors: tuple[float, float]
+    sd: tuple[float, float]
+    origin: Floats
+    photo_to_ground: bool
+
+    @property
+    def line(self) -> float:
+        """Seconds from line to line: as far on the ground as from sample to sample."""
+        c = abs(self.principal_distance)
+        return self.scanner.pitch * self.height / c / self.scanner.speed
+
+    @property
+    def ahead(self) -> float:
+        """Metres that the line that looks farthest ahead looks ahead."""
+        return self.height * math.tan(max(self.scanner.views.values()))
+
+    def sensors(self) -> dict[str, LineSensor]:
+        """Return the lines of sensors by name: each as long as the frame, ahead of the axis or behind."""
+        pitch = self.scanner.pitch
+        middle = round(self.frame_size / pitch) / 2
+        return {
+            name: LineSensor((pitch, 0.0), middle, y0=-self.principal_distance * math.tan(angle))
+            for name, angle in self.scanner.views.items()
+        }
+
+
+@dataclass(frozen=True)
+class _Pass:
+    """A strip or a scene.
+
+    It is flown from `first` on in a sense of x at `across` of y, metres of the plan, for some seconds from
+    `start` on, over points of the grid.
+    """
+
+    name: str
+    start: float
+    seconds: float
+    sense: float
+    first: float
+    across: float
+    points: Indices
+
+
+def scanned(layout: Layout, flown: Flown, ground: Floats, random: np.random.Generator) -> Taken:
+    """Let a line scanner take the points of a layout.
+
+    Parameters
+    ----------
+    layout
+        The strips, or the scenes.
+    flown
+        How they are flown.
+    ground
+        (n, 3) the points of its grid, in the object space.
+    random
+        What is drawn is drawn from it.
+    """
+    sensors = flown.sensors()
+    cameras = [Camera("perspective", {"c": flown.principal_distance}, name=name) for name in sensors]
+    ids: list[str] = []
+    poses: list[tuple[Floats, Floats]] = []
+    found: list[tuple[Indices, Floats, Floats]] = []
+    timed: tuple[list[Timed], list[Timed]] = ([], [])
+    records: tuple[list[Observation], list[Observation]] = ([], [])
+    for each in _passes(layout, flown):
+        lines = Lines([[0.0, each.start, flown.line]])
+        both = _trajectories(each, flown, random)
+        for part, own in zip(records, _records(each, both, flown, random), strict=True):
+            part.extend(own)
+        pose = about(both[0], each.start + each.seconds / 2)
+        for camera, (name, sensor) in zip(cameras, sensors.items(), strict=True):
+            ids.append(each.name if len(cameras) == 1 else f"{each.name} {name}")
+            for photos, trajectory in zip(timed, both, strict=True):
+                photos.append(Timed(ids[-1], trajectory, lines=lines, line_sensor=sensor))
+            found.append(_images(each, timed[0][-1], camera, ground))
+            poses.append(pose)
+    of = np.repeat(np.arange(len(ids)), [len(points) for points, _, _ in found])
+    points, xy, per_error = (np.concatenate(part) for part in zip(*found, strict=True))
+    tied = np.bincount(points, minlength=1)[points] >= 2 if len(points) else np.zeros(0, dtype=bool)
+    taken = {
+        "principal_distances": None,
+        "cameras": cameras,
+        "photo_cameras": np.arange(len(ids)) % len(cameras),
+    }
+    return Taken(
+        ids,
+        np.array([place for place, _ in poses]),
+        photo_angles(np.array([axes for _, axes in poses]), flown.photo_to_ground),
+        of[tied],
+        points[tied],
+        xy[tied],
+        per_error[tied],
+        {**taken, "timed": timed[0], "observations": records[0]},
+        {**taken, "timed": timed[1], "observations": records[1]},
+    )
+
+
+def _passes(layout: Layout, flown: Flown) -> Iterator[_Pass]:
+    """Yield strips, or scenes, one after the other."""
+    columns, rows = window(layout)
+    all_columns, all_rows = grid(layout)
+    half = flown.frame_size / 2 / abs(flown.principal_distance) * flown.height
+    scenes = flown.scanner.scenes
+    names = photo_ids(layout) if scenes else strip_ids(layout)
+    start = 0.0
+    for row, name in enumerate(names):
+        strip, number = divmod(row, layout.photos_per_strip) if scenes else (row, 0)
+        middle = number * layout.base - layout.length / 2 if scenes else 0.0
+        reach = (half if scenes else layout.length / 2) + flown.ahead
+        sense = 1.0 - 2.0 * (strip % 2)
+        own = number * layout.columns_per_base + np.arange(len(columns if scenes else all_columns))
+        below = strip * layout.rows_per_strip + np.arange(len(rows))
+        points = (own[:, np.newaxis] * len(all_rows) + below).ravel()
+        seconds = 2 * reach / flown.scanner.speed
+        across = strip * layout.separation - layout.width / 2
+        yield _Pass(name, start, seconds, sense, middle - sense * reach, across, points)
+        start = math.ceil(start + seconds + _BETWEEN)
+
+
+def _trajectories(each: _Pass, flown: Flown, random: np.random.Generator) -> tuple[Trajectory, Trajectory]:
+    """Return the true trajectory, and what is known of it: the same table with other coefficients."""
+    scanner = flown.scanner
+    times = np.arange(-1.0, math.ceil(each.seconds / scanner.every) + 2) * scanner.every + each.start
+    along = each.first + each.sense * scanner.speed * (times - each.start)
+    places = np.column_stack([along, np.full(len(times), each.across), np.full(len(times), flown.height)])
+    # Samples to the right of the flight, y of the camera ahead.
+    heading = random.uniform(-flown.crab, flown.crab) - each.sense * math.pi / 2
+    vectors = np.zeros((len(times), 3))
+    for axis in (0, 1):
+        periods, phases = random.uniform(*_PERIODS, 3), random.uniform(0, 2 * math.pi, 3)
+        waves = np.sin(2 * math.pi * times[:, np.newaxis] / periods + phases)
+        vectors[:, axis] = flown.tilt * waves.mean(axis=1)
+    axes = rotations_of(np.array([[0.0, 0.0, heading]])) @ rotations_of(vectors)
+    table = Table(times, places + flown.origin, times, axes)
+    true: list[Polynomial | Spline | None] = [None, None]
+    given = true.copy()
+    # Of a spline that goes on beyond the images nothing would show the last coefficients.
+    beyond = _BEYOND * flown.line
+    for which, (basis, error, sd) in enumerate(
+        zip((scanner.position, scanner.rotation), flown.errors, flown.sd, strict=True)
+    ):
+        # What is fixed at the truth, or has no error, has no corrections.
+        if error and sd:
+            placed = basis.over(each.start - beyond, each.start + each.seconds + beyond)
+            drawn = error * random.standard_normal((placed.count, 3))
+            true[which] = replace(placed, value=drawn, sd=error)
+            given[which] = replace(placed, value=0.0, sd=error)
+    return (
+        Trajectory(each.name, table, position=true[0], rotation=true[1]),
+        Trajectory(each.name, table, position=given[0], rotation=given[1]),
+    )
+
+
+def _records(
+    each: _Pass, both: tuple[Trajectory, Trajectory], flown: Flown, random: np.random.Generator
+) -> tuple[list[Observation], list[Observation]]:
+    """Return positions and attitudes of a pass that are observed: without errors, and with them."""
+    every = flown.scanner.every
+    count = math.floor(each.seconds / every + 0.5)
+    times = np.asarray(each.start + every * (np.arange(count) + 0.5), dtype=np.float64)
+    places, axes = given_poses(both[0], times)
+    parts: tuple[list[Observation], list[Observation]] = ([], [])
+    position_sd, attitude_sd = flown.sd
+    draws = random.standard_normal((2, len(times), 3))
+    for part, trajectory, error in zip(parts, both, (0.0, 1.0), strict=True):
+        if 0 < position_sd < math.inf:
+            observed = places + error * position_sd * draws[0]
+            part += [
+                Position(None, place, sd=position_sd, trajectory=trajectory, time=time)
+                for time, place in zip(times.tolist(), observed, strict=True)
+            ]
+        if 0 < attitude_sd < math.inf:
+            turned = axes @ rotations_of(error * attitude_sd * draws[1])
+            part += [
+                Attitude(None, matrix, sd=attitude_sd, trajectory=trajectory, time=time)
+                for time, matrix in zip(times.tolist(), turned, strict=True)
+            ]
+    return parts
+
+
+def _images(each: _Pass, own: Timed, camera: Camera, ground: Floats) -> tuple[Indices, Floats, Floats]:
+    """Return points that an image of a pass shows, their samples and lines, and these by errors."""
+    assert own.trajectory is not None
+    assert own.lines is not None
+    assert own.line_sensor is not None
+    xy = projected(own, own.trajectory, camera, ground[each.points])
+    extent = np.array([2 * own.line_sensor.s0, own.lines.at(each.start + each.seconds)])
+    seen = ((xy >= 0) & (xy <= extent)).all(axis=1)
+    points, xy = each.points[seen], xy[seen]
+    before, after = (
+        standing(own, own.trajectory, camera, ground[points], own.lines.times(xy[:, 1] + half))
+        for half in (-0.5, 0.5)
+    )
+    # v = place of the sample - image in the focal plane, by samples and lines.
+    by = np.empty((len(points), 2, 2))
+    by[:, :, 0] = own.line_sensor.pitch
+    by[:, :, 1] = before - after
+    return points, xy, np.asarray(np.linalg.inv(by), dtype=np.float64)
