@@ -259,7 +259,7 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
         jigsaw=added.jigsaw,
     )
     project = with_sd(read(path, added.file_format, wishes), sd)
-    job.reads(*project.details.get("photo tables", ()))
+    job.reads(*project.details.get("further inputs", ()))
     job.spares(*project.details.get("photo pictures", ()))
     if added.keep_repeated:
         project = with_repeated(project)

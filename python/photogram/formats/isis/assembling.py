@@ -202,7 +202,7 @@ def _project(contents: Contents, seen: _Seen, messages: list[Message]) -> Projec
         spheroid=spheroid,
         lacks=[f"no standard deviations of image coordinates: {_ASSUMED} (--sd images=...)"],
         messages=[*messages, *known.messages, *map(Message, contents.settings.told)],
-        details={DETAILS: contents},
+        details={DETAILS: contents, "further inputs": [each.path for each in contents.different]},
     )
 
 

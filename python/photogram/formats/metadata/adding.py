@@ -77,7 +77,7 @@ def with_photo_files(project: Project, files: PhotoFiles, sd: Mapping[str, tuple
     lacks = list(project.lacks)
     if lacking:
         lacks.append(f"no standard deviations of {counted(lacking, 'position')} of photos (--sd gnss=...)")
-    read = {"photo tables": metadata.tables, "photo pictures": metadata.pictures}
+    read = {"further inputs": metadata.tables, "photo pictures": metadata.pictures}
     project = project.replace(
         messages=(*project.messages, *messages), lacks=tuple(lacks), details={**project.details, **read}
     )
