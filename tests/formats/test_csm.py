@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ephemeris_seconds import added_to_ephemeris_seconds
 from photogram import Block, InputError, adjust
 from photogram.formats.csm.angles import Polynomials, fitted_angles, of_angles
 from photogram.formats.csm.isd import Positions
@@ -214,7 +215,9 @@ def test_the_published_pointing_holds(lro, isds, measures):
         photo_cameras=[0, 1],
         timed=[each.timed[0] for each in images],
     )
-    result = adjust(block)
+    # Our own are exact; the figures are not.
+    with added_to_ephemeris_seconds():
+        result = adjust(block)
     residuals = to_pixels(result.residuals).reshape(2, count, 2)
     told = np.array([truth["fixed_points_residual_px"][side] for side in SIDES])
     np.testing.assert_allclose(residuals[:, fixed], told, rtol=0, atol=1e-8)

@@ -90,11 +90,11 @@ class Lines:
             raise InputError(f"lines are first line, time, seconds per line, ascending: {shown(self.table)}")
         object.__setattr__(self, "table", rows)
 
-    def times(self, lines: ArrayLike) -> Floats:
-        """Return the times of lines, in seconds."""
+    def times(self, lines: ArrayLike, start: float = 0.0) -> Floats:
+        """Return the times of lines, in seconds from another: added to late times they would lose digits."""
         rows, lines = np.asarray(self.table), np.asarray(lines, dtype=float)
         own = rows[np.maximum(np.searchsorted(rows[:, 0], lines, side="right") - 1, 0)]
-        return np.asarray(own[..., 1] + (lines - own[..., 0]) * own[..., 2])
+        return np.asarray(own[..., 1] - start + (lines - own[..., 0]) * own[..., 2])
 
     def at(self, times: ArrayLike) -> Floats:
         """Return the lines at times in seconds: what :meth:`times` makes of them."""
@@ -319,10 +319,11 @@ class Timed:
     def images(self, xy: Floats) -> tuple[float, Floats, Floats]:
         """Return its time, and of (n, 2) images their times on its scale and coordinates for the core."""
         if self.lines is not None and self.line_sensor is not None:
-            times = self.lines.times(xy[:, 1])
-            first = float(np.asarray(self.lines.table)[0, 1])
-            time = self.time if self.time is not None else float(times.mean()) if len(times) else first
-            return time, times - time, self.line_sensor.places(xy[:, 0])
+            time, lines = self.time, xy[:, 1]
+            if time is None:
+                first = float(np.asarray(self.lines.table)[0, 1])
+                time = first + (float(self.lines.times(lines, first).mean()) if len(lines) else 0.0)
+            return time, self.lines.times(lines, time), self.line_sensor.places(xy[:, 0])
         time = self.time or 0.0
         return time, np.zeros(len(xy)) if self.shutter is None else self.shutter.times(xy), xy
 

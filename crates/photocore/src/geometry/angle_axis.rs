@@ -3,21 +3,45 @@
 use super::axes::{Matrix3, Vector3};
 
 /// Square of the angle below which the closed forms of (a - sin a) / a^3 and of 1/a^2 - cot(a/2) / (2a) lose digits, and their
-/// series do not.
+/// series do not. Those of sin a / a and (1 - cos a) / a^2 take less time than a sine.
 const SMALL: f64 = 0.1;
 
+/// 1/n!, -1/(n+2)!, 1/(n+4)! ...: as many as count below [`SMALL`].
+const fn inverse_factorials(n: u32) -> [f64; 8] {
+    let (mut all, mut term, mut m) = ([0.0; 8], 1.0, 1);
+    while m <= n {
+        term /= m as f64;
+        m += 1;
+    }
+    let mut k = 0;
+    while k < all.len() {
+        all[k] = term;
+        term /= -((m * (m + 1)) as f64);
+        m += 2;
+        k += 1;
+    }
+    all
+}
+
+/// The series of powers of the square of an angle.
+#[inline(always)]
+fn series(coefficients: &[f64; 8], square: f64) -> f64 {
+    coefficients.iter().rev().fold(0.0, |sum, term| sum * square + term)
+}
+
 /// sin a / a, (1 - cos a) / a^2 and (a - sin a) / a^3.
+#[inline]
 fn ratios(square: f64) -> (f64, f64, f64) {
+    const SINE: [f64; 8] = inverse_factorials(1);
+    const VERSINE: [f64; 8] = inverse_factorials(2);
+    const REST: [f64; 8] = inverse_factorials(3);
+    if square < SMALL {
+        return (series(&SINE, square), series(&VERSINE, square), series(&REST, square));
+    }
     let angle = square.sqrt();
-    let half = if angle > 0.0 { (0.5 * angle).sin() / (0.5 * angle) } else { 1.0 };
-    let (sine, versine) = (if angle > 0.0 { angle.sin() / angle } else { 1.0 }, 0.5 * half * half);
-    let rest = if square > SMALL {
-        (1.0 - sine) / square
-    } else {
-        let term = |rest: f64, n: f64| 1.0 - square * rest / ((n + 1.0) * (n + 2.0));
-        [11.0, 9.0, 7.0, 5.0, 3.0].into_iter().fold(1.0, term) / 6.0
-    };
-    (sine, versine, rest)
+    let half = (0.5 * angle).sin() / (0.5 * angle);
+    let sine = angle.sin() / angle;
+    (sine, 0.5 * half * half, (1.0 - sine) / square)
 }
 
 /// a I + b `[w]x` + c w w^T

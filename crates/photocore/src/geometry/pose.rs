@@ -32,8 +32,8 @@ pub struct Pose {
 pub struct Steps(SmallVec<[Vector6<f64>; POSE]>);
 
 impl Steps {
-    /// Those of other unknowns, dC and rho of each.
-    pub fn become_those(&mut self, each: impl IntoIterator<Item = (Vector3, Vector3)>) {
+    /// Puts those of other unknowns in their place, dC and rho of each.
+    pub fn put(&mut self, each: impl IntoIterator<Item = (Vector3, Vector3)>) {
         self.0.clear();
         self.0.extend(each.into_iter().map(|(shift, rho)| column(&shift, &rho)));
     }

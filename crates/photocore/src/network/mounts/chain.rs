@@ -90,7 +90,7 @@ impl Chain {
         own.blocks.clear();
         own.blocks.extend(blocks);
         if !own.blocks.is_empty() {
-            own.steps.become_those(steps);
+            own.steps.put(steps);
             self.used += 1;
         }
     }
