@@ -66,3 +66,17 @@ def test_residuals_and_redundancy(weighted, side):
     np.testing.assert_allclose(found, truth["residuals_px"][side], rtol=0, atol=1e-5)
     redundancy = result.redundancy[mine][order]
     np.testing.assert_allclose(redundancy, truth["kinds"][f"image_{side}"]["redundancy"], rtol=0, atol=1e-6)
+
+
+def test_the_settings_of_the_published_test(tmp_path):
+    # Its radii are from an elevation model that is not there; those of the sphere leave other residuals.
+    words = "CAMSOLVE=all CKDEGREE=2 CKSOLVEDEGREE=3 TWIST=no RADIUS=no"
+    own = project(LRO / "observationPair.net", tmp_path, words)
+    assert [each.file.name for each in own.messages] == ["observationImageR.isd", "observationImageL.isd"]
+    result = adjust(own.block)
+    assert result.status == "converged"
+    assert result.degrees_of_freedom == 2 * 92 - 2 * 44 - 2 * 2 * 4
+    sizes = np.linalg.norm(Outcome(contents_of(own.details), result).residuals, axis=1)
+    assert sizes.mean() < 2 * answers()["published"]["average_residual_px"]
+    free = np.linalg.norm(Outcome(contents_of(own.details), result).xyz, axis=1)[1:5]
+    np.testing.assert_allclose(free, 1737400.0, atol=1e-3)
