@@ -95,13 +95,16 @@ def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> st
     """
     block = result.block
     own = result.used_images & photos[block.image_photos] & np.isfinite(motion).all(axis=1)
+    if not own.any():
+        return ""
     residuals = np.where(result.used_images[:, np.newaxis], result.residuals / block.image_sd, 0.0)
     factor, down = factored(result), _down(block, camera)
     columns = {axis: _column(block, motion, own, axis, down) for axis in (1, 0)}
     tried = {axis: Scores.of(factor, each[np.newaxis], residuals) for axis, each in columns.items()}
     axis = max(tried, key=lambda each: tried[each].fall())
     readout, sd = tried[axis].estimate(block.image_photos)
-    if not min(abs(readout) / sd, _significance(result, tried[axis].fall())) > SIGNIFICANT:
+    significant = _significance(result, tried[axis].fall()) > SIGNIFICANT
+    if not (significant and abs(readout) > SIGNIFICANT * sd):
         return ""
     rivals = np.concatenate([lens_partials(result, own), _affinities(block, own)])
     together = Scores.of(factor, np.concatenate([columns[axis][np.newaxis], rivals]), residuals)

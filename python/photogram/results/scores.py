@@ -70,13 +70,16 @@ class Scores:
         """Return what the first would be alone, to first order, and its standard deviation.
 
         That is from how (m,) groups of images differ in it, c_g - x C_g: whatever bends each of them its own
-        way is in it.
+        way is in it. Where unknowns take it up it may be anything.
         """
         # R v = v: what unknowns take up of B has no part in either sum.
         of_images = [(self.projected[0] * each).sum(axis=1) for each in (self.residuals, self.projected[0])]
         c, own = (np.bincount(groups, each) for each in of_images)
-        value = float(c.sum() / own.sum())
-        return value, float(np.sqrt(((c - value * own) ** 2).sum()) / own.sum())
+        total = float(own.sum())
+        if not total > TAKEN_UP * self.sizes[0] ** 2:
+            return 0.0, np.inf
+        value = float(c.sum()) / total
+        return value, float(np.sqrt(((c - value * own) ** 2).sum())) / total
 
     def fall(self, first: int = 0) -> float:
         """Return T = c' C^-1 c of those from a place on, but for what the network takes up of them."""
