@@ -10,7 +10,7 @@ __all__ = ["Command"]
 
 PANELS = {
     "Input": "example packaged file_format control control_crs columns roles images names camera sd"
-    " photos_dir photos_crs mrk_antenna pixel_origin model angles grid hand against"
+    " cubes jigsaw photos_dir photos_crs mrk_antenna pixel_origin model angles grid hand against"
     " against_spacing against_position_sd catalogue utc epoch faintest points point_sd decimals"
     " format zero_missing ground_unit model_unit restart start reject photos kind",
     "Results": "out overwrite json xlsx html no_html plots plot_format parquet crs map ply ply_origin listing"

@@ -17,8 +17,7 @@ CubesFile = Annotated[
     typer.Option(
         "--cubes",
         metavar="LIST",
-        help="The images of a control network: a line each, the path of a cube, or serial number, comma and"
-        " path of an ISD.",
+        help="Images of a control network: cubes, or serial numbers and ISDs.",
         show_default=False,
     ),
 ]
@@ -27,8 +26,7 @@ JigsawSettings = Annotated[
     typer.Option(
         "--jigsaw",
         metavar="NAME=VALUE ...",
-        help="With --cubes: settings as on the command line of jigsaw, in quotes (CAMSOLVE=all RADIUS=yes),"
-        " or the path of a file with them.",
+        help="Settings of jigsaw, in quotes, or a file of them.",
         show_default=False,
     ),
 ]

@@ -47,7 +47,7 @@ def test_other_commands_know_networks(given, tmp_path):
     done = run("info", *given)
     assert done.exit_code == 0, done.output
     assert "control network (ISIS)" in done.output
-    assert "1.4 pixels of the detector are assumed" in done.output
+    assert "1.4 px is assumed" in done.output
     done = run("check", *given, "--out", tmp_path / "checked")
     assert done.exit_code in (0, 3), done.output
     done = run("convert", *given, tmp_path / "there")

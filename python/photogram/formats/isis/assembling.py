@@ -13,7 +13,7 @@ from photogram.errors import InputError
 from photogram.formats.csm.lists import read_list, read_support
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.format import Wishes
-from photogram.formats.isis.contents import DETAILS, PITCHES, Contents, Image, rows_of_each
+from photogram.formats.isis.contents import DETAILS, PITCHES, Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.points import given_starts, known_points
 from photogram.formats.isis.reading import read_network
@@ -30,7 +30,6 @@ from photogram.network.whereabouts import about
 __all__ = ["TITLE", "read"]
 
 TITLE = "control network (ISIS)"
-_ASSUMED = f"{PITCHES} pixels of the detector are assumed, as jigsaw does"
 
 
 def read(path: Path, wishes: Wishes) -> Project:
@@ -56,7 +55,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     photos = {each.photo: own for own in images for each in own.supported.timed}
     starts = np.full((len(network.points), 3), np.nan)
     starts[seen.points] = _starts(network, images, seen, Place(path))
-    contents = Contents(network, path, photos, settings, starts)
+    contents = PlanetaryContents(network, path, photos, settings, starts)
     unused = [serial for serial in files if serial not in {each.serial for each in images}]
     return _project(contents, seen, [*_left_out(network, unused, wishes.cubes), *_remarks(images)])
 
@@ -163,7 +162,7 @@ def _starts(network: ControlNetwork, images: list[Image], seen: _Seen, place: Pl
     return starts
 
 
-def _spheroid(contents: Contents) -> Spheroid | None:
+def _spheroid(contents: PlanetaryContents) -> Spheroid | None:
     """Return the sphere above which points are; None where X, Y, Z are adjusted."""
     if contents.settings.axes == "rectangular":
         return None
@@ -171,7 +170,7 @@ def _spheroid(contents: Contents) -> Spheroid | None:
     return Spheroid((2 * a + b) / 3, (2 * a + b) / 3)
 
 
-def _project(contents: Contents, seen: _Seen, messages: list[Message]) -> Project:
+def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) -> Project:
     network, place, spheroid = contents.network, Place(contents.path), _spheroid(contents)
     starts = contents.starts[seen.points]
     known = known_points(network, seen.points, starts, contents.settings, spheroid, place)
@@ -200,13 +199,13 @@ def _project(contents: Contents, seen: _Seen, messages: list[Message]) -> Projec
         observations=known.controls,
         timed=timed,
         spheroid=spheroid,
-        lacks=[f"no standard deviations of image coordinates: {_ASSUMED} (--sd images=...)"],
+        lacks=[f"no standard deviations of image coordinates: {PITCHES:g} px is assumed (--sd images=...)"],
         messages=[*messages, *known.messages, *map(Message, contents.settings.told)],
         details={DETAILS: contents, "further inputs": [each.path for each in contents.different]},
     )
 
 
-def _poses(contents: Contents, spheroid: Spheroid | None) -> tuple[Floats, Floats]:
+def _poses(contents: PlanetaryContents, spheroid: Spheroid | None) -> tuple[Floats, Floats]:
     """Return where photos are about, and how they are turned, in the space of the block."""
     axes, found = Cartesian(spheroid), []
     for own in contents.different:
@@ -220,7 +219,7 @@ def _begin(own: Timed) -> float:
     return float(own.time or 0.0) if own.lines is None else float(own.lines.times([0.0])[0])
 
 
-def _cameras(contents: Contents) -> tuple[list[Image], Indices]:
+def _cameras(contents: PlanetaryContents) -> tuple[list[Image], Indices]:
     """Return an image of each camera, and which camera each photo has."""
     known: dict[object, int] = {}
     first: list[Image] = []

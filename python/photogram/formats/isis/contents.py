@@ -17,7 +17,7 @@ from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.settings import Settings
 from photogram.formats.isis.solving import Solving
 
-__all__ = ["PITCHES", "Contents", "Image", "contents_of", "rows_of_each"]
+__all__ = ["PITCHES", "Image", "PlanetaryContents", "contents_of", "rows_of_each"]
 
 DETAILS = "control network"
 PITCHES = 1.4
@@ -53,7 +53,7 @@ class Image:
 
 
 @dataclass(frozen=True, eq=False)
-class Contents:
+class PlanetaryContents:
     """A network with its images, and how it is adjusted.
 
     Attributes
@@ -86,7 +86,7 @@ def rows_of_each(values: NDArray[np.integer[Any]], count: int) -> list[Indices]:
     return np.split(order, np.searchsorted(values[order], np.arange(1, count)))
 
 
-def contents_of(details: Mapping[str, Any]) -> Contents:
+def contents_of(details: Mapping[str, Any]) -> PlanetaryContents:
     """Return the contents of a project.
 
     Raises
@@ -95,6 +95,6 @@ def contents_of(details: Mapping[str, Any]) -> Contents:
         It was not read from a control network.
     """
     found = details.get(DETAILS)
-    if not isinstance(found, Contents):
+    if not isinstance(found, PlanetaryContents):
         raise InputError("the project was not read from a control network")
     return found

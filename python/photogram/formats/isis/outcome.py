@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.adjustment.known import Cartesian
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.formats.isis.contents import Contents, Image, rows_of_each
+from photogram.formats.isis.contents import Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.points import per_metre
 from photogram.network.geometry import local_frames
 from photogram.network.motion import focal_images
@@ -30,7 +30,7 @@ class Outcome:
         Of the adjustment of its block, from which images and points may have been taken out.
     """
 
-    contents: Contents
+    contents: PlanetaryContents
     result: Result
 
     @cached_property
