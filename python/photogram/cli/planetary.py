@@ -17,7 +17,7 @@ CubesFile = Annotated[
     typer.Option(
         "--cubes",
         metavar="LIST",
-        help="Images of a control network: cubes, or serial numbers and ISDs.",
+        help="Cubes or ISDs of a control network.",
         show_default=False,
     ),
 ]
@@ -26,7 +26,7 @@ JigsawSettings = Annotated[
     typer.Option(
         "--jigsaw",
         metavar="NAME=VALUE ...",
-        help="Settings of jigsaw, in quotes, or a file of them.",
+        help="Settings of jigsaw, in quotes, or a file.",
         show_default=False,
     ),
 ]
