@@ -19,6 +19,7 @@ from peak import forget_peak, peak_memory
 from photogram import Block, Camera, adjust
 from photogram.arguments.types import Floats, Indices
 from photogram.memory import give_back, resident_memory
+from photogram.network.attitudes import Attitudes
 from photogram.network.timed import Lines, LineSensor, Timed
 from photogram.network.trajectories import Polynomial, Table, Trajectory
 
@@ -32,15 +33,6 @@ SD = {"image": 0.0035, "position": 20.0, "rotation": np.array([1e-4, 3e-5, 3e-5]
 """Millimetres, metres, radians by degree, metres."""
 
 
-def turned(r: Floats) -> Floats:
-    """Return (n, 3, 3) rotations by (n, 3) vectors."""
-    angle = np.linalg.norm(r, axis=1)[:, np.newaxis, np.newaxis]
-    k = np.zeros((len(r), 3, 3))
-    k[:, 0, 1], k[:, 0, 2], k[:, 1, 2] = -r[:, 2], r[:, 1], -r[:, 0]
-    k -= np.swapaxes(k, 1, 2).copy()
-    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * k + (1 - np.cos(angle)) / angle**2 * k @ k)
-
-
 def measured(images: Indices, points: Floats, begins: Floats, c: Floats, r: Floats) -> Floats:
     """Return (n, 2) sample and line of (n, 3) points in images: the time at which each is on its line."""
     half = LENGTH / SPEED / 2
@@ -49,7 +41,7 @@ def measured(images: Indices, points: Floats, begins: Floats, c: Floats, r: Floa
         s = ((times - half) / half)[:, np.newaxis]
         about = r[0][images] + r[1][images] * s + r[2][images] * s**2
         at = begins[images] + c[images] + times[:, np.newaxis] * [0.0, SPEED, 0.0]
-        u = np.einsum("nji,nj->ni", turned(about), points - at)
+        u = np.einsum("nji,nj->ni", Attitudes.of("rotation_vector", about).matrices, points - at)
         times += u[:, 1] / SPEED
     return np.column_stack([C * u[:, 0] / u[:, 2] / PITCH, times / LINE])
 

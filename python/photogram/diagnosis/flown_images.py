@@ -14,15 +14,14 @@ from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.regression import UNKNOWN, given_points, spread
 from photogram.errors import InputError
 from photogram.network.block import Block
-from photogram.network.cameras import Camera
 from photogram.network.chosen import kept_images
 from photogram.network.directions import image_directions
 from photogram.network.flown import timed_images
 from photogram.network.geometry import geographic_to_geocentric
 from photogram.network.motion import timed_photos
-from photogram.network.projecting import projected
+from photogram.network.projecting import camera_of, projected
 from photogram.network.rays import meet
-from photogram.network.whereabouts import reach
+from photogram.network.whereabouts import given_poses, reach
 
 __all__ = ["flown_misfits", "flown_predictions", "flown_view"]
 
@@ -82,18 +81,12 @@ def flown_predictions(block: Block, photos: Indices) -> Floats:
             continue
         images = images[np.isfinite(places[block.image_points[images]]).all(axis=1)]
         try:
-            seen = projected(own, trajectory, _camera(block, row), places[block.image_points[images]])
+            seen = projected(own, trajectory, camera_of(block, row), places[block.image_points[images]])
         except InputError:
             # A scanner of whose trajectory there is one record.
             continue
         found[images] = seen
     return found
-
-
-def _camera(block: Block, photo: int) -> Camera:
-    if block.photo_cameras is not None:
-        return block.cameras[int(block.photo_cameras[photo])]
-    return Camera("perspective", {"c": float(block.known_distances("hints")[photo])})
 
 
 def _places(block: Block) -> Floats:
@@ -124,10 +117,8 @@ def _rays(block: Block) -> tuple[Floats, Floats]:
     seen = image_directions(block)
     centres, directions = np.full(seen.shape, np.nan), np.full(seen.shape, np.nan)
     for own, trajectory, _, images in timed_images(block):
-        coefficients = (np.array([each.position for each in part]) for part in trajectory.coefficients)
         times = np.clip(own.times(block.image_xy[images]), *reach(trajectory))
-        at, turned, *_ = trajectory.flown(times, *coefficients)
-        turned = turned.reshape(-1, 3, 3)
+        at, turned = given_poses(trajectory, times)
         if own.sensor is not None:
             at, turned = at + turned @ own.sensor.position, turned @ own.sensor.attitude
         centres[images] = at

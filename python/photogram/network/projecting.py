@@ -13,6 +13,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.network.flown import timed_images
 from photogram.network.geometry import geographic_to_geocentric
 from photogram.network.timed import Timed
 from photogram.network.trajectories import Trajectory
@@ -126,16 +127,11 @@ def projected_images(block: Block) -> Floats:
     """
     if block.refraction is not None:
         raise InputError("images of photos on trajectories are computed without refraction, which is given")
-    order = np.argsort(block.image_photos, kind="stable")
-    bounds = np.searchsorted(block.image_photos[order], np.arange(len(block.photo_ids) + 1)).tolist()
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
     points = block.point_positions
     if block.spheroid is not None:
         points = geographic_to_geocentric(points, block.spheroid)
     found = np.full(block.image_xy.shape, np.nan)
-    for own, trajectory in zip(block.timed, block.trajectories, strict=True):
-        row = rows[own.photo]
-        images = order[bounds[row] : bounds[row + 1]]
+    for own, trajectory, row, images in timed_images(block):
         if len(images):
             places = points[block.image_points[images]]
             found[images] = projected(own, trajectory, camera_of(block, row), places)

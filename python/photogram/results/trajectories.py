@@ -13,9 +13,8 @@ from photogram.arguments.arrays import freeze_fields, shaped, standard_deviation
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.block import Block
-from photogram.network.cameras import Camera
 from photogram.network.geometry import geographic_to_geocentric
-from photogram.network.projecting import projected
+from photogram.network.projecting import camera_of, projected
 from photogram.network.trajectories import Trajectory
 from photogram.network.whereabouts import reach
 from photogram.results.cameras import AdjustedCamera
@@ -199,7 +198,7 @@ def project(
     if cameras and block.photo_cameras is not None:
         camera = cameras[int(block.photo_cameras[index])].camera
     else:
-        camera = Camera("perspective", {"c": float(block.known_distances("project")[index])})
+        camera = camera_of(block, index)
     places = shaped("points", points, (len(np.asarray(points)), 3))
     if block.spheroid is not None:
         places = geographic_to_geocentric(places, block.spheroid)

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use nalgebra::{DMatrix, Matrix6, Matrix6xX};
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 
 use super::commons::CommonState;
 use super::in_block::InBlock;
@@ -28,10 +28,8 @@ impl Bundle {
     pub(super) fn blocks_of_pose(&self, photo: usize, at: f64) -> impl Iterator<Item = usize> {
         let main = self.main_block_of_pose(photo);
         let commons = self.mounts.commons(photo, Some(at)).into_iter();
-        let others = commons
-            .filter_map(|common| Some(self.blocks.of_common[common]?.block))
-            .filter(move |&own| own != main);
-        let mut seen: SmallVec<[usize; 16]> = SmallVec::new();
+        let others = commons.filter_map(|common| Some(self.blocks.of_common[common]?.block));
+        let mut seen: SmallVec<[usize; 16]> = smallvec![main];
         let once = move |&own: &usize| {
             let new = !seen.contains(&own);
             if new {

@@ -28,13 +28,7 @@ BEYOND = 4
 
 def of_quaternions(quaternions: Floats) -> Floats:
     """Return the (n, 3, 3) matrices of (n, 4) quaternions w, x, y, z of any length, applied as C v."""
-    w, x, y, z = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
-    rows = [
-        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    return Attitudes.of("quaternion", quaternions).matrices
 
 
 def of_angles(angles: Floats) -> Floats:
