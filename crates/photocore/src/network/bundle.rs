@@ -49,7 +49,7 @@ impl Network {
             datum: self.given_datum(selected, &mounts),
             mounts,
             image_times,
-            passages: Passages::new(self, &selected.points),
+            passages: Passages::new(&self.passages, &selected.points, self.points.len()),
             origin,
             locals: selected.locals,
             points,

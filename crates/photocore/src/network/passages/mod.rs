@@ -7,9 +7,8 @@ use std::ops::Deref;
 
 use smallvec::SmallVec;
 
-use super::Network;
 use super::commons::CommonKind;
-use crate::geometry::Vector3;
+use crate::geometry::{ObjectSpace, Vector3};
 
 /// Something that images pass.
 pub trait PassageModel {
@@ -17,7 +16,15 @@ pub trait PassageModel {
     fn unknowns(&self) -> Vec<(usize, CommonKind)>;
 
     /// Whether it is one of a network: points, photos and cameras are there, and such as it may have.
-    fn is_of(&self, network: &Network) -> bool;
+    fn is_of(&self, network: &Facts) -> bool;
+}
+
+/// What passages ask of a network.
+pub struct Facts {
+    /// Coordinates of its points.
+    pub space: ObjectSpace,
+    /// Of each point, whether it is given and nothing but images is of it.
+    pub given: Vec<bool>,
 }
 
 macro_rules! kinds {
@@ -76,14 +83,14 @@ pub(super) struct Passages {
 }
 
 impl Passages {
-    /// Those of a network of which these points take part.
-    pub fn new(network: &Network, points: &[usize]) -> Self {
-        if network.passages.is_empty() {
-            return Self::default();
-        }
+    /// Those of a network of so many points, of which these take part.
+    pub fn new(passages: &[Passage], points: &[usize], count: usize) -> Self {
         let mut own = Self::default();
-        let mut of_point = vec![None; network.points.len()];
-        for passage in &network.passages {
+        if passages.is_empty() {
+            return own;
+        }
+        let mut of_point = vec![None; count];
+        for passage in passages {
             match passage {
                 Passage::Figure(figure) => {
                     let number = own.figures.len();
