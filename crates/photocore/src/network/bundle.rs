@@ -42,7 +42,7 @@ impl Network {
             refraction: self
                 .refraction
                 .map(|refraction| Refraction { datum: refraction.datum + origin[2], ..refraction }),
-            cameras: self.photos.iter().map(|photo| self.camera(photo).camera).collect(),
+            cameras: self.photos.iter().map(|photo| self.camera(photo).camera.clone()).collect(),
             blocks: Blocks::new(self, self.shared_cameras(&selected.surroundings)),
             camera_priors: vec![],
             commons: self.placed_commons(selected, &mounts, (&images, &image_times), middle),

@@ -256,10 +256,10 @@ impl Bundle {
             let pose = std::array::from_fn(|k| pose[k]);
             let shared = self.blocks.of_camera[photo]
                 .map(|block| self.blocks.first[block]..self.blocks.first[block + 1]);
-            let (own, camera) = (self.cameras[photo], shared.map_or(camera, |range| &unknowns[range]));
+            let (own, camera) = (&self.cameras[photo], shared.map_or(camera, |range| &unknowns[range]));
             Station {
                 orientation: self.orientation(photo, &pose),
-                camera: own.with_parameters(camera).unwrap_or(own),
+                camera: own.with_parameters(camera).unwrap_or_else(|| own.clone()),
             }
         };
         let mut photos: Vec<Station> = (0..self.cameras.len()).map(photo).collect();
