@@ -119,9 +119,9 @@ def _indices(arrays: Arrays, count: int) -> Indices:
 def _freed(arrays: Arrays) -> _Free:
     core = arrays.first("do_optimize_intrinsics_core", "do_optimize_intrinsic_core")
     lens = arrays.first("do_optimize_intrinsics_distortions", "do_optimize_intrinsic_distortions")
-    for name in ("do_optimize_frames", "do_optimize_extrinsics"):
-        if name in arrays and not arrays.says(name):
-            raise arrays.error(name, "is false: poses that were held are not taken")
+    for held in ("do_optimize_frames", "do_optimize_extrinsics"):
+        if held in arrays and not arrays.says(held):
+            raise arrays.error(held, "is false: poses that were held are not taken")
     return _Free(arrays.says(core), arrays.says(lens), arrays.says("do_optimize_calobject_warp"))
 
 
@@ -134,10 +134,10 @@ def _cameras(arrays: Arrays, free: _Free) -> list[Camera]:
     model, count = own
     rows = arrays.numbers("intrinsics", None, count)
     cameras = []
-    for number, row in enumerate(rows.tolist()):
+    for number, values in enumerate(rows.tolist()):
         names = Camera(model, {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0}).names[:count]
         freed = [name for k, name in enumerate(names) if (free.core if k < 4 else free.lens)]
-        given = dict(zip(names, row, strict=True))
+        given = dict(zip(names, values, strict=True))
         cameras.append(Camera(model, given, dict.fromkeys(freed, np.inf), name=f"camera {number}"))
     return cameras
 
@@ -145,7 +145,7 @@ def _cameras(arrays: Arrays, free: _Free) -> list[Camera]:
 def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats]:
     """Return (K, 4, 4) sensors, camera 0 -> camera k, and (V, 4, 4) views, board -> camera 0."""
     views = of_vectors(arrays.numbers(arrays.first("frames_rt_toref", "rt_ref_frame"), None, 6))
-    mounted = [name for name in ("extrinsics_rt_fromref", "rt_cam_ref") if name in arrays]
+    mounted = [each for each in ("extrinsics_rt_fromref", "rt_cam_ref") if each in arrays]
     to_camera = of_vectors(arrays.numbers(mounted[0], None, 6)) if mounted else np.zeros((0, 4, 4))
     name = "indices_frame_camintrinsics_camextrinsics"
     if indices[:, 0].max() >= len(views) or indices[:, 2].max() >= len(to_camera):
