@@ -15,7 +15,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
 from photogram.show.brief import Brief, Rows
-from photogram.show.ways import Paged
+from photogram.show.ways import Shown
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
 from photogram.targets.vision import FLIP, composed, sensor_steps, view_steps, vision_poses
@@ -48,7 +48,7 @@ def with_unknown_weight(result: Result) -> Result:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Calibrated(Brief, Paged):
+class Calibrated(Brief, Shown):
     """An adjusted calibration of K cameras in V views of a board of n points.
 
     Attributes
