@@ -14,6 +14,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.network.attitudes import Attitudes
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
+from photogram.results.snooped import Snooped
 from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown
 from photogram.statistics.limits import GlobalTest
@@ -59,11 +60,14 @@ class Calibrated(Brief, Shown):
         The adjusted block: residuals, redundancy numbers, tests, the verdict.
     unregularised
         The adjustment without priors of cameras, where there are any: what these have moved.
+    snooped
+        What was taken out, where gross errors were looked for; `result` is what is left.
     """
 
     calibration: Calibration
     result: Result
     unregularised: Result | None = None
+    snooped: Snooped | None = None
 
     def brief(self) -> tuple[str, Rows]:
         """Return how the adjustment ended in a few lines."""

@@ -36,6 +36,7 @@ def calibration_document(calibrated: Calibrated) -> dict[str, Any]:
         "board": _board(calibrated),
         "views": records([*views(calibrated), Quantity(calibrated.poses, member="pose")]),
         **({"sensors": sensors} if sensors else {}),
+        **({} if calibrated.snooped is None else {"snooping": calibrated.snooped.document()}),
         **({"moved_by_priors": records(moved)} if moved else {}),
     }
 

@@ -20,7 +20,7 @@ __all__ = ["calibration_page"]
 @np.errstate(over="ignore", invalid="ignore")
 def calibration_page(calibrated: Calibrated) -> Page:
     """Return the report of a calibration for the browser."""
-    page = page_of(calibrated.result)
+    page = page_of(calibrated.snooped or calibrated.result)
     board: list[Part] = [Facts("The board", board_facts(calibrated))]
     if worst := worst_points(calibrated):
         board.append(Remarks(worst))

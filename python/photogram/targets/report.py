@@ -16,6 +16,8 @@ from photogram.targets.tables import board_facts, views, worst_points
 __all__ = ["calibration_summary", "report"]
 
 TITLE = "calibration with targets"
+ON_TOP = 2
+"""Sections of what snooping says that every summary has: the verdict, and what to do next."""
 
 
 @report_of.register(Calibrated)
@@ -29,6 +31,7 @@ def calibration_summary(calibrated: Calibrated) -> list[Section]:
     """Return what a reader wants first: the summary of the block, the board, its views."""
     return [
         *summary(calibrated.result),
+        *([] if calibrated.snooped is None else calibrated.snooped.sections()[ON_TOP:]),
         ("Board", [*fact_lines(board_facts(calibrated)), *worst_points(calibrated)]),
         ("What the priors of cameras have moved", moved_lines(calibrated)),
         ("Views", _views(views(calibrated))),

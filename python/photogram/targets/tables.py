@@ -83,6 +83,8 @@ def board_facts(calibrated: Calibrated) -> list[Fact]:
             "Scale", "from the spacing", note="nothing checks it: its relative error is that of every length"
         ),
     ]
+    where = "cx, cy and pixels count from 0 at the centre of the first; COLMAP has 0.5 more"
+    found.append(Fact("Pixels", "centre is 0", note=where))
     fit = board_fit(calibrated)
     if fit is None:
         return found
