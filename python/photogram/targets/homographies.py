@@ -64,10 +64,10 @@ def ray_homographies(places: Floats, rays: Floats) -> Floats:
     """
     seen = np.isfinite(rays[..., 0])
     plane, of_plane = _scaled(np.broadcast_to(places, (*rays.shape[:2], 2)), seen)
-    found: Floats = _smallest(_equations(plane, rays), seen) @ of_plane
+    found = np.matmul(_smallest(_equations(plane, rays), seen), of_plane)
     towards = np.einsum("pni,pij,nj->pn", np.nan_to_num(rays), found, _with_one(places))
-    signed: Floats = found * np.where(towards.sum(axis=1) < 0, -1.0, 1.0)[:, np.newaxis, np.newaxis]
-    return signed
+    found *= np.where(towards.sum(axis=1) < 0, -1.0, 1.0)[:, np.newaxis, np.newaxis]
+    return found
 
 
 def angles_apart(places: Floats, rays: Floats, found: Floats) -> Floats:

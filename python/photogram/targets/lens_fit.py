@@ -10,8 +10,10 @@ from types import MappingProxyType
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.messages import nearest
 from photogram.network.cameras import Camera
 
 __all__ = ["LENS_TERMS", "fitted", "grid_of_pixels", "is_perspective", "lens_of"]
@@ -65,10 +67,10 @@ def lens_of(model: str, source: Camera, size: tuple[int, int]) -> Camera:
         A model that there is not, or one that counts no columns and rows of pixels.
     """
     own, count = ("opencv_pinhole", LENS_TERMS[model]) if model in LENS_TERMS else (model, None)
-    known = {name for name, _ in _photocore.camera_models()}
-    if own not in known:
-        raise InputError(f"model: there is no lens {model}, but {', '.join([*LENS_TERMS, *sorted(known)])}")
-    names = [name for name, _ in dict(_photocore.camera_models())[own][1]]
+    models = dict(_photocore.camera_models())
+    if own not in models:
+        raise InputError(f"model: there is no lens {shown(model)}{nearest(model, [*LENS_TERMS, *models])}")
+    names = [name for name, _ in models[own][1]]
     if not ({"f", "fx"} & {*names} and "cx" in names):
         raise InputError(f"model: {model} has no focal length and principal point in pixels to begin with")
     given = source.parameters

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.messages import Message
+from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
 from photogram.targets.families import POOR, misfits, rays_of
 from photogram.targets.homographies import centres, poses, ray_homographies
@@ -56,23 +56,19 @@ class Pictures:
         """Return (P,) in which order the corners of each picture are listed, and what is to be said of it.
 
         That of their numbers is kept where a picture fits as well as most do, and sees the board from the
-        side that most see. Else the first order is taken of which both is true.
+        side that most see: the front, x to the right and y down, where none says it. Else the first order
+        is taken of which both is true.
         """
         misfit, front = self._tried()
         best = misfit.min(axis=1, keepdims=True)
         limit = max(POOR * float(np.median(best)), ROUNDING)
         fits = (misfit <= limit) & (misfit <= np.maximum(CLEAR * best, ROUNDING))
         fits[:, 0] |= misfit[:, 0] <= limit
-        first = np.take_along_axis(front, np.argmax(fits, axis=1)[:, np.newaxis], axis=1)
-        side = 1.0 if first[fits.any(axis=1)].sum() > 0 else -1.0
+        side = 1.0 if front[fits[:, 0], 0].sum() > 0 else -1.0
         right = fits & (front == side)
         orders = np.zeros(len(self.usable), dtype=np.int64)
         orders[self.usable] = np.argmax(right, axis=1)
-        told = [
-            self._told(row, int(orders[row]), fits[k], right[k], float(best[k, 0]) / limit * POOR)
-            for k, row in enumerate(np.flatnonzero(self.usable).tolist())
-        ]
-        return orders, [each for each in told if each is not None]
+        return orders, self._told(orders, fits, right)
 
     def _rays(self, seen: Sightings) -> Floats:
         """Return (P, n, 3) rays, those of each picture by its camera."""
@@ -93,18 +89,27 @@ class Pictures:
             front[:, order] = np.sign(centres(poses(ray_homographies(own.plane, rays)))[:, 2])
         return misfit, front
 
-    def _told(self, row: int, order: int, fits: Bools, right: Bools, ratio: float) -> Message | None:
-        """Return what is to be said of the order of a picture; None where it is that of the numbers."""
-        name = f"picture {self.names[row]}: its corners"
-        if not fits.any():
-            return Message(
-                f"{name} fit the board in no order, {ratio:.0f} times worse than those of most pictures do:"
-                " they are probably not where they should be"
+    def _told(self, orders: Indices, fits: Bools, right: Bools) -> list[Message]:
+        """Return what is to be said of pictures whose corners are not listed as the board's are."""
+        names = np.array(self.names)[self.usable]
+        own = orders[self.usable]
+        mirrored = fits.any(axis=1) & (~right.any(axis=1) | (fits[:, 0] & (own > 0)))
+        other = right.any(axis=1) & ~mirrored
+        told = []
+        if (bad := ~fits.any(axis=1)).any():
+            told.append(
+                f"corners of {listed(names[bad].tolist())} fit the board more than {POOR:g} times worse than"
+                " those of most pictures, in whatever order: some are probably not where they should be"
             )
-        if not right.any() or (order and fits[0]):
-            taken = f"; taken for listed {LISTED[order]}" if right.any() else ""
-            return Message(
-                f"{name} are mirrored, which those of a board that is seen cannot be: rows or columns are"
-                f" listed in a wrong order{taken}"
+        for order in np.unique(own[mirrored]).tolist():
+            those = listed(names[mirrored & (own == order)].tolist())
+            told.append(
+                f"corners of {those} are mirrored, which those of a board that is seen cannot be; their rows or"
+                " columns stand in a wrong order" + (f": taken for listed {LISTED[order]}" if order else "")
             )
-        return Message(f"{name} were listed in another order: {LISTED[order]}") if order else None
+        for order in np.unique(own[other & (own > 0)]).tolist():
+            those = listed(names[other & (own == order)].tolist())
+            told.append(f"corners of {those} were listed in another order: {LISTED[order]}")
+        if len(own) > 1 and other.all() and (own > 0).all():
+            told.append("no picture lists its corners as the board does: are its columns its rows?")
+        return [Message(each) for each in told]
