@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.targets.vision import composed
 
 __all__ = [
     "angles_apart",
@@ -64,7 +65,7 @@ def ray_homographies(places: Floats, rays: Floats) -> Floats:
     """
     seen = np.isfinite(rays[..., 0])
     plane, of_plane = _scaled(np.broadcast_to(places, (*rays.shape[:2], 2)), seen)
-    found = np.matmul(_smallest(_equations(plane, rays), seen), of_plane)
+    found: Floats = _smallest(_equations(plane, rays), seen) @ of_plane
     towards = np.einsum("pni,pij,nj->pn", np.nan_to_num(rays), found, _with_one(places))
     found *= np.where(towards.sum(axis=1) < 0, -1.0, 1.0)[:, np.newaxis, np.newaxis]
     return found
@@ -74,7 +75,8 @@ def angles_apart(places: Floats, rays: Floats, found: Floats) -> Floats:
     """Return (P, n) the angles (rad) between rays and H (x, y, 1); NaN where not seen."""
     there = np.einsum("pij,nj->pni", found, _with_one(places))
     across = np.linalg.norm(np.cross(rays, there), axis=-1)
-    return np.arctan2(across, np.einsum("pni,pni->pn", rays, there))
+    angles: Floats = np.arctan2(across, np.einsum("pni,pni->pn", rays, there))
+    return angles
 
 
 def focal_lengths(found: Floats, middle: Floats) -> tuple[float, float, float]:
@@ -112,10 +114,8 @@ def poses(found: Floats) -> Floats:
     scale = np.linalg.norm(found[:, :, :2], axis=1).mean(axis=1)
     own = found / scale[:, np.newaxis, np.newaxis]
     third = np.cross(own[:, :, 0], own[:, :, 1])
-    made = np.tile(np.eye(4), (len(found), 1, 1))
-    made[:, :3, :3] = nearest_rotations(np.stack([own[:, :, 0], own[:, :, 1], third], axis=2))
-    made[:, :3, 3] = own[:, :, 2]
-    return made
+    axes = np.stack([own[:, :, 0], own[:, :, 1], third], axis=2)
+    return composed(nearest_rotations(axes), own[:, :, 2])
 
 
 def nearest_rotations(matrices: Floats) -> Floats:

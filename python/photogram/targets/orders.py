@@ -104,8 +104,9 @@ class Pictures:
         for order in np.unique(own[mirrored]).tolist():
             those = listed(names[mirrored & (own == order)].tolist())
             told.append(
-                f"corners of {those} are mirrored, which those of a board that is seen cannot be; their rows or"
-                " columns stand in a wrong order" + (f": taken for listed {LISTED[order]}" if order else "")
+                f"corners of {those} are mirrored, which those of a board that is seen cannot be; their rows"
+                " or columns stand in a wrong order"
+                + (f": taken for listed {LISTED[order]}" if order else "")
             )
         for order in np.unique(own[other & (own > 0)]).tolist():
             those = listed(names[other & (own == order)].tolist())
