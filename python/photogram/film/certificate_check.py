@@ -123,7 +123,7 @@ def difference_of(
     found = DistanceDifference(name, float(own[name]), _from_coordinates(fields, own))
     if not found.beyond:
         return found
-    places = {f"{mark}.{axis}": usual[mark]["xy".index(axis)] for mark in usual for axis in "xy"}
+    places = {field: usual[field[:-2]]["xy".index(field[-1])] for field in fields[:4] if field[:-2] in usual}
     return replace(found, explanations=explained(fields, own, places))
 
 
@@ -132,8 +132,8 @@ def explained(
 ) -> tuple[Explanation, ...]:
     """Return the single changes that bring a distance and four coordinates together.
 
-    In the order of the kinds of slips and, among changes of a kind, nearest to the usual places first; where
-    these are not known, by what is left.
+    In the order of the kinds of slips and, among changes of a kind, by how far from its usual place the
+    farthest of both marks then is; where these are not known, by what is left.
 
     Parameters
     ----------
@@ -144,21 +144,18 @@ def explained(
     places
         Usual coordinates by the same fields, as far as they are known.
     """
-    found = []
-    for field in fields:
+    found: list[tuple[tuple[int, float, int, int], Explanation]] = []
+    kinds = get_args(How)
+    for order, field in enumerate(fields):
         for how, perhaps in _variants(typed[field]):
             changed = {**typed, field: perhaps}
             left = float(changed[fields[-1]]) - _from_coordinates(fields, changed)
             if abs(left) < EXPLAINED:
                 usual = float(perhaps) - places[field] if field in places else None
-                found.append(Explanation(field, typed[field], perhaps, how, left, usual))
-    kinds = get_args(How)
-
-    def rank(each: Explanation) -> tuple[int, float, int, int]:
-        far = abs(each.from_usual) if each.from_usual is not None else math.inf if places else 0.0
-        return kinds.index(each.how), far, round(abs(each.remaining) / SAME), fields.index(each.field)
-
-    return tuple(sorted(found, key=rank))
+                far = max((abs(float(changed[each]) - places[each]) for each in places), default=0.0)
+                rank = kinds.index(how), far, round(abs(left) / SAME), order
+                found.append((rank, Explanation(field, typed[field], perhaps, how, left, usual)))
+    return tuple(each for _, each in sorted(found, key=lambda pair: pair[0]))
 
 
 def _from_coordinates(fields: Sequence[str], typed: Mapping[str, str]) -> float:
