@@ -1,4 +1,4 @@
-"""Planes seen by cameras: homographies of pixels and of rays, what they say of focal lengths, and their poses.
+"""Planes seen by cameras: homographies of pixels and rays, the focal lengths and poses that they say.
 
 Arrays stand as pictures by points of the board: (P, n, 2) pixels or (P, n, 3) rays, NaN where a point was
 not seen. Axes are those of vision: x right, y down, z forward.
@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.targets.vision import composed
 
 __all__ = [
     "angles_apart",
@@ -34,7 +35,7 @@ def homographies(places: Floats, xy: Floats) -> Floats:
     places
         (n, 2) places of the points in the plane of the board.
     xy
-        (P, n, 2) pixels; NaN where not seen. Four at least are seen in each picture, no three of them on a line.
+        (P, n, 2) pixels; NaN where not seen. Each picture has four at least, no three of them on a line.
 
     Returns
     -------
@@ -44,7 +45,8 @@ def homographies(places: Floats, xy: Floats) -> Floats:
     plane, of_plane = _scaled(np.broadcast_to(places, xy.shape), seen)
     image, of_image = _scaled(xy, seen)
     found = _smallest(_equations(plane, _with_one(image))[:, :, :2], seen)
-    return np.linalg.solve(of_image, found @ of_plane)
+    made: Floats = np.linalg.inv(of_image) @ found @ of_plane
+    return made
 
 
 def ray_homographies(places: Floats, rays: Floats) -> Floats:
@@ -65,14 +67,16 @@ def ray_homographies(places: Floats, rays: Floats) -> Floats:
     plane, of_plane = _scaled(np.broadcast_to(places, (*rays.shape[:2], 2)), seen)
     found: Floats = _smallest(_equations(plane, rays), seen) @ of_plane
     towards = np.einsum("pni,pij,nj->pn", np.nan_to_num(rays), found, _with_one(places))
-    return found * np.where(towards.sum(axis=1) < 0, -1.0, 1.0)[:, np.newaxis, np.newaxis]
+    found *= np.where(towards.sum(axis=1) < 0, -1.0, 1.0)[:, np.newaxis, np.newaxis]
+    return found
 
 
 def angles_apart(places: Floats, rays: Floats, found: Floats) -> Floats:
     """Return (P, n) the angles (rad) between rays and H (x, y, 1); NaN where not seen."""
     there = np.einsum("pij,nj->pni", found, _with_one(places))
     across = np.linalg.norm(np.cross(rays, there), axis=-1)
-    return np.arctan2(across, np.einsum("pni,pni->pn", rays, there))
+    angles: Floats = np.arctan2(across, np.einsum("pni,pni->pn", rays, there))
+    return angles
 
 
 def focal_lengths(found: Floats, middle: Floats) -> tuple[float, float, float]:
@@ -110,10 +114,8 @@ def poses(found: Floats) -> Floats:
     scale = np.linalg.norm(found[:, :, :2], axis=1).mean(axis=1)
     own = found / scale[:, np.newaxis, np.newaxis]
     third = np.cross(own[:, :, 0], own[:, :, 1])
-    made = np.tile(np.eye(4), (len(found), 1, 1))
-    made[:, :3, :3] = nearest_rotations(np.stack([own[:, :, 0], own[:, :, 1], third], axis=2))
-    made[:, :3, 3] = own[:, :, 2]
-    return made
+    axes = np.stack([own[:, :, 0], own[:, :, 1], third], axis=2)
+    return composed(nearest_rotations(axes), own[:, :, 2])
 
 
 def nearest_rotations(matrices: Floats) -> Floats:
@@ -141,7 +143,7 @@ def _with_one(points: Floats) -> Floats:
 
 
 def _scaled(points: Floats, seen: Bools) -> tuple[Floats, Floats]:
-    """Return (P, n, 2) points from their centroids at a mean distance of sqrt 2, and (P, 3, 3) what did it."""
+    """Return (P, n, 2) points scaled to a mean distance of sqrt 2 from their centroids, and (P, 3, 3) how."""
     kept = np.where(seen[..., np.newaxis], points, np.nan)
     middle = np.nanmean(kept, axis=1)
     apart = kept - middle[:, np.newaxis]

@@ -9,6 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.targets.homographies import nearest_rotations
+from photogram.targets.vision import composed, inverted
 
 __all__ = ["Rig", "connected", "mean_pose"]
 
@@ -76,16 +77,14 @@ def connected(poses: Floats, cameras: Indices, views: Indices, count: int, turns
         turned[second], apart[second] = orders, away
         for order, turn in turns.items():
             rows = second[orders == order]
-            found[rows] = found[rows] @ np.linalg.inv(turn)
+            found[rows] = found[rows] @ inverted(turn)
     return Rig(sensors, references, turned, apart)
 
 
 def mean_pose(poses: Floats) -> Floats:
     """Return the (4, 4) chordal mean of the attitudes of poses with the median of their translations."""
-    found = np.eye(4)
-    found[:3, :3] = nearest_rotations(poses[:, :3, :3].mean(axis=0)[np.newaxis])[0]
-    found[:3, 3] = np.median(poses[:, :3, 3], axis=0)
-    return found
+    rotation = nearest_rotations(poses[:, :3, :3].mean(axis=0)[np.newaxis])[0]
+    return composed(rotation, np.median(poses[:, :3, 3], axis=0))
 
 
 def _relation(first: Floats, second: Floats, turns: dict[int, Floats]) -> tuple[Floats, Indices, Bools]:
@@ -111,7 +110,7 @@ def _relation(first: Floats, second: Floats, turns: dict[int, Floats]) -> tuple[
 
 
 def _apart(poses: Floats, other: Floats, far: float) -> Floats:
-    """Return how far (..., 4, 4) poses are from another: the chord of attitudes, and translations by a length."""
+    """Return how far (..., 4, 4) poses are from another: chords of attitudes, shifts over a length."""
     turns = np.linalg.norm(poses[..., :3, :3] - other[:3, :3], axis=(-2, -1)) / math.sqrt(2)
     shifts = np.linalg.norm(poses[..., :3, 3] - other[:3, 3], axis=-1) / far
     return np.asarray(turns + shifts)

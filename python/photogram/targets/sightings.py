@@ -1,4 +1,4 @@
-"""A board as pictures show it: arrays of pictures by points, and the orders in which corners may be listed."""
+"""A board as pictures show it: arrays of pictures by points, and the orders in which these are listed."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from typing import Self
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
 from photogram.targets.board import Board
+from photogram.targets.corners import Corners
 from photogram.targets.homographies import nearest_rotations
+from photogram.targets.vision import composed
 
 __all__ = ["LISTED", "Listings", "Sightings"]
 
@@ -24,6 +27,10 @@ LISTED = (
     "column by column, from the last corner",
 )
 """In which order a file or a detector may list corners."""
+FLAT = 0.02
+"""Of the extent of a board: what its points may be off a plane for first values of planes."""
+UPRIGHT = 1e3
+"""Weight of an axis that stays where it is, over those that turn."""
 _SAME = 1e-6
 """Of the size of a board: two orders differ by more than this."""
 
@@ -86,11 +93,9 @@ def _turn(places: Floats, listed: Floats) -> Floats:
     """Return the (4, 4) motion that takes places nearest to others, their z kept upright."""
     middles = places.mean(axis=0), listed.mean(axis=0)
     products = (listed - middles[1]).T @ (places - middles[0])
-    products[2, 2] += np.abs(products).max()
-    turn = np.eye(4)
-    turn[:3, :3] = nearest_rotations(products[np.newaxis])[0]
-    turn[:3, 3] = middles[1] - turn[:3, :3] @ middles[0]
-    return turn
+    products[2, 2] += UPRIGHT * np.abs(products).max()
+    rotation = nearest_rotations(products[np.newaxis])[0]
+    return composed(rotation, middles[1] - rotation @ middles[0])
 
 
 def _is_affine(a: Floats, b: Floats, size: float) -> bool:
@@ -117,6 +122,30 @@ class Sightings:
     listings: Listings
     xy: Floats
     sd: Floats
+
+    @classmethod
+    def of_corners(cls, board: Board, corners: Corners) -> Self:
+        """Return the corners that count, of all pictures.
+
+        Raises
+        ------
+        InputError
+            Points that the board does not have, a board that is not flat.
+        """
+        places = board.places
+        beyond = corners.point >= len(places)
+        if beyond.any():
+            row = int(np.argmax(beyond))
+            raise InputError(f"{corners.title(row)}: the board has {len(places)} points, {board.described}")
+        if np.ptp(places[:, 2]) > FLAT * np.ptp(places, axis=0).max():
+            raise InputError(
+                "the points of the board do not lie in the plane of x and y: first values come from planes;"
+                " give the camera and the poses of its views"
+            )
+        xy, sd = (np.full((len(corners.pictures), len(places), *more), np.nan) for more in ((2,), ()))
+        at = corners.picture[corners.use], corners.point[corners.use]
+        xy[at], sd[at] = corners.xy[corners.use], corners.sd[corners.use]
+        return cls(places, Listings.of(board), xy, sd)
 
     @property
     def plane(self) -> Floats:

@@ -1,4 +1,4 @@
-"""Views of one camera as a block whose object space is the board, its points held: adjusted for first values."""
+"""Views of one camera as a block whose object space is the board, whose points are held."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from photogram.errors import AdjustmentError
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.targets.homographies import centres
+from photogram.targets.sightings import Sightings
+from photogram.targets.vision import photo_poses, vision_poses
 
-__all__ = ["Adjusted", "adjusted_views", "as_photos"]
+__all__ = ["Adjusted", "adjusted_views"]
 
 TOLERANCE = 1e-3
 """Of a standard deviation: where steps of first values end."""
@@ -41,23 +42,15 @@ class Adjusted:
     variance: float
 
 
-def as_photos(poses: Floats) -> dict[str, Floats]:
-    """Return positions and attitudes of photos, as a block has them, of (P, 4, 4) poses board -> camera."""
-    angles = Attitudes.of("matrix_to_vision", poses[:, :3, :3]).values("omega_phi_kappa")
-    return {"photo_positions": centres(poses), "photo_attitudes": angles}
-
-
-def adjusted_views(camera: Camera, places: Floats, xy: Floats, sd: Floats, poses: Floats) -> Adjusted | None:
+def adjusted_views(camera: Camera, seen: Sightings, poses: Floats) -> Adjusted | None:
     """Adjust a camera and the poses of views; with less of it free where they do not determine all.
 
     Parameters
     ----------
     camera
         The camera, what is unknown of it free.
-    places
-        (n, 3) points of the board.
-    xy, sd
-        (P, n, 2) pixels, NaN where not seen, and (P, n) their standard deviations.
+    seen
+        The views, their corners in the order of their numbers.
     poses
         (P, 4, 4) board -> camera, to begin with.
 
@@ -65,15 +58,17 @@ def adjusted_views(camera: Camera, places: Floats, xy: Floats, sd: Floats, poses
     -------
     What was adjusted; None where the adjustment fails, whatever is held.
     """
-    view, point = np.nonzero(np.isfinite(xy[..., 0]))
+    view, point = np.nonzero(np.isfinite(seen.xy[..., 0]))
+    positions, attitudes = photo_poses(poses)
     block = Block(
-        **as_photos(poses),
-        point_positions=places,
+        photo_positions=positions,
+        photo_attitudes=attitudes.values("omega_phi_kappa"),
+        point_positions=seen.places,
         point_sd=0.0,
         image_photos=view,
         image_points=point,
-        image_xy=xy[view, point],
-        image_sd=np.repeat(sd[view, point, np.newaxis], 2, axis=1),
+        image_xy=seen.xy[view, point],
+        image_sd=np.repeat(seen.sd[view, point, np.newaxis], 2, axis=1),
         cameras=[camera],
         photo_cameras=0,
     )
@@ -85,10 +80,8 @@ def adjusted_views(camera: Camera, places: Floats, xy: Floats, sd: Floats, poses
             continue
         if result.status == "diverged":
             continue
-        found = np.tile(np.eye(4), (len(poses), 1, 1))
-        attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes)
-        found[:, :3, :3] = attitudes.values("matrix_to_vision")
-        found[:, :3, 3] = attitudes.translations(result.photo_positions)
+        turned = Attitudes.of("omega_phi_kappa", result.photo_attitudes)
+        found = vision_poses(result.photo_positions, turned)
         adjusted = result.cameras[0].camera.replace(sd=camera.sd)
         squares, freedom = result.sum_and_freedom
         return Adjusted(adjusted, found, squares / max(freedom, 1.0))
