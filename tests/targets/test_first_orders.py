@@ -95,9 +95,6 @@ def test_what_cannot_be_is_refused_by_name():
         first_values(board, corners, "opencv_pinhol")
     with pytest.raises(InputError, match="brown has no focal length and principal point in pixels"):
         first_values(board, corners, "brown")
-    cube = np.array([[i, j, k] for k in range(2) for j in range(4) for i in range(8)], dtype=float)
-    with pytest.raises(InputError, match="do not lie in the plane"):
-        first_values(Board(kind="points", points=cube), corners.replace(point=corners.point, use=False))
     with pytest.raises(InputError, match="camera left: no picture has enough corners: left01"):
         first_values(board, corners.replace(use=False))
 

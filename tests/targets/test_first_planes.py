@@ -20,7 +20,7 @@ def thirteen():
 
 def test_homographies_and_focal_lengths_are_the_golden_ones(thirteen):
     known = golden("opencv_left.json")["left"]
-    found = homographies(thirteen.plane, thirteen.xy)
+    found = homographies(thirteen.coordinates, thirteen.xy)
     found /= found[:, 2:, 2:]
     np.testing.assert_allclose(found, known["homographies"], rtol=1e-8)
     start = known["start"]
@@ -32,14 +32,14 @@ def test_poses_of_homographies_are_the_golden_ones(thirteen):
     start = golden("opencv_left.json")["left"]["start"]
     parameters = {"fx": start["fx"], "fy": start["fy"], "cx": 319.5, "cy": 239.5}
     matrix = np.array([[start["fx"], 0, 319.5], [0, start["fy"], 239.5], [0, 0, 1]])
-    found = np.linalg.inv(matrix) @ homographies(thirteen.plane, thirteen.xy)
+    found = np.linalg.inv(matrix) @ homographies(thirteen.coordinates, thirteen.xy)
     rays = rays_of(Camera("pinhole", parameters), thirteen.xy)
     towards = np.einsum("pi,pi->p", rays[:, 0], found[:, :, 2])
     made = poses(found * np.sign(towards)[:, None, None])
     np.testing.assert_allclose(made[:, :3, :3], start["R"], atol=1e-9)
     np.testing.assert_allclose(made[:, :3, 3], start["t"], rtol=1e-8)
     # Homographies of rays weigh the same corners a little otherwise.
-    of_rays = poses(ray_homographies(thirteen.plane, rays))
+    of_rays = poses(ray_homographies(thirteen.coordinates, rays))
     np.testing.assert_allclose(of_rays[:, :3, :3], start["R"], atol=0.02)
 
 

@@ -22,6 +22,7 @@ from photogram.targets.vision import inverted
 
 __all__ = ["FirstCalibration", "first_values"]
 
+IN_A_PLANE = "all its points lie in one plane, but those of the board do not"
 FRONTAL = math.radians(3.0)
 """Boards tilted by less say nothing of a focal length."""
 
@@ -67,7 +68,7 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
     Parameters
     ----------
     board
-        The board; its points lie in a plane, nearly.
+        The board. Where its points lie in no plane, pictures that show those of a plane alone have no pose.
     corners
         The corners of all cameras.
     model
@@ -78,11 +79,12 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
     Raises
     ------
     InputError
-        A board that is not flat, points that it does not have, a camera without a picture that could be
-        used, a model that cannot be.
+        Points that the board does not have, a camera without a picture that could be used, a model that
+        cannot be.
     """
     seen = Sightings.of_corners(board, corners)
-    without = corners.poor()
+    without = {corners.pictures[row]: IN_A_PLANE for row in np.flatnonzero(seen.in_a_plane()).tolist()}
+    without |= corners.poor()
     usable = np.array([name not in without for name in corners.pictures], dtype=bool)
     cameras, remarks = [], []
     for k, name in enumerate(corners.camera_names):
@@ -101,7 +103,8 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
     made = pictures.poses(orders)
     rig = connected(made, corners.cameras, corners.views, len(cameras), seen.listings.turns)
     made = _turned(made, rig, seen.listings)
-    remarks += [*of_orders, *_of_rig(rig, corners), *_frontal(made, corners)]
+    remarks += [*of_orders, *_of_rig(rig, corners), *(_frontal(made, corners) if seen.is_flat else ())]
+    made = made @ seen.axes
     return FirstCalibration(
         cameras=cameras,
         sensors=rig.sensors,

@@ -19,7 +19,7 @@ pub use inverse::{Matrix2, RadialLimit};
 pub use measured::Measured;
 pub use model::{CameraModel, Image, LensDirection, ModelFacts, Unit};
 pub use orthogonal::{Ebner12, Gruen44, Orthogonal, OrthogonalSet};
-pub use splined_stereographic::Patch;
+pub use splined_stereographic::{Patch, Window};
 
 macro_rules! cameras {
     ($d:tt $($file:ident::$name:ident;)* $([$family:ident] { $($member:ident;)* })*) => {

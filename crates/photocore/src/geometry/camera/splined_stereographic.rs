@@ -65,6 +65,28 @@ impl Patch {
     }
 }
 
+/// Knots of some columns and rows that stand together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// The first, by column and row.
+    pub first: [usize; 2],
+    /// One beyond the last.
+    pub end: [usize; 2],
+}
+
+impl Window {
+    /// Whether it has all knots of a patch.
+    pub fn has(&self, patch: &Patch) -> bool {
+        (0..2).all(|k| self.first[k] <= patch.first[k] && patch.first[k] + patch.nodes <= self.end[k])
+    }
+
+    /// Its knots, numbered row by row of so many columns.
+    pub fn knots(&self, columns: usize) -> impl Iterator<Item = usize> + use<> {
+        let Self { first, end } = *self;
+        (first[1]..end[1]).flat_map(move |row| (first[0]..end[0]).map(move |column| row * columns + column))
+    }
+}
+
 /// The values of the splines that are not zero at a place along an axis, their slopes, and the first knot.
 struct Basis {
     first: usize,
@@ -151,6 +173,23 @@ impl SplinedStereographic {
     fn seen(u: &Vector3) -> ([f64; 2], [[f64; 3]; 2]) {
         let seen = Stereographic::project([u.x, -u.y, -u.z], [0.0; 2]);
         (seen.ab, seen.by_ray)
+    }
+
+    /// The knots that images depend on which are nearer to that of u than so many distances of knots; None where constants are none of a
+    /// spline.
+    pub fn window(&self, u: &Vector3, margin: f64) -> Option<Window> {
+        let Grid { nodes, per_place, .. } = self.grid;
+        if nodes == 0 {
+            return None;
+        }
+        let (place, _) = Self::seen(u);
+        let at = |off: f64| self.grid.bases(place.map(|own| own + off / per_place)).map(|own| own.first);
+        Some(Window { first: at(-margin), end: at(margin).map(|first| first + nodes) })
+    }
+
+    /// How many knots there are in a row.
+    pub fn columns(&self) -> usize {
+        self.grid.size[0]
     }
 
     /// The place of the stereographic image that is moved to the given one.
