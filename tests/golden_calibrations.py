@@ -1,0 +1,172 @@
+"""Calibrations of an independent program (../shared/data/targets) as the numerics of the package take them."""
+
+import ast
+import base64
+import io
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from scipy.linalg import expm
+
+from photogram import Camera
+from photogram.targets.housing import Housing, Seen, mean_motion
+from photogram.targets.vision import cross_matrices, imaged, motion_partials
+from shared_data import SHARED
+
+DATA = SHARED / "targets"
+VIEWS = 20
+OPENCV = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
+
+
+@cache
+def golden(name):
+    """Return what a file of golden data holds."""
+    return json.loads((DATA / f"{name}.json").read_text())
+
+
+def pose(rotation, translation):
+    """Return the (4, 4) matrix of a pose, or (n, 4, 4) of several."""
+    found = np.zeros((*np.shape(translation)[:-1], 4, 4))
+    found[..., :3, :3], found[..., :3, 3], found[..., 3, 3] = rotation, translation, 1.0
+    return found
+
+
+@cache
+def rig_small():
+    """Return two cameras of eight parameters each, 20 views of a board whose points have weights."""
+    data = golden("rig_small")
+    found, seen = data["points"], rig_corners()
+    whole = np.load(DATA / "rig_small_cofactors.npy")
+    common = whole.shape[0] - 6 * VIEWS
+    poses = pose(found["R"], found["t"])
+    to_motion = np.zeros((common + 6, len(whole)))
+    to_motion[:common, :common] = np.eye(common)
+    to_motion[common:, common:] = np.concatenate(mean_motion(poses), axis=1)
+    points = np.array(found["board"])
+    weights = np.zeros((common, common))
+    weights[22:, 22:] = np.diag(1 / np.tile(data["board"]["point_sd"], len(points)) ** 2)
+    return Housing(
+        cameras=tuple(Camera("opencv", dict(zip(OPENCV, each, strict=True)), sd=np.inf) for each in found["cameras"]),
+        sensors=np.stack([np.eye(4), pose(found["sensor1"]["R"], found["sensor1"]["t"])]),
+        poses=poses,
+        points=points,
+        points_by_board=np.eye(3 * len(points)).reshape(len(points), 3, -1),
+        seen=seen,
+        cofactors=to_motion @ whole @ to_motion.T,
+        weights=weights,
+        variance=1.0,
+    )
+
+
+@cache
+def rig_corners():
+    """Return the corners of both cameras."""
+    corners = np.array(golden("rig_small")["corners"])
+    views, cameras, points = corners[:, :3].astype(np.int64).T
+    return Seen(cameras, views, points, corners[:, 3:5], 0.3 * 2.0 ** corners[:, 5])
+
+
+@cache
+def stored(name):
+    """Return the inputs of a calibration of mrcal, which are in its file: base 85 of the bytes of a NPZ."""
+    text = (DATA / f"{name}.cameramodel").read_text()
+    content = ast.literal_eval(text)["optimization_inputs"]
+    return dict(np.load(io.BytesIO(base64.b85decode(content)), allow_pickle=False))
+
+
+@cache
+def opencv8():
+    """Return the wide lens of mrcal at its optimum with regularisation; all poses once more from the corners."""
+    given, found = stored("opencv8-0"), golden("mrcal_opencv8")["with_regularisation"]
+    names = list(found["intrinsics"])
+    camera = Camera("opencv_pinhole", found["intrinsics"], sd=dict.fromkeys(names, np.inf))
+    observed = given["observations_board"].reshape(len(given["observations_board"]), -1, 3)
+    views, points = np.nonzero(observed[:, :, 2] > 0)
+    rows = observed[views, points]
+    points_by_board = bent(*given["observations_board"].shape[1:3])
+    spacing = float(given["calibration_object_spacing"])
+    board = grid(*given["observations_board"].shape[1:3], spacing) + points_by_board @ found["board_bend"]
+    seen = Seen(np.zeros_like(views), views, points, rows[:, :2], 1 / rows[:, 2])
+    frames = given["frames_rt_toref"]
+    rotations = rotations_of(frames[:, :3])
+    poses = pose(rotations, frames[:, 3:])
+    scale = found["regularisation_scale"]
+    sd = {name: 1 / scale["lens"] for name in names[4:9]}
+    sd |= {name: 1 / scale["denominator"] for name in names[9:]}
+    sd |= {name: 1 / scale["centre"] for name in ("cx", "cy")}
+    weights = np.diag([*(1 / sd[name] ** 2 if name in sd else 0.0 for name in names), 0.0, 0.0])
+    given = Housing((camera,), np.eye(4)[np.newaxis], poses, board, points_by_board, seen, np.zeros((20, 20)), weights)
+    moved = dense(given)[1]
+    poses = np.stack([pose(rotations_of(step[np.newaxis, 3:])[0] @ each[:3, :3], each[:3, 3] + step[:3])
+                      for step, each in zip(moved, poses, strict=True)])
+    housing = replace(given, poses=poses, variance=found["sigma_mrcal"] ** 2)
+    return replace(housing, cofactors=dense(housing)[0])
+
+
+def grid(rows, columns, spacing):
+    """Return the points of a chessboard."""
+    places = np.arange(rows * columns)
+    return spacing * np.column_stack([places % columns, places // columns, np.zeros_like(places)])
+
+
+def bent(rows, columns):
+    """Return what two parabolas, 4 a (1 - a) and 4 b (1 - b), do to the points of a board."""
+    places = np.arange(rows * columns)
+    a, b = places % columns / (columns - 1), places // columns / (rows - 1)
+    found = np.zeros((rows * columns, 3, 2))
+    found[:, 2] = np.column_stack([4 * a * (1 - a), 4 * b * (1 - b)])
+    return found
+
+
+def rotations_of(vectors):
+    """Return the (n, 3, 3) matrices of rotation vectors."""
+    return np.stack([expm(each) for each in cross_matrices(np.asarray(vectors))])
+
+
+def dense(housing):
+    """Return cofactors by normal equations of one's own, view by view, and (V, 6) steps of the poses alone."""
+    poses, normal = housing.poses, housing.weights.copy()
+    mean = mean_motion(poses)
+    inverse, across, steps = [], [], []
+    for view in range(len(poses)):
+        by_common, by_pose, misclosure = rows_of_view(housing, view)
+        own = np.linalg.inv(by_pose.T @ by_pose)
+        mixed = by_pose.T @ by_common
+        normal += by_common.T @ by_common - mixed.T @ own @ mixed
+        inverse.append(own)
+        across.append(-own @ mixed)
+        steps.append(own @ by_pose.T @ misclosure)
+    cofactors = np.linalg.inv(normal)
+    to_mean = np.einsum("vij,vjk->ik", mean, np.array(across))
+    both = np.vstack([np.eye(len(cofactors)), to_mean])
+    found = both @ cofactors @ both.T
+    found[-6:, -6:] += np.einsum("vij,vjk,vlk->il", mean, np.array(inverse), mean)
+    return found, np.array(steps)
+
+
+def rows_of_view(housing, view):
+    """Return whitened partials of the images of a view by the common unknowns and by its pose; observed less computed."""
+    seen = housing.seen[housing.seen.views == view]
+    by_common, by_pose = np.zeros((len(seen.sd), 2, housing.common)), np.zeros((len(seen.sd), 2, 6))
+    misclosure = np.zeros((len(seen.sd), 2))
+    for camera, model in enumerate(housing.cameras):
+        own = seen.cameras == camera
+        turned = housing.points[seen.points[own]] @ housing.poses[view, :3, :3].T
+        in_first = turned + housing.poses[view, :3, 3]
+        sensor = housing.sensors[camera]
+        images = imaged(model, in_first @ sensor[:3, :3].T + sensor[:3, 3])
+        in_board = images.by_point @ sensor[:3, :3] @ housing.poses[view, :3, :3]
+        by_common[own, :, housing.parameters(camera)] = images.by_parameters
+        if camera:
+            by_common[own, :, housing.sensor(camera)] = images.by_point @ motion_partials(in_first @ sensor[:3, :3].T)
+        by_common[own, :, housing.board] = in_board @ housing.points_by_board[seen.points[own]]
+        by_pose[own] = images.by_point @ sensor[:3, :3] @ motion_partials(turned)
+        misclosure[own] = seen.xy[own] - images.xy
+    sd = seen.sd[:, np.newaxis]
+    return (
+        (by_common / sd[:, :, np.newaxis]).reshape(-1, housing.common),
+        (by_pose / sd[:, :, np.newaxis]).reshape(-1, 6),
+        (misclosure / sd).ravel(),
+    )
