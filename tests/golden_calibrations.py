@@ -12,7 +12,8 @@ from scipy.linalg import expm
 
 from photogram import Camera
 from photogram.targets.housing import Housing, Seen, mean_motion
-from photogram.targets.vision import cross_matrices, imaged, motion_partials
+from photogram.targets.view_rows import view_rows
+from photogram.targets.vision import cross_matrices
 from shared_data import SHARED
 
 DATA = SHARED / "targets"
@@ -147,26 +148,11 @@ def dense(housing):
 
 
 def rows_of_view(housing, view):
-    """Return whitened partials of the images of a view by the common unknowns and by its pose; observed less computed."""
+    """Return whitened partials by the common unknowns and by the pose of a view; observed less computed."""
     seen = housing.seen[housing.seen.views == view]
-    by_common, by_pose = np.zeros((len(seen.sd), 2, housing.common)), np.zeros((len(seen.sd), 2, 6))
-    misclosure = np.zeros((len(seen.sd), 2))
-    for camera, model in enumerate(housing.cameras):
-        own = seen.cameras == camera
-        turned = housing.points[seen.points[own]] @ housing.poses[view, :3, :3].T
-        in_first = turned + housing.poses[view, :3, 3]
-        sensor = housing.sensors[camera]
-        images = imaged(model, in_first @ sensor[:3, :3].T + sensor[:3, 3])
-        in_board = images.by_point @ sensor[:3, :3] @ housing.poses[view, :3, :3]
-        by_common[own, :, housing.parameters(camera)] = images.by_parameters
-        if camera:
-            by_common[own, :, housing.sensor(camera)] = images.by_point @ motion_partials(in_first @ sensor[:3, :3].T)
-        by_common[own, :, housing.board] = in_board @ housing.points_by_board[seen.points[own]]
-        by_pose[own] = images.by_point @ sensor[:3, :3] @ motion_partials(turned)
-        misclosure[own] = seen.xy[own] - images.xy
-    sd = seen.sd[:, np.newaxis]
+    rows, sd = view_rows(housing, housing.poses[view], seen.cameras, seen.points), seen.sd[:, np.newaxis]
     return (
-        (by_common / sd[:, :, np.newaxis]).reshape(-1, housing.common),
-        (by_pose / sd[:, :, np.newaxis]).reshape(-1, 6),
-        (misclosure / sd).ravel(),
+        (rows.by_common / sd[:, :, np.newaxis]).reshape(-1, housing.common),
+        (rows.by_pose / sd[:, :, np.newaxis]).reshape(-1, 6),
+        ((seen.xy - rows.xy) / sd).ravel(),
     )
