@@ -14,7 +14,7 @@ from photogram.targets.datums import datum_rows
 from photogram.targets.housing import Housing
 from photogram.targets.vision import imaged, motion_partials, rays
 
-__all__ = ["image_partials", "of_functions", "projection_cofactors", "with_motion", "worst"]
+__all__ = ["common_partials", "image_partials", "of_functions", "projection_cofactors", "with_motion", "worst"]
 
 TOGETHER = 2048
 """Pixels whose partials are in memory at a time."""
@@ -48,6 +48,16 @@ def with_motion(housing: Housing, camera: int, rows: Floats) -> Floats:
     both = np.vstack([np.eye(len(housing.cofactors))[housing.parameters(camera)], rows])
     moved = rows @ housing.cofactors
     return np.asarray(np.vstack([own, moved]) @ both.T)
+
+
+def common_partials(
+    housing: Housing, camera: int, pixels: Floats, distance: float, rows: Floats
+) -> Floats:
+    """Return (n, 2, c) J by the common unknowns, in a datum that says nothing of the single views."""
+    partials = image_partials(housing.cameras[camera], pixels, distance)
+    found = partials[:, :, -6:] @ rows[:, : housing.common]
+    found[:, :, housing.parameters(camera)] += partials[:, :, :-6]
+    return np.asarray(found)
 
 
 def image_partials(camera: Camera, pixels: Floats, distance: float) -> Floats:

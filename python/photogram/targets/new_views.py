@@ -1,0 +1,185 @@
+"""What a further view of the board would add to the knowledge of a calibration.
+
+A view with the rows A_v of its pose and A_c of the common unknowns adds M = A_c' A_c - A_c' A_v (A_v' A_v)^-1
+A_v' A_c to the inverse of their cofactors. Of functions J of the unknowns, with F = Q J',
+
+    J (Q^-1 + M)^-1 J' = J Q J' - F' M (I + Q M)^-1 F,
+
+where only the unknowns that the view touches count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.targets.housing import Housing, transformed
+from photogram.targets.projection import worst
+from photogram.targets.view_rows import view_rows
+from photogram.targets.vision import rays
+
+__all__ = ["Added", "Candidate", "NewView", "added_by", "best_views", "seen_from"]
+
+FEWEST = 12
+"""Corners that a picture must have to count."""
+MARGIN = 5.0
+"""Pixels about a corner that must be in the picture for a detector to find it."""
+STRAIGHT = 1e-6
+"""By how much the ray of an image may miss the point that it is of: more, and the lens has folded."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A view that may be taken.
+
+    Attributes
+    ----------
+    name
+        Where the board is to be held, in words.
+    pose
+        (4, 4) board -> camera 0.
+    """
+
+    name: str
+    pose: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Added:
+    """What a view adds.
+
+    Attributes
+    ----------
+    touched
+        (t,) common unknowns that it says something of.
+    normal
+        (t, t) M of these.
+    corners
+        (K,) corners in the picture of each camera.
+    """
+
+    touched: Indices
+    normal: Floats
+    corners: Indices
+
+    def gain(self, cofactors: Floats) -> Floats:
+        """Return (t, t) M (I + Q M)^-1: F' of it F is what variances lose."""
+        own = cofactors[np.ix_(self.touched, self.touched)]
+        found = np.linalg.solve(np.eye(len(own)) + self.normal @ own, self.normal)
+        return np.asarray((found + found.T) / 2)
+
+
+@dataclass(frozen=True, eq=False)
+class NewView:
+    """A view that is worth taking, and the map of uncertainty with it.
+
+    Attributes
+    ----------
+    candidate
+        The view.
+    corners
+        (K,) corners in the picture of each camera.
+    sd
+        (n,) standard deviations of the map in the worst direction, pixels.
+    """
+
+    candidate: Candidate
+    corners: Indices
+    sd: Floats
+
+    @property
+    def largest(self) -> float:
+        """Of the map."""
+        return float(self.sd.max())
+
+    @property
+    def rms(self) -> float:
+        """Root mean square over the map."""
+        return float(np.sqrt(np.mean(self.sd**2)))
+
+
+def seen_from(housing: Housing, pose: Floats, sizes: Floats) -> tuple[Indices, Indices]:
+    """Return cameras and points of the images that a view would have: those in pictures with 12 or more.
+
+    Parameters
+    ----------
+    housing, pose
+        The cameras, and the (4, 4) pose board -> camera 0.
+    sizes
+        (K, 2) width and height of pictures.
+    """
+    cameras, points = [], []
+    for number, camera in enumerate(housing.cameras):
+        places = transformed(housing.sensors[number] @ pose, housing.points)
+        xy = camera.project(places * [1.0, -1.0, -1.0])
+        with np.errstate(invalid="ignore"):
+            inside = ((xy >= MARGIN) & (xy <= sizes[number] - 1 - MARGIN)).all(axis=1)
+            back = rays(camera, np.where(inside[:, np.newaxis], xy, np.nan))
+            towards = places / np.linalg.norm(places, axis=1)[:, np.newaxis]
+            own = np.flatnonzero(inside & (np.linalg.norm(back - towards, axis=1) < STRAIGHT))
+        if len(own) >= FEWEST:
+            cameras.append(np.full(len(own), number))
+            points.append(own)
+    if not points:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    return np.concatenate(cameras), np.concatenate(points)
+
+
+def added_by(housing: Housing, pose: Floats, sizes: Floats, sd: float) -> Added | None:
+    """Return what a view adds, with corners of a standard deviation in pixels; None where nothing is seen."""
+    cameras, points = seen_from(housing, pose, sizes)
+    if not len(points):
+        return None
+    rows = view_rows(housing, pose, cameras, points)
+    by_common = rows.by_common.reshape(-1, housing.common) / sd
+    touched = np.flatnonzero(by_common.any(axis=0))
+    by_common = by_common[:, touched]
+    basis = np.linalg.qr(rows.by_pose.reshape(-1, 6))[0]
+    mixed = basis.T @ by_common
+    counts = np.bincount(cameras, minlength=len(housing.cameras))
+    return Added(touched, by_common.T @ by_common - mixed.T @ mixed, counts)
+
+
+def best_views(
+    housing: Housing, functions: Floats, candidates: list[Candidate], sizes: Floats, sd: float, count: int
+) -> list[NewView]:
+    """Return views that make the largest standard deviation of a map smallest, each with those before it.
+
+    Parameters
+    ----------
+    housing
+        The cameras.
+    functions
+        (n, 2, c) J of the map by the common unknowns, in a datum that stays as it is.
+    candidates
+        Views that may be taken, each once.
+    sizes, sd
+        (K, 2) of pictures, and the standard deviation of a corner in pixels.
+    count
+        How many views.
+    """
+    seen = [(each, added_by(housing, each.pose, sizes, sd)) for each in candidates]
+    left = [(each, added) for each, added in seen if added is not None]
+    cofactors = housing.cofactors[: housing.common, : housing.common].copy()
+    found: list[NewView] = []
+    while left and len(found) < count:
+        lever = functions @ cofactors
+        now = lever @ functions.transpose(0, 2, 1)
+        best = min(
+            ((NewView(each, added.corners, _after(now, lever, cofactors, added)), added) for each, added in left),
+            key=lambda pair: (pair[0].largest, pair[0].rms),
+        )
+        scale = np.sqrt(housing.variance)
+        found.append(NewView(best[0].candidate, best[0].corners, scale * best[0].sd))
+        left = [pair for pair in left if pair[0] is not best[0].candidate]
+        to_touched = cofactors[:, best[1].touched]
+        cofactors -= to_touched @ best[1].gain(cofactors) @ to_touched.T
+    return found
+
+
+def _after(now: Floats, lever: Floats, cofactors: Floats, added: Added) -> Floats:
+    """Return (n,) standard deviations in the worst direction with a further view."""
+    own = lever[:, :, added.touched]
+    return worst(now - (own @ added.gain(cofactors)) @ own.transpose(0, 2, 1))
