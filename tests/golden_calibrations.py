@@ -8,12 +8,10 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from scipy.linalg import expm
 
-from photogram import Camera
+from photogram import Camera, _photocore
 from photogram.targets.housing import Housing, Seen, mean_motion
 from photogram.targets.view_rows import view_rows
-from photogram.targets.vision import cross_matrices
 from shared_data import SHARED
 
 DATA = SHARED / "targets"
@@ -91,7 +89,7 @@ def opencv8():
     board = grid(*given["observations_board"].shape[1:3], spacing) + points_by_board @ found["board_bend"]
     seen = Seen(np.zeros_like(views), views, points, rows[:, :2], 1 / rows[:, 2])
     frames = given["frames_rt_toref"]
-    rotations = rotations_of(frames[:, :3])
+    rotations = _photocore.vector_rotations(frames[:, :3])
     poses = pose(rotations, frames[:, 3:])
     scale = found["regularisation_scale"]
     sd = {name: 1 / scale["lens"] for name in names[4:9]}
@@ -100,7 +98,7 @@ def opencv8():
     weights = np.diag([*(1 / sd[name] ** 2 if name in sd else 0.0 for name in names), 0.0, 0.0])
     given = Housing((camera,), np.eye(4)[np.newaxis], poses, board, points_by_board, seen, np.zeros((20, 20)), weights)
     moved = dense(given)[1]
-    poses = np.stack([pose(rotations_of(step[np.newaxis, 3:])[0] @ each[:3, :3], each[:3, 3] + step[:3])
+    poses = np.stack([pose(_photocore.vector_rotations(step[np.newaxis, 3:])[0] @ each[:3, :3], each[:3, 3] + step[:3])
                       for step, each in zip(moved, poses, strict=True)])
     housing = replace(given, poses=poses, variance=found["sigma_mrcal"] ** 2)
     return replace(housing, cofactors=dense(housing)[0])
@@ -119,11 +117,6 @@ def bent(rows, columns):
     found = np.zeros((rows * columns, 3, 2))
     found[:, 2] = np.column_stack([4 * a * (1 - a), 4 * b * (1 - b)])
     return found
-
-
-def rotations_of(vectors):
-    """Return the (n, 3, 3) matrices of rotation vectors."""
-    return np.stack([expm(each) for each in cross_matrices(np.asarray(vectors))])
 
 
 def dense(housing):

@@ -13,7 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
 from photogram.targets.housing import Housing
-from photogram.targets.vision import cross_matrices, imaged, motion_partials
+from photogram.targets.imaging import cross_matrices, imaged, motion_partials
 
 __all__ = ["DatumName", "datum_rows", "fixed_points", "housing_rows"]
 
@@ -37,14 +37,14 @@ def datum_rows(
     datum
         Its name.
     fixed
-        Of `image`: (n, 3) points in the axes of the camera that hold still, their (n, 2, 2) square roots of
-        weights S, S'S = W, and whether they are at finite distances.
+        Of `image`: (n, 3) points in the axes of the camera that hold still, their (n, 2, 2) weights W,
+        and whether they are at finite distances.
     """
     found = np.zeros((6, housing.common + 6))
     own = housing.parameters(camera)
     if datum == "corners":
         places, sd = housing.places(camera)
-        found[:, own] = fixed_points(housing.cameras[camera], places, np.eye(2) / sd[:, np.newaxis, np.newaxis])
+        found[:, own] = fixed_points(housing.cameras[camera], places, np.eye(2) / sd[:, np.newaxis, np.newaxis] ** 2)
     elif datum == "image" and fixed is not None:
         found[:, own] = fixed_points(housing.cameras[camera], *fixed)
     elif datum == "mean-frames":
@@ -58,7 +58,7 @@ def datum_rows(
     return found
 
 
-def fixed_points(camera: Camera, points: Floats, roots: Floats, finite: bool = True) -> Floats:
+def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool = True) -> Floats:
     """Return (6, p) T by which the images of points move least when the camera's parameters change.
 
     T = -(sum G' Pi' W Pi G)^-1 sum G' Pi' W K. At infinity there is no translation to find.
@@ -67,8 +67,8 @@ def fixed_points(camera: Camera, points: Floats, roots: Floats, finite: bool = T
     ----------
     camera, points
         The camera, and (n, 3) points in its axes.
-    roots
-        (n, 2, 2) S with S'S = W.
+    weights
+        (n, 2, 2) W of their images.
     finite
         Whether they are at finite distances.
     """
@@ -76,10 +76,10 @@ def fixed_points(camera: Camera, points: Floats, roots: Floats, finite: bool = T
     for start in range(0, len(points), TOGETHER):
         part = slice(start, start + TOGETHER)
         images = imaged(camera, points[part])
-        by_motion = (roots[part] @ images.by_point @ motion_partials(points[part], finite)).reshape(-1, 6)
-        by_parameters = (roots[part] @ images.by_parameters).reshape(len(by_motion), -1)
-        normal += by_motion.T @ by_motion
-        right += by_motion.T @ by_parameters
+        by_motion = images.by_point @ motion_partials(points[part], finite)
+        weighted = (weights[part] @ by_motion).reshape(-1, 6)
+        normal += weighted.T @ by_motion.reshape(-1, 6)
+        right += weighted.T @ images.by_parameters.reshape(len(weighted), -1)
     return _moved_back(normal, right, finite)
 
 

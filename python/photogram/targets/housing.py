@@ -13,7 +13,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network.cameras import Camera
-from photogram.targets.vision import cross_matrices
+from photogram.targets.imaging import cross_matrices
 
 __all__ = ["Housing", "Seen", "mean_motion", "transformed"]
 

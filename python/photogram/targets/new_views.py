@@ -18,7 +18,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.targets.housing import Housing, transformed
 from photogram.targets.projection import worst
 from photogram.targets.view_rows import view_rows
-from photogram.targets.vision import rays
+from photogram.targets.imaging import rays
 
 __all__ = ["Added", "Candidate", "NewView", "added_by", "best_views", "seen_from"]
 

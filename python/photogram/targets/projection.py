@@ -12,7 +12,7 @@ from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
 from photogram.targets.datums import datum_rows
 from photogram.targets.housing import Housing
-from photogram.targets.vision import imaged, motion_partials, rays
+from photogram.targets.imaging import imaged, motion_partials, rays
 
 __all__ = ["common_partials", "image_partials", "of_functions", "projection_cofactors", "with_motion", "worst"]
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.targets.housing import Housing
-from photogram.targets.vision import imaged, motion_partials, rays
+from photogram.targets.imaging import imaged, motion_partials, rays
 
 __all__ = ["Triangulated", "triangulated"]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.targets.housing import Housing
-from photogram.targets.vision import imaged, motion_partials
+from photogram.targets.imaging import imaged, motion_partials
 
 __all__ = ["ViewRows", "view_rows"]
 
