@@ -1,4 +1,4 @@
-"""Calibrations of an independent program (../shared/data/targets) as the numerics of the package take them."""
+"""Calibrations of an independent program (../shared/data/targets) as arrays of a housing."""
 
 import ast
 import base64
@@ -47,7 +47,9 @@ def rig_small():
     weights = np.zeros((common, common))
     weights[22:, 22:] = np.diag(1 / np.tile(data["board"]["point_sd"], len(points)) ** 2)
     return Housing(
-        cameras=tuple(Camera("opencv", dict(zip(OPENCV, each, strict=True)), sd=np.inf) for each in found["cameras"]),
+        cameras=tuple(
+            Camera("opencv", dict(zip(OPENCV, each, strict=True)), sd=np.inf) for each in found["cameras"]
+        ),
         sensors=np.stack([np.eye(4), pose(found["sensor1"]["R"], found["sensor1"]["t"])]),
         poses=poses,
         points=points,
@@ -77,7 +79,7 @@ def stored(name):
 
 @cache
 def opencv8():
-    """Return the wide lens of mrcal at its optimum with regularisation; all poses once more from the corners."""
+    """Return the wide lens of mrcal at its optimum with regularisation; poses once more from the corners."""
     given, found = stored("opencv8-0"), golden("mrcal_opencv8")["with_regularisation"]
     names = list(found["intrinsics"])
     camera = Camera("opencv_pinhole", found["intrinsics"], sd=dict.fromkeys(names, np.inf))
@@ -92,14 +94,20 @@ def opencv8():
     rotations = _photocore.vector_rotations(frames[:, :3])
     poses = pose(rotations, frames[:, 3:])
     scale = found["regularisation_scale"]
-    sd = {name: 1 / scale["lens"] for name in names[4:9]}
-    sd |= {name: 1 / scale["denominator"] for name in names[9:]}
-    sd |= {name: 1 / scale["centre"] for name in ("cx", "cy")}
+    sd = dict.fromkeys(names[4:9], 1 / scale["lens"])
+    sd |= dict.fromkeys(names[9:], 1 / scale["denominator"])
+    sd |= dict.fromkeys(("cx", "cy"), 1 / scale["centre"])
     weights = np.diag([*(1 / sd[name] ** 2 if name in sd else 0.0 for name in names), 0.0, 0.0])
-    given = Housing((camera,), np.eye(4)[np.newaxis], poses, board, points_by_board, seen, np.zeros((20, 20)), weights)
+    given = Housing(
+        (camera,), np.eye(4)[np.newaxis], poses, board, points_by_board, seen, np.zeros((20, 20)), weights
+    )
     moved = dense(given)[1]
-    poses = np.stack([pose(_photocore.vector_rotations(step[np.newaxis, 3:])[0] @ each[:3, :3], each[:3, 3] + step[:3])
-                      for step, each in zip(moved, poses, strict=True)])
+    poses = np.stack(
+        [
+            pose(_photocore.vector_rotations(step[np.newaxis, 3:])[0] @ each[:3, :3], each[:3, 3] + step[:3])
+            for step, each in zip(moved, poses, strict=True)
+        ]
+    )
     housing = replace(given, poses=poses, variance=found["sigma_mrcal"] ** 2)
     return replace(housing, cofactors=dense(housing)[0])
 
@@ -120,7 +128,7 @@ def bent(rows, columns):
 
 
 def dense(housing):
-    """Return cofactors by normal equations of one's own, view by view, and (V, 6) steps of the poses alone."""
+    """Return cofactors by normal equations of views, one by one, and (V, 6) steps of the poses alone."""
     poses, normal = housing.poses, housing.weights.copy()
     mean = mean_motion(poses)
     inverse, across, steps = [], [], []

@@ -1,5 +1,7 @@
 """What further views add to a calibration, against an independent program and against adjusting with them."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -28,7 +30,9 @@ def test_before(functions):
 @pytest.mark.parametrize("number", range(6))
 def test_a_view_alone(functions, number):
     each = golden("rig_small")["new_views"]["candidates"][number]
-    (found,) = best_views(rig_small(), functions, [Candidate(each["name"], pose(each["R"], each["t"]))], SIZES, SD, 1)
+    (found,) = best_views(
+        rig_small(), functions, [Candidate(each["name"], pose(each["R"], each["t"]))], SIZES, SD, 1
+    )
     assert found.corners.tolist() == each["corners"]
     assert found.sd == pytest.approx(each["worst_sd_after"], rel=1e-6)
     assert (found.largest, found.rms) == pytest.approx((each["largest"], each["rms"]), rel=1e-6)
@@ -40,4 +44,6 @@ def test_the_best_view_is_first_and_the_next_counts_on_it(functions):
     found = best_views(rig_small(), functions, candidates, SIZES, SD, 6)
     assert found[0].candidate.name == min(data, key=lambda each: each["largest"])["name"]
     assert len({each.candidate.name for each in found}) == 6
-    assert all((later.sd <= earlier.sd + 1e-12).all() for earlier, later in zip(found, found[1:], strict=False))
+    assert all(
+        (later.sd <= earlier.sd + 1e-12).all() for earlier, later in pairwise(found)
+    )

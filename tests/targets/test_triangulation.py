@@ -1,4 +1,4 @@
-"""Points from two cameras with the errors of pixels and of the calibration, against an independent program."""
+"""Points from two cameras, with errors of pixels and calibration, against an independent program."""
 
 import numpy as np
 import pytest
@@ -37,6 +37,8 @@ def test_points_and_both_parts_of_their_covariance(datum):
 
 
 def test_rays_that_do_not_meet_have_no_point():
-    found = triangulated(rig_small(), (0, 1), np.array([[[640.0, 480.0], [20.0, 900.0]], [[np.nan] * 2] * 2]), SD)
+    found = triangulated(
+        rig_small(), (0, 1), np.array([[[640.0, 480.0], [20.0, 900.0]], [[np.nan] * 2] * 2]), SD
+    )
     assert np.isnan(found.points[1]).all()
     assert np.isnan(found.by_pixels[1]).all()

@@ -1,4 +1,4 @@
-"""Cross-validation: do parts of the views agree as well as their cofactors say?
+"""Cross-validation: whether parts of the views agree as well as their cofactors say.
 
 Parts a and b are adjusted by themselves from the values of the whole. With the weights P of what both share,
 priors and the nominal points of the board,
@@ -19,45 +19,12 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.statistics.distributions import log_chi_square, log_fisher
+from photogram.targets.agreement import Agreement
 from photogram.targets.datums import datum_rows
 from photogram.targets.housing import Housing
 from photogram.targets.projection import common_partials
 
-__all__ = ["Agreement", "CrossMap", "changes_between", "cross_map", "parts_agree", "splits"]
-
-EXPLAINED = 0.01
-"""Probability beyond which parts differ as they should."""
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """The test of a difference of two parts.
-
-    Attributes
-    ----------
-    name
-        What differs: a camera, or all cameras and sensors.
-    chi2, dof
-        dk' cov(dk)^-1 dk over the variance of unit weight, and how many unknowns.
-    probability
-        Of a difference as large.
-    """
-
-    name: str
-    chi2: float
-    dof: int
-    probability: float
-
-    @property
-    def explained(self) -> bool:
-        """Whether the cofactors explain the difference."""
-        return self.probability > EXPLAINED
-
-    @property
-    def factor(self) -> float:
-        """By which the parts differ more than their standard deviations say, in the mean."""
-        return math.sqrt(self.chi2 / self.dof)
+__all__ = ["CrossMap", "changes_between", "cross_map", "parts_agree", "splits"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +50,7 @@ class CrossMap:
 
 
 def splits(views: int, into: str | int) -> list[tuple[list[int], list[int]]]:
-    """Return pairs of parts of the views: `odd`, even against odd numbers; `halves`; K parts against the rest."""
+    """Return parts of the views in pairs: `odd`: even, odd numbers; `halves`; K: each part and the rest."""
     numbers = list(range(views))
     if into == "odd":
         return [(numbers[::2], numbers[1::2])]
@@ -101,7 +68,9 @@ def changes_between(a: Housing, b: Housing) -> tuple[Floats, Floats]:
         if number:
             turn = b.sensors[number, :3, :3] @ a.sensors[number, :3, :3].T
             moved = b.sensors[number, :3, 3] - a.sensors[number, :3, 3]
-            found[a.sensor(number)] = np.concatenate([moved, _photocore.rotation_vectors(turn[np.newaxis])[0]])
+            found[a.sensor(number)] = np.concatenate(
+                [moved, _photocore.rotation_vectors(turn[np.newaxis])[0]]
+            )
     common = slice(0, a.common)
     own, other = a.cofactors[common, common], b.cofactors[common, common]
     shared = own @ a.weights @ other
@@ -129,10 +98,8 @@ def parts_agree(
         groups["all"] = slice(0, a.board.start)
     found = []
     for name, own in groups.items():
-        dof = len(change[own])
         chi2 = float(change[own] @ np.linalg.solve(cofactors[own, own], change[own])) / variance
-        logarithm = log_chi_square(chi2, dof) if math.isinf(freedom) else log_fisher(chi2 / dof, dof, freedom)
-        found.append(Agreement(name, chi2, dof, float(np.exp(logarithm))))
+        found.append(Agreement.of(name, chi2, len(change[own]), freedom))
     return found
 
 

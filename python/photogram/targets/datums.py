@@ -44,7 +44,9 @@ def datum_rows(
     own = housing.parameters(camera)
     if datum == "corners":
         places, sd = housing.places(camera)
-        found[:, own] = fixed_points(housing.cameras[camera], places, np.eye(2) / sd[:, np.newaxis, np.newaxis] ** 2)
+        found[:, own] = fixed_points(
+            housing.cameras[camera], places, np.eye(2) / sd[:, np.newaxis, np.newaxis] ** 2
+        )
     elif datum == "image" and fixed is not None:
         found[:, own] = fixed_points(housing.cameras[camera], *fixed)
     elif datum == "mean-frames":
@@ -84,7 +86,7 @@ def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool =
 
 
 def housing_rows(housing: Housing) -> Floats:
-    """Return (6, c + 6) T_rig: the one motion, in axes of camera 0, by which all corners of all cameras move least."""
+    """Return (6, c + 6) T_rig: motion of axes of camera 0 by which the corners of all cameras move least."""
     normal, right = np.zeros((6, 6)), np.zeros((6, housing.common + 6))
     for number, camera in enumerate(housing.cameras):
         places, sd = housing.places(number)

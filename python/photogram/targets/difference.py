@@ -13,11 +13,12 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
 from photogram.targets.imaging import imaged, motion_partials, rays
 
-__all__ = ["Criterion", "Fitted", "differences_at", "fitted_motion", "image_grid", "points_at"]
+__all__ = ["Criterion", "Fitted", "differences_at", "fitted_motion", "points_at"]
 
 Criterion = Literal["pixels", "mrcal"]
 """What is least: squares of the differences in pixels, or fourth powers of angles as mrcal 2 has it."""
@@ -25,6 +26,8 @@ Criterion = Literal["pixels", "mrcal"]
 STEPS = 200
 CLOSE = 1e-11
 """Radians, and of the shortest distance: a motion that changes by less is found."""
+FEWEST = 10
+"""Pixels that a motion is fitted to."""
 HUBER = np.radians(5.0) ** 2
 """theta^2 beyond which mrcal's criterion grows more slowly."""
 
@@ -40,25 +43,16 @@ class Fitted:
     finite
         Whether the translation was fitted: all distances are finite.
     points
-        How many pixels took part, each at every distance.
-    steps
-        How many steps it took.
+        How many pixels took part, counted at every distance.
     """
 
     motion: Floats
     finite: bool
     points: int
-    steps: int
-
-
-def image_grid(size: tuple[int, int], grid: tuple[int, int]) -> Floats:
-    """Return (columns rows, 2) pixels over a picture, row by row, its corners included."""
-    across, down = (np.linspace(0.0, length - 1.0, count) for length, count in zip(size, grid, strict=True))
-    return np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
 
 
 def points_at(camera: Camera, pixels: Floats, distances: Sequence[float]) -> Floats:
-    """Return (D n, 3) where pixels look, in the axes of a camera: at each distance; directions at infinity."""
+    """Return (D n, 3) where pixels look, in the axes of a camera, at each distance; directions at infinity."""
     towards = rays(camera, pixels)
     return np.concatenate([towards * (each if np.isfinite(each) else 1.0) for each in distances])
 
@@ -91,19 +85,27 @@ def fitted_motion(
     criterion
         What is least.
     weights
-        Of each pixel: (n, 2, 2) W of differences in pixels, (n,) w of mrcal's criterion; None: equal weights.
+        Of each pixel at each distance, one after the other: (D n, 2, 2) W of differences in pixels, (D n,) w
+        of mrcal's criterion; NaN where a pixel does not count. None: equal weights.
+
+    Raises
+    ------
+    InputError
+        The two see too few pixels in common.
     """
     finite = bool(np.isfinite(distances).all())
-    towards, seen = points_at(a, pixels, distances), rays(b, pixels)
+    towards = points_at(a, pixels, distances)
+    aims, places = (np.concatenate([each] * len(distances)) for each in (rays(b, pixels), pixels))
     if weights is None:
-        weights = np.tile(np.eye(2), (len(pixels), 1, 1)) if criterion == "pixels" else np.ones(len(pixels))
-    aims, places, weights = (np.concatenate([each] * len(distances)) for each in (seen, pixels, weights))
-    usable = np.isfinite(towards).all(axis=1) & np.isfinite(aims).all(axis=1)
+        weights = np.tile(np.eye(2), (len(towards), 1, 1)) if criterion == "pixels" else np.ones(len(towards))
+    numbers = np.column_stack([towards, aims, weights.reshape(len(towards), -1)])
+    usable = np.isfinite(numbers).all(axis=1)
+    if (count := int(np.count_nonzero(usable))) < FEWEST:
+        raise InputError(f"the two cameras both see {count} of the pixels: too few to compare them")
     towards, aims, places, weights = towards[usable], aims[usable], places[usable], weights[usable]
     motion, free = np.eye(4), slice(0 if finite else 3, 6)
     motion[:3, :3] = _turned_onto(_unit(towards), aims)
-    steps = 0
-    for steps in range(1, STEPS + 1):
+    for _ in range(STEPS):
         moved = transformed(motion, towards)
         by_motion = motion_partials(moved, finite)[:, :, free]
         if criterion == "pixels":
@@ -115,7 +117,7 @@ def fitted_motion(
         motion[:3] = _stepped(motion, step)
         if np.abs(step[3:]).max() < CLOSE and np.abs(step[:3]).max() < CLOSE * np.min(distances):
             break
-    return Fitted(motion, finite, int(usable.sum()) // len(distances), steps)
+    return Fitted(motion, finite, count)
 
 
 def _stepped(motion: Floats, step: Floats) -> Floats:

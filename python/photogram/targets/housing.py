@@ -67,8 +67,8 @@ class Housing:
     seen
         The corners.
     cofactors
-        (c + 6, c + 6) of the common unknowns and of the mean motion of the boards (:func:`mean_motion`), for a
-        priori unit weight.
+        (c + 6, c + 6) of the common unknowns and of the mean motion of the boards (:func:`mean_motion`), for
+        a priori unit weight.
     weights
         (c, c) of what was known of the common unknowns before: inverse covariances, 0 without.
     variance

@@ -43,8 +43,8 @@ def imaged(camera: Camera, points: Floats) -> Imaged:
 
 
 def rays(camera: Camera, pixels: Floats) -> Floats:
-    """Return (n, 3) unit vectors in the axes of a camera to where (n, 2) pixels look; NaN for those without."""
-    return camera.rays(pixels) * TURNED
+    """Return (n, 3) unit vectors, in the axes of a camera, to where (n, 2) pixels look; NaN without."""
+    return np.asarray(camera.rays(pixels) * TURNED)
 
 
 def cross_matrices(vectors: Floats) -> Floats:

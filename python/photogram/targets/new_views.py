@@ -16,9 +16,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.targets.housing import Housing, transformed
+from photogram.targets.imaging import rays
 from photogram.targets.projection import worst
 from photogram.targets.view_rows import view_rows
-from photogram.targets.imaging import rays
 
 __all__ = ["Added", "Candidate", "NewView", "added_by", "best_views", "seen_from"]
 
@@ -167,15 +167,12 @@ def best_views(
     while left and len(found) < count:
         lever = functions @ cofactors
         now = lever @ functions.transpose(0, 2, 1)
-        best = min(
-            ((NewView(each, added.corners, _after(now, lever, cofactors, added)), added) for each, added in left),
-            key=lambda pair: (pair[0].largest, pair[0].rms),
-        )
-        scale = np.sqrt(housing.variance)
-        found.append(NewView(best[0].candidate, best[0].corners, scale * best[0].sd))
-        left = [pair for pair in left if pair[0] is not best[0].candidate]
-        to_touched = cofactors[:, best[1].touched]
-        cofactors -= to_touched @ best[1].gain(cofactors) @ to_touched.T
+        tried = [_after(now, lever, cofactors, added) for _, added in left]
+        best = min(range(len(left)), key=lambda row: (tried[row].max(), np.mean(tried[row] ** 2)))
+        candidate, added = left.pop(best)
+        found.append(NewView(candidate, added.corners, np.sqrt(housing.variance) * tried[best]))
+        to_touched = cofactors[:, added.touched]
+        cofactors -= to_touched @ added.gain(cofactors) @ to_touched.T
     return found
 
 

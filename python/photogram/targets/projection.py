@@ -10,11 +10,18 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
-from photogram.targets.datums import datum_rows
 from photogram.targets.housing import Housing
 from photogram.targets.imaging import imaged, motion_partials, rays
 
-__all__ = ["common_partials", "image_partials", "of_functions", "projection_cofactors", "with_motion", "worst"]
+__all__ = [
+    "common_partials",
+    "image_partials",
+    "of_functions",
+    "point_partials",
+    "projection_cofactors",
+    "with_motion",
+    "worst",
+]
 
 TOGETHER = 2048
 """Pixels whose partials are in memory at a time."""
@@ -50,9 +57,7 @@ def with_motion(housing: Housing, camera: int, rows: Floats) -> Floats:
     return np.asarray(np.vstack([own, moved]) @ both.T)
 
 
-def common_partials(
-    housing: Housing, camera: int, pixels: Floats, distance: float, rows: Floats
-) -> Floats:
+def common_partials(housing: Housing, camera: int, pixels: Floats, distance: float, rows: Floats) -> Floats:
     """Return (n, 2, c) J by the common unknowns, in a datum that says nothing of the single views."""
     partials = image_partials(housing.cameras[camera], pixels, distance)
     found = partials[:, :, -6:] @ rows[:, : housing.common]
@@ -63,7 +68,11 @@ def common_partials(
 def image_partials(camera: Camera, pixels: Floats, distance: float) -> Floats:
     """Return (n, 2, p + 6) J = (K, Pi G) of points at (n, 2) pixels and a distance."""
     finite = bool(np.isfinite(distance))
-    points = rays(camera, pixels) * (distance if finite else 1.0)
+    return point_partials(camera, rays(camera, pixels) * (distance if finite else 1.0), finite)
+
+
+def point_partials(camera: Camera, points: Floats, finite: bool) -> Floats:
+    """Return (n, 2, p + 6) J = (K, Pi G) of (n, 3) points, or directions, in the axes of a camera."""
     images = imaged(camera, points)
     return np.concatenate([images.by_parameters, images.by_point @ motion_partials(points, finite)], axis=2)
 

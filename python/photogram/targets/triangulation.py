@@ -60,7 +60,7 @@ class Triangulated:
         along = self.points / self.distances[:, np.newaxis]
         own = self.by_calibration.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
         variances = [np.einsum("ni,nij,nj->n", along, each, along) for each in (self.by_pixels, own)]
-        return np.sqrt(np.stack(variances, axis=1))
+        return np.asarray(np.sqrt(np.stack(variances, axis=1)))
 
     @property
     def covariance(self) -> Floats:
@@ -134,7 +134,7 @@ def _settled(housing: Housing, cameras: Sequence[int], pixels: Floats, points: F
 def _rows(
     housing: Housing, cameras: Sequence[int], pixels: Floats, points: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return (n, 2 k) observed less computed, their partials by the points (n, 2 k, 3) and by the unknowns."""
+    """Return (n, 2 k) observed less computed, and partials by points (n, 2 k, 3) and unknowns (n, 2 k, c)."""
     count = len(points)
     residuals = np.empty((count, len(cameras), 2))
     by_point = np.empty((count, len(cameras), 2, 3))
@@ -163,8 +163,8 @@ def _inverses(by_point: Floats) -> Floats:
 
 def _inverted(matrices: Floats) -> Floats:
     """Return inverses; NaN of what has none."""
-    known = np.isfinite(matrices).all(axis=(1, 2))
-    known[known] = np.linalg.cond(matrices[known]) < 1 / np.finfo(float).eps
+    rows = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
+    rows = rows[np.linalg.cond(matrices[rows]) < 1 / np.finfo(float).eps]
     found = np.full_like(matrices, np.nan)
-    found[known] = np.linalg.inv(matrices[known])
+    found[rows] = np.linalg.inv(matrices[rows])
     return found

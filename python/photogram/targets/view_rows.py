@@ -1,4 +1,4 @@
-"""Observation equations of one view of the board: partials of its images by the common unknowns and its pose."""
+"""Observation equations of one view: partials of its images by the common unknowns and by its pose."""
 
 from __future__ import annotations
 
