@@ -1,0 +1,292 @@
+"""First values of cameras, poses and rig from corners of boards alone, for any lens."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
+from photogram.messages import Message, counted, listed
+from photogram.network.cameras import Camera
+from photogram.targets.board import Board
+from photogram.targets.corners import Corners
+from photogram.targets.families import POOR, misfits, rays_of
+from photogram.targets.first_camera import first_camera, picture_size
+from photogram.targets.homographies import centres, frontal_tilts, poses, ray_homographies
+from photogram.targets.sensors import Rig, connected, mean_pose
+from photogram.targets.sightings import LISTED, Listings, Sightings
+
+__all__ = ["FirstCalibration", "first_values"]
+
+FLAT = 0.02
+"""Of the extent of a board: what its points may be off a plane for first values of planes."""
+FRONTAL = math.radians(3.0)
+"""Boards tilted by less say nothing of a focal length."""
+ROUNDING = 1e-6
+"""Radians: pictures that fit to this fit."""
+CLEAR = 1.5
+"""What the misfit of an order may be over the best one's, to be taken for the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class FirstCalibration:
+    """Where the adjustment of a calibration begins: K cameras, V views, P pictures.
+
+    Attributes
+    ----------
+    cameras
+        K cameras of the wanted model; what an adjustment may change is free.
+    sensors
+        (K, 4, 4) from the reference camera to each camera, axes of vision.
+    references
+        (K,) the reference of each camera: 0, or, of cameras without a view in common with those of 0, the
+        first of the cameras that hang together with them.
+    poses
+        (V, 4, 4) board -> reference, of the cameras with the lowest reference that see it; NaN where unknown.
+    picture_poses
+        (P, 4, 4) board -> camera of the picture; NaN where unknown.
+    corners
+        The corners, numbered anew where they were listed in another order.
+    without
+        Pictures without a pose, and why.
+    remarks
+        What was found on the way: orders of corners, frontal views, cameras by themselves.
+    """
+
+    cameras: list[Camera]
+    sensors: Floats
+    references: Indices
+    poses: Floats
+    picture_poses: Floats
+    corners: Corners
+    without: dict[str, str]
+    remarks: list[Message]
+
+
+def first_values(board: Board, corners: Corners, model: str | None = None) -> FirstCalibration:
+    """Find cameras, rig and poses from corners of a board alone.
+
+    Parameters
+    ----------
+    board
+        The board; its points lie in a plane, nearly.
+    corners
+        The corners of all cameras.
+    model
+        The lens that is wanted: a model of `docs/cameras.md`, or `opencv4`, `opencv5`, `opencv8`, `opencv12`,
+        `opencv_pinhole` with so many terms. None: `opencv5` below 90 degrees of horizontal field, `opencv8`
+        above, `opencv_fisheye` where corners are seen beside the camera and behind it.
+
+    Raises
+    ------
+    InputError
+        A board that is not flat, points that it does not have, a camera without a picture that could be
+        used, a model that cannot be.
+    """
+    seen = _sightings(board, corners)
+    without = corners.poor()
+    usable = np.array([name not in without for name in corners.pictures], dtype=bool)
+    cameras, remarks = [], []
+    for k, name in enumerate(corners.camera_names):
+        own = seen.of((corners.cameras == k) & usable)
+        if not len(own.xy):
+            raise InputError(f"camera {name}: no picture has enough corners: {_reasons(corners, without, k)}")
+        size = picture_size(own, corners.sizes[k])
+        if corners.sizes[k] is None:
+            said = f"taken for {size[0]} x {size[1]} px, about whose middle the corners lie"
+            remarks.append(Message(f"camera {name}: the size of its pictures is not known: {said}"))
+        camera, told = first_camera(own, size, name, model)
+        cameras.append(camera)
+        remarks += told
+    pictures = _Pictures(seen, corners, cameras, usable)
+    orders, of_orders = pictures.ordered()
+    made = pictures.poses(orders)
+    rig = connected(made, corners.cameras, corners.views, len(cameras), seen.listings.turns)
+    made = _turned(made, rig, seen.listings)
+    remarks += [*of_orders, *_of_rig(rig, corners), *_frontal(made, corners)]
+    return FirstCalibration(
+        cameras=cameras,
+        sensors=rig.sensors,
+        references=rig.references,
+        poses=_of_views(made, rig, corners),
+        picture_poses=made,
+        corners=_renumbered(corners, seen.listings, orders, rig.turned),
+        without=without,
+        remarks=remarks,
+    )
+
+
+def _sightings(board: Board, corners: Corners) -> Sightings:
+    """Return the corners that count as arrays of pictures by points."""
+    places = board.places
+    beyond = corners.point >= len(places)
+    if beyond.any():
+        row = int(np.argmax(beyond))
+        raise InputError(f"{corners.title(row)}: the board has {len(places)} points, {board.described}")
+    spread = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+    if spread[2] > FLAT * spread[0] or np.ptp(places[:, 2]) > FLAT * np.ptp(places, axis=0).max():
+        raise InputError(
+            "the points of the board do not lie in the plane of x and y: first values come from planes; give"
+            " the camera and the poses of its views"
+        )
+    xy, sd = (np.full((len(corners.pictures), len(places), *more), np.nan) for more in ((2,), ()))
+    use = corners.use
+    at = corners.picture[use], corners.point[use]
+    xy[at], sd[at] = corners.xy[use], corners.sd[use]
+    return Sightings(places, Listings.of(board), xy, sd)
+
+
+def _reasons(corners: Corners, without: dict[str, str], camera: int) -> str:
+    own = [name for name, k in zip(corners.pictures, corners.cameras.tolist(), strict=True) if k == camera]
+    return listed([f"{name} ({without[name]})" for name in own]) or "it has none"
+
+
+@dataclass(frozen=True, eq=False)
+class _Pictures:
+    """All pictures with the cameras that took them; those that are not usable have no rays."""
+
+    seen: Sightings
+    corners: Corners
+    cameras: list[Camera]
+    usable: Bools
+
+    def rays(self, seen: Sightings) -> Floats:
+        """Return (P, n, 3) rays, each picture's by its camera."""
+        found = np.full((*seen.xy.shape[:2], 3), np.nan)
+        for k, camera in enumerate(self.cameras):
+            own = (self.corners.cameras == k) & self.usable
+            found[own] = rays_of(camera, seen.xy[own])
+        return found
+
+    def poses(self, orders: Indices) -> Floats:
+        """Return (P, 4, 4) poses board -> camera with corners listed in (P,) orders; NaN where unknown."""
+        own = self.seen.listed(orders)
+        found = np.full((len(orders), 4, 4), np.nan)
+        rays = self.rays(own)[self.usable]
+        found[self.usable] = poses(ray_homographies(own.plane, rays))
+        return found
+
+    def ordered(self) -> tuple[Indices, list[Message]]:
+        """Return (P,) in which order the corners of each picture are listed, and what is to be said of it."""
+        count, usable = len(self.seen.listings.points), self.usable
+        misfit, front = (np.full((len(usable), count), np.nan) for _ in range(2))
+        for order in range(count):
+            own = self.seen.listed(np.full(len(usable), order))
+            misfit[usable, order] = misfits(own.of(usable), self.rays(own)[usable])
+            made = self.poses(np.full(len(usable), order))[usable]
+            front[usable, order] = np.sign(centres(made)[:, 2])
+        orders = np.zeros(len(usable), dtype=np.int64)
+        best = misfit[usable].min(axis=1, keepdims=True)
+        limit = max(POOR * float(np.median(best)), ROUNDING)
+        fits = (misfit[usable] <= limit) & (misfit[usable] <= np.maximum(CLEAR * best, ROUNDING))
+        fits[:, 0] |= misfit[usable, 0] <= limit
+        side = -1.0 if _side(fits, front[usable]) <= 0 else 1.0
+        right = fits & (front[usable] == side)
+        orders[usable] = np.argmax(right, axis=1)
+        return orders, self._told(np.flatnonzero(usable), orders, fits, right, misfit[usable] / limit * POOR)
+
+    def _told(
+        self, rows: Indices, orders: Indices, fits: Bools, right: Bools, ratios: Floats
+    ) -> list[Message]:
+        told = []
+        for row, fit, good, ratio in zip(rows.tolist(), fits, right, ratios, strict=True):
+            name, order = self.corners.pictures[row], int(orders[row])
+            if not good.any():
+                told.append(
+                    Message(
+                        f"picture {name}: its corners fit the board in no order, {ratio.min():.0f} times worse"
+                        " than those of most pictures: they are probably not where they should be"
+                    )
+                )
+            elif order and fit[0]:
+                told.append(
+                    Message(
+                        f"picture {name}: its corners are mirrored, which no board that is seen can be: a wrong"
+                        f" order of rows or columns; taken for listed with {LISTED[order]}"
+                    )
+                )
+            elif order:
+                told.append(
+                    Message(f"picture {name}: its corners were listed in another order: {LISTED[order]}")
+                )
+        return told
+
+
+def _side(fits: Bools, front: Floats) -> float:
+    """Return on which side of the board more cameras are, as its corners are listed."""
+    first = np.argmax(fits, axis=1)
+    return float(front[np.arange(len(front)), first][fits.any(axis=1)].sum())
+
+
+def _turned(made: Floats, rig: Rig, listings: Listings) -> Floats:
+    """Return the poses of pictures, the boards turned as the rig has shown."""
+    found = made.copy()
+    for order, turn in listings.turns.items():
+        found[rig.turned == order] = made[rig.turned == order] @ np.linalg.inv(turn)
+    return found
+
+
+def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
+    """Return what is to be said of cameras on a rig."""
+    told = []
+    for row in np.flatnonzero(rig.turned).tolist():
+        told.append(
+            Message(
+                f"picture {corners.pictures[row]}: its corners begin at another corner of the board than those"
+                f" of other cameras in this view: taken for listed {LISTED[rig.turned[row]]}"
+            )
+        )
+    apart = [corners.pictures[row] for row in np.flatnonzero(rig.apart)]
+    if apart:
+        told.append(
+            Message(
+                f"pictures {listed(apart)}: their poses do not agree with the place of the camera on the rig:"
+                " are they of the same moment as those of the other cameras?"
+            )
+        )
+    for k in range(1, len(corners.camera_names)):
+        if rig.references[k] == k:
+            told.append(
+                Message(
+                    f"camera {corners.camera_names[k]} has no view in common with those before: where it is to"
+                    " them is not known, and it is adjusted apart"
+                )
+            )
+    return told
+
+
+def _frontal(made: Floats, corners: Corners) -> list[Message]:
+    """Name the pictures whose boards are parallel to the image."""
+    flat = frontal_tilts(made) < FRONTAL
+    if not flat.any():
+        return []
+    names = [corners.pictures[row] for row in np.flatnonzero(flat)]
+    return [
+        Message(
+            f"{counted(len(names), 'picture')} of a board that is parallel to the image within 3 degrees, which"
+            f" says nothing of the focal length: {listed(names)}"
+        )
+    ]
+
+
+def _of_views(made: Floats, rig: Rig, corners: Corners) -> Floats:
+    """Return (V, 4, 4) poses board -> reference camera, of all pictures of a view the middle."""
+    found = np.full((corners.view_count, 4, 4), np.nan)
+    known = np.isfinite(made).all(axis=(1, 2))
+    to_reference = np.linalg.inv(rig.sensors[corners.cameras]) @ made
+    of = rig.references[corners.cameras]
+    for view in range(corners.view_count):
+        own = known & (corners.views == view)
+        if own.any():
+            agreeing = own & ~rig.apart if (own & ~rig.apart).any() else own
+            found[view] = mean_pose(to_reference[agreeing & (of == of[agreeing].min())])
+    return found
+
+
+def _renumbered(corners: Corners, listings: Listings, orders: Indices, turned: Indices) -> Corners:
+    """Return the corners with the numbers that points have in the orders that were found."""
+    first = listings.points[orders[corners.picture], corners.point]
+    return corners.replace(point=listings.points[turned[corners.picture], first])
