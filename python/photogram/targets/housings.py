@@ -1,0 +1,140 @@
+"""From adjusted calibrations to the arrays that their products are computed from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.arguments.arrays import shown
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.targets.calibrated import Calibrated
+from photogram.targets.housing import Housing, Seen, mean_motion
+
+__all__ = ["camera_number", "housing_of", "size_of"]
+
+
+def camera_number(calibrated: Calibrated, camera: int | str) -> int:
+    """Return the number of a camera by its number or name.
+
+    Raises
+    ------
+    InputError
+        There is no such camera.
+    """
+    names = [each.name for each in calibrated.cameras]
+    if isinstance(camera, str) and camera in names:
+        return names.index(camera)
+    if isinstance(camera, str) or not 0 <= camera < len(names):
+        raise InputError(f"the calibration has the cameras {', '.join(names)}, not {shown(camera)}")
+    return camera
+
+
+def size_of(calibrated: Calibrated, camera: int) -> tuple[int, int]:
+    """Return width and height of the pictures of a camera.
+
+    Raises
+    ------
+    InputError
+        Nobody has said.
+    """
+    size = calibrated.calibration.corners.sizes[camera]
+    if size is None:
+        name = calibrated.cameras[camera].name
+        raise InputError(f"how large the pictures of {name} are is not known: a map needs their size")
+    return size
+
+
+def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
+    """Return the housing of a camera, and the camera's number in it: the rig, or the camera by itself."""
+    calibration = calibrated.calibration
+    rig = calibration.is_rig
+    cameras = list(range(len(calibrated.cameras))) if rig else [camera]
+    corners = calibration.corners
+    own_views = np.unique(corners.views[np.isin(corners.cameras, cameras)])
+    poses = calibrated.poses[own_views]
+    housing = Housing(
+        cameras=tuple(calibrated.cameras[each].camera for each in cameras),
+        sensors=calibrated.sensors[cameras],
+        poses=poses,
+        points=calibrated.points,
+        points_by_board=_points_by_board(calibrated),
+        seen=_seen(calibrated, cameras, own_views),
+        cofactors=_cofactors(calibrated, cameras, own_views, poses),
+        weights=_weights(calibrated, cameras),
+        variance=calibrated.result.covariance_scale,
+    )
+    return housing, camera if rig else 0
+
+
+def _board_rows(calibrated: Calibrated) -> list[int]:
+    """Return the points of the board that are unknowns."""
+    if calibrated.calibration.shape != "points":
+        return []
+    return np.flatnonzero(calibrated.result.used_points).tolist()
+
+
+def _points_by_board(calibrated: Calibrated) -> Floats:
+    rows = _board_rows(calibrated)
+    found = np.zeros((len(calibrated.points), 3, len(rows), 3))
+    found[rows, :, np.arange(len(rows))] = np.eye(3)
+    return found.reshape(len(found), 3, -1)
+
+
+def _seen(calibrated: Calibrated, cameras: list[int], views: Floats) -> Seen:
+    """Return the corners that took part; views and cameras are numbered within the housing."""
+    result, corners = calibrated.result, calibrated.calibration.corners
+    block = result.block
+    used = result.used_images & np.isin(corners.cameras[block.image_photos], cameras)
+    used &= result.image_weights > 0
+    photos = block.image_photos[used]
+    return Seen(
+        cameras=np.searchsorted(cameras, corners.cameras[photos]),
+        views=np.searchsorted(views, corners.views[photos]),
+        points=block.image_points[used],
+        xy=block.image_xy[used],
+        sd=block.image_sd[used, 0] / np.sqrt(result.image_weights[used]),
+    )
+
+
+def _cofactors(calibrated: Calibrated, cameras: list[int], views: Floats, poses: Floats) -> Floats:
+    """Return the cofactors of common unknowns and of the mean motion of the boards."""
+    lengths = [len(each.names) for each in calibrated.cameras]
+    starts = np.concatenate([[0], np.cumsum(lengths)])
+    kept = [
+        starts[each] + np.flatnonzero(calibrated.cameras[each].camera.deviations > 0) for each in cameras
+    ]
+    sensors = calibrated.sensors_adjusted() if len(cameras) > 1 else []
+    board = 3 * len(_board_rows(calibrated))
+    others = 6 * len(calibrated.sensors_adjusted())
+    shared = np.arange(others if sensors else 0) + starts[-1]
+    kept += [shared, np.arange(board) + starts[-1] + others]
+    columns = np.concatenate(kept).astype(np.int64)
+    before = starts[-1] + others + board
+    partials = np.zeros((len(columns) + 6, before + 6 * len(calibrated.poses)))
+    partials[np.arange(len(columns)), columns] = 1.0
+    for view, each in zip(views.tolist(), mean_motion(poses), strict=True):
+        partials[len(columns) :, before + 6 * view : before + 6 * view + 6] = each
+    parts = ("cameras", "sensors", *(("board",) if board else ()), "views")
+    return calibrated.combined(partials, parts)
+
+
+def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
+    """Return the inverse covariances of what was known before: priors of cameras, nominal points."""
+    block, rows = calibrated.result.block, _board_rows(calibrated)
+    blocks = []
+    for each in cameras:
+        sd = block.cameras[each].deviations
+        weighted = np.isfinite(sd[sd > 0])
+        own = np.diag(np.where(weighted, 1 / sd[sd > 0] ** 2, 0.0))
+        covariance = block.cameras[each].prior_covariance
+        if covariance is not None:
+            own[np.ix_(weighted, weighted)] = np.linalg.inv(covariance)
+        blocks.append(own)
+    blocks += [np.zeros((6, 6))] * (len(cameras) - 1)
+    blocks.append(np.diag(1 / block.point_sd[rows].ravel() ** 2))
+    found = np.zeros((sum(map(len, blocks)),) * 2)
+    start = 0
+    for own in blocks:
+        found[start : start + len(own), start : start + len(own)] = own
+        start += len(own)
+    return found
