@@ -139,7 +139,7 @@ def adjusted_family(seen: Sightings, found: list[Trial]) -> tuple[Trial, Adjuste
         fit = trial.misfits <= POOR * trial.angle
         own = seen.of(fit).listed(trial.orders[fit])
         start = poses(ray_homographies(own.plane, rays_of(trial.camera, own.xy)))
-        adjusted = adjusted_views(trial.camera, own.places, own.xy, own.sd, start)
+        adjusted = adjusted_views(trial.camera, own, start)
         if adjusted is not None:
             ended.append((trial, adjusted))
     if not ended:

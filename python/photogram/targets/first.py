@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import Message, counted, listed
 from photogram.network.cameras import Camera
 from photogram.targets.board import Board
 from photogram.targets.corners import Corners
-from photogram.targets.families import POOR, misfits, rays_of
 from photogram.targets.first_camera import first_camera, picture_size
-from photogram.targets.homographies import centres, frontal_tilts, poses, ray_homographies
+from photogram.targets.homographies import frontal_tilts
+from photogram.targets.orders import Pictures
 from photogram.targets.sensors import Rig, connected, mean_pose
 from photogram.targets.sightings import LISTED, Listings, Sightings
 
@@ -25,10 +25,6 @@ FLAT = 0.02
 """Of the extent of a board: what its points may be off a plane for first values of planes."""
 FRONTAL = math.radians(3.0)
 """Boards tilted by less say nothing of a focal length."""
-ROUNDING = 1e-6
-"""Radians: pictures that fit to this fit."""
-CLEAR = 1.5
-"""What the misfit of an order may be over the best one's, to be taken for the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +97,7 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
         camera, told = first_camera(own, size, name, model)
         cameras.append(camera)
         remarks += told
-    pictures = _Pictures(seen, corners, cameras, usable)
+    pictures = Pictures(seen, list(corners.pictures), corners.cameras, cameras, usable)
     orders, of_orders = pictures.ordered()
     made = pictures.poses(orders)
     rig = connected(made, corners.cameras, corners.views, len(cameras), seen.listings.turns)
@@ -144,83 +140,6 @@ def _reasons(corners: Corners, without: dict[str, str], camera: int) -> str:
     return listed([f"{name} ({without[name]})" for name in own]) or "it has none"
 
 
-@dataclass(frozen=True, eq=False)
-class _Pictures:
-    """All pictures with the cameras that took them; those that are not usable have no rays."""
-
-    seen: Sightings
-    corners: Corners
-    cameras: list[Camera]
-    usable: Bools
-
-    def rays(self, seen: Sightings) -> Floats:
-        """Return (P, n, 3) rays, each picture's by its camera."""
-        found = np.full((*seen.xy.shape[:2], 3), np.nan)
-        for k, camera in enumerate(self.cameras):
-            own = (self.corners.cameras == k) & self.usable
-            found[own] = rays_of(camera, seen.xy[own])
-        return found
-
-    def poses(self, orders: Indices) -> Floats:
-        """Return (P, 4, 4) poses board -> camera with corners listed in (P,) orders; NaN where unknown."""
-        own = self.seen.listed(orders)
-        found = np.full((len(orders), 4, 4), np.nan)
-        rays = self.rays(own)[self.usable]
-        found[self.usable] = poses(ray_homographies(own.plane, rays))
-        return found
-
-    def ordered(self) -> tuple[Indices, list[Message]]:
-        """Return (P,) in which order the corners of each picture are listed, and what is to be said of it."""
-        count, usable = len(self.seen.listings.points), self.usable
-        misfit, front = (np.full((len(usable), count), np.nan) for _ in range(2))
-        for order in range(count):
-            own = self.seen.listed(np.full(len(usable), order))
-            misfit[usable, order] = misfits(own.of(usable), self.rays(own)[usable])
-            made = self.poses(np.full(len(usable), order))[usable]
-            front[usable, order] = np.sign(centres(made)[:, 2])
-        orders = np.zeros(len(usable), dtype=np.int64)
-        best = misfit[usable].min(axis=1, keepdims=True)
-        limit = max(POOR * float(np.median(best)), ROUNDING)
-        fits = (misfit[usable] <= limit) & (misfit[usable] <= np.maximum(CLEAR * best, ROUNDING))
-        fits[:, 0] |= misfit[usable, 0] <= limit
-        side = -1.0 if _side(fits, front[usable]) <= 0 else 1.0
-        right = fits & (front[usable] == side)
-        orders[usable] = np.argmax(right, axis=1)
-        return orders, self._told(np.flatnonzero(usable), orders, fits, right, misfit[usable] / limit * POOR)
-
-    def _told(
-        self, rows: Indices, orders: Indices, fits: Bools, right: Bools, ratios: Floats
-    ) -> list[Message]:
-        told = []
-        for row, fit, good, ratio in zip(rows.tolist(), fits, right, ratios, strict=True):
-            name, order = self.corners.pictures[row], int(orders[row])
-            if not good.any():
-                told.append(
-                    Message(
-                        f"picture {name}: its corners fit the board in no order, {ratio.min():.0f} times worse"
-                        " than those of most pictures: they are probably not where they should be"
-                    )
-                )
-            elif order and fit[0]:
-                told.append(
-                    Message(
-                        f"picture {name}: its corners are mirrored, which no board that is seen can be: a wrong"
-                        f" order of rows or columns; taken for listed with {LISTED[order]}"
-                    )
-                )
-            elif order:
-                told.append(
-                    Message(f"picture {name}: its corners were listed in another order: {LISTED[order]}")
-                )
-        return told
-
-
-def _side(fits: Bools, front: Floats) -> float:
-    """Return on which side of the board more cameras are, as its corners are listed."""
-    first = np.argmax(fits, axis=1)
-    return float(front[np.arange(len(front)), first][fits.any(axis=1)].sum())
-
-
 def _turned(made: Floats, rig: Rig, listings: Listings) -> Floats:
     """Return the poses of pictures, the boards turned as the rig has shown."""
     found = made.copy()
@@ -231,15 +150,14 @@ def _turned(made: Floats, rig: Rig, listings: Listings) -> Floats:
 
 def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
     """Return what is to be said of cameras on a rig."""
-    told = []
-    for row in np.flatnonzero(rig.turned).tolist():
-        told.append(
-            Message(
-                f"picture {corners.pictures[row]}: its corners begin at another corner of the board than those"
-                f" of other cameras in this view: taken for listed {LISTED[rig.turned[row]]}"
-            )
+    told = [
+        Message(
+            f"picture {corners.pictures[row]}: its corners begin at another corner of the board than those of"
+            f" other cameras in this view: taken for listed {LISTED[rig.turned[row]]}"
         )
-    apart = [corners.pictures[row] for row in np.flatnonzero(rig.apart)]
+        for row in np.flatnonzero(rig.turned).tolist()
+    ]
+    apart = [corners.pictures[row] for row in np.flatnonzero(rig.apart).tolist()]
     if apart:
         told.append(
             Message(
@@ -247,26 +165,25 @@ def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
                 " are they of the same moment as those of the other cameras?"
             )
         )
-    for k in range(1, len(corners.camera_names)):
-        if rig.references[k] == k:
-            told.append(
-                Message(
-                    f"camera {corners.camera_names[k]} has no view in common with those before: where it is to"
-                    " them is not known, and it is adjusted apart"
-                )
-            )
+    alone = [k for k in range(1, len(corners.camera_names)) if rig.references[k] == k]
+    told += [
+        Message(
+            f"camera {corners.camera_names[k]} has no view in common with those before: its place on the rig"
+            " is not known, and it is adjusted apart"
+        )
+        for k in alone
+    ]
     return told
 
 
 def _frontal(made: Floats, corners: Corners) -> list[Message]:
     """Name the pictures whose boards are parallel to the image."""
-    flat = frontal_tilts(made) < FRONTAL
-    if not flat.any():
+    names = [corners.pictures[row] for row in np.flatnonzero(frontal_tilts(made) < FRONTAL).tolist()]
+    if not names:
         return []
-    names = [corners.pictures[row] for row in np.flatnonzero(flat)]
     return [
         Message(
-            f"{counted(len(names), 'picture')} of a board that is parallel to the image within 3 degrees, which"
+            f"{counted(len(names), 'picture')} of a board that is parallel to the image within 3 degrees, and"
             f" says nothing of the focal length: {listed(names)}"
         )
     ]

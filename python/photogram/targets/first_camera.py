@@ -10,11 +10,11 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.cameras import Camera
-from photogram.targets.families import POOR, adjusted_family, rays_of, trials
+from photogram.targets.families import POOR, Trial, adjusted_family, misfits, rays_of, trials
 from photogram.targets.homographies import poses, ray_homographies
 from photogram.targets.lens_fit import fitted, is_perspective, lens_of
 from photogram.targets.sightings import Sightings
-from photogram.targets.small_block import adjusted_views
+from photogram.targets.small_block import Adjusted, adjusted_views
 
 __all__ = ["first_camera", "picture_size"]
 
@@ -22,6 +22,8 @@ MANY = 62
 """Pictures that first values of a camera are adjusted by, at the most: the others would say the same."""
 NARROW, WIDEST = math.radians(90.0), math.radians(88.0)
 """The horizontal field below which `opencv5` is usual, and how far from the axis `opencv8` may see."""
+NO_WORSE = 1.5
+"""What a misfit may grow when one more view takes part."""
 MARGIN = 1.05
 """Of the farthest corner from the middle of the picture: how far out the wanted lens is fitted."""
 
@@ -63,15 +65,34 @@ def first_camera(
     wanted = _wanted(family, seen, size, model)
     reach = MARGIN * float(np.nanmax(np.linalg.norm(seen.xy - (np.array(size) - 1) / 2, axis=2)))
     camera = fitted(family, wanted, size, radius=reach)
-    fit = trial.misfits <= POOR * trial.angle
-    own = used.of(fit).listed(trial.orders[fit])
-    start = (
-        poses(ray_homographies(own.plane, rays_of(family, own.xy))) if adjusted is None else adjusted.poses
-    )
-    done = adjusted_views(camera, own.places, own.xy, own.sd, start)
+    done = _adjusted(used.listed(trial.orders), trial, family, camera)
     if done is None:
         remarks.append(Message(f"camera {name}: {wanted} was fitted to a lens of the family {family.model}"))
     return (camera if done is None else done.camera), remarks
+
+
+def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> Adjusted | None:
+    """Return a camera adjusted by the views that fit the family, and by those that then fit it, too.
+
+    A family of two parameters fits badly where a lens is unlike it, in the corners of the picture: a view
+    there belongs to the others if the lens, adjusted with it, fits it, and these no worse than before.
+    """
+    start = poses(ray_homographies(seen.plane, rays_of(family, seen.xy)))
+    fits = trial.misfits <= POOR * trial.angle
+    done = adjusted_views(camera, seen.of(fits), start[fits])
+    if done is None:
+        return None
+    for row in np.argsort(trial.misfits)[np.count_nonzero(fits) :].tolist():
+        before = float(np.median(misfits(seen.of(fits), rays_of(done.camera, seen.of(fits).xy))))
+        more = fits | (np.arange(len(fits)) == row)
+        wider = adjusted_views(done.camera, seen.of(more), start[more])
+        if wider is None:
+            break
+        after = misfits(seen, rays_of(wider.camera, seen.xy))
+        if not (after[row] <= POOR * before and float(np.median(after[fits])) <= NO_WORSE * before):
+            break
+        fits, done = more, wider
+    return done
 
 
 def _wanted(family: Camera, seen: Sightings, size: tuple[int, int], model: str | None) -> str:

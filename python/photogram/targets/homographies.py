@@ -1,4 +1,4 @@
-"""Planes seen by cameras: homographies of pixels and of rays, what they say of focal lengths, and their poses.
+"""Planes seen by cameras: homographies of pixels and rays, the focal lengths and poses that they say.
 
 Arrays stand as pictures by points of the board: (P, n, 2) pixels or (P, n, 3) rays, NaN where a point was
 not seen. Axes are those of vision: x right, y down, z forward.
@@ -34,7 +34,7 @@ def homographies(places: Floats, xy: Floats) -> Floats:
     places
         (n, 2) places of the points in the plane of the board.
     xy
-        (P, n, 2) pixels; NaN where not seen. Four at least are seen in each picture, no three of them on a line.
+        (P, n, 2) pixels; NaN where not seen. Each picture has four at least, no three of them on a line.
 
     Returns
     -------
@@ -44,7 +44,8 @@ def homographies(places: Floats, xy: Floats) -> Floats:
     plane, of_plane = _scaled(np.broadcast_to(places, xy.shape), seen)
     image, of_image = _scaled(xy, seen)
     found = _smallest(_equations(plane, _with_one(image))[:, :, :2], seen)
-    return np.linalg.solve(of_image, found @ of_plane)
+    made: Floats = np.linalg.inv(of_image) @ found @ of_plane
+    return made
 
 
 def ray_homographies(places: Floats, rays: Floats) -> Floats:
@@ -63,9 +64,10 @@ def ray_homographies(places: Floats, rays: Floats) -> Floats:
     """
     seen = np.isfinite(rays[..., 0])
     plane, of_plane = _scaled(np.broadcast_to(places, (*rays.shape[:2], 2)), seen)
-    found: Floats = _smallest(_equations(plane, rays), seen) @ of_plane
+    found = np.matmul(_smallest(_equations(plane, rays), seen), of_plane)
     towards = np.einsum("pni,pij,nj->pn", np.nan_to_num(rays), found, _with_one(places))
-    return found * np.where(towards.sum(axis=1) < 0, -1.0, 1.0)[:, np.newaxis, np.newaxis]
+    found *= np.where(towards.sum(axis=1) < 0, -1.0, 1.0)[:, np.newaxis, np.newaxis]
+    return found
 
 
 def angles_apart(places: Floats, rays: Floats, found: Floats) -> Floats:
@@ -141,7 +143,7 @@ def _with_one(points: Floats) -> Floats:
 
 
 def _scaled(points: Floats, seen: Bools) -> tuple[Floats, Floats]:
-    """Return (P, n, 2) points from their centroids at a mean distance of sqrt 2, and (P, 3, 3) what did it."""
+    """Return (P, n, 2) points scaled to a mean distance of sqrt 2 from their centroids, and (P, 3, 3) how."""
     kept = np.where(seen[..., np.newaxis], points, np.nan)
     middle = np.nanmean(kept, axis=1)
     apart = kept - middle[:, np.newaxis]

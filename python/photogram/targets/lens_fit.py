@@ -10,8 +10,10 @@ from types import MappingProxyType
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.messages import nearest
 from photogram.network.cameras import Camera
 
 __all__ = ["LENS_TERMS", "fitted", "grid_of_pixels", "is_perspective", "lens_of"]
@@ -25,7 +27,7 @@ NEARLY_ACROSS = math.cos(math.radians(89.0))
 _FIRST = frozenset({"f", "fx", "fy", "cx", "cy"})
 _STAGES = (frozenset({"k", "k0", "k1"}), frozenset({"k2"}), frozenset({"p0", "p1", "p2"}))
 """Terms in the order in which they are freed, after these; the rest follow together."""
-_STARTS: Mapping[str, float] = MappingProxyType({"alpha": 0.5, "beta": 1.0, "omega": 0.5})
+_STARTS = (("alpha", 0.5), ("beta", 1.0), ("omega", 0.5))
 """Where terms begin that say nothing at 0."""
 STEPS, CLOSE = 100, 1e-10
 """Steps of a fit at the most, and the relative fall of the sum of squares with which it ends."""
@@ -65,15 +67,15 @@ def lens_of(model: str, source: Camera, size: tuple[int, int]) -> Camera:
         A model that there is not, or one that counts no columns and rows of pixels.
     """
     own, count = ("opencv_pinhole", LENS_TERMS[model]) if model in LENS_TERMS else (model, None)
-    known = {name for name, _ in _photocore.camera_models()}
-    if own not in known:
-        raise InputError(f"model: there is no lens {model}, but {', '.join([*LENS_TERMS, *sorted(known)])}")
-    names = [name for name, _ in dict(_photocore.camera_models())[own][1]]
+    models = dict(_photocore.camera_models())
+    if own not in models:
+        raise InputError(f"model: there is no lens {shown(model)}{nearest(model, [*LENS_TERMS, *models])}")
+    names = [name for name, _ in models[own][1]]
     if not ({"f", "fx"} & {*names} and "cx" in names):
         raise InputError(f"model: {model} has no focal length and principal point in pixels to begin with")
     given = source.parameters
     fx, fy = given.get("fx", given.get("f")), given.get("fy", given.get("f"))
-    start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1]} | _STARTS
+    start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1]} | dict(_STARTS)
     start |= _principal_point(source, "w" in names, size)
     free = {*names} - {"w", "h"}
     if count is not None:
@@ -174,7 +176,7 @@ class _Fit:
     xy: Floats
 
     def least(self, values: Floats, free: list[int]) -> Floats:
-        """Return parameters with the least sum of squares, those that are free moved (Levenberg-Marquardt)."""
+        """Return parameters with the least sum of squares, of free ones (Levenberg-Marquardt)."""
         cost, rows, misses = self._linearized(values, free)
         damping = 1e-6
         for _ in range(STEPS):

@@ -111,7 +111,7 @@ def _relation(first: Floats, second: Floats, turns: dict[int, Floats]) -> tuple[
 
 
 def _apart(poses: Floats, other: Floats, far: float) -> Floats:
-    """Return how far (..., 4, 4) poses are from another: the chord of attitudes, and translations by a length."""
+    """Return how far (..., 4, 4) poses are from another: chords of attitudes, shifts over a length."""
     turns = np.linalg.norm(poses[..., :3, :3] - other[:3, :3], axis=(-2, -1)) / math.sqrt(2)
     shifts = np.linalg.norm(poses[..., :3, 3] - other[:3, 3], axis=-1) / far
     return np.asarray(turns + shifts)

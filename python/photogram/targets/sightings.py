@@ -1,4 +1,4 @@
-"""A board as pictures show it: arrays of pictures by points, and the orders in which corners may be listed."""
+"""A board as pictures show it: arrays of pictures by points, and the orders in which these are listed."""
 
 from __future__ import annotations
 

@@ -1,10 +1,11 @@
-"""Views of one camera as a block whose object space is the board, its points held: adjusted for first values."""
+"""Views of one camera as a block whose object space is the board, whose points are held."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.targets.homographies import centres
+from photogram.targets.sightings import Sightings
 
 __all__ = ["Adjusted", "adjusted_views", "as_photos"]
 
@@ -41,23 +43,21 @@ class Adjusted:
     variance: float
 
 
-def as_photos(poses: Floats) -> dict[str, Floats]:
+def as_photos(poses: Floats) -> dict[str, Any]:
     """Return positions and attitudes of photos, as a block has them, of (P, 4, 4) poses board -> camera."""
     angles = Attitudes.of("matrix_to_vision", poses[:, :3, :3]).values("omega_phi_kappa")
     return {"photo_positions": centres(poses), "photo_attitudes": angles}
 
 
-def adjusted_views(camera: Camera, places: Floats, xy: Floats, sd: Floats, poses: Floats) -> Adjusted | None:
+def adjusted_views(camera: Camera, seen: Sightings, poses: Floats) -> Adjusted | None:
     """Adjust a camera and the poses of views; with less of it free where they do not determine all.
 
     Parameters
     ----------
     camera
         The camera, what is unknown of it free.
-    places
-        (n, 3) points of the board.
-    xy, sd
-        (P, n, 2) pixels, NaN where not seen, and (P, n) their standard deviations.
+    seen
+        The views, their corners in the order of their numbers.
     poses
         (P, 4, 4) board -> camera, to begin with.
 
@@ -65,15 +65,15 @@ def adjusted_views(camera: Camera, places: Floats, xy: Floats, sd: Floats, poses
     -------
     What was adjusted; None where the adjustment fails, whatever is held.
     """
-    view, point = np.nonzero(np.isfinite(xy[..., 0]))
+    view, point = np.nonzero(np.isfinite(seen.xy[..., 0]))
     block = Block(
         **as_photos(poses),
-        point_positions=places,
+        point_positions=seen.places,
         point_sd=0.0,
         image_photos=view,
         image_points=point,
-        image_xy=xy[view, point],
-        image_sd=np.repeat(sd[view, point, np.newaxis], 2, axis=1),
+        image_xy=seen.xy[view, point],
+        image_sd=np.repeat(seen.sd[view, point, np.newaxis], 2, axis=1),
         cameras=[camera],
         photo_cameras=0,
     )
