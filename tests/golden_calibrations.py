@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 
 from photogram import Camera, _photocore
+from photogram.targets import Board, Calibration, Corners
 from photogram.targets.housing import Housing, Seen, mean_motion
 from photogram.targets.view_rows import view_rows
 from shared_data import SHARED
@@ -157,3 +158,33 @@ def rows_of_view(housing, view):
         (rows.by_pose / sd[:, :, np.newaxis]).reshape(-1, 6),
         ((seen.xy - rows.xy) / sd).ravel(),
     )
+
+
+@cache
+def adjusted_rig():
+    """Return the simulated rig as the package adjusts it, from its true values."""
+    given = golden("rig_small")
+    truth = given["truth"]
+    view, camera, point, x, y, level = np.array(given["corners"], dtype=float).T
+    pictures, picture = np.unique(2 * view + camera, return_inverse=True)
+    in_plane, _, across = given["board"]["point_sd"]
+    return Calibration(
+        board=Board(
+            columns=9, rows=7, spacing=0.04, shape="points", sd_plane=across, sd_spacing=in_plane
+        ),
+        corners=Corners(
+            pictures=[f"{'ab'[int(each) % 2]}{int(each) // 2:02d}" for each in pictures],
+            cameras=(pictures % 2).astype(int),
+            views=(pictures // 2).astype(int),
+            camera_names=["a", "b"],
+            sizes=[(1280, 960)] * 2,
+            picture=picture,
+            point=point.astype(int),
+            xy=np.column_stack([x, y]),
+            sd=2.0**level,
+        ),
+        cameras=[Camera("opencv", dict(zip(OPENCV, each, strict=True)), sd=np.inf) for each in truth["cameras"]],
+        poses=pose(truth["R"], truth["t"]),
+        sensors=np.stack([np.eye(4), pose(truth["sensor1"]["R"], truth["sensor1"]["t"])]),
+        sd0=0.3,
+    ).adjust()

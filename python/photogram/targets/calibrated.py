@@ -169,9 +169,7 @@ class Calibrated(Brief, Paged):
             start += len(each)
         return self.result.covariances().combined(own, wanted) / self.result.covariance_scale
 
-    def _selected(
-        self, parts: Sequence[Part]
-    ) -> tuple[list[str], list[tuple[str, list[str]]], list[Floats]]:
+    def _selected(self, parts: Sequence[Part]) -> tuple[list[str], list[tuple[str, list[str]]], list[Floats]]:
         """Return names of unknowns, what they are in the result, and their partials by steps of the block."""
         names: list[str] = []
         wanted: list[tuple[str, list[str]]] = []

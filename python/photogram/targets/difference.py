@@ -52,7 +52,7 @@ class Fitted:
 
 
 def points_at(camera: Camera, pixels: Floats, distances: Sequence[float]) -> Floats:
-    """Return (D n, 3) where pixels look, in the axes of a camera, at each distance; directions at infinity."""
+    """Return (D n, 3) where pixels look, in axes of a camera, at each distance; directions at infinity."""
     towards = rays(camera, pixels)
     return np.concatenate([towards * (each if np.isfinite(each) else 1.0) for each in distances])
 

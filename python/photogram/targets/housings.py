@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from photogram.arguments.arrays import shown
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.housing import Housing, Seen, mean_motion
@@ -44,26 +46,35 @@ def size_of(calibrated: Calibrated, camera: int) -> tuple[int, int]:
     return size
 
 
+_MADE: WeakKeyDictionary[Calibrated, dict[int, Housing]] = WeakKeyDictionary()
+"""Housings of results that are still there: each takes a solution for every unknown that views share."""
+
+
 def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
     """Return the housing of a camera, and the camera's number in it: the rig, or the camera by itself."""
-    calibration = calibrated.calibration
-    rig = calibration.is_rig
+    rig = calibrated.calibration.is_rig
     cameras = list(range(len(calibrated.cameras))) if rig else [camera]
-    corners = calibration.corners
-    own_views = np.unique(corners.views[np.isin(corners.cameras, cameras)])
-    poses = calibrated.poses[own_views]
-    housing = Housing(
+    made = _MADE.setdefault(calibrated, {})
+    if cameras[0] not in made:
+        made[cameras[0]] = _housing(calibrated, cameras)
+    return made[cameras[0]], camera if rig else 0
+
+
+def _housing(calibrated: Calibrated, cameras: list[int]) -> Housing:
+    corners = calibrated.calibration.corners
+    views = np.unique(corners.views[np.isin(corners.cameras, cameras)])
+    poses = calibrated.poses[views]
+    return Housing(
         cameras=tuple(calibrated.cameras[each].camera for each in cameras),
         sensors=calibrated.sensors[cameras],
         poses=poses,
         points=calibrated.points,
         points_by_board=_points_by_board(calibrated),
-        seen=_seen(calibrated, cameras, own_views),
-        cofactors=_cofactors(calibrated, cameras, own_views, poses),
+        seen=_seen(calibrated, cameras, views),
+        cofactors=_cofactors(calibrated, cameras, views, poses),
         weights=_weights(calibrated, cameras),
         variance=calibrated.result.covariance_scale,
     )
-    return housing, camera if rig else 0
 
 
 def _board_rows(calibrated: Calibrated) -> list[int]:
@@ -80,7 +91,7 @@ def _points_by_board(calibrated: Calibrated) -> Floats:
     return found.reshape(len(found), 3, -1)
 
 
-def _seen(calibrated: Calibrated, cameras: list[int], views: Floats) -> Seen:
+def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> Seen:
     """Return the corners that took part; views and cameras are numbered within the housing."""
     result, corners = calibrated.result, calibrated.calibration.corners
     block = result.block
@@ -96,13 +107,11 @@ def _seen(calibrated: Calibrated, cameras: list[int], views: Floats) -> Seen:
     )
 
 
-def _cofactors(calibrated: Calibrated, cameras: list[int], views: Floats, poses: Floats) -> Floats:
+def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses: Floats) -> Floats:
     """Return the cofactors of common unknowns and of the mean motion of the boards."""
     lengths = [len(each.names) for each in calibrated.cameras]
     starts = np.concatenate([[0], np.cumsum(lengths)])
-    kept = [
-        starts[each] + np.flatnonzero(calibrated.cameras[each].camera.deviations > 0) for each in cameras
-    ]
+    kept = [starts[each] + np.flatnonzero(calibrated.cameras[each].camera.deviations > 0) for each in cameras]
     sensors = calibrated.sensors_adjusted() if len(cameras) > 1 else []
     board = 3 * len(_board_rows(calibrated))
     others = 6 * len(calibrated.sensors_adjusted())
