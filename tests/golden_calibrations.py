@@ -169,9 +169,7 @@ def adjusted_rig():
     pictures, picture = np.unique(2 * view + camera, return_inverse=True)
     in_plane, _, across = given["board"]["point_sd"]
     return Calibration(
-        board=Board(
-            columns=9, rows=7, spacing=0.04, shape="points", sd_plane=across, sd_spacing=in_plane
-        ),
+        board=Board(columns=9, rows=7, spacing=0.04, shape="points", sd_plane=across, sd_spacing=in_plane),
         corners=Corners(
             pictures=[f"{'ab'[int(each) % 2]}{int(each) // 2:02d}" for each in pictures],
             cameras=(pictures % 2).astype(int),
@@ -183,7 +181,9 @@ def adjusted_rig():
             xy=np.column_stack([x, y]),
             sd=2.0**level,
         ),
-        cameras=[Camera("opencv", dict(zip(OPENCV, each, strict=True)), sd=np.inf) for each in truth["cameras"]],
+        cameras=[
+            Camera("opencv", dict(zip(OPENCV, each, strict=True)), sd=np.inf) for each in truth["cameras"]
+        ],
         poses=pose(truth["R"], truth["t"]),
         sensors=np.stack([np.eye(4), pose(truth["sensor1"]["R"], truth["sensor1"]["t"])]),
         sd0=0.3,

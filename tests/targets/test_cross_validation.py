@@ -1,4 +1,4 @@
-"""Cross-validation: differences of parts of the views and their covariance, against an independent program."""
+"""Cross-validation: differences of parts and their covariance, against an independent program."""
 
 import numpy as np
 import pytest

@@ -44,6 +44,4 @@ def test_the_best_view_is_first_and_the_next_counts_on_it(functions):
     found = best_views(rig_small(), functions, candidates, SIZES, SD, 6)
     assert found[0].candidate.name == min(data, key=lambda each: each["largest"])["name"]
     assert len({each.candidate.name for each in found}) == 6
-    assert all(
-        (later.sd <= earlier.sd + 1e-12).all() for earlier, later in pairwise(found)
-    )
+    assert all((later.sd <= earlier.sd + 1e-12).all() for earlier, later in pairwise(found))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from photogram.targets.projection import of_functions, point_partials, worst
 
 __all__ = ["Difference", "Side", "compared"]
 
-NOWHERE = np.empty((0, 2))
 DEFINED = 1e-5
 """Of the largest: what the cofactors of differences over a grid say less of is rounding."""
 TESTED = (12, 8)
@@ -46,7 +45,7 @@ class Side:
 
     name: str
     camera: Camera
-    corners: Floats = NOWHERE
+    corners: Floats = field(default_factory=lambda: np.empty((0, 2)))
     covariance: Floats | None = None
     rows: Floats | None = None
 

@@ -5,7 +5,7 @@ A_v' A_c to the inverse of their cofactors. Of functions J of the unknowns, with
 
     J (Q^-1 + M)^-1 J' = J Q J' - F' M (I + Q M)^-1 F,
 
-where only the unknowns that the view touches count.
+where only the unknowns that the view touches, and those that J is of, count.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.targets.housing import Housing, transformed
 from photogram.targets.imaging import rays
-from photogram.targets.projection import worst
+from photogram.targets.projection import of_functions, worst
 from photogram.targets.view_rows import view_rows
 
 __all__ = ["Added", "Candidate", "NewView", "added_by", "best_views", "seen_from"]
@@ -64,10 +64,11 @@ class Added:
     normal: Floats
     corners: Indices
 
-    def gain(self, cofactors: Floats) -> Floats:
-        """Return (t, t) M (I + Q M)^-1: F' of it F is what variances lose."""
-        own = cofactors[np.ix_(self.touched, self.touched)]
-        found = np.linalg.solve(np.eye(len(own)) + self.normal @ own, self.normal)
+    def gain(self, cofactors: Floats, rows: Indices) -> Floats:
+        """Return (k, k) what the cofactors of some unknowns lose: Q M (I + Q M)^-1 Q in these rows."""
+        touched = cofactors[np.ix_(self.touched, self.touched)]
+        across = cofactors[np.ix_(self.touched, rows)]
+        found = across.T @ self.normal @ np.linalg.solve(np.eye(len(touched)) + touched @ self.normal, across)
         return np.asarray((found + found.T) / 2)
 
 
@@ -162,21 +163,14 @@ def best_views(
     """
     seen = [(each, added_by(housing, each.pose, sizes, sd)) for each in candidates]
     left = [(each, added) for each, added in seen if added is not None]
-    cofactors = housing.cofactors[: housing.common, : housing.common].copy()
+    rows, every = np.flatnonzero(functions.any(axis=(0, 1))), np.arange(housing.common)
+    partials, cofactors = functions[:, :, rows], housing.cofactors[np.ix_(every, every)].copy()
     found: list[NewView] = []
     while left and len(found) < count:
-        lever = functions @ cofactors
-        now = lever @ functions.transpose(0, 2, 1)
-        tried = [_after(now, lever, cofactors, added) for _, added in left]
+        own = cofactors[np.ix_(rows, rows)]
+        tried = [worst(of_functions(partials, own - added.gain(cofactors, rows))) for _, added in left]
         best = min(range(len(left)), key=lambda row: (tried[row].max(), np.mean(tried[row] ** 2)))
         candidate, added = left.pop(best)
         found.append(NewView(candidate, added.corners, np.sqrt(housing.variance) * tried[best]))
-        to_touched = cofactors[:, added.touched]
-        cofactors -= to_touched @ added.gain(cofactors) @ to_touched.T
+        cofactors -= added.gain(cofactors, every)
     return found
-
-
-def _after(now: Floats, lever: Floats, cofactors: Floats, added: Added) -> Floats:
-    """Return (n,) standard deviations in the worst direction with a further view."""
-    own = lever[:, :, added.touched]
-    return worst(now - (own @ added.gain(cofactors)) @ own.transpose(0, 2, 1))
