@@ -185,6 +185,7 @@ def _height(size: tuple[int, int]) -> float:
 def _contours(axes: Axes, columns: Floats, rows: Floats, values: Floats, unit: str) -> None:
     """Draw filled contours at 1, 2, 5 steps with their values on the lines."""
     from matplotlib.colors import LogNorm
+    from matplotlib.patheffects import withStroke
 
     positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
@@ -196,7 +197,8 @@ def _contours(axes: Axes, columns: Floats, rows: Floats, values: Floats, unit: s
     shades = np.exp(np.interp(places, np.arange(len(levels)), np.log(levels)))
     filled = axes.contourf(columns, rows, shown, shades, cmap=ORDERED, norm=norm, extend="min")
     lines = axes.contour(columns, rows, shown, levels, colors=INK, linewidths=0.7)
-    axes.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8.0)
+    for text in axes.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8.0):
+        text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
     bar = axes.figure.colorbar(filled, ax=axes, shrink=0.85, ticks=levels, format="%g")
     bar.ax.minorticks_off()
     bar.set_label(unit)
