@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from photogram.adjustment.adjustment import Progress, adjust, adjusted_again
 from photogram.adjustment.robust import Loss
-from photogram.arguments.arrays import one_of, shaped, shown
+from photogram.adjustment.snooping import snoop
+from photogram.arguments.arrays import indices, one_of, shaped, shown
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
@@ -54,10 +55,13 @@ class Calibration(Valued, Brief):
     cameras
         K cameras in pixels, counted from 0 at the centre of the first; free parameters start where they are.
     poses
-        (V, 4, 4) of the views: board -> camera 0, or the camera that took the picture where images are not
-        synchronised. Vision axes: x right, y down, z forward.
+        (V, 4, 4) of the views: board -> reference of the cameras that took the pictures of the view. Vision
+        axes: x right, y down, z forward.
     sensors
-        (K, 4, 4) camera 0 -> camera k; None: one camera, or none that is tied to another.
+        (K, 4, 4) reference -> camera k; None: one camera, or none that is tied to another.
+    references
+        (K,) the camera that each one's sensor counts from. None: camera 0. Where images are not synchronised,
+        each itself.
     sd0
         Standard deviation of a corner of level 0, pixels. None: it is not known; the adjustment estimates it,
         and nothing tests it.
@@ -83,6 +87,7 @@ class Calibration(Valued, Brief):
     cameras: Sequence[Camera]
     poses: ArrayLike
     sensors: ArrayLike | None = None
+    references: ArrayLike | None = None
     sd0: float | None = None
     sync: Synchronisation = "known"
     regularise: Regularisation | None = None
@@ -105,6 +110,10 @@ class Calibration(Valued, Brief):
             raise InputError("several cameras that are synchronised have sensors: camera 0 -> camera k")
         sensors = np.tile(np.eye(4), (count, 1, 1)) if self.sensors is None else self.sensors
         self._set("sensors", shaped("sensors", sensors, (count, 4, 4)))
+        references = np.zeros(count, dtype=np.int64) if self.references is None else self.references
+        if self.sync == "none":
+            references = np.arange(count)
+        self._set("references", indices("references", references, count, count))
         poses = shaped("poses", self.poses, (self.corners.view_count, 4, 4), missing=True)
         self._set("poses", poses)
         over = np.flatnonzero(self.corners.point >= len(self.board.places))
@@ -149,9 +158,10 @@ class Calibration(Valued, Brief):
         return replace(self, **changes)
 
     @property
-    def is_rig(self) -> bool:
-        """Whether cameras are tied to each other."""
-        return len(self.cameras) > 1 and self.sync == "known"
+    def tied(self) -> Bools:
+        """(K,) whether a camera is tied to another, its reference."""
+        found: Bools = np.asarray(self.references) != np.arange(len(self.cameras))
+        return found
 
     def picture_poses(self) -> Floats:
         """Return (P, 4, 4) the pose of each picture: board -> its camera."""
@@ -170,13 +180,13 @@ class Calibration(Valued, Brief):
         return self.board.bent(*self.bend) if bent else self.board.places
 
     def frames(self) -> tuple[list[str], Indices]:
-        """Return the names of views without a picture of camera 0 on a rig, and (V,) the photo of each view.
+        """Return the names of views without a picture of their reference, and (V,) the photo of each view.
 
         Photos are the pictures, and behind them one without images for each of these views: its frame.
         """
         corners = self.corners
         photo = np.full(corners.view_count, -1)
-        first = corners.cameras == 0 if self.is_rig else np.ones(len(corners.pictures), dtype=bool)
+        first = ~self.tied[corners.cameras]
         photo[corners.views[first]] = np.flatnonzero(first)
         alone = np.flatnonzero(photo < 0)
         photo[alone] = len(corners.pictures) + np.arange(len(alone))
@@ -201,8 +211,7 @@ class Calibration(Valued, Brief):
         corners, poses = self.corners, np.asarray(self.poses)
         frames, photo = self.frames()
         names = [*corners.pictures, *frames]
-        alone = photo[photo >= len(corners.pictures)] - len(corners.pictures)
-        of_frames = poses[photo >= len(corners.pictures)][np.argsort(alone)]
+        of_frames = poses[photo >= len(corners.pictures)]
         centres, attitudes = photo_poses(np.concatenate([self.picture_poses(), of_frames]))
         use = corners.use
         return Block(
@@ -210,7 +219,7 @@ class Calibration(Valued, Brief):
             photo_positions=centres,
             photo_attitudes=attitudes.values("omega_phi_kappa"),
             cameras=self.cameras if cameras is None else cameras,
-            photo_cameras=np.concatenate([corners.cameras, np.zeros(len(frames), dtype=np.int64)]),
+            photo_cameras=np.concatenate([corners.cameras, self._cameras_of_frames(photo)]),
             point_ids=self.board.names,
             point_positions=self.places(),
             point_sd=self.board.deviations(corners.view_count),
@@ -222,9 +231,14 @@ class Calibration(Valued, Brief):
             linear_unit=self.board.unit,
         )
 
+    def _cameras_of_frames(self, photo: Indices) -> Indices:
+        """Return the references of views that have no picture of them."""
+        corners = self.corners
+        reference = np.empty(corners.view_count, dtype=np.int64)
+        reference[corners.views] = np.asarray(self.references)[corners.cameras]
+        return reference[photo >= len(corners.pictures)]
+
     def _mounts(self, names: Sequence[str], photo: Indices) -> list[Mount]:
-        if not self.is_rig:
-            return []
         corners = self.corners
         sensors = [
             Sensor.from_colmap(name, pose[:3, :3], pose[:3, 3])
@@ -232,7 +246,7 @@ class Calibration(Valued, Brief):
         ]
         return [
             Mount(names[row], names[photo[corners.views[row]]], sensors[corners.cameras[row]])
-            for row in np.flatnonzero(corners.cameras > 0).tolist()
+            for row in np.flatnonzero(self.tied[corners.cameras]).tolist()
         ]
 
     def residuals(self) -> Floats:
@@ -283,6 +297,39 @@ class Calibration(Valued, Brief):
         if own.sd0 is None:
             told = with_unknown_weight(told)
         return Calibrated(calibration=own, result=told, unregularised=free if own.regularise else None)
+
+    def snoop(self, **options: Any) -> Calibrated:
+        """Take gross errors out one after the other, and adjust what is left.
+
+        Parameters
+        ----------
+        options
+            Those of :func:`photogram.snoop`.
+
+        Raises
+        ------
+        InputError
+            Priors of cameras, which snooping does not take; what :meth:`block` refuses.
+        RankError, AdjustmentError, OutOfMemoryError, KeyboardInterrupt
+            As of :func:`photogram.snoop`.
+        """
+        if self.regularise is not None:
+            raise InputError("gross errors are taken out without priors of cameras: regularise is None")
+        found = snoop(self.block(), **options)
+        result = found.judged
+        assert isinstance(result, Result)
+        own = self._kept(result.block)
+        told = replace(result, messages=[*own.messages, *result.messages])
+        vars(told)["verdict"] = found.verdict
+        return Calibrated(calibration=own, result=told, snooped=found)
+
+    def _kept(self, block: Block) -> Calibration:
+        """Return the calibration with the corners that a block still has."""
+        corners, points = self.corners, len(self.board.places)
+        kept = np.isin(
+            corners.picture * points + corners.point, block.image_photos * points + block.image_points
+        )
+        return self.replace(corners=corners.replace(use=corners.use & kept))
 
     def without(self, images: Bools) -> Calibration:
         """Return the calibration without some images (m,) of its block."""

@@ -1,4 +1,4 @@
-"""Which lens shows boards as planes: trial families and fields of view, without any start value."""
+"""Which lens shows boards as they are: trial families and fields of view, without any start value."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Trial:
     orders
         (P,) in which order the corners of each picture fit best.
     misfits
-        (P,) median angles (rad) between rays and the plane of each.
+        (P,) median angles (rad) between rays and the board in each.
     """
 
     camera: Camera
@@ -76,9 +76,9 @@ def rays_of(camera: Camera, xy: Floats) -> Floats:
 
 
 def misfits(seen: Sightings, rays: Floats) -> Floats:
-    """Return (P,) the median angle (rad) between the rays of each picture and what a plane makes of them."""
-    found = ray_homographies(seen.plane, rays)
-    return np.asarray(np.nanmedian(angles_apart(seen.plane, rays, found), axis=1))
+    """Return (P,) the median angle (rad) between the rays of each picture and those of the board."""
+    found = ray_homographies(seen.coordinates, rays)
+    return np.asarray(np.nanmedian(angles_apart(seen.coordinates, rays, found), axis=1))
 
 
 def _tried(seen: Sightings, camera: Camera) -> Trial:
@@ -102,7 +102,7 @@ def _camera(family: str, fx: float, fy: float, size: tuple[int, int]) -> Camera:
 def perspective(seen: Sightings, size: tuple[int, int]) -> Trial:
     """Return the perspective lens of the homographies of pixels; of 1.2 widths where these say nothing."""
     first = _tried(seen, _camera("pinhole", size[0], size[0], size))
-    found = homographies(seen.plane, seen.listed(first.orders).xy)
+    found = homographies(seen.coordinates, seen.listed(first.orders).xy)
     fx, fy, f = focal_lengths(found, (np.array(size) - 1) / 2)
     if not (fx > 0 and fy > 0):
         fx = fy = f if f > 0 else NO_FOCUS * size[0]
@@ -138,7 +138,7 @@ def adjusted_family(seen: Sightings, found: list[Trial]) -> tuple[Trial, Adjuste
     for trial in found:
         fit = trial.misfits <= POOR * trial.angle
         own = seen.of(fit).listed(trial.orders[fit])
-        start = poses(ray_homographies(own.plane, rays_of(trial.camera, own.xy)))
+        start = poses(ray_homographies(own.coordinates, rays_of(trial.camera, own.xy)))
         adjusted = adjusted_views(trial.camera, own, start)
         if adjusted is not None:
             ended.append((trial, adjusted))

@@ -18,11 +18,11 @@ from photogram.targets.homographies import frontal_tilts
 from photogram.targets.orders import Pictures
 from photogram.targets.sensors import Rig, connected, mean_pose
 from photogram.targets.sightings import LISTED, Listings, Sightings
+from photogram.targets.vision import inverted
 
 __all__ = ["FirstCalibration", "first_values"]
 
-FLAT = 0.02
-"""Of the extent of a board: what its points may be off a plane for first values of planes."""
+IN_A_PLANE = "all its points lie in one plane, but those of the board do not"
 FRONTAL = math.radians(3.0)
 """Boards tilted by less say nothing of a focal length."""
 
@@ -68,7 +68,7 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
     Parameters
     ----------
     board
-        The board; its points lie in a plane, nearly.
+        The board. Where its points lie in no plane, pictures that show those of a plane alone have no pose.
     corners
         The corners of all cameras.
     model
@@ -79,11 +79,12 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
     Raises
     ------
     InputError
-        A board that is not flat, points that it does not have, a camera without a picture that could be
-        used, a model that cannot be.
+        Points that the board does not have, a camera without a picture that could be used, a model that
+        cannot be.
     """
-    seen = _sightings(board, corners)
-    without = corners.poor()
+    seen = Sightings.of_corners(board, corners)
+    without = {corners.pictures[row]: IN_A_PLANE for row in np.flatnonzero(seen.in_a_plane()).tolist()}
+    without |= corners.poor()
     usable = np.array([name not in without for name in corners.pictures], dtype=bool)
     cameras, remarks = [], []
     for k, name in enumerate(corners.camera_names):
@@ -102,7 +103,8 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
     made = pictures.poses(orders)
     rig = connected(made, corners.cameras, corners.views, len(cameras), seen.listings.turns)
     made = _turned(made, rig, seen.listings)
-    remarks += [*of_orders, *_of_rig(rig, corners), *_frontal(made, corners)]
+    remarks += [*of_orders, *_of_rig(rig, corners), *(_frontal(made, corners) if seen.is_flat else ())]
+    made = made @ seen.axes
     return FirstCalibration(
         cameras=cameras,
         sensors=rig.sensors,
@@ -115,26 +117,6 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
     )
 
 
-def _sightings(board: Board, corners: Corners) -> Sightings:
-    """Return the corners that count as arrays of pictures by points."""
-    places = board.places
-    beyond = corners.point >= len(places)
-    if beyond.any():
-        row = int(np.argmax(beyond))
-        raise InputError(f"{corners.title(row)}: the board has {len(places)} points, {board.described}")
-    spread = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
-    if spread[2] > FLAT * spread[0] or np.ptp(places[:, 2]) > FLAT * np.ptp(places, axis=0).max():
-        raise InputError(
-            "the points of the board do not lie in the plane of x and y: first values come from planes; give"
-            " the camera and the poses of its views"
-        )
-    xy, sd = (np.full((len(corners.pictures), len(places), *more), np.nan) for more in ((2,), ()))
-    use = corners.use
-    at = corners.picture[use], corners.point[use]
-    xy[at], sd[at] = corners.xy[use], corners.sd[use]
-    return Sightings(places, Listings.of(board), xy, sd)
-
-
 def _reasons(corners: Corners, without: dict[str, str], camera: int) -> str:
     own = [name for name, k in zip(corners.pictures, corners.cameras.tolist(), strict=True) if k == camera]
     return listed([f"{name} ({without[name]})" for name in own]) or "it has none"
@@ -144,7 +126,7 @@ def _turned(made: Floats, rig: Rig, listings: Listings) -> Floats:
     """Return the poses of pictures, the boards turned as the rig has shown."""
     found = made.copy()
     for order, turn in listings.turns.items():
-        found[rig.turned == order] = made[rig.turned == order] @ np.linalg.inv(turn)
+        found[rig.turned == order] = made[rig.turned == order] @ inverted(turn)
     return found
 
 

@@ -77,7 +77,7 @@ def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> 
     A family of two parameters fits badly where a lens is unlike it, in the corners of the picture: a view
     there belongs to the others if the lens, adjusted with it, fits it, and these no worse than before.
     """
-    start = poses(ray_homographies(seen.plane, rays_of(family, seen.xy)))
+    start = poses(ray_homographies(seen.coordinates, rays_of(family, seen.xy)))
     fits = trial.misfits <= POOR * trial.angle
     done = adjusted_views(camera, seen.of(fits), start[fits])
     if done is None:

@@ -27,6 +27,7 @@ from photogram.targets.vision import inverted, of_vectors
 __all__ = ["KEY", "read_model"]
 
 KEY = "optimization_inputs"
+INDICES = "indices_frame_camintrinsics_camextrinsics"
 PREFIX = "LENSMODEL_"
 OPENCV = "opencv_pinhole"
 _LENSES = {
@@ -107,12 +108,11 @@ def _packed(path: Path) -> bytes:
 
 def _indices(arrays: Arrays, count: int) -> Indices:
     """Return (P, 3) view, camera and sensor of each picture; sensor -1 is at the reference."""
-    name = "indices_frame_camintrinsics_camextrinsics"
-    if name not in arrays:
-        raise InputError(f"its {KEY} have no {name}", file=arrays.path)
-    found = arrays.numbers(name, count, 3).astype(np.int64)
+    if INDICES not in arrays:
+        raise InputError(f"its {KEY} have no {INDICES}", file=arrays.path)
+    found = arrays.numbers(INDICES, count, 3).astype(np.int64)
     if (found[:, :2] < 0).any() or (found[:, 2] < -1).any():
-        raise arrays.error(name, "counts from 0, sensors from -1")
+        raise arrays.error(INDICES, "counts from 0, sensors from -1")
     return found
 
 
@@ -135,9 +135,9 @@ def _cameras(arrays: Arrays, free: _Free) -> list[Camera]:
     rows = arrays.numbers("intrinsics", None, count)
     cameras = []
     for number, values in enumerate(rows.tolist()):
-        names = Camera(model, {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0}).names[:count]
-        freed = [name for k, name in enumerate(names) if (free.core if k < 4 else free.lens)]
-        given = dict(zip(names, values, strict=True))
+        terms = Camera(model, {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0}).names[:count]
+        freed = (terms[:4] if free.core else ()) + (terms[4:] if free.lens else ())
+        given = dict(zip(terms, values, strict=True))
         cameras.append(Camera(model, given, dict.fromkeys(freed, np.inf), name=f"camera {number}"))
     return cameras
 
@@ -147,16 +147,15 @@ def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats
     views = of_vectors(arrays.numbers(arrays.first("frames_rt_toref", "rt_ref_frame"), None, 6))
     mounted = [each for each in ("extrinsics_rt_fromref", "rt_cam_ref") if each in arrays]
     to_camera = of_vectors(arrays.numbers(mounted[0], None, 6)) if mounted else np.zeros((0, 4, 4))
-    name = "indices_frame_camintrinsics_camextrinsics"
     if indices[:, 0].max() >= len(views) or indices[:, 2].max() >= len(to_camera):
-        raise arrays.error(name, "names a view or a sensor that is not there")
+        raise arrays.error(INDICES, "names a view or a sensor that is not there")
     if set(indices[:, 1].tolist()) != set(range(count)):
-        raise arrays.error(name, f"does not name each of the {count} cameras")
+        raise arrays.error(INDICES, f"does not name each of the {count} cameras")
     from_reference = np.empty((count, 4, 4))
     for camera in range(count):
         of = np.unique(indices[indices[:, 1] == camera, 2])
         if len(of) > 1:
-            raise arrays.error(name, f"has the camera {camera} in several places: a camera that moves")
+            raise arrays.error(INDICES, f"has the camera {camera} in several places: a camera that moves")
         from_reference[camera] = np.eye(4) if of[0] < 0 else to_camera[of[0]]
     first = from_reference[0]
     seen = np.unique(indices[:, 0])

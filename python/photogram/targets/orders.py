@@ -49,7 +49,7 @@ class Pictures:
         """Return (P, 4, 4) poses board -> camera with corners listed in (P,) orders; NaN where unknown."""
         own = self.seen.listed(orders)
         found = np.full((len(orders), 4, 4), np.nan)
-        found[self.usable] = poses(ray_homographies(own.plane, self._rays(own)[self.usable]))
+        found[self.usable] = poses(ray_homographies(own.coordinates, self._rays(own)[self.usable]))
         return found
 
     def ordered(self) -> tuple[Indices, list[Message]]:
@@ -79,14 +79,16 @@ class Pictures:
         return found
 
     def _tried(self) -> tuple[Floats, Floats]:
-        """Return how usable pictures fit in each order, radians, and the sign of z of the cameras then."""
+        """Return how usable pictures fit in each order, radians, and then the sign of z of its camera."""
         count = len(self.seen.listings.points)
-        misfit, front = (np.empty((int(self.usable.sum()), count)) for _ in range(2))
+        misfit, front = (np.full((int(self.usable.sum()), count), -1.0) for _ in range(2))
         for order in range(count):
             own = self.seen.listed(np.full(len(self.usable), order))
             rays = self._rays(own)[self.usable]
             misfit[:, order] = misfits(own, rays)
-            front[:, order] = np.sign(centres(poses(ray_homographies(own.plane, rays)))[:, 2])
+            if self.seen.listings.one_sided:
+                made = poses(ray_homographies(own.coordinates, rays))
+                front[:, order] = np.sign(centres(made)[:, 2])
         return misfit, front
 
     def _told(self, orders: Indices, fits: Bools, right: Bools) -> list[Message]:
@@ -104,8 +106,9 @@ class Pictures:
         for order in np.unique(own[mirrored]).tolist():
             those = listed(names[mirrored & (own == order)].tolist())
             told.append(
-                f"corners of {those} are mirrored, which those of a board that is seen cannot be; their rows or"
-                " columns stand in a wrong order" + (f": taken for listed {LISTED[order]}" if order else "")
+                f"corners of {those} are mirrored, which those of a board that is seen cannot be; their rows"
+                " or columns stand in a wrong order"
+                + (f": taken for listed {LISTED[order]}" if order else "")
             )
         for order in np.unique(own[other & (own > 0)]).tolist():
             those = listed(names[other & (own == order)].tolist())

@@ -9,6 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.targets.homographies import nearest_rotations
+from photogram.targets.vision import composed, inverted
 
 __all__ = ["Rig", "connected", "mean_pose"]
 
@@ -76,16 +77,14 @@ def connected(poses: Floats, cameras: Indices, views: Indices, count: int, turns
         turned[second], apart[second] = orders, away
         for order, turn in turns.items():
             rows = second[orders == order]
-            found[rows] = found[rows] @ np.linalg.inv(turn)
+            found[rows] = found[rows] @ inverted(turn)
     return Rig(sensors, references, turned, apart)
 
 
 def mean_pose(poses: Floats) -> Floats:
     """Return the (4, 4) chordal mean of the attitudes of poses with the median of their translations."""
-    found = np.eye(4)
-    found[:3, :3] = nearest_rotations(poses[:, :3, :3].mean(axis=0)[np.newaxis])[0]
-    found[:3, 3] = np.median(poses[:, :3, 3], axis=0)
-    return found
+    rotation = nearest_rotations(poses[:, :3, :3].mean(axis=0)[np.newaxis])[0]
+    return composed(rotation, np.median(poses[:, :3, 3], axis=0))
 
 
 def _relation(first: Floats, second: Floats, turns: dict[int, Floats]) -> tuple[Floats, Indices, Bools]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,10 +14,10 @@ from photogram.errors import AdjustmentError
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.targets.homographies import centres
 from photogram.targets.sightings import Sightings
+from photogram.targets.vision import photo_poses, vision_poses
 
-__all__ = ["Adjusted", "adjusted_views", "as_photos"]
+__all__ = ["Adjusted", "adjusted_views"]
 
 TOLERANCE = 1e-3
 """Of a standard deviation: where steps of first values end."""
@@ -43,12 +42,6 @@ class Adjusted:
     variance: float
 
 
-def as_photos(poses: Floats) -> dict[str, Any]:
-    """Return positions and attitudes of photos, as a block has them, of (P, 4, 4) poses board -> camera."""
-    angles = Attitudes.of("matrix_to_vision", poses[:, :3, :3]).values("omega_phi_kappa")
-    return {"photo_positions": centres(poses), "photo_attitudes": angles}
-
-
 def adjusted_views(camera: Camera, seen: Sightings, poses: Floats) -> Adjusted | None:
     """Adjust a camera and the poses of views; with less of it free where they do not determine all.
 
@@ -66,8 +59,10 @@ def adjusted_views(camera: Camera, seen: Sightings, poses: Floats) -> Adjusted |
     What was adjusted; None where the adjustment fails, whatever is held.
     """
     view, point = np.nonzero(np.isfinite(seen.xy[..., 0]))
+    positions, attitudes = photo_poses(poses)
     block = Block(
-        **as_photos(poses),
+        photo_positions=positions,
+        photo_attitudes=attitudes.values("omega_phi_kappa"),
         point_positions=seen.places,
         point_sd=0.0,
         image_photos=view,
@@ -85,10 +80,8 @@ def adjusted_views(camera: Camera, seen: Sightings, poses: Floats) -> Adjusted |
             continue
         if result.status == "diverged":
             continue
-        found = np.tile(np.eye(4), (len(poses), 1, 1))
-        attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes)
-        found[:, :3, :3] = attitudes.values("matrix_to_vision")
-        found[:, :3, 3] = attitudes.translations(result.photo_positions)
+        turned = Attitudes.of("omega_phi_kappa", result.photo_attitudes)
+        found = vision_poses(result.photo_positions, turned)
         adjusted = result.cameras[0].camera.replace(sd=camera.sd)
         squares, freedom = result.sum_and_freedom
         return Adjusted(adjusted, found, squares / max(freedom, 1.0))
