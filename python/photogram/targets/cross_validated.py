@@ -18,7 +18,7 @@ from photogram.targets.agreement import EXPLAINED, Agreement
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.cross_validation import CrossMap, cross_map, parts_agree, splits
 from photogram.targets.housing import Housing
-from photogram.targets.housings import camera_number, housing_of
+from photogram.targets.housings import camera_number, housed_with, housing_of
 
 if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
@@ -132,7 +132,7 @@ def cross_validate(
     if isinstance(into, int) and into < 2:
         raise InputError(f"views are cross-validated in 2 parts or more, not {into}")
     number = camera_number(result, camera)
-    cameras = range(len(result.cameras)) if result.calibration.is_rig else [number]
+    cameras = housed_with(result, number)
     names = tuple(result.cameras[each].name for each in cameras)
     corners = result.calibration.corners
     mine = np.isin(corners.cameras, cameras)
@@ -145,7 +145,7 @@ def cross_validate(
         for part in pair:
             if progress is not None:
                 progress(f"cross-validation: {len(part)} of {len(views)} views")
-            adjusted.append(_adjusted(result, mine & np.isin(corners.views, views[part]), list(cameras)))
+            adjusted.append(_adjusted(result, mine & np.isin(corners.views, views[part]), cameras))
         a, b = (housing_of(each)[0] for each in adjusted)
         parts.append((tuple(views[pair[0]].tolist()), tuple(views[pair[1]].tolist())))
         tests.append(tuple(parts_agree(a, b, names, _unit(adjusted))))
@@ -167,13 +167,14 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
     part = given.replace(
         board=given.board.replace(shape=given.shape),
         corners=corners.replace(
-            cameras=np.searchsorted(cameras, corners.cameras),
+            cameras=[cameras.index(each) for each in corners.cameras.tolist()],
             camera_names=[given.corners.camera_names[each] for each in cameras],
             sizes=[given.corners.sizes[each] for each in cameras],
         ),
         cameras=[_freed(whole.cameras[each].camera) for each in cameras],
         sensors=whole.sensors[cameras],
         poses=whole.poses[np.unique(given.corners.views[pictures])],
+        references=None,
         regularise=None,
     )
     loss, scale = whole.result.options.loss or (None, None)

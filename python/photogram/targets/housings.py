@@ -12,7 +12,7 @@ from photogram.errors import InputError
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.housing import Housing, Seen, mean_motion
 
-__all__ = ["camera_number", "housing_of", "size_of"]
+__all__ = ["camera_number", "housed_with", "housing_of", "size_of"]
 
 
 def camera_number(calibrated: Calibrated, camera: int | str) -> int:
@@ -51,13 +51,20 @@ _MADE: WeakKeyDictionary[Calibrated, dict[int, Housing]] = WeakKeyDictionary()
 
 
 def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
-    """Return the housing of a camera, and the camera's number in it: the rig, or the camera by itself."""
-    rig = calibrated.calibration.is_rig
-    cameras = list(range(len(calibrated.cameras))) if rig else [camera]
+    """Return the housing of a camera, and the camera's number in it."""
+    cameras = housed_with(calibrated, camera)
     made = _MADE.setdefault(calibrated, {})
     if cameras[0] not in made:
         made[cameras[0]] = _housing(calibrated, cameras)
-    return made[cameras[0]], camera if rig else 0
+    return made[cameras[0]], cameras.index(camera)
+
+
+def housed_with(calibrated: Calibrated, camera: int) -> list[int]:
+    """Return the cameras that are tied to one, the reference first, with itself among them."""
+    references = np.asarray(calibrated.calibration.references)
+    reference = int(references[camera])
+    others = np.flatnonzero((references == reference) & (np.arange(len(references)) != reference))
+    return [reference, *others.tolist()]
 
 
 def _housing(calibrated: Calibrated, cameras: list[int]) -> Housing:
@@ -99,7 +106,7 @@ def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> Seen:
     used &= result.image_weights > 0
     photos = block.image_photos[used]
     return Seen(
-        cameras=np.searchsorted(cameras, corners.cameras[photos]),
+        cameras=np.array([cameras.index(each) for each in corners.cameras[photos].tolist()], dtype=np.int64),
         views=np.searchsorted(views, corners.views[photos]),
         points=block.image_points[used],
         xy=block.image_xy[used],
@@ -112,13 +119,11 @@ def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses
     lengths = [len(each.names) for each in calibrated.cameras]
     starts = np.concatenate([[0], np.cumsum(lengths)])
     kept = [starts[each] + np.flatnonzero(calibrated.cameras[each].camera.deviations > 0) for each in cameras]
-    sensors = calibrated.sensors_adjusted() if len(cameras) > 1 else []
-    board = 3 * len(_board_rows(calibrated))
-    others = 6 * len(calibrated.sensors_adjusted())
-    shared = np.arange(others if sensors else 0) + starts[-1]
-    kept += [shared, np.arange(board) + starts[-1] + others]
-    columns = np.concatenate(kept).astype(np.int64)
-    before = starts[-1] + others + board
+    sensors, board = calibrated.sensors_adjusted(), 3 * len(_board_rows(calibrated))
+    kept += [starts[-1] + 6 * sensors.index(each) + np.arange(6) for each in cameras[1:]]
+    kept.append(starts[-1] + 6 * len(sensors) + np.arange(board))
+    columns = np.concatenate(kept)
+    before = starts[-1] + 6 * len(sensors) + board
     partials = np.zeros((len(columns) + 6, before + 6 * len(calibrated.poses)))
     partials[np.arange(len(columns)), columns] = 1.0
     for view, each in zip(views.tolist(), mean_motion(poses), strict=True):

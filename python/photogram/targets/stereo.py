@@ -15,7 +15,7 @@ from photogram.errors import InputError
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.datums import housing_rows
 from photogram.targets.housing import Housing, transformed
-from photogram.targets.housings import camera_number, housing_of, size_of
+from photogram.targets.housings import camera_number, housed_with, housing_of, size_of
 from photogram.targets.imaging import imaged, rays
 from photogram.targets.maps import image_grid
 from photogram.targets.triangulation import Triangulated, triangulated
@@ -43,7 +43,7 @@ def triangulate(
     pixel_sd
         Standard deviation of an image coordinate, pixels.
     datum
-        `axes`: points are in the axes of camera 0, which distances do not depend on. `corners`: they are
+        `axes`: points are in the axes of camera 0 of the rig, which distances do not depend on. `corners`: they are
         fixed to the housing, as the corners of all cameras hold it.
 
     Raises
@@ -51,11 +51,10 @@ def triangulate(
     InputError
         Cameras that are not on a rig, fewer than two, one twice; other shapes.
     """
-    numbers = _of_rig(result, cameras)
+    housing, numbers = _of_rig(result, cameras)
     where = shaped("pixels", pixels, (length("pixels", pixels), len(numbers), 2))
     if not 0 < pixel_sd < np.inf:
         raise InputError(f"the standard deviation of pixels is a positive number, not {pixel_sd:g}")
-    housing = housing_of(result)[0]
     return triangulated(
         housing, numbers, where, pixel_sd, housing_rows(housing) if datum == "corners" else None
     )
@@ -90,16 +89,15 @@ def distance_uncertainty(
     """
     if not 0 < depth < np.inf:
         raise InputError(f"a depth is a positive number, not {depth:g}")
-    numbers = _of_rig(result, cameras)
-    housing = housing_of(result)[0]
-    pixels = image_grid(size_of(result, numbers[0]), grid)[2]
+    housing, numbers = _of_rig(result, cameras)
+    sizes = [size_of(result, camera_number(result, each)) for each in cameras]
+    pixels = image_grid(sizes[0], grid)[2]
     looking = rays(housing.cameras[numbers[0]], pixels)
     ahead = looking[:, 2] > 0
     points = looking[ahead] * (depth / looking[ahead, 2:])
     images = _images(housing, numbers, points)
-    sizes = np.array([size_of(result, each) for each in numbers])
     with np.errstate(invalid="ignore"):
-        seen = ((images >= 0) & (images <= sizes - 1)).all(axis=(1, 2))
+        seen = ((images >= 0) & (images <= np.array(sizes) - 1)).all(axis=(1, 2))
     return pixels[ahead][seen], triangulated(housing, numbers, images[seen], pixel_sd)
 
 
@@ -113,14 +111,15 @@ def _images(housing: Housing, cameras: Sequence[int], points: Floats) -> Floats:
     return np.stack([imaged(housing.cameras[cameras[0]], points).xy, *found], axis=1)
 
 
-def _of_rig(result: Calibrated, cameras: Sequence[int | str]) -> list[int]:
-    """Return numbers of cameras of a rig."""
-    if not result.calibration.is_rig:
-        raise InputError("points are triangulated by cameras that are tied to each other: this is no rig")
+def _of_rig(result: Calibrated, cameras: Sequence[int | str]) -> tuple[Housing, list[int]]:
+    """Return the housing of some cameras, and their numbers in it."""
     numbers = [camera_number(result, each) for each in cameras]
     if len(numbers) < 2 or len(set(numbers)) < len(numbers):
         raise InputError("points are triangulated by two cameras or more, each of them once")
-    return numbers
+    housed = housed_with(result, numbers[0])
+    if not set(numbers) <= set(housed):
+        raise InputError("points are triangulated by cameras that are tied to each other: these are not")
+    return housing_of(result, numbers[0])[0], [housed.index(each) for each in numbers]
 
 
 check_arguments(globals(), ["distance_uncertainty", "triangulate"])

@@ -16,7 +16,7 @@ from photogram.show.brief import Brief, Rows
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.datums import datum_rows
 from photogram.targets.housing import Housing
-from photogram.targets.housings import camera_number, housing_of, size_of
+from photogram.targets.housings import camera_number, housed_with, housing_of, size_of
 from photogram.targets.imaging import rays
 from photogram.targets.maps import distance_text, image_grid
 from photogram.targets.new_views import Candidate, NewView, best_views
@@ -117,8 +117,7 @@ def suggest_views(
     number = camera_number(result, camera)
     checked_distance(distance)
     housing, own = housing_of(result, number)
-    cameras = range(len(housing.cameras)) if result.calibration.is_rig else [number]
-    sizes = np.array([size_of(result, each) for each in cameras])
+    sizes = np.array([size_of(result, each) for each in housed_with(result, number)])
     pixels = image_grid(size_of(result, number), GRID)[2]
     functions = common_partials(housing, own, pixels, distance, datum_rows(housing, own, "corners"))
     known = np.isfinite(functions).all(axis=(1, 2))
