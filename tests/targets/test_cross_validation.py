@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
+from given_targets import golden
+from golden_calibrations import adjusted_rig
 
-from golden_calibrations import DATA, adjusted_rig, golden
 from photogram import InputError
 from photogram.targets.cross_validated import cross_validate
 from photogram.targets.cross_validation import changes_between, cross_map, parts_agree, splits
-
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="golden data are not here")
 
 
 @pytest.fixture(scope="module")

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
+from golden_calibrations import adjusted_rig, rig_small
 
-from golden_calibrations import DATA, adjusted_rig, rig_small
 from photogram.targets.housings import housing_of
-
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="golden data are not here")
 
 
 def test_a_rig_has_the_arrays_of_the_golden_one():

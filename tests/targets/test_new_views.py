@@ -4,13 +4,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from given_targets import golden
+from golden_calibrations import rig_small
 
-from golden_calibrations import DATA, golden, pose, rig_small
 from photogram.targets.datums import datum_rows
 from photogram.targets.new_views import Candidate, best_views
 from photogram.targets.projection import common_partials, worst
+from photogram.targets.vision import composed
 
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="golden data are not here")
 SIZES = np.array([[1280, 960]] * 2)
 SD = 0.3
 
@@ -31,7 +32,7 @@ def test_before(functions):
 def test_a_view_alone(functions, number):
     each = golden("rig_small")["new_views"]["candidates"][number]
     (found,) = best_views(
-        rig_small(), functions, [Candidate(each["name"], pose(each["R"], each["t"]))], SIZES, SD, 1
+        rig_small(), functions, [Candidate(each["name"], composed(each["R"], each["t"]))], SIZES, SD, 1
     )
     assert found.corners.tolist() == each["corners"]
     assert found.sd == pytest.approx(each["worst_sd_after"], rel=1e-6)
@@ -40,7 +41,7 @@ def test_a_view_alone(functions, number):
 
 def test_the_best_view_is_first_and_the_next_counts_on_it(functions):
     data = golden("rig_small")["new_views"]["candidates"]
-    candidates = [Candidate(each["name"], pose(each["R"], each["t"])) for each in data]
+    candidates = [Candidate(each["name"], composed(each["R"], each["t"])) for each in data]
     found = best_views(rig_small(), functions, candidates, SIZES, SD, 6)
     assert found[0].candidate.name == min(data, key=lambda each: each["largest"])["name"]
     assert len({each.candidate.name for each in found}) == 6

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from given_targets import golden
+from golden_calibrations import opencv8, rig_small
 
-from golden_calibrations import DATA, golden, opencv8, rig_small
 from photogram.targets.datums import datum_rows
 from photogram.targets.projection import projection_cofactors
 
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="golden data are not here")
 DISTANCES = {"infinity": np.inf, "1 m": 1.0}
 
 

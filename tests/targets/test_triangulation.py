@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from given_targets import golden
+from golden_calibrations import rig_small
 
-from golden_calibrations import DATA, golden, rig_small
 from photogram.targets.datums import housing_rows
 from photogram.targets.triangulation import triangulated
 
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="golden data are not here")
 SD = 0.3
 
 

@@ -43,8 +43,8 @@ def triangulate(
     pixel_sd
         Standard deviation of an image coordinate, pixels.
     datum
-        `axes`: points are in the axes of camera 0 of the rig, which distances do not depend on. `corners`: they are
-        fixed to the housing, as the corners of all cameras hold it.
+        `axes`: points are in the axes of camera 0 of the rig, which distances do not depend on. `corners`:
+        they are fixed to the housing, as the corners of all cameras hold it.
 
     Raises
     ------
@@ -55,9 +55,8 @@ def triangulate(
     where = shaped("pixels", pixels, (length("pixels", pixels), len(numbers), 2))
     if not 0 < pixel_sd < np.inf:
         raise InputError(f"the standard deviation of pixels is a positive number, not {pixel_sd:g}")
-    return triangulated(
-        housing, numbers, where, pixel_sd, housing_rows(housing) if datum == "corners" else None
-    )
+    still = housing_rows(housing) if datum == "corners" else None
+    return triangulated(housing, numbers, where, pixel_sd, still)
 
 
 def distance_uncertainty(

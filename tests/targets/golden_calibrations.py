@@ -3,34 +3,19 @@
 import ast
 import base64
 import io
-import json
 from dataclasses import replace
 from functools import cache
 
+import given_targets
 import numpy as np
+from given_targets import DATA, NAMES, golden
 
 from photogram import Camera, _photocore
-from photogram.targets import Board, Calibration, Corners
 from photogram.targets.housing import Housing, Seen, mean_motion
 from photogram.targets.view_rows import view_rows
-from shared_data import SHARED
+from photogram.targets.vision import composed, of_vectors
 
-DATA = SHARED / "targets"
 VIEWS = 20
-OPENCV = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
-
-
-@cache
-def golden(name):
-    """Return what a file of golden data holds."""
-    return json.loads((DATA / f"{name}.json").read_text())
-
-
-def pose(rotation, translation):
-    """Return the (4, 4) matrix of a pose, or (n, 4, 4) of several."""
-    found = np.zeros((*np.shape(translation)[:-1], 4, 4))
-    found[..., :3, :3], found[..., :3, 3], found[..., 3, 3] = rotation, translation, 1.0
-    return found
 
 
 @cache
@@ -40,7 +25,7 @@ def rig_small():
     found, seen = data["points"], rig_corners()
     whole = np.load(DATA / "rig_small_cofactors.npy")
     common = whole.shape[0] - 6 * VIEWS
-    poses = pose(found["R"], found["t"])
+    poses = composed(found["R"], found["t"])
     to_motion = np.zeros((common + 6, len(whole)))
     to_motion[:common, :common] = np.eye(common)
     to_motion[common:, common:] = np.concatenate(mean_motion(poses), axis=1)
@@ -49,9 +34,9 @@ def rig_small():
     weights[22:, 22:] = np.diag(1 / np.tile(data["board"]["point_sd"], len(points)) ** 2)
     return Housing(
         cameras=tuple(
-            Camera("opencv", dict(zip(OPENCV, each, strict=True)), sd=np.inf) for each in found["cameras"]
+            Camera("opencv", dict(zip(NAMES, each, strict=True)), sd=np.inf) for each in found["cameras"]
         ),
-        sensors=np.stack([np.eye(4), pose(found["sensor1"]["R"], found["sensor1"]["t"])]),
+        sensors=np.stack([np.eye(4), composed(found["sensor1"]["R"], found["sensor1"]["t"])]),
         poses=poses,
         points=points,
         points_by_board=np.eye(3 * len(points)).reshape(len(points), 3, -1),
@@ -92,8 +77,7 @@ def opencv8():
     board = grid(*given["observations_board"].shape[1:3], spacing) + points_by_board @ found["board_bend"]
     seen = Seen(np.zeros_like(views), views, points, rows[:, :2], 1 / rows[:, 2])
     frames = given["frames_rt_toref"]
-    rotations = _photocore.vector_rotations(frames[:, :3])
-    poses = pose(rotations, frames[:, 3:])
+    poses = of_vectors(frames)
     scale = found["regularisation_scale"]
     sd = dict.fromkeys(names[4:9], 1 / scale["lens"])
     sd |= dict.fromkeys(names[9:], 1 / scale["denominator"])
@@ -105,7 +89,9 @@ def opencv8():
     moved = dense(given)[1]
     poses = np.stack(
         [
-            pose(_photocore.vector_rotations(step[np.newaxis, 3:])[0] @ each[:3, :3], each[:3, 3] + step[:3])
+            composed(
+                _photocore.vector_rotations(step[np.newaxis, 3:])[0] @ each[:3, :3], each[:3, 3] + step[:3]
+            )
             for step, each in zip(moved, poses, strict=True)
         ]
     )
@@ -163,28 +149,4 @@ def rows_of_view(housing, view):
 @cache
 def adjusted_rig():
     """Return the simulated rig as the package adjusts it, from its true values."""
-    given = golden("rig_small")
-    truth = given["truth"]
-    view, camera, point, x, y, level = np.array(given["corners"], dtype=float).T
-    pictures, picture = np.unique(2 * view + camera, return_inverse=True)
-    in_plane, _, across = given["board"]["point_sd"]
-    return Calibration(
-        board=Board(columns=9, rows=7, spacing=0.04, shape="points", sd_plane=across, sd_spacing=in_plane),
-        corners=Corners(
-            pictures=[f"{'ab'[int(each) % 2]}{int(each) // 2:02d}" for each in pictures],
-            cameras=(pictures % 2).astype(int),
-            views=(pictures // 2).astype(int),
-            camera_names=["a", "b"],
-            sizes=[(1280, 960)] * 2,
-            picture=picture,
-            point=point.astype(int),
-            xy=np.column_stack([x, y]),
-            sd=2.0**level,
-        ),
-        cameras=[
-            Camera("opencv", dict(zip(OPENCV, each, strict=True)), sd=np.inf) for each in truth["cameras"]
-        ],
-        poses=pose(truth["R"], truth["t"]),
-        sensors=np.stack([np.eye(4), pose(truth["sensor1"]["R"], truth["sensor1"]["t"])]),
-        sd0=0.3,
-    ).adjust()
+    return given_targets.rig_small().adjust()
