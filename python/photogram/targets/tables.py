@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.page import Fact, significant
+from photogram.show.page import Fact, Tone, significant
 from photogram.show.quantity import Axis, Quantity
 from photogram.targets.board_fit import STRETCHES, board_fit
 from photogram.targets.calibrated import Calibrated
@@ -90,10 +90,8 @@ def board_facts(calibrated: Calibrated) -> list[Fact]:
         return found
     found.append(Fact("Out of its plane, rms", significant(fit.rms_out_of_plane, 3), unit))
     for name, value, sd in zip(STRETCHES, fit.stretch.tolist(), fit.sd.tolist(), strict=True):
-        tone = "look" if abs(value) > NOTABLE * sd else ""
-        found.append(
-            Fact(f"Spacing, {name}", f"{value:.0f}", "ppm", f"sd {sd:.0f} ppm", "look" if tone else "")
-        )
+        tone: Tone = "look" if abs(value) > NOTABLE * sd else ""
+        found.append(Fact(f"Spacing, {name}", f"{value:.0f}", "ppm", f"sd {sd:.0f} ppm", tone))
     return found
 
 
