@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -19,10 +19,8 @@ from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
+from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
-
-if TYPE_CHECKING:
-    from photogram.targets.calibration import Calibration
 
 __all__ = ["STEPS", "Calibrated", "Part", "UnknownWeight", "with_unknown_weight"]
 
@@ -64,7 +62,7 @@ class Calibrated(Brief, Shown):
         What was taken out, where gross errors were looked for; `result` is what is left.
     """
 
-    calibration: Calibration
+    calibration: Start
     result: Result
     unregularised: Result | None = None
     snooped: Snooped | None = None
