@@ -78,7 +78,7 @@ class Calibration(Start):
         AdjustmentError, OutOfMemoryError, KeyboardInterrupt
             As of :func:`photogram.adjust`.
         InputError
-            The shape `bend`; priors without the size of pictures.
+            Priors without the size of pictures.
         """
         return adjusted_start(self, loss=loss, outliers=outliers, threads=threads, progress=progress)
 
@@ -93,7 +93,7 @@ class Calibration(Start):
         Raises
         ------
         InputError
-            Priors of cameras, which snooping does not take; what :meth:`block` refuses.
+            Priors of cameras, which snooping does not take.
         RankError, AdjustmentError, OutOfMemoryError, KeyboardInterrupt
             As of :func:`photogram.snoop`.
         """

@@ -16,6 +16,7 @@ from photogram.errors import InputError
 from photogram.messages import Message, listed
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
+from photogram.network.passages import Bend, Figure
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Sensor
 from photogram.show.brief import Brief, Rows, few
@@ -23,15 +24,13 @@ from photogram.targets.board import Board, Shape
 from photogram.targets.corners import Corners
 from photogram.targets.vision import FLIP, photo_poses
 
-__all__ = ["Regularisation", "Start", "Synchronisation"]
+__all__ = ["BOARD", "Regularisation", "Start", "Synchronisation"]
 
 Synchronisation = Literal["known", "none"]
 Regularisation = Literal["mrcal"]
 
-BEND = (
-    "the shape `bend` of a board cannot be adjusted yet: `points` sees every shape, `held` takes the board"
-    " for plane"
-)
+BOARD = "board"
+"""What the bend of the board is called among the common unknowns."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -131,7 +130,7 @@ class Start(Valued, Brief):
         return self.board.shape_of(self.corners.view_count)
 
     def places(self) -> Floats:
-        """Return (n, 3) the points of the board as they are given: bent, unless each is an unknown."""
+        """Return (n, 3) the points of the board where an adjustment begins with them."""
         bent = any(self.bend) and self.shape != "points"
         return self.board.bent(*self.bend) if bent else self.board.places
 
@@ -156,14 +155,7 @@ class Start(Valued, Brief):
         ----------
         cameras
             In the place of those that are given.
-
-        Raises
-        ------
-        InputError
-            The shape `bend`.
         """
-        if self.shape == "bend":
-            raise InputError(BEND)
         corners, poses = self.corners, np.asarray(self.poses)
         frames, photo = self.frames()
         names = [*corners.pictures, *frames]
@@ -177,7 +169,7 @@ class Start(Valued, Brief):
             cameras=self.cameras if cameras is None else cameras,
             photo_cameras=np.concatenate([corners.cameras, self._cameras_of_frames(photo)]),
             point_ids=self.board.names,
-            point_positions=self.places(),
+            point_positions=self.board.places if self.shape == "bend" else self.places(),
             point_sd=self.board.deviations(corners.view_count),
             image_photos=corners.picture[use],
             image_points=corners.point[use],
@@ -185,7 +177,14 @@ class Start(Valued, Brief):
             image_sd=np.repeat(corners.sd[use, np.newaxis] * (self.sd0 or 1.0), 2, axis=1),
             mounts=self._mounts(names, photo),
             linear_unit=self.board.unit,
+            passages=self._passages(),
         )
+
+    def _passages(self) -> list[Figure]:
+        """Return what the points of the board follow from, where it is bent by an unknown amount."""
+        if self.shape != "bend":
+            return []
+        return [Figure(Bend(BOARD, self.bend), self.board.names, self.board.shifts())]
 
     def _cameras_of_frames(self, photo: Indices) -> Indices:
         """Return the references of views that have no picture of them."""
