@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import Camera, InputError, adjust, predict
+from photogram import Camera, InputError, predict
 from shared_data import SHARED
 
 TARGETS = SHARED / "data" / "targets"
