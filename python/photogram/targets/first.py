@@ -99,8 +99,8 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
         cameras.append(camera)
         remarks += told
     pictures = Pictures(seen, list(corners.pictures), corners.cameras, cameras, usable)
-    orders, of_orders = pictures.ordered()
-    made = pictures.poses(orders)
+    orders, fits, of_orders = pictures.ordered()
+    made = pictures.adjusted(orders, fits)
     rig = connected(made, corners.cameras, corners.views, len(cameras), seen.listings.turns)
     made = _turned(made, rig, seen.listings)
     remarks += [*of_orders, *_of_rig(rig, corners), *(_frontal(made, corners) if seen.is_flat else ())]

@@ -12,6 +12,7 @@ from photogram.network.cameras import Camera
 from photogram.targets.families import POOR, misfits, rays_of
 from photogram.targets.homographies import centres, poses, ray_homographies
 from photogram.targets.sightings import LISTED, Sightings
+from photogram.targets.small_block import adjusted_views
 
 __all__ = ["Pictures"]
 
@@ -52,8 +53,18 @@ class Pictures:
         found[self.usable] = poses(ray_homographies(own.coordinates, self._rays(own)[self.usable]))
         return found
 
-    def ordered(self) -> tuple[Indices, list[Message]]:
-        """Return (P,) in which order the corners of each picture are listed, and what is to be said of it.
+    def adjusted(self, orders: Indices, fits: Bools) -> Floats:
+        """Return these poses adjusted with the cameras held, of (P,) pictures that fit."""
+        found, seen = self.poses(orders), self.seen.listed(orders)
+        for k, camera in enumerate(self.cameras):
+            own = (self.of_cameras == k) & fits
+            done = adjusted_views(camera.replace(sd=0.0), seen.of(own), found[own]) if own.any() else None
+            if done is not None:
+                found[own] = done.poses
+        return found
+
+    def ordered(self) -> tuple[Indices, Bools, list[Message]]:
+        """Return (P,) in which order the corners of each picture are listed, whether they fit, and remarks.
 
         That of their numbers is kept where a picture fits as well as most do, and sees the board from the
         side that most see: the front, x to the right and y down, where none says it. Else the first order
@@ -68,7 +79,9 @@ class Pictures:
         right = fits & (front == side)
         orders = np.zeros(len(self.usable), dtype=np.int64)
         orders[self.usable] = np.argmax(right, axis=1)
-        return orders, self._told(orders, fits, right)
+        fit = np.zeros(len(self.usable), dtype=bool)
+        fit[self.usable] = fits.any(axis=1)
+        return orders, fit, self._told(orders, fits, right)
 
     def _rays(self, seen: Sightings) -> Floats:
         """Return (P, n, 3) rays, those of each picture by its camera."""
