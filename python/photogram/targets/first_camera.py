@@ -72,8 +72,8 @@ def first_camera(
         done = _adjusted(own, trial, family, camera)
         if done is not None and done.is_whole:
             return done.camera, remarks
-        why = f"its corners alone hardly determine the terms of {wanted}: priors or fewer terms would help"
-        remarks.append(Message(f"camera {name}: {why}"))
+        why = f"its corners alone hardly determine the terms of {wanted}"
+        remarks.append(Message(f"camera {name}: {why}: priors, or another lens, would help"))
     return (camera if done is None else done.camera), remarks
 
 
