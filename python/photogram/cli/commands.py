@@ -31,6 +31,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "Adjust a block in whatever files it lies: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...",
         "adjust.adjust",
     ),
+    "calibrate": (
+        "Calibrate cameras and rigs with pictures of a board: cameras with their uncertainty.",
+        "calibrate.calibrate",
+    ),
     "check": (
         "Look for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.",
         "check_project.check_project",
@@ -94,6 +98,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
             "correct": "comparator.correct",
             "compare": "comparator.compare",
         },
+    ),
+    "certificate": (
+        "Check a camera's certificate: typing errors, marks from distances, lens from its table.",
+        "certificate.certificate",
     ),
     "stellar-camera": (
         "Calibrate a camera by a plate with stars, or by exposures of the sky.",

@@ -11,3 +11,11 @@ from photogram.targets.reading import read
 __all__ = ["Board", "Calibrated", "Calibration", "Corners", "FirstCalibration", "first_values", "read"]
 
 check_arguments(globals(), set(__all__) - {"Calibrated", "FirstCalibration"})
+
+WAYS = {
+    "document_of": ("document",),
+    "findings_of": ("findings",),
+    "page_of": ("page",),
+    "report_of": ("report",),
+}
+"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""

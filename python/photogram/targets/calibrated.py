@@ -14,8 +14,9 @@ from photogram.arguments.types import Floats, Indices
 from photogram.network.attitudes import Attitudes
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
+from photogram.results.snooped import Snooped
 from photogram.show.brief import Brief, Rows
-from photogram.show.ways import Paged
+from photogram.show.ways import Shown
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
 from photogram.targets.vision import FLIP, composed, sensor_steps, view_steps, vision_poses
@@ -48,7 +49,7 @@ def with_unknown_weight(result: Result) -> Result:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Calibrated(Brief, Paged):
+class Calibrated(Brief, Shown):
     """An adjusted calibration of K cameras in V views of a board of n points.
 
     Attributes
@@ -59,11 +60,14 @@ class Calibrated(Brief, Paged):
         The adjusted block: residuals, redundancy numbers, tests, the verdict.
     unregularised
         The adjustment without priors of cameras, where there are any: what these have moved.
+    snooped
+        What was taken out, where gross errors were looked for; `result` is what is left.
     """
 
     calibration: Calibration
     result: Result
     unregularised: Result | None = None
+    snooped: Snooped | None = None
 
     def brief(self) -> tuple[str, Rows]:
         """Return how the adjustment ended in a few lines."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from photogram.adjustment.adjustment import Progress, adjust, adjusted_again
 from photogram.adjustment.robust import Loss
+from photogram.adjustment.snooping import snoop
 from photogram.arguments.arrays import indices, one_of, shaped, shown
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Bools, Floats, Indices
@@ -296,6 +297,39 @@ class Calibration(Valued, Brief):
         if own.sd0 is None:
             told = with_unknown_weight(told)
         return Calibrated(calibration=own, result=told, unregularised=free if own.regularise else None)
+
+    def snoop(self, **options: Any) -> Calibrated:
+        """Take gross errors out one after the other, and adjust what is left.
+
+        Parameters
+        ----------
+        options
+            Those of :func:`photogram.snoop`.
+
+        Raises
+        ------
+        InputError
+            Priors of cameras, which snooping does not take; what :meth:`block` refuses.
+        RankError, AdjustmentError, OutOfMemoryError, KeyboardInterrupt
+            As of :func:`photogram.snoop`.
+        """
+        if self.regularise is not None:
+            raise InputError("gross errors are taken out without priors of cameras: regularise is None")
+        found = snoop(self.block(), **options)
+        result = found.judged
+        assert isinstance(result, Result)
+        own = self._kept(result.block)
+        told = replace(result, messages=[*own.messages, *result.messages])
+        vars(told)["verdict"] = found.verdict
+        return Calibrated(calibration=own, result=told, snooped=found)
+
+    def _kept(self, block: Block) -> Calibration:
+        """Return the calibration with the corners that a block still has."""
+        corners, points = self.corners, len(self.board.places)
+        kept = np.isin(
+            corners.picture * points + corners.point, block.image_photos * points + block.image_points
+        )
+        return self.replace(corners=corners.replace(use=corners.use & kept))
 
     def without(self, images: Bools) -> Calibration:
         """Return the calibration without some images (m,) of its block."""
