@@ -71,12 +71,10 @@ def lens_of(model: str, source: Camera, size: tuple[int, int]) -> Camera:
     if own not in models:
         raise InputError(f"model: there is no lens {shown(model)}{nearest(model, [*LENS_TERMS, *models])}")
     names = [name for name, _ in models[own][1]]
-    constants = {*names[len(names) - models[own][2] :]} - {"w", "h"}
-    if not ({"f", "fx"} & {*names} and "cx" in names) or constants:
-        raise InputError(
-            f"model: {model} has no focal length and principal point in pixels to begin with"
-            + "".join(f", and a constant {each} that nothing says" for each in sorted(constants))
-        )
+    if not ({"f", "fx"} & {*names} and "cx" in names):
+        raise InputError(f"model: {model} has no focal length and principal point in pixels to begin with")
+    if constants := sorted({*names[len(names) - models[own][2] :]} - {"w", "h"}):
+        raise InputError(f"model: {model} has constants that no corners say: {', '.join(constants)}")
     given = source.parameters
     fx, fy = given.get("fx", given.get("f")), given.get("fy", given.get("f"))
     start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1]} | dict(_STARTS)
