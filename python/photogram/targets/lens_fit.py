@@ -73,8 +73,6 @@ def lens_of(model: str, source: Camera, size: tuple[int, int]) -> Camera:
     names = [name for name, _ in models[own][1]]
     if not ({"f", "fx"} & {*names} and "cx" in names):
         raise InputError(f"model: {model} has no focal length and principal point in pixels to begin with")
-    if constants := sorted({*names[len(names) - models[own][2] :]} - {"w", "h"}):
-        raise InputError(f"model: {model} has constants that no corners say: {', '.join(constants)}")
     given = source.parameters
     fx, fy = given.get("fx", given.get("f")), given.get("fy", given.get("f"))
     start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1]} | dict(_STARTS)
