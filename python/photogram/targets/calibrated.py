@@ -140,6 +140,41 @@ class Calibrated(Brief, Shown):
         InputError, OutOfMemoryError, KeyboardInterrupt
             As of :meth:`photogram.Result.covariance`; a part that there is not.
         """
+        names, wanted, steps = self._selected(parts)
+        found = self.result.covariance(wanted) / self.result.covariance_scale
+        start = 0
+        for each in steps:
+            own = slice(start, start + len(each))
+            found[own] = each @ found[own]
+            found[:, own] = found[:, own] @ each.T
+            start += len(each)
+        return names, found
+
+    def combined(self, partials: Floats, parts: Sequence[Part]) -> Floats:
+        """Return the (m, m) cofactors of linear combinations of some parts: J Q J'.
+
+        Parameters
+        ----------
+        partials
+            (m, q) J: a column for each of the q unknowns of :meth:`cofactors`.
+        parts
+            As of :meth:`cofactors`.
+
+        Raises
+        ------
+        InputError, OutOfMemoryError, KeyboardInterrupt
+            As of :meth:`cofactors`.
+        """
+        _, wanted, steps = self._selected(parts)
+        own, start = partials.copy(), 0
+        for each in steps:
+            columns = slice(start, start + len(each))
+            own[:, columns] = own[:, columns] @ each
+            start += len(each)
+        return self.result.covariances().combined(own, wanted) / self.result.covariance_scale
+
+    def _selected(self, parts: Sequence[Part]) -> tuple[list[str], list[tuple[str, list[str]]], list[Floats]]:
+        """Return names of unknowns, what they are in the result, and their partials by steps of the block."""
         names: list[str] = []
         wanted: list[tuple[str, list[str]]] = []
         steps: list[Floats] = []
@@ -149,14 +184,7 @@ class Calibrated(Brief, Shown):
             names += own_names
             wanted += [selection] if selection[1] else []
             steps += partials
-        found = self.result.covariance(wanted) / self.result.covariance_scale
-        start = 0
-        for each in steps:
-            own = slice(start, start + len(each))
-            found[own] = each @ found[own]
-            found[:, own] = found[:, own] @ each.T
-            start += len(each)
-        return names, found
+        return names, wanted, steps
 
     def _cameras(self) -> tuple[list[str], tuple[str, list[str]], list[Floats]]:
         names = [f"{each.name} {name}" for each in self.cameras for name in each.names]
