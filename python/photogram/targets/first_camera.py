@@ -11,6 +11,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.cameras import Camera
+from photogram.network.knots import KNOTTED
 from photogram.targets.families import POOR, Trial, adjusted_family, misfits, rays_of, trials
 from photogram.targets.homographies import poses, ray_homographies
 from photogram.targets.lens_fit import fitted, is_perspective, lens_of
@@ -52,7 +53,8 @@ def first_camera(
     size, name
         Width and height of them in pixels, and what the camera is called.
     model
-        The wanted model; None for what is usual at its field of view.
+        The wanted model; None for what is usual at its field of view. The knots of a splined one are fitted
+        to the usual one: many of them are where no corner is.
 
     Raises
     ------
@@ -67,14 +69,16 @@ def first_camera(
         remarks.append(Message(f"camera {name}: no trial lens could be adjusted; the first values are rough"))
     reach = MARGIN * float(np.nanmax(np.linalg.norm(seen.xy - (np.array(size) - 1) / 2, axis=2)))
     own = used.listed(trial.orders)
-    for wanted in _wanted(family, seen, size, model):
+    splined = model == KNOTTED
+    for wanted in _wanted(family, seen, size, None if splined else model):
         camera = fitted(family, wanted, size, radius=reach)
         done = _adjusted(own, trial, family, camera)
         if done is not None and done.is_whole:
-            return done.camera, remarks
+            break
         why = f"its corners alone hardly determine the terms of {wanted}"
         remarks.append(Message(f"camera {name}: {why}: priors, or another lens, would help"))
-    return (camera if done is None else done.camera), remarks
+    found = camera if done is None else done.camera
+    return (fitted(found, KNOTTED, size) if splined else found), remarks
 
 
 def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> Adjusted | None:

@@ -59,7 +59,8 @@ class Pictures:
         found, seen = self.poses(orders), self.seen.listed(orders)
         for k, camera in enumerate(self.cameras):
             own = (self.of_cameras == k) & fits
-            done = adjusted_views(camera.replace(sd=0.0), seen.of(own), found[own]) if own.any() else None
+            held = camera.replace(sd=0.0, knot_sd=None)
+            done = adjusted_views(held, seen.of(own), found[own]) if own.any() else None
             if done is not None:
                 found[own] = done.poses
         return found
