@@ -23,6 +23,7 @@ from photogram.targets.vision import FLIP, composed, sensor_steps, view_steps, v
 
 if TYPE_CHECKING:
     from photogram.targets.calibration import Calibration
+    from photogram.targets.worth import Worth
 
 __all__ = ["STEPS", "Calibrated", "Part", "UnknownWeight", "with_unknown_weight"]
 
@@ -62,12 +63,15 @@ class Calibrated(Brief, Shown):
         The adjustment without priors of cameras, where there are any: what these have moved.
     snooped
         What was taken out, where gross errors were looked for; `result` is what is left.
+    worth
+        Maps of uncertainty, cross-validation and what else was asked for, which reports show.
     """
 
     calibration: Calibration
     result: Result
     unregularised: Result | None = None
     snooped: Snooped | None = None
+    worth: Worth | None = None
 
     def brief(self) -> tuple[str, Rows]:
         """Return how the adjustment ended in a few lines."""

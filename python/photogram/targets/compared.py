@@ -166,6 +166,12 @@ class Difference(Brief):
         return self.title, rows + [("", each) for each in self.remarks]
 
     @property
+    def sentences(self) -> list[str]:
+        """The difference in lines of text."""
+        title, rows = self.brief()
+        return [title, *(f"{name}: {said}" if name else said for name, said in rows)]
+
+    @property
     def remarks(self) -> list[str]:
         """What limits the comparison, and what came out of its test."""
         said = []
