@@ -12,6 +12,7 @@ from photogram.show.ways import page_of
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.prior_shift import prior_shift
 from photogram.targets.tables import board_facts, views, worst_points
+from photogram.targets.worth_page import worth_facts, worth_section
 
 __all__ = ["calibration_page"]
 
@@ -29,9 +30,17 @@ def calibration_page(calibrated: Calibrated) -> Page:
         "Pictures of one view show the board in one pose. chi² is the weighted sum of squares of its corners."
     )
     moved = prior_shift(calibrated)
+    worth = calibrated.worth
     sections = [
+        worth_section(worth),
         Section("board", "Board", board),
         Section("views", "Views", [page_table("Views", table)], intro),
         Section("priors", "Priors of cameras", [page_table("What they have moved", moved)] if moved else []),
     ]
-    return replace(page, what="Calibration with targets", sections=[*sections, *page.sections])
+    highlights = [*([] if worth is None else worth_facts(worth)), *page.highlights]
+    return replace(
+        page,
+        what="Calibration with targets",
+        highlights=highlights,
+        sections=[*sections, *page.sections],
+    )

@@ -1,4 +1,4 @@
-"""What a calibration is worth: maps of its uncertainty, what cross-validation says of them, what to do next."""
+"""What a calibration is worth: maps of uncertainty, what cross-validation says of them, what to do next."""
 
 from __future__ import annotations
 
@@ -82,11 +82,13 @@ class Worth:
     @property
     def sentences(self) -> list[str]:
         """What a reader wants first, a line for each thing."""
-        said = [
-            f"{each.camera}: {each.largest:.2g} px worst where the board was seen,"
-            f" {distance_text(each.distance, each.unit)}; {each.model}"
-            for each in self.maps
-        ]
+        said = []
+        for camera in dict.fromkeys(each.camera for each in self.maps):
+            own = [each for each in self.maps if each.camera == camera]
+            largest = ", ".join(
+                f"{each.largest:.2g} px {distance_text(each.distance, each.unit)}" for each in own
+            )
+            said.append(f"{camera}: worst where the board was seen {largest}; {own[0].model}")
         said += [line for each in self.differences for line in each.sentences]
         for each in self.suggestions:
             said += [f"view to take next: {line}" for line in each.sentences]
@@ -126,8 +128,17 @@ def worth(
         model = model_verdict(calibrated, number, cross)
         for distance in asked.distances or (math.inf, median_distance(calibrated, number)):
             told(f"map of {camera.name} {distance_text(distance, calibrated.calibration.board.unit)}")
-            how = {"datum": asked.datum, "noise_only": asked.noise_only, "model": model}
-            maps.append(uncertainty_map(calibrated, number, distance, asked.grid, **how))
+            maps.append(
+                uncertainty_map(
+                    calibrated,
+                    number,
+                    distance,
+                    asked.grid,
+                    datum=asked.datum,
+                    noise_only=asked.noise_only,
+                    model=model,
+                )
+            )
     suggestions = []
     if asked.suggest and maps:
         told("views to take next")
