@@ -155,7 +155,8 @@ def _uncertainty(found: UncertaintyMap, ax: Where) -> Any:
         _contours(axes, found.columns, found.rows, found.sd, "px")
         _seen(axes, found.corners, found.coverage)
         _frame(axes, found.size)
-        axes.set_title(f"{found.title}\n{found.model}", fontsize=9.0)
+        said = found.model.replace("; ", "\n")
+        axes.set_title(f"{found.title}\n{said}", fontsize=9.0)
     return handed_out([axes])
 
 
@@ -256,7 +257,7 @@ def _height(size: tuple[int, int]) -> float:
 def _contours(
     axes: Axes, columns: Floats, rows: Floats, values: Floats, unit: str, lowest: float = 0.01
 ) -> None:
-    """Draw filled contours at 1, 2, 5 steps with their values on the lines, from a share of the largest on."""
+    """Draw filled contours at 1, 2, 5 steps with their values on the lines, from a share of the largest."""
     from matplotlib.colors import LogNorm
     from matplotlib.patheffects import withStroke
 
@@ -270,8 +271,10 @@ def _contours(
     places = np.arange(SHADES * (len(levels) - 1) + 1) / SHADES
     shades = np.exp(np.interp(places, np.arange(len(levels)), np.log(levels)))
     filled = axes.contourf(columns, rows, shown, shades, cmap=ORDERED, norm=norm, extend="min")
-    lines = axes.contour(columns, rows, shown, levels, colors=INK, linewidths=0.7)
+    filled.set_edgecolor("face")  # no seams between colours
+    lines = axes.contour(columns, rows, shown, levels, colors="white", linewidths=0.9)
     for text in axes.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8.0):
+        text.set_color(INK)
         text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
     bar = axes.figure.colorbar(filled, ax=axes, shrink=0.85, ticks=levels, format="%g")
     bar.ax.minorticks_off()
@@ -282,7 +285,7 @@ def _seen(axes: Axes, corners: Floats, coverage: Floats) -> None:
     if not len(corners):
         return
     step = -(-len(corners) // DOTS)
-    axes.plot(*corners[::step].T, ".", color=INK, markersize=2.5, alpha=0.6, markeredgewidth=0.0)
+    axes.plot(*corners[::step].T, ".", color="white", markersize=2.5, alpha=0.6, markeredgewidth=0.0)
     axes.plot(*np.vstack([coverage, coverage[:1]]).T, color=VERMILION, linewidth=1.2)
 
 
