@@ -19,6 +19,7 @@ PROGRAMS = (
     "comparator",
     "stellar",
     "targets",
+    "film",
 )
 FLOORS = (
     ("cli",),

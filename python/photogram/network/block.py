@@ -17,7 +17,7 @@ from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import listed
-from photogram.network.cameras import Camera, CameraRow, camera_rows, checked_cameras, photo_indices
+from photogram.network.cameras import Camera, CameraRow, camera_rows
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import (
@@ -30,6 +30,7 @@ from photogram.network.observations import (
 )
 from photogram.network.observations.smoothness import with_smoothness
 from photogram.network.passages import Figure, Passage, checked_passages
+from photogram.network.photo_cameras import checked_cameras, photo_indices
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.rigs import Mount, checked_mounts
 from photogram.network.tables import (
@@ -525,7 +526,7 @@ class Block(Valued, Brief):
             return camera_rows(self.cameras), self.photo_cameras
         distances = self.known_distances("the adjustment").tolist()
         places = {distance: row for row, distance in enumerate(dict.fromkeys(distances))}
-        rows: list[CameraRow] = [("perspective", [distance], [0.0], None) for distance in places]
+        rows: list[CameraRow] = [("perspective", [distance], [0.0], None, None) for distance in places]
         return rows, np.array([places[distance] for distance in distances], dtype=np.int64)
 
     def known_distances(self, what: str) -> Floats:

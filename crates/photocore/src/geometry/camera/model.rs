@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::inverse::RadialLimit;
-use super::splined_stereographic::Patch;
+use super::knots::Patch;
 use crate::geometry::axes::Vector3;
 
 /// How a camera maps u, a point in the photo's axes (it looks along -z), to image coordinates.
