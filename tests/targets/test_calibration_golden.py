@@ -101,7 +101,7 @@ def test_state_of_mrcal():
 
 
 def test_left_pictures_of_opencv_from_corners_alone(tmp_path):
-    found = read(left_table(tmp_path), size=(640, 480)).adjust()
+    found = read(left_table(tmp_path)).adjust()
     expected, opencv = golden("opencv_left")["left"]["solution"], golden("opencv_left")["left"]["opencv"]
     camera = found.cameras[0]
     names = expected["order"].split()

@@ -53,6 +53,10 @@ class PriorName(StrEnum):
     MRCAL = "mrcal"
 
 
+PLAIN_GOES = "--shape, --sd, --regularise alone"
+"""Options that go with a plain project."""
+
+
 @dataclass(frozen=True)
 class Seen:
     """What a user says of the board, of images and of the lens, with the options that say it."""
@@ -126,6 +130,8 @@ class Seen:
         """Read what lies at a path."""
         from photogram.targets import read
 
+        if (path / "project.toml").exists():
+            return self._of_project(path)
         given: dict[str, Any] = {
             "views": self.views.value,
             "sync": self.sync.value,
@@ -144,6 +150,21 @@ class Seen:
             sd0=self._sd0(),
             **given,
         )
+
+    def _of_project(self, path: Path) -> Calibration:
+        """Return the calibration that a plain project is, with what a user says otherwise."""
+        from photogram import formats
+        from photogram.formats.calibrations import calibration_of
+
+        found = calibration_of(formats.read(path))
+        if self != Seen(shape=self.shape, sd=self.sd, regularise=self.regularise):
+            raise typer.BadParameter("a project has board, views and lens", param_hint=PLAIN_GOES)
+        changes: dict[str, Any] = {"regularise": self.regularise and self.regularise.value}
+        if self.shape is not None:
+            changes["board"] = found.board.replace(shape=self.shape.value)
+        if self.sd is not None:
+            changes["sd0"] = self._sd0()
+        return found.replace(**changes)
 
     def _board(self) -> Board | Path | None:
         """Return the board of `--board` and `--spacing`, or the file that describes it."""
@@ -267,7 +288,7 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     """Make everything that goes to the directory, before anything is written."""
     from photogram.formats import to_files
     from photogram.formats.adjusted import table_files
-    from photogram.formats.targets import adjusted_project
+    from photogram.formats.calibrations import adjusted_project
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
     from photogram.targets.tables import views

@@ -58,7 +58,7 @@ class Board(Valued, Brief):
         Standard deviations of z, and of x and y, of each point for `points`. None: 1/200 and 1/500 of the
         spacing.
     point_sd
-        Of `points`: (n, 3) in the place of these; None: these.
+        (n, 3) in the place of these; None: these.
 
     Raises
     ------
@@ -90,6 +90,11 @@ class Board(Valued, Brief):
             self._check_points()
         else:
             self._check_grid()
+        if self.point_sd is not None:
+            sd = shaped("point_sd", self.point_sd, (len(self.places), 3))
+            if not ((sd >= 0) & np.isfinite(sd)).all():
+                raise InputError("point_sd of a board are not standard deviations")
+            self._set("point_sd", sd)
         for name in ("sd_plane", "sd_spacing"):
             if getattr(self, name) is not None:
                 self._set(name, _length(name, getattr(self, name)))
@@ -103,7 +108,7 @@ class Board(Valued, Brief):
                 raise InputError(f"a board of the kind {self.kind} has no {name}")
 
     def _check_grid(self) -> None:
-        self._refuse("points", "point_names", "point_sd")
+        self._refuse("points", "point_names")
         least = 1 if self.kind == "aprilgrid" else 2
         for name in ("columns", "rows"):
             count = whole_number(f"{name} of a board", getattr(self, name))
@@ -148,11 +153,6 @@ class Board(Valued, Brief):
             if len(given) != count or len(set(given)) < count:
                 raise InputError(f"point_names of a board are not {count} different names")
             self._set("point_names", tuple(given))
-        if self.point_sd is not None:
-            sd = shaped("point_sd", self.point_sd, (count, 3))
-            if not ((sd >= 0) & np.isfinite(sd)).all():
-                raise InputError("point_sd of a board are not standard deviations")
-            self._set("point_sd", sd)
 
     def brief(self) -> tuple[str, Rows]:
         """Return what the board is in a few lines."""

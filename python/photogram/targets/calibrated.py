@@ -19,7 +19,7 @@ from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
-from photogram.targets.vision import FLIP, composed, sensor_steps, view_steps, vision_poses
+from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 
 if TYPE_CHECKING:
     from photogram.targets.calibration import Calibration
@@ -94,9 +94,7 @@ class Calibrated(Brief, Shown):
         found = np.tile(np.eye(4), (len(self.cameras), 1, 1))
         for each in self.result.unknowns:
             if each.kind == "sensor":
-                # A = F R'F, c = -F R't.
-                rotation = FLIP @ each.attitude.T @ FLIP
-                found[self._numbers[each.name]] = composed(rotation, -rotation @ FLIP @ each.position)
+                found[self._numbers[each.name]] = sensor_pose(each.position, each.attitude)
         return found
 
     @cached_property

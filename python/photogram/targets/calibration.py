@@ -128,7 +128,7 @@ class Calibration(Valued, Brief):
 
     def _leave_out(self, poses: Floats) -> None:
         """Leave out pictures that say nothing, or whose pose nobody knows, and name them."""
-        poor = self.corners.poor()
+        poor = self.corners.poor(self.board.places)
         keep = np.array([name not in poor for name in self.corners.pictures], dtype=bool)
         unposed = keep & ~np.isfinite(poses[self.corners.views]).all(axis=(1, 2))
         keep &= ~unposed

@@ -42,8 +42,8 @@ def calibration_summary(calibrated: Calibrated) -> list[Section]:
 
 def _views(table: list[Quantity]) -> list[str]:
     width = max(len(str(each)) for each in table[0].values)
-    forms = {"rms": ".3f", "redundancy": ".1f", "chi2": ".1f", "largest_standardized": ".2f"}
-    heads = {"left_out": "left out", "largest_standardized": "largest w", "rms": "rms px"}
+    forms = {"rms_px": ".3f", "redundancy": ".1f", "chi2": ".1f", "largest_standardized": ".2f"}
+    heads = {"left_out": "left out", "largest_standardized": "largest w", "rms_px": "rms px"}
     fields = field(table[0], max(width, 4), head="view")
     for each in table[1:]:
         name = str(each.name)

@@ -49,7 +49,7 @@ def views(calibrated: Calibrated) -> list[Quantity]:
         ),
         Quantity(used, (), "number", "corners", "corners", head="Corners"),
         Quantity(left_out, (), "number", "left_out", "left_out", head="Left out"),
-        Quantity(rms, _PIXELS, "value", "rms", "rms_px", head="rms"),
+        Quantity(rms, _PIXELS, "value", "rms_px", "rms_px", head="rms"),
         Quantity(
             _sums(view, result.redundancy, count), (), "number", "redundancy", "redundancy", head="Redundancy"
         ),

@@ -17,6 +17,7 @@ __all__ = [
     "inverted",
     "of_vectors",
     "photo_poses",
+    "sensor_pose",
     "sensor_steps",
     "view_steps",
     "vision_poses",
@@ -53,6 +54,15 @@ def inverted(pose: Floats) -> Floats:
     """Return (4, 4) the way back: [R' -R't; 0 1]."""
     turned = pose[:3, :3].T
     return composed(turned, -turned @ pose[:3, 3])
+
+
+def sensor_pose(position: Floats, attitude: Floats) -> Floats:
+    """Return (4, 4) the pose frame -> sensor of one with the position c and the attitude A on its frame.
+
+    A = F R'F and c = -F R't.
+    """
+    rotation = FLIP @ attitude.T @ FLIP
+    return composed(rotation, -rotation @ FLIP @ position)
 
 
 def crossing(vector: Floats) -> Floats:

@@ -1,0 +1,82 @@
+"""The table of boards: what the control of a calibration with targets is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, get_args
+
+import numpy as np
+
+from photogram.errors import InputError
+from photogram.formats.plain.tables import Tables
+from photogram.io.delimited import ColumnTable
+from photogram.targets.board import Board, BoardKind, Shape
+
+__all__ = ["ASSUMED", "boards_table", "levels", "read_boards"]
+
+ASSUMED = "sd of corners assumed"
+"""The detail of a project whose standard deviations of corners nobody has given: levels tell ratios."""
+_LENGTHS = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")
+
+
+def read_boards(tables: Tables) -> dict[str, Board]:
+    """Read boards of columns and rows; points of others are the control of the project.
+
+    Raises
+    ------
+    InputError
+        A kind or shape that there is not, what is no board, more than one.
+    """
+    table = tables.read("boards")
+    if table is None or not table.count:
+        return {}
+    if table.count > 1:
+        raise table.error(1, "several boards: those fixed to each other are one of the kind points")
+    return {name: _board(table, row, tables) for row, name in enumerate(table.names_once("board"))}
+
+
+def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
+    kind, shape = (table.texts(name)[row] for name in ("kind", "shape"))
+    given: dict[str, Any] = {"unit": tables.settings.length}
+    for name, word, words in (("kind", kind, get_args(BoardKind)), ("shape", shape, get_args(Shape))):
+        if word and word not in words:
+            raise table.error(row, f"column {name}: {word} is none of {', '.join(words)}")
+        given |= {name: word} if word else {}
+    if given.get("kind") == "points":
+        # Their places are those of the control, which is read later.
+        given["points"] = np.zeros((0, 3))
+        return Board(**given)
+    lengths = {name: float(table.numbers(name)[row]) for name in _LENGTHS}
+    given |= {name: int(table.numbers(name, 0.0)[row]) for name in ("columns", "rows")}
+    given |= {name: lengths[name] for name in _LENGTHS[2:] if not np.isnan(lengths[name])}
+    if "tag_size" not in given:
+        given["spacing"] = lengths["spacing_x"], lengths["spacing_y"]
+    try:
+        return Board(**given)
+    except InputError as error:
+        raise table.error(row, error.message) from None
+
+
+def boards_table(boards: Mapping[str, Board]) -> dict[str, Any]:
+    """Return the columns of boards; none without."""
+    if not boards:
+        return {}
+    each = boards.values()
+    grids = [None if own.kind == "points" else own for own in each]
+    columns: dict[str, Any] = {"board": [*boards], "kind": [own.kind for own in each]}
+    for name in ("columns", "rows"):
+        columns[name] = [None if own is None else getattr(own, name) for own in grids]
+    for k, name in enumerate(_LENGTHS[:2]):
+        columns[name] = [None if own is None or own.tag_size else own.pitch[k] for own in grids]
+    for name in _LENGTHS[2:]:
+        columns[name] = [getattr(own, name) for own in each]
+    return columns | {"shape": [own.shape or "" for own in each]}
+
+
+def levels(image_sd: np.ndarray, *, assumed: bool) -> np.ndarray | None:
+    """Return (m,) levels l of images whose standard deviations are 2^l of an assumed one; else None."""
+    if not assumed:
+        return None
+    found = np.log2(image_sd[:, 0])
+    whole = np.round(found)
+    return whole if np.array_equal(2.0**whole, image_sd[:, 0]) else None
