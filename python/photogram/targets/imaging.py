@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
 
@@ -27,7 +26,8 @@ class Imaged:
     by_point
         (n, 2, 3) by the point: Pi.
     by_parameters
-        (n, 2, p) by the parameters of the camera that are unknown, in their order: K.
+        (n, 2, p) by the parameters of the camera that are unknown, in their order, then by its unknown knots:
+        K.
     """
 
     xy: Floats
@@ -37,8 +37,10 @@ class Imaged:
 
 def imaged(camera: Camera, points: Floats) -> Imaged:
     """Return the images of (n, 3) points, or directions, in the axes of a camera, with their partials."""
-    xy, by_u, by_parameters = _photocore.camera_partials(camera.model, camera.values, points * TURNED)
+    xy, by_u, by_parameters = camera.partials(points * TURNED)
     unknown = camera.deviations > 0
+    if camera.knot_sd is not None:
+        unknown = np.append(unknown, camera.knot_sd.any(axis=2).repeat(2))
     return Imaged(xy, by_u * TURNED, by_parameters[:, :, unknown])
 
 
