@@ -40,6 +40,7 @@ FORMATS: dict[str, Format] = {
         "aicon",
         "giant",
         "isis",
+        "targets",
         "results",
     )
 }

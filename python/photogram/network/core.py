@@ -9,10 +9,12 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.memory import available_memory
 from photogram.network.block import Block
 from photogram.network.flown import flown
 from photogram.network.observations import observation_rows
+from photogram.network.passages import passage_rows
 from photogram.network.rigs import mount_rows
 from photogram.network.unknowns import Unknown
 from photogram.show.ways import Way
@@ -65,11 +67,14 @@ def block_network(
     own = flown(block, unknowns)
     groups = observation_rows(block.observations, block.point_ids, block.photo_ids, unknowns)
     cameras, photo_cameras = block.core_cameras()
+    for each in block.cameras:
+        if np.any(each.knot_sd):
+            raise InputError(f"knots of the camera {each.title} cannot be adjusted: knot_sd must be 0")
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
     known = np.zeros_like(own.positions)
     if own.records:
         # They have a camera of their own, and are known but for their trajectory.
-        cameras = [*cameras, ("perspective", [-1.0], [0.0], None)]
+        cameras = [*cameras, ("perspective", [-1.0], [0.0], None, None)]
         photo_cameras = np.append(photo_cameras, np.full(own.records, len(cameras) - 1))
     return _photocore.block_network(
         _and(block.photo_positions, own.positions),
@@ -92,6 +97,7 @@ def block_network(
         trajectories=own.trajectories,
         timed=own.timed,
         image_times=own.image_times,
+        passages=passage_rows(block.passages, block.point_ids, block.photo_ids, unknowns),
         records=own.records,
         spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
         photo_to_ground=block.photo_to_ground,

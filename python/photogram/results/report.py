@@ -54,6 +54,7 @@ FLOWN, WORST = 100, 20
 __all__ = [
     "ORDERINGS",
     "bandwidths",
+    "details",
     "first_sections",
     "problems_of",
     "reliability_lines",
@@ -77,8 +78,14 @@ ORDERINGS = {
 @np.errstate(over="ignore")  # what is too large for its unit is infinite
 def report(result: Result) -> str:
     """Return the report of an adjusted block."""
-    sections = [
-        *summary(result),
+    sections = [*summary(result), *details(result)]
+    return composed(headline("block adjustment", result.block.title), sections)
+
+
+@np.errstate(over="ignore")
+def details(result: Result) -> list[Section]:
+    """Return what a report says behind its summary, as titled sections."""
+    return [
         ("Redundancy by kind of observation", _redundancy(result)),
         ("Reliability", reliability_lines(result, result.block.linear_unit)),
         ("Iterations", iteration_lines(iterations(result), ".6f")),
@@ -109,7 +116,6 @@ def report(result: Result) -> str:
         ("Image points: observed minus computed, redundancy, standardized residual", image_lines(result)),
         ("Work", _work(result)),
     ]
-    return composed(headline("block adjustment", result.block.title), sections)
 
 
 @np.errstate(over="ignore")

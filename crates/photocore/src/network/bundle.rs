@@ -9,6 +9,7 @@ use super::commons::PlacedCommon;
 use super::model::{Bundle, GivenDatum};
 use super::mounts::{AT_PHOTO, Mounts};
 use super::observations::{Fault, Observation, TiedObservation, Touches};
+use super::passages::Passages;
 use super::selection::{Selected, TOGETHER};
 use super::{Camera, Image, Network, NetworkError, Photo, Point, Screens};
 use crate::geometry::{Matrix3, ObjectSpace, POSE, PoseNumbers, Refraction, local_vertical};
@@ -41,13 +42,18 @@ impl Network {
             refraction: self
                 .refraction
                 .map(|refraction| Refraction { datum: refraction.datum + origin[2], ..refraction }),
-            cameras: self.photos.iter().map(|photo| self.camera(photo).camera).collect(),
+            cameras: self.photos.iter().map(|photo| self.camera(photo).camera.clone()).collect(),
             blocks: Blocks::new(self, self.shared_cameras(&selected.surroundings)),
             camera_priors: vec![],
             commons: self.placed_commons(selected, &mounts, (&images, &image_times), middle),
             datum: self.given_datum(selected, &mounts),
             mounts,
             image_times,
+            passages: Passages::new(
+                &self.passages,
+                (&selected.points, self.points.len()),
+                self.photos.iter().map(|photo| photo.camera),
+            ),
             origin,
             locals: selected.locals,
             points,

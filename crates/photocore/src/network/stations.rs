@@ -4,7 +4,7 @@ use super::Image;
 use super::commons::CommonState;
 use super::mounts::Composed;
 use crate::geometry::camera::each_camera;
-use crate::geometry::{self, Camera, CameraModel, ObjectSpace, Orientation, POSE, Ray, Refraction, Vertical};
+use crate::geometry::{self, Camera, CameraModel, ObjectSpace, Orientation, POSE, Refraction, Vertical};
 use crate::normals::GroupRows;
 
 /// Photos and points at given values of the unknowns.
@@ -43,17 +43,10 @@ pub struct Placed {
 }
 
 /// A photo at given values of its unknowns.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Station {
     pub orientation: Orientation,
     pub camera: Camera,
-}
-
-impl Station {
-    /// The ray of an image position; None where no direction has it.
-    pub fn ray(&self, xy: [f64; 2]) -> Option<Ray> {
-        self.camera.direction(xy).map(|direction| self.orientation.ray(&direction))
-    }
 }
 
 /// What refraction needs besides.

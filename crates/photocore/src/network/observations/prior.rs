@@ -4,15 +4,18 @@ use nalgebra::DMatrix;
 
 use super::{Named, ObservationModel, Precision, Rows, Sites, Touches};
 
-/// What is given of a common unknown as one observation with its full covariance, from an adjustment of its own.
+/// What was observed of a common unknown as one observation with its full covariance, from an adjustment of its own.
 ///
-/// v = -x, x being the unknowns, which count from what is given: with rotations v = Log(R^T R_0). The partials are I.
+/// v = d - x, x being the unknowns, which count from what is given, and d what was observed of them, where that is another: with rotations
+/// v = Log(R^T R_0), and d is zero. The partials are I.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     /// The common unknown; its own standard deviations are infinite.
     pub common: usize,
     /// How many unknowns it has.
     pub components: usize,
+    /// d; nothing at all where what is given was observed.
+    pub observed: Vec<f64>,
     /// Of these.
     pub precision: Precision,
 }
@@ -20,9 +23,11 @@ pub struct Prior {
 impl ObservationModel for Prior {
     const NAME: &'static str = "prior";
 
-    fn from_numbers(of: &Named<'_>, _: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let &[Some(common)] = of.commons else { return None };
-        Some(Self { common, components: covariance.nrows(), precision: Precision::Covariance(covariance) })
+        let (components, observed) = (covariance.nrows(), values.to_vec());
+        let sound = observed.is_empty() || observed.len() == components;
+        sound.then_some(Self { common, components, observed, precision: Precision::Covariance(covariance) })
     }
 
     fn touches(&self) -> Touches {
@@ -38,8 +43,9 @@ impl ObservationModel for Prior {
     }
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let unknowns: Vec<f64> = sites.common(0).unknowns().collect();
-        rows.residual(0, &unknowns.iter().map(|value| -value).collect::<Vec<f64>>());
+        let observed = |k: usize| self.observed.get(k).copied().unwrap_or_default();
+        let missing = sites.common(0).unknowns().enumerate().map(|(k, value)| observed(k) - value);
+        rows.residual(0, &missing.collect::<Vec<f64>>());
         rows.by_itself(0, 0, self.components);
     }
 }
@@ -53,7 +59,8 @@ mod tests {
     fn partials_agree_with_differences() {
         for (common, components) in [(SENSORS[0], 6), (PLANE, 3)] {
             let precision = Precision::Deviations(vec![0.01; components]);
-            agrees(&Prior { common, components, precision }.into());
+            let observed = vec![0.5; components];
+            agrees(&Prior { common, components, observed, precision }.into());
         }
     }
 }

@@ -267,7 +267,7 @@ fn common_unknowns_of_other_types_are_refused() {
     assert_eq!(check(level(2).into()), Some(Fault::NoCommon(2)));
     let prior = |components: usize| {
         let precision = Precision::Deviations(vec![1.0; components]);
-        check(super::Prior { common: 1, components, precision }.into())
+        check(super::Prior { common: 1, components, observed: vec![], precision }.into())
     };
     assert_eq!(prior(3), None);
     assert_eq!(prior(1), Some(Fault::Deviations { components: 3, given: 1 }));
