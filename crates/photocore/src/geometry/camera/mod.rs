@@ -4,7 +4,7 @@
 //! `cameras!` below.
 
 pub mod backward;
-mod inverse;
+pub(super) mod inverse;
 mod model;
 mod projections;
 mod radial_tangential;
