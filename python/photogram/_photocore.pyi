@@ -628,6 +628,7 @@ def block_network(
     trajectories: list[TrajectoryRow],
     timed: list[tuple[int, int, float, int | None, int | None]],
     image_times: _Floats,
+    passages: list[tuple[str, list[int], list[int], _Floats]],
     records: int,
     spheroid: tuple[float, float] | None,
     photo_to_ground: bool,
@@ -693,6 +694,10 @@ def block_network(
         the indices of the rate and of the offset of its times among the common unknowns.
     image_times
         (m,) the number of each image that the rate is multiplied by; empty where all are 0.
+    passages
+        What images pass beside pose, point and camera: kind, indices of common unknowns, indices of points,
+        photos or cameras, and numbers. `figure`: points beside what is given by w_1 e_1 + w_2 e_2; w a
+        `bend`, the numbers (e_1, e_2) of each point.
     records
         How many photos, the last, are records of trajectories: they have no images, and the last camera.
     spheroid

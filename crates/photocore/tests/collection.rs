@@ -159,6 +159,7 @@ fn collection(photos: usize, points: usize, coarseness: f64) -> Network {
         mounts: vec![],
         trajectories: vec![],
         image_times: vec![],
+        passages: vec![],
     }
 }
 

@@ -108,6 +108,7 @@ fn images_alone() -> Network {
         mounts: vec![],
         trajectories: vec![],
         image_times: vec![],
+        passages: vec![],
     }
 }
 

@@ -72,6 +72,7 @@ fn block(strips: usize, points: usize) -> Network {
         mounts: vec![],
         trajectories: vec![],
         image_times: vec![],
+        passages: vec![],
     }
 }
 

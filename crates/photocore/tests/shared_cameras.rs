@@ -157,6 +157,7 @@ fn network() -> Network {
         mounts: vec![],
         trajectories: vec![],
         image_times: vec![],
+        passages: vec![],
     }
 }
 

@@ -141,6 +141,7 @@ fn network(seed: u64) -> Network {
         mounts: (0..PHOTOS).map(moves).collect(),
         trajectories: (0..PHOTOS).map(trajectory).collect(),
         image_times: times,
+        passages: vec![],
     }
 }
 
@@ -206,6 +207,7 @@ fn photos_at_rest_are_photos() {
         mounts: vec![],
         trajectories: vec![],
         image_times: vec![],
+        passages: vec![],
         commons: vec![],
         ..resting.clone()
     };

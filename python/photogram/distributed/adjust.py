@@ -21,7 +21,7 @@ from photogram.distributed.parts import incidence_of, vertices_of
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, core_options, opened
-from photogram.network.block import Block, checked
+from photogram.network.block import Block, checked, refuse_passages
 from photogram.network.core import CoreOptions
 from photogram.network.motion import refuse_trajectories
 from photogram.network.refracted import check_cameras
@@ -135,6 +135,7 @@ def _ready(block: Block) -> Block:
     """Return a block whose common unknowns have values to start from; refuse what cannot be adjusted."""
     check_cameras(checked(block))
     refuse_trajectories(block, "blocks in parts")
+    refuse_passages(block, "blocks in parts")
     return started(block)
 
 

@@ -34,4 +34,6 @@ def lost_observations(block: Block, gnss: str) -> list[str]:
         found.append(f"{gnss} of GNSS, lever arms, shifts and drifts")
     if block.mounts:
         found.append("rigs: photos have their poses")
+    if block.passages:
+        found.append("what images pass: boards are flat")
     return found

@@ -11,7 +11,7 @@ from photogram.formats.intersection import intersected
 from photogram.formats.plain.writing import attitude_matrices
 from photogram.formats.project import Frame, Project
 from photogram.network.attitudes import Attitudes
-from photogram.network.block import Block
+from photogram.network.block import Block, refuse_passages
 from photogram.network.geometry import (
     Spheroid,
     geocentric_to_geographic,
@@ -43,6 +43,7 @@ def in_topocentric(project: Project) -> Project:
     if block.spheroid is None:
         return project
     refuse_trajectories(block, "a topocentric frame")
+    refuse_passages(block, "a topocentric frame")
     origin, spheroid = _origin(block), block.spheroid
     axes = local_frames(origin)[0]
     middle = geographic_to_geocentric(origin, spheroid)[0]

@@ -29,6 +29,7 @@ from photogram.network.observations import (
     of_records,
 )
 from photogram.network.observations.smoothness import with_smoothness
+from photogram.network.passages import Figure, Passage, checked_passages
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.rigs import Mount, checked_mounts
 from photogram.network.tables import (
@@ -123,6 +124,8 @@ class Block(Valued, Brief):
         Which photos are on a frame with others, and in which pose (:mod:`photogram.network.rigs`).
     timed
         Which photos are on trajectories: rolling shutters, line scanners (:mod:`photogram.network.timed`).
+    passages
+        What images pass beside pose, point and camera: boards that bend (:mod:`photogram.network.passages`).
     frame
         Where on the earth the coordinates are, for maps and other systems; the adjustment does not ask.
 
@@ -160,6 +163,7 @@ class Block(Valued, Brief):
     photo_cameras: Indices | None = None
     mounts: Sequence[Mount] = ()
     timed: Sequence[Timed] = ()
+    passages: Sequence[Passage] = ()
     frame: Frame = field(default_factory=Frame)
     point_check_sd: Floats | None = None
     if TYPE_CHECKING:
@@ -192,6 +196,7 @@ class Block(Valued, Brief):
             photo_cameras: ArrayLike | Sequence[str] | None = None,
             mounts: Sequence[Mount] = (),
             timed: Sequence[Timed] = (),
+            passages: Sequence[Passage] = (),
             frame: Frame = ...,
             point_check_sd: ArrayLike | None = None,
         ) -> None: ...
@@ -412,8 +417,24 @@ class Block(Valued, Brief):
         self._check_mounts()
         self._check_timed()
         self._check_motions()
+        self._set("passages", checked_passages(self.passages, self.point_ids, self.photo_ids))
         self._set("observations", with_smoothness(self.observations, self.trajectories))
         observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
+        self._check_figures()
+
+    def _check_figures(self) -> None:
+        named = {
+            name: each.title for each in self.passages if isinstance(each, Figure) for name in each.points
+        }
+        if not named:
+            return
+        touched = {name for each in self.observations for name in each.points}
+        for row, name in enumerate(self.point_ids):
+            if name in named and (self.point_sd[row].any() or name in touched):
+                raise InputError(
+                    f"the point {name} of the {named[name]} is free, weighted or observed beside images: its"
+                    " coordinates are given, and point_sd is 0"
+                )
 
     def _refuse(self, name: str, bad: NDArray[np.bool_], why: str, owners: list[str] | None) -> None:
         if bad.any():
@@ -479,7 +500,8 @@ class Block(Valued, Brief):
         of_times = [scalar for each in self.timed for scalar in each.scalars]
         coefficients = [each for own in self.trajectories for all_ in own.coefficients for each in all_]
         records = of_records(self.observations)
-        return different_unknowns([*sensors, *of_times, *coefficients, *records, *of_observations])
+        passed = [own for each in self.passages for own in each.unknowns]
+        return different_unknowns([*sensors, *of_times, *coefficients, *records, *passed, *of_observations])
 
     @property
     def image_unit(self) -> str:
@@ -629,11 +651,26 @@ def of_images_alone(block: Block, what: str) -> Block:
     if block.timed:
         photo = block.timed[0].photo
         raise InputError(f"{what}: the photo {photo} is on a trajectory, which is not taken there")
+    refuse_passages(block, what)
     if block.observations:
         raise InputError(f"{what}: the block has observations beside images, which are not taken there")
     if block.mounts:
         raise InputError(f"{what}: the block has photos on frames, which are not taken there")
     return block
+
+
+def refuse_passages(block: Block, what: str) -> None:
+    """Refuse a block whose images pass something beside pose, point and camera.
+
+    Raises
+    ------
+    InputError
+        `what` does not take what is named.
+    """
+    if block.passages:
+        raise InputError(
+            f"{what}: images of the block pass a {block.passages[0].KIND}, which is not taken there"
+        )
 
 
 def checked(block: Block) -> Block:

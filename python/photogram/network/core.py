@@ -13,6 +13,7 @@ from photogram.memory import available_memory
 from photogram.network.block import Block
 from photogram.network.flown import flown
 from photogram.network.observations import observation_rows
+from photogram.network.passages import passage_rows
 from photogram.network.rigs import mount_rows
 from photogram.network.unknowns import Unknown
 from photogram.show.ways import Way
@@ -92,6 +93,7 @@ def block_network(
         trajectories=own.trajectories,
         timed=own.timed,
         image_times=own.image_times,
+        passages=passage_rows(block.passages, block.point_ids, block.photo_ids, unknowns),
         records=own.records,
         spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
         photo_to_ground=block.photo_to_ground,

@@ -19,6 +19,7 @@ from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.motion import scanners
 from photogram.network.observations import Observation
+from photogram.network.passages import Passage
 from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
@@ -124,7 +125,9 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     InputError
         Files that are missing, damaged or contradict each other.
     """
-    saved = read_saved(folder, [*_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown)], document)
+    saved = read_saved(
+        folder, [*_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown), *_below(Passage)], document
+    )
     given = saved.members("block", Block)
     images, names = saved.sheets["images"], {}
     for kind in ("photo", "point"):

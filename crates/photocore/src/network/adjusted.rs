@@ -164,10 +164,16 @@ pub(super) fn adjusted_points(
             // The last retained blocks.
             Some(tied) => &all.retained[all.retained.len() - 9 * (points.len() - model.locals - tied)..],
         });
+        let found =
+            || own.map_or_else(|| Matrix3::repeat(f64::NAN), |own| Matrix3::from_row_slice(&own[..9]));
+        let shifted = model.shifted(i, &unknowns[model.of_stations()], cofactors);
+        let (coordinates, cofactors) = match shifted {
+            Some((place, cofactors)) => (std::array::from_fn(|k| place[k] + origin[k]), cofactors),
+            None => (std::array::from_fn(absolute), found()),
+        };
         AdjustedPoint {
-            coordinates: std::array::from_fn(absolute),
-            cofactors: own
-                .map_or_else(|| Matrix3::repeat(f64::NAN), |own| Matrix3::from_row_slice(&own[..9])),
+            coordinates,
+            cofactors,
             redundancy: adjustment.prior_redundancy(first),
             last_correction: std::array::from_fn(|k| corrections(first + k)),
             rays: model.images_of(i).len(),

@@ -9,6 +9,7 @@ use super::commons::PlacedCommon;
 use super::model::{Bundle, GivenDatum};
 use super::mounts::{AT_PHOTO, Mounts};
 use super::observations::{Fault, Observation, TiedObservation, Touches};
+use super::passages::Passages;
 use super::selection::{Selected, TOGETHER};
 use super::{Camera, Image, Network, NetworkError, Photo, Point, Screens};
 use crate::geometry::{Matrix3, ObjectSpace, POSE, PoseNumbers, Refraction, local_vertical};
@@ -48,6 +49,7 @@ impl Network {
             datum: self.given_datum(selected, &mounts),
             mounts,
             image_times,
+            passages: Passages::new(self, &selected.points),
             origin,
             locals: selected.locals,
             points,
@@ -64,6 +66,7 @@ impl Network {
             CameraPrior::of(camera, self.first_parameter(&bundle, index)?)
         };
         bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();
+        bundle.count_passed();
         bundle.observations = self.tied_observations(selected, &bundle)?;
         Ok(bundle)
     }

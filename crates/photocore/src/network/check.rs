@@ -5,7 +5,7 @@ use std::mem::discriminant;
 use super::mounts::AT_PHOTO;
 use super::observations::{Fault, Observation};
 use super::surroundings::{BlockOf, Surroundings};
-use super::{CommonKind, Image, Mount, Network, NetworkError, Trajectory};
+use super::{CommonKind, Image, Mount, Network, NetworkError, Passage, Trajectory};
 use crate::geometry::{ObjectSpace, PoseNumbers};
 
 impl Network {
@@ -41,6 +41,7 @@ impl Network {
         }
         self.check_trajectories()?;
         self.check_mounts()?;
+        self.check_passages()?;
         let flies = self.flies();
         for (index, observation) in self.observations.iter().enumerate() {
             let checked = observation
@@ -110,6 +111,15 @@ impl Network {
         let both = self.mounts.iter().position(|mount| on_another(mount) && carries[mount.photo()]);
         both.map_or(Ok(()), |index| Err(NetworkError::Mount(index)))?;
         self.check_flights()
+    }
+
+    /// Refuses passages that are none of the network.
+    fn check_passages(&self) -> Result<(), NetworkError> {
+        let of_type = |(common, kind): (usize, CommonKind)| {
+            self.commons.get(common).is_some_and(|own| own.kind == kind)
+        };
+        let bad = |own: &Passage| !own.unknowns().into_iter().all(of_type) || !own.is_of(self);
+        self.passages.iter().position(bad).map_or(Ok(()), |index| Err(NetworkError::Passage(index)))
     }
 
     /// Refuses photos and images at times that their trajectory does not reach.

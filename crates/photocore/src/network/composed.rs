@@ -93,6 +93,9 @@ impl Bundle {
         rows: &mut GroupRows<'_>,
         own: &mut Composed,
     ) {
+        if !self.passages.is_empty() {
+            return self.observe_passing((stations, bent), group, local, rows, own);
+        }
         let timed = self.compose_timed((stations, bent), group, own);
         bent.write(self.space, stations, timed.then_some(&*own), &self.images[group], local, rows);
     }
@@ -111,7 +114,12 @@ impl Bundle {
         bent.seen(self.space, stations, timed, photo, local, |orientation, point| orientation.sight(point))
     }
 
-    fn compose_timed(&self, (stations, bent): (&Stations, &Bent), image: usize, own: &mut Composed) -> bool {
+    pub(super) fn compose_timed(
+        &self,
+        (stations, bent): (&Stations, &Bent),
+        image: usize,
+        own: &mut Composed,
+    ) -> bool {
         bent.mounted.as_ref().is_some_and(|mounted| self.compose(mounted, &stations.commons, image, own))
     }
 

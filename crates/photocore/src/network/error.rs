@@ -57,6 +57,9 @@ pub enum NetworkError {
         "mount {0} names a photo or sensor that is not there, or a photo that is mounted twice or has others mounted on it"
     )]
     Mount(usize),
+    /// What images pass names unknowns, points, photos or cameras that are not there, or not such as it may have.
+    #[error("passage {0} names unknowns, points, photos or cameras that are not there, or not of its kind")]
+    Passage(usize),
     /// A trajectory whose basis is none, or that has not a coefficient of the right type for each function.
     #[error(
         "trajectory {0} has knots that are none, or more or fewer coefficients than functions of its basis"

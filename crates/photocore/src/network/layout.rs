@@ -12,7 +12,7 @@ pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, Ne
     let widths: Vec<usize> = widths.chain(vec![3; tied]).collect();
     let main_of = (0..groups).map(|image| model.main_block(image) as u32).collect();
     let mut layout = Layout::new(2, 3, &widths, model.point_images.start[..=model.locals].to_vec(), main_of)?;
-    if !(model.blocks.shared.is_empty() && model.mounts.is_empty()) {
+    if !(model.blocks.shared.is_empty() && model.mounts.is_empty() && model.passages.is_empty()) {
         let (mut shared_ptr, mut shared) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
         shared_ptr.push(0);
         for image in 0..groups {

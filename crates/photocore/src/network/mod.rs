@@ -68,6 +68,8 @@ mod neighbourhood;
 mod node;
 pub mod observations;
 mod parts;
+pub mod passages;
+mod passing;
 mod precision;
 mod predictions;
 mod problem;
@@ -104,6 +106,7 @@ pub(crate) use median::median;
 pub use mounts::{Mount, Trajectory};
 pub use node::{FormedNode, Node, NodePrediction};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
+pub use passages::Passage;
 pub use predictions::{OnPoint, Prediction};
 pub use responses::{Moved, UnknownOf};
 pub use selection::{Dropped, Reason};
@@ -234,6 +237,8 @@ pub struct Network {
     pub trajectories: Vec<Trajectory>,
     /// Of each image its number on the scale of its photo's time (see [`mounts::OnTrajectory`]); nothing at all where all are zero.
     pub image_times: Vec<f64>,
+    /// What images pass beside pose, point and camera.
+    pub passages: Vec<Passage>,
 }
 
 impl Network {
@@ -258,6 +263,7 @@ impl Default for Network {
             mounts: vec![],
             trajectories: vec![],
             image_times: vec![],
+            passages: vec![],
         }
     }
 }

@@ -12,12 +12,13 @@ use super::in_block::InBlock;
 use super::mounts::{AT_PHOTO, Mounts};
 use super::observations::{CommonSite, PhotoSite, PointSite, TiedModel, TiedObservation, Touches};
 use super::parts::Parts;
+use super::passages::Passages;
 use super::selection::PointImages;
 use super::stations::{Bent, Placed, Refracted, Station, Stations};
 use super::{Image, Minimum, Point, Screens};
 use crate::geometry::{
     self, AttitudeNumbers, Camera, ObjectSpace, Orientation, POSE, PoseNumbers, Refraction, RotationSense,
-    Vertical,
+    Vector3, Vertical,
 };
 use crate::normals::{Cofactors, GroupRows, Tie, TieRows};
 use crate::parallel;
@@ -43,6 +44,8 @@ pub struct Bundle {
     pub mounts: Mounts,
     /// The number of each image on the scale of its photo's time; none at all where all are zero.
     pub image_times: Vec<f64>,
+    /// What images pass beside pose, point and camera.
+    pub passages: Passages,
     /// What coordinates are counted from.
     pub origin: [f64; 3],
     /// The points, local ones first; coordinates counted from the origin.
@@ -152,10 +155,12 @@ impl Bundle {
         if block < self.stations() { self.of_block(block).len() } else { 3 }
     }
 
-    /// The retained blocks of an image: those of its pose, the main one first, then the camera where that is shared.
+    /// The retained blocks of an image: those of its pose, the main one first, then those of what it passes, then the camera where that is
+    /// shared.
     pub fn blocks_of_image(&self, image: usize) -> impl Iterator<Item = usize> {
         let photo = self.images[image].photo;
-        self.blocks_of_pose(photo, self.time_of(image)).chain(self.blocks.of_camera[photo])
+        let passed = self.blocks_of_passages(image);
+        self.blocks_of_pose(photo, self.time_of(image)).chain(passed).chain(self.blocks.of_camera[photo])
     }
 
     /// The number of an image on the scale of its photo's time.
@@ -188,7 +193,7 @@ impl Bundle {
     }
 
     /// The point of an image.
-    fn point_of(&self, image: usize) -> usize {
+    pub(super) fn point_of(&self, image: usize) -> usize {
         self.point_images.start.partition_point(|&start| start <= image) - 1
     }
 
@@ -383,11 +388,16 @@ impl Bundle {
                 local.chunks(3).chain(tied.as_flattened().chunks(3)),
             ),
         });
-        let plain = refracted.is_none() && mounted.is_none();
+        let plain = refracted.is_none() && mounted.is_none() && self.passages.is_empty();
         let bent = (!plain).then_some(Bent { refracted, mounted });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
         let local: &[[f64; 3]] = local.as_chunks().0;
         let mut points = parallel::map_in_place(local.len(), 1024, &|point| place(&local[point]));
+        if !self.passages.is_empty() {
+            let shift = |point| self.passages.shift(point, |common| commons[common].vector());
+            let shifted = (0..local.len()).map(|point| Vector3::from(local[point]) + shift(point));
+            points = shifted.map(|own| place(&own.into())).collect();
+        }
         points.extend(tied.iter().map(place));
         Stations { photos: stations, points, tied, commons, bent }
     }

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
 use photocore::geometry::PoseNumbers;
-use photocore::network::{Camera, Minimum, Network, Options, Photo, Screens, Start, UnitVariance};
+use photocore::network::{Camera, Minimum, Network, Options, Passage, Photo, Screens, Start, UnitVariance};
 use pyo3::prelude::*;
 
 use super::block_network::BlockNetwork;
@@ -34,10 +34,18 @@ fn camera((model, parameters, sd, covariance): CameraRow) -> PyResult<Camera> {
     Ok(Camera { covariance: covariance.map(square), ..Camera::new(named(&model, &parameters)?, sd) })
 }
 
+/// Kind; indices of common unknowns; of points, photos or cameras; numbers.
+type PassageRow<'py> = (String, Vec<usize>, Vec<usize>, PyReadonlyArrayDyn<'py, f64>);
+
+fn passage((kind, commons, of, values): PassageRow<'_>) -> PyResult<Passage> {
+    let values = numbers("numbers of a passage", &values)?;
+    Passage::from_numbers(&kind, &commons, &of, &values).ok_or_else(|| unknown("passage", &kind))
+}
+
 #[pyfunction]
 #[pyo3(signature = (
     photo_positions, photo_attitudes, photo_positions_observed, photo_attitudes_observed, photo_position_sd, photo_attitude_sd,
-    photo_cameras, cameras, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, unknowns, mounts, trajectories, timed, image_times, records, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
+    photo_cameras, cameras, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, unknowns, mounts, trajectories, timed, image_times, passages, records, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
     covariance, loss, ordering, unit_variance, minimum, memory, points_given
 ))]
 fn block_network(
@@ -61,6 +69,7 @@ fn block_network(
     trajectories: Vec<TrajectoryRow<'_>>,
     timed: Vec<TimedRow>,
     image_times: PyReadonlyArrayDyn<'_, f64>,
+    passages: Vec<PassageRow<'_>>,
     records: usize,
     spheroid: Option<(f64, f64)>,
     photo_to_ground: bool,
@@ -119,6 +128,7 @@ fn block_network(
             .collect(),
         trajectories: trajectories.into_iter().map(trajectory).collect::<PyResult<_>>()?,
         image_times: numbers("image_times", &image_times)?,
+        passages: passages.into_iter().map(passage).collect::<PyResult<_>>()?,
     };
     let method = match criterion {
         "fraction" => Method::Damped(Stop::Fraction(limit)),

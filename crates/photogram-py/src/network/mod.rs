@@ -115,6 +115,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::CommonDeviations(_)
         | Failure::Mount(_)
         | Failure::Trajectory(_)
+        | Failure::Passage(_)
         | Failure::ImageTimes(_)
         | Failure::OutsideTrajectory { .. }
         | Failure::CameraConstant { .. }

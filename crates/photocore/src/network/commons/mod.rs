@@ -120,6 +120,8 @@ kinds! {
     GyroBias = "gyro bias", Stays, [("x", 0, Rate), ("y", 1, Rate), ("z", 2, Rate)];
     /// The readout time of all rows of a rolling shutter, or the factor of the line rates of a scanner, which is about 1.
     Readout = "readout", Stays, [("time", 0, Time)];
+    /// w of a figure: how far a target bends, in the middle along its first and along its second axis.
+    Bend = "bend", Stays, [("x", 0, Length), ("y", 1, Length)];
     /// d, by which the clock of a receiver is behind that of a trajectory.
     Clock = "clock", Stays, [("offset", 0, Time)];
 }

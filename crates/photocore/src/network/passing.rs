@@ -1,0 +1,137 @@
+//! Images that pass more than pose and camera: their blocks, and the equations there.
+
+use smallvec::{SmallVec, smallvec};
+
+use super::in_block::InBlock;
+use super::model::Bundle;
+use super::mounts::Composed;
+use super::passages::Own;
+use super::stations::{Bent, Stations};
+use crate::geometry::Matrix3;
+use crate::normals::{Cofactors, GroupRows};
+
+/// Where the columns of a block are among those that an image has in common with others; None of the main block.
+#[derive(Debug, Clone, Copy)]
+struct Slot {
+    block: usize,
+    first: Option<usize>,
+}
+
+/// The rows of an image, and where the columns of each block stand.
+struct Columns<'a, 'b> {
+    rows: &'a mut GroupRows<'b>,
+    slots: SmallVec<[Slot; 32]>,
+}
+
+impl Columns<'_, '_> {
+    /// Adds the partials of the computed position by one of the unknowns at a place.
+    fn add(&mut self, place: InBlock, k: usize, by: [f64; 2]) {
+        let slot = self.slots.iter().find(|slot| slot.block == place.block);
+        let (to, start) = match slot.map(|slot| slot.first) {
+            Some(Some(first)) => (&mut *self.rows.shared, first),
+            Some(None) => (&mut *self.rows.retained, 0),
+            None => return,
+        };
+        let width = to.len() / 2;
+        (0..2).for_each(|row| to[width * row + start + place.first + k] += by[row]);
+    }
+}
+
+impl Bundle {
+    /// The common unknowns that an image steps with by what it passes.
+    fn passed_by(&self, image: usize) -> Own {
+        self.passages.commons(self.point_of(image))
+    }
+
+    /// The retained blocks of these, each once.
+    pub(super) fn blocks_of_passages(&self, image: usize) -> SmallVec<[usize; 32]> {
+        let mut blocks = SmallVec::new();
+        if self.passages.is_empty() {
+            return blocks;
+        }
+        for common in self.passed_by(image) {
+            if let Some(place) = self.blocks.of_common[common]
+                && !blocks.contains(&place.block)
+            {
+                blocks.push(place.block);
+            }
+        }
+        blocks
+    }
+
+    /// Counts which common unknowns images step with by what they pass.
+    pub(super) fn count_passed(&mut self) {
+        if self.passages.is_empty() {
+            return;
+        }
+        let all: Vec<Own> = (0..self.images.len()).map(|image| self.passed_by(image)).collect();
+        all.into_iter().flatten().for_each(|common| self.commons[common].uses += 1);
+    }
+
+    /// Writes the equations of an image that passes more than pose and camera: those of pose, point and camera first.
+    pub(super) fn observe_passing(
+        &self,
+        (stations, bent): (&Stations, &Bent),
+        group: usize,
+        local: usize,
+        rows: &mut GroupRows<'_>,
+        own: &mut Composed,
+    ) {
+        let photo = self.images[group].photo;
+        let (main, all) = (self.main_block(group), rows.shared.len() / 2);
+        let mut slots: SmallVec<[Slot; 32]> = smallvec![Slot { block: main, first: None }];
+        let mut place = |blocks: &mut dyn Iterator<Item = usize>, mut first: usize| {
+            for block in blocks {
+                slots.push(Slot { block, first: Some(first) });
+                first += self.of_block(block).len();
+            }
+            first
+        };
+        let poses = place(&mut self.blocks_of_pose(photo, self.time_of(group)).skip(1), 0);
+        let passed = place(&mut self.blocks_of_passages(group).into_iter(), poses);
+        let plain = poses + all - passed;
+        let mut shared: SmallVec<[f64; 64]> = smallvec![0.0; 2 * plain];
+        let (constant, point, retained) = (&mut *rows.constant, &mut *rows.local, &mut *rows.retained);
+        let mut inner = GroupRows { constant, local: point, retained, shared: &mut shared };
+        let timed = self.compose_timed((stations, bent), group, own);
+        bent.write(self.space, stations, timed.then_some(&*own), &self.images[group], local, &mut inner);
+        for (to, from) in rows.shared.chunks_exact_mut(all).zip(shared.chunks(plain.max(1))) {
+            to[..poses].copy_from_slice(&from[..poses]);
+            to[poses..passed].fill(0.0);
+            to[passed..].copy_from_slice(&from[poses..]);
+        }
+        self.step_figure(local, &mut Columns { rows, slots });
+    }
+
+    /// The partials by the numbers of a figure: by the point, times how that is shifted.
+    fn step_figure(&self, local: usize, columns: &mut Columns<'_, '_>) {
+        let Some((figure, k)) = self.passages.figure(local) else { return };
+        let Some(place) = self.blocks.of_common[figure.common] else { return };
+        let by_point: [f64; 2 * 3] = std::array::from_fn(|i| columns.rows.local[i]);
+        for (number, shift) in figure.shifts[k].column_iter().enumerate() {
+            let by = |row: usize| (0..3).map(|i| by_point[3 * row + i] * shift[i]).sum();
+            columns.add(place, number, [by(0), by(1)]);
+        }
+    }
+
+    /// The coordinates of a point that a figure shifts, and the cofactors that it has by it; None of all others. `unknowns` are those of all
+    /// stations.
+    pub(super) fn shifted(
+        &self,
+        point: usize,
+        unknowns: &[f64],
+        cofactors: Option<&Cofactors>,
+    ) -> Option<([f64; 3], Matrix3)> {
+        let (figure, k) = self.passages.figure(point)?;
+        let (given, shifts) = (self.points[point].coordinates, figure.shifts[k]);
+        let shift = figure.shift(k, &self.common_state(figure.common, unknowns).vector());
+        let own = cofactors.map(|all| self.cofactors_of_common(all, figure.common));
+        let found = match own {
+            None => Matrix3::repeat(f64::NAN),
+            // Of numbers that are known.
+            Some(own) if own.is_empty() => Matrix3::zeros(),
+            Some(own) => shifts * own.fixed_view::<2, 2>(0, 0) * shifts.transpose(),
+        };
+        Some((std::array::from_fn(|i| given[i] + shift[i]), found))
+    }
+}

@@ -1,0 +1,157 @@
+"""What images pass beside pose, point and camera: a board that bends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import names, shaped, shown
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.network.unknowns import Unknown
+
+__all__ = ["Bend", "Figure", "Passage", "PassageRow", "checked_passages", "passage_rows"]
+
+PassageRow = tuple[str, list[int], list[int], Floats]
+"""Kind; indices of unknowns; of points, photos or cameras; numbers, as the core takes a passage."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bend(Unknown):
+    """The two numbers w of a figure: of a board, the deflections of its middle along x and along y.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    value
+        (2,) in the linear unit.
+    sd
+        (2,) standard deviations of the same, or one for both.
+    """
+
+    KIND = "bend"
+
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+
+    def _position(self) -> Floats:
+        return np.append(shaped(f"value of {self.title}", self.value, (2,)), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """What all kinds have in common."""
+
+    KIND: ClassVar[str] = ""
+    """The name under which the core knows the kind."""
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What it steps with."""
+        raise NotImplementedError
+
+    def of(self, points: Mapping[str, int], photos: Mapping[str, int]) -> list[int]:
+        """Return the rows of the points or photos that it is of.
+
+        Raises
+        ------
+        InputError
+            One that is not there.
+        """
+        raise NotImplementedError
+
+    def numbers(self) -> Floats:
+        """Return what else the core takes."""
+        return np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False)
+class Figure(Passage):
+    """Points that are given, and stand beside that by `w_1 e_1 + w_2 e_2`.
+
+    Parameters
+    ----------
+    bend
+        w, one object for all points.
+    points
+        n names; their given coordinates are fixed (`point_sd` 0), in rectangular space, and no observation
+        but images is of them.
+    shifts
+        (n, 2, 3) e_1 and e_2 of each point, in the axes of the block.
+    """
+
+    KIND = "figure"
+
+    bend: Bend
+    points: Sequence[str]
+    shifts: ArrayLike
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.bend, Bend):
+            raise InputError(f"the bend of a figure is no Bend: {shown(self.bend)}")
+        object.__setattr__(self, "points", tuple(names("points of a figure", self.points)))
+        shifts = shaped(f"shifts of the figure {self.bend.name}", self.shifts, (len(self.points), 2, 3))
+        if not np.isfinite(shifts).all():
+            raise InputError(f"a shift of the figure {self.bend.name} is not finite")
+        object.__setattr__(self, "shifts", shifts)
+
+    @property
+    def title(self) -> str:
+        """What it is called."""
+        return f"{self.KIND} {self.bend.name}"
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What it steps with."""
+        return (self.bend,)
+
+    def of(self, points: Mapping[str, int], photos: Mapping[str, int]) -> list[int]:
+        """Return the rows of its points."""
+        if missing := [name for name in self.points if name not in points]:
+            raise InputError(f"the block has no point {missing[0]}, which the figure {self.bend.name} names")
+        return [points[name] for name in self.points]
+
+    def numbers(self) -> Floats:
+        """Return the shifts, point by point."""
+        return np.asarray(self.shifts, dtype=float).ravel()
+
+
+def checked_passages(passages: object, points: Sequence[str], photos: Sequence[str]) -> tuple[Passage, ...]:
+    """Return what images of a block pass.
+
+    Raises
+    ------
+    InputError
+        What is no passage, or is of points or photos that are not there.
+    """
+    if not isinstance(passages, Sequence):
+        raise InputError(f"passages is no list: {shown(passages)}")
+    for row, each in enumerate(passages):
+        if not isinstance(each, Passage) or not each.KIND:
+            raise InputError(f"passages[{row}] is no passage: {shown(each)}")
+    _places(passages, points, photos)
+    return tuple(passages)
+
+
+def passage_rows(
+    passages: Sequence[Passage], points: Sequence[str], photos: Sequence[str], unknowns: Sequence[Unknown]
+) -> list[PassageRow]:
+    """Return what the core takes."""
+    rows = {id(each): row for row, each in enumerate(unknowns)}
+    places = _places(passages, points, photos)
+    return [
+        (each.KIND, [rows[id(own)] for own in each.unknowns], of, each.numbers())
+        for each, of in zip(passages, places, strict=True)
+    ]
+
+
+def _places(passages: Sequence[Passage], points: Sequence[str], photos: Sequence[str]) -> list[list[int]]:
+    if not passages:
+        return []
+    of_points, of_photos = ({name: row for row, name in enumerate(own)} for own in (points, photos))
+    return [each.of(of_points, of_photos) for each in passages]
