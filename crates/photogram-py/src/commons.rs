@@ -26,6 +26,8 @@ fn measured(measure: Measure) -> &'static str {
         Measure::Rate => "rate",
         Measure::Time => "time",
         Measure::Ratio => "ratio",
+        Measure::InImage => "in image",
+        Measure::PerImage => "per image",
     }
 }
 

@@ -25,6 +25,13 @@ _PLACED = frozenset(
     )
 )
 """Types with components of `position` for values."""
+_NUMBERS = frozenset(
+    (
+        *("film placement", "film size", "film bend", "roll"),
+        *("fiducial", "pattern", "scanner", "scanner curve"),
+    )
+)
+"""Types whose values are the first of `position`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +108,8 @@ class AdjustedUnknown:
         """(k,) components of `position` where they are its own, else `change`."""
         own = {"x": 0, "y": 1, "z": 2, "scale": 0, "constant": 1, "height": 2}
         own |= {"offset": 0, "time": 0, "factor": 0}
+        if self.kind in _NUMBERS:
+            return self.position[: len(self.components)]
         if self.kind not in _PLACED:
             return self.change
         found = [

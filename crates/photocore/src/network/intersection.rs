@@ -51,15 +51,19 @@ impl Bundle {
 
     /// The rays of a point, each from the pose of its image.
     fn rays(&self, placed: &Placed, point: usize) -> impl Iterator<Item = Ray> {
-        let Placed { photos, commons, mounted } = placed;
+        let Placed { photos, commons, mounted, films } = placed;
         let ray = move |image: usize| {
             let (own, photo) = (&self.images[image], &photos[self.images[image].photo]);
+            let xy = match films.get(own.photo) {
+                Some(Some(film)) => film.place(own.xy, self.passages.cell(image))?,
+                _ => own.xy,
+            };
             let mut pose = Composed::new(false);
             let compose = |mounted: &Mounted| self.compose(mounted, commons, image, &mut pose);
             if mounted.as_ref().is_some_and(compose) {
-                Station { orientation: pose.orientation, ..*photo }.ray(own.xy)
+                Station { orientation: pose.orientation, ..*photo }.ray(xy)
             } else {
-                photo.ray(own.xy)
+                photo.ray(xy)
             }
         };
         (self.point_images.start[point]..self.point_images.start[point + 1]).filter_map(ray)

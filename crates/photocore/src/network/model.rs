@@ -265,7 +265,8 @@ impl Bundle {
         let mut photos: Vec<Station> = (0..self.cameras.len()).map(photo).collect();
         let commons = self.common_states(unknowns);
         let mounted = self.mount_all(&mut photos, &commons);
-        Placed { photos, commons, mounted }
+        let films = self.passages.films(&commons);
+        Placed { photos, commons, mounted, films }
     }
 
     /// The photos alone.
@@ -378,7 +379,7 @@ impl Bundle {
         let photos = &unknowns[self.of_stations()];
         let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_stations().end..]);
         let tied = tied.as_chunks().0.to_vec();
-        let Placed { photos: stations, commons, mounted } = self.placed(photos);
+        let Placed { photos: stations, commons, mounted, films } = self.placed(photos);
         let refracted = self.refraction.map(|refraction| Refracted {
             refraction,
             at_photos: self.verticals_at_photos(&refraction, photos, &stations),
@@ -389,7 +390,7 @@ impl Bundle {
             ),
         });
         let plain = refracted.is_none() && mounted.is_none() && self.passages.is_empty();
-        let bent = (!plain).then_some(Bent { refracted, mounted });
+        let bent = (!plain).then_some(Bent { refracted, mounted, films });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
         let local: &[[f64; 3]] = local.as_chunks().0;
         let mut points = parallel::map_in_place(local.len(), 1024, &|point| place(&local[point]));

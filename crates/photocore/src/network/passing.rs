@@ -2,6 +2,9 @@
 
 use smallvec::{SmallVec, smallvec};
 
+use super::Image;
+use super::commons::CommonState;
+use super::film::FilmOf;
 use super::in_block::InBlock;
 use super::model::Bundle;
 use super::mounts::Composed;
@@ -40,7 +43,7 @@ impl Columns<'_, '_> {
 impl Bundle {
     /// The common unknowns that an image steps with by what it passes.
     fn passed_by(&self, image: usize) -> Own {
-        self.passages.commons(self.point_of(image))
+        self.passages.commons(image, self.point_of(image), self.images[image].photo)
     }
 
     /// The retained blocks of these, each once.
@@ -77,7 +80,7 @@ impl Bundle {
         rows: &mut GroupRows<'_>,
         own: &mut Composed,
     ) {
-        let photo = self.images[group].photo;
+        let (photo, cell) = (self.images[group].photo, self.passages.cell(group));
         let (main, all) = (self.main_block(group), rows.shared.len() / 2);
         let mut slots: SmallVec<[Slot; 32]> = smallvec![Slot { block: main, first: None }];
         let mut place = |blocks: &mut dyn Iterator<Item = usize>, mut first: usize| {
@@ -94,13 +97,39 @@ impl Bundle {
         let (constant, point, retained) = (&mut *rows.constant, &mut *rows.local, &mut *rows.retained);
         let mut inner = GroupRows { constant, local: point, retained, shared: &mut shared };
         let timed = self.compose_timed((stations, bent), group, own);
-        bent.write(self.space, stations, timed.then_some(&*own), &self.images[group], local, &mut inner);
+        let own = timed.then_some(&*own);
+        let read = bent.write(self.space, stations, own, (&self.images[group], cell), local, &mut inner);
         for (to, from) in rows.shared.chunks_exact_mut(all).zip(shared.chunks(plain.max(1))) {
             to[..poses].copy_from_slice(&from[..poses]);
             to[poses..passed].fill(0.0);
             to[passed..].copy_from_slice(&from[poses..]);
         }
-        self.step_figure(local, &mut Columns { rows, slots });
+        let mut columns = Columns { rows, slots };
+        self.step_figure(local, &mut columns);
+        if let (Some(film), Some(read)) = (self.passages.film(photo), read) {
+            let commons = film.commons(cell);
+            film.partials(&read, |slot, by| {
+                let common = commons[slot].0;
+                let Some(place) = self.blocks.of_common[common] else { return };
+                for (k, &(_, component, _)) in self.commons[common].kind.unknowns().iter().enumerate() {
+                    columns.add(place, k, [by[(0, component)], by[(1, component)]]);
+                }
+            });
+        }
+    }
+
+    /// Finds in which cells of patterns images are, at the values that are given.
+    pub(super) fn find_cells(&mut self) {
+        let grid = |photo| self.passages.film(photo).is_some_and(FilmOf::has_cells);
+        if !(0..self.cameras.len()).any(grid) {
+            return;
+        }
+        let given: Vec<CommonState> =
+            self.commons.iter().map(|own| own.at(&vec![0.0; own.kind.unknowns().len()])).collect();
+        let films = self.passages.films(&given);
+        let cell =
+            |image: &Image| films[image.photo].as_ref().map_or(0, |film| film.cell_of_reading(image.xy));
+        self.passages.cells = self.images.iter().map(cell).collect();
     }
 
     /// The partials by the numbers of a figure: by the point, times how that is shifted.

@@ -11,6 +11,7 @@ from photogram.network.observations.control import Control
 from photogram.network.observations.difference import Difference
 from photogram.network.observations.distance import Distance
 from photogram.network.observations.equal_height import EqualHeight
+from photogram.network.observations.fiducial import Fiducial, KnownFilm, KnownTogether
 from photogram.network.observations.observation import (
     Observation,
     all_trajectories,
@@ -35,6 +36,9 @@ __all__ = [
     "Difference",
     "Distance",
     "EqualHeight",
+    "Fiducial",
+    "KnownFilm",
+    "KnownTogether",
     "Observation",
     "OnLevel",
     "OnLine",

@@ -58,6 +58,21 @@ pub struct Reading {
     pub by_scanner: [[f64; PARAMETERS]; 2],
 }
 
+impl Reading {
+    /// Of a place that no reading has.
+    pub const NONE: Self = {
+        let square = [[f64::NAN; 2]; 2];
+        Self {
+            xy: [f64::NAN; 2],
+            by_q: square,
+            by_film: [[f64::NAN; 6]; 2],
+            by_bend: square,
+            by_shift: square,
+            by_scanner: [[f64::NAN; PARAMETERS]; 2],
+        }
+    };
+}
+
 /// e with its partials.
 struct Aged {
     e: [f64; 2],

@@ -21,7 +21,7 @@ pub enum Pattern {
     Grid(Grid),
 }
 
-/// The nodes of a grid, column by column faster.
+/// The nodes of a grid, row by row. Weights are the shifts in x and y, node by node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
     /// The first node.
@@ -32,10 +32,10 @@ pub struct Grid {
     pub nodes: [usize; 2],
 }
 
-/// A function that is not zero at a place.
+/// A function that is not zero in a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Function {
-    /// The number of its weight.
+    /// The number of its weight among those of the [`Pattern::pairs`] of the cell.
     pub weight: usize,
     /// Along x or y.
     pub axis: usize,
@@ -45,7 +45,7 @@ pub struct Function {
     pub slope: [f64; 2],
 }
 
-/// The functions that are not zero at a place.
+/// The functions that are not zero in a cell.
 pub type Functions = SmallVec<[Function; 20]>;
 
 /// D at a place, and its partials by the place.
@@ -80,12 +80,28 @@ impl Pattern {
         }
     }
 
-    /// The functions that are not zero at a place.
-    pub fn at(&self, place: [f64; 2]) -> Functions {
+    /// The cell of a place: patterns that are no grid have one.
+    pub fn cell(&self, place: [f64; 2]) -> usize {
+        match self {
+            Self::Quadratic { .. } | Self::Ebner { .. } => 0,
+            Self::Grid(grid) => grid.cell(place),
+        }
+    }
+
+    /// The pairs of weights that count in a cell: weights 2k and 2k + 1 are pair k.
+    pub fn pairs(&self, cell: usize) -> SmallVec<[usize; 5]> {
+        match self {
+            Self::Quadratic { .. } | Self::Ebner { .. } => (0..self.count() / 2).collect(),
+            Self::Grid(grid) => grid.corners(cell).into_iter().collect(),
+        }
+    }
+
+    /// The functions of a cell at a place.
+    pub fn at(&self, cell: usize, place: [f64; 2]) -> Functions {
         match *self {
             Self::Quadratic { half } => quadratic(half, place).into_iter().collect(),
             Self::Ebner { half } => ebner(half, place),
-            Self::Grid(grid) => grid.at(place),
+            Self::Grid(grid) => grid.at(cell, place),
         }
     }
 }
@@ -117,22 +133,32 @@ fn ebner(half: f64, place: [f64; 2]) -> Functions {
 }
 
 impl Grid {
-    fn at(&self, place: [f64; 2]) -> Functions {
+    /// Cells are numbered by their first corners.
+    fn cell(&self, place: [f64; 2]) -> usize {
         let along = |k: usize| {
             let from_first = (place[k] - self.first[k]) / self.spacing[k];
-            let cell = from_first.floor().clamp(0.0, self.nodes[k] as f64 - 2.0);
-            (cell as usize, from_first - cell)
+            from_first.floor().clamp(0.0, self.nodes[k] as f64 - 2.0) as usize
         };
-        let ((column, u), (row, v)) = (along(0), along(1));
-        let mut all = Functions::new();
-        for (i, (of_y, by_y)) in [(1.0 - v, -1.0), (v, 1.0)].into_iter().enumerate() {
-            for (j, (of_x, by_x)) in [(1.0 - u, -1.0), (u, 1.0)].into_iter().enumerate() {
-                let node = (row + i) * self.nodes[0] + column + j;
-                let slope = [by_x * of_y / self.spacing[0], of_x * by_y / self.spacing[1]];
-                let shift = |axis| Function { weight: 2 * node + axis, axis, value: of_x * of_y, slope };
-                all.extend([shift(0), shift(1)]);
-            }
-        }
-        all
+        along(1) * self.nodes[0] + along(0)
+    }
+
+    fn corners(&self, cell: usize) -> [usize; 4] {
+        [cell, cell + 1, cell + self.nodes[0], cell + self.nodes[0] + 1]
+    }
+
+    fn at(&self, cell: usize, place: [f64; 2]) -> Functions {
+        let corner = [cell % self.nodes[0], cell / self.nodes[0]];
+        let along = |k: usize| (place[k] - self.first[k]) / self.spacing[k] - corner[k] as f64;
+        let sides = |k: usize| {
+            let (u, rate) = (along(k), 1.0 / self.spacing[k]);
+            [(1.0 - u, -rate), (u, rate)]
+        };
+        let ([left, right], [low, high]) = (sides(0), sides(1));
+        let corners = [(left, low), (right, low), (left, high), (right, high)];
+        let shifts = corners.into_iter().enumerate().flat_map(|(k, ((of_x, by_x), (of_y, by_y)))| {
+            let (value, slope) = (of_x * of_y, [by_x * of_y, of_x * by_y]);
+            [0, 1].map(|axis| Function { weight: 2 * k + axis, axis, value, slope })
+        });
+        shifts.collect()
     }
 }

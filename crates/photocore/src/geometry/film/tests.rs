@@ -20,9 +20,13 @@ struct Scene {
 
 impl Scene {
     fn reading(&self) -> Reading {
-        let functions = self.pattern.at(self.q);
-        let deformation = Deformation::new(&functions, |k| self.weights[k]);
-        self.photo().read(self.q, &deformation, &self.scanner).unwrap()
+        self.photo().read(self.q, &self.deformation(self.q), &self.scanner).unwrap()
+    }
+
+    fn deformation(&self, q: [f64; 2]) -> Deformation {
+        let cell = self.pattern.cell(self.q);
+        let pairs = self.pattern.pairs(cell);
+        Deformation::new(&self.pattern.at(cell, q), |k| self.weights[2 * pairs[k / 2] + k % 2])
     }
 
     fn photo(&self) -> Film {
@@ -43,10 +47,11 @@ impl Scene {
             add([0.5, 0.5, 2e-3, 1e-3, 1e-3, 1e-3][k], column([&found.by_film[0], &found.by_film[1]], k));
         });
         (0..2).for_each(|k| add(2e-6, rows(&found.by_bend, k)));
-        let functions = self.pattern.at(self.q);
+        let cell = self.pattern.cell(self.q);
+        let (functions, pairs) = (self.pattern.at(cell, self.q), self.pattern.pairs(cell));
         for weight in 0..self.pattern.count() {
             let mut by = [0.0; 2];
-            for own in functions.iter().filter(|own| own.weight == weight) {
+            for own in functions.iter().filter(|own| 2 * pairs[own.weight / 2] + own.weight % 2 == weight) {
                 (0..2).for_each(|row| by[row] += found.by_shift[row][own.axis] * own.value);
             }
             add(0.5, by);
@@ -117,8 +122,7 @@ fn partials_agree_with_differences() {
 #[test]
 fn a_place_comes_back_from_its_reading() {
     for scene in scenes() {
-        let deformation = |q| Deformation::new(&scene.pattern.at(q), |k| scene.weights[k]);
-        let back = scene.photo().place(scene.reading().xy, deformation, &scene.scanner).unwrap();
+        let back = scene.photo().place(scene.reading().xy, |q| scene.deformation(q), &scene.scanner).unwrap();
         (0..2).for_each(|k| assert!((back[k] - scene.q[k]).abs() < 1e-11));
     }
 }

@@ -8,13 +8,19 @@ use std::ops::Deref;
 use smallvec::SmallVec;
 
 use super::Network;
-use super::commons::CommonKind;
+use super::commons::{CommonKind, CommonState};
+use super::film::{FilmAt, FilmOf};
 use crate::geometry::Vector3;
 
 /// Something that images pass.
 pub trait PassageModel {
     /// The common unknowns that it has, with their types.
     fn unknowns(&self) -> Vec<(usize, CommonKind)>;
+
+    /// Those of them that are one block, group by group: whatever touches one of a group touches all.
+    fn together(&self) -> Vec<Vec<usize>> {
+        vec![]
+    }
 
     /// Whether it is one of a network: points, photos and cameras are there, and such as it may have.
     fn is_of(&self, network: &Network) -> bool;
@@ -62,6 +68,7 @@ macro_rules! kinds {
 
 kinds! {
     figure::Figure;
+    scan::Scan;
 }
 
 /// The common unknowns that an image steps with, each once.
@@ -73,6 +80,11 @@ pub(super) struct Passages {
     figures: Vec<Figure>,
     /// By point of the model: its figure, and its number there.
     of_point: Vec<Option<(usize, usize)>>,
+    scans: Vec<Scan>,
+    /// By photo: its scan.
+    of_photo: Vec<Option<usize>>,
+    /// By image of the model the cell of the pattern where it is; none where there are no patterns of several.
+    pub cells: Vec<usize>,
 }
 
 impl Passages {
@@ -83,6 +95,7 @@ impl Passages {
         }
         let mut own = Self::default();
         let mut of_point = vec![None; network.points.len()];
+        own.of_photo = vec![None; network.photos.len()];
         for passage in &network.passages {
             match passage {
                 Passage::Figure(figure) => {
@@ -91,6 +104,10 @@ impl Passages {
                     places.for_each(|(k, &point)| of_point[point] = Some((number, k)));
                     own.figures.push(figure.clone());
                 }
+                Passage::Scan(scan) => {
+                    own.of_photo[scan.photo] = Some(own.scans.len());
+                    own.scans.push(scan.clone());
+                }
             }
         }
         own.of_point = points.iter().map(|&point| of_point[point]).collect();
@@ -98,7 +115,31 @@ impl Passages {
     }
 
     pub fn is_empty(&self) -> bool {
-        self.figures.is_empty()
+        self.figures.is_empty() && self.scans.is_empty()
+    }
+
+    /// The film of a photo.
+    pub fn film(&self, photo: usize) -> Option<&FilmOf> {
+        Some(&self.scans[(*self.of_photo.get(photo)?)?].film)
+    }
+
+    /// The films of all photos at given values of the common unknowns; nothing at all where there are none.
+    pub fn films(&self, commons: &[CommonState]) -> Vec<Option<FilmAt>> {
+        if self.scans.is_empty() {
+            return vec![];
+        }
+        let at = |photo| Some(self.film(photo)?.at(&|common| commons.get(common).map(CommonState::vector)));
+        (0..self.of_photo.len()).map(at).collect()
+    }
+
+    /// The common unknowns of films, with their photos.
+    pub fn own(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.scans.iter().flat_map(|own| own.unknowns().into_iter().map(|(common, _)| (common, own.photo)))
+    }
+
+    /// The cell of the pattern where an image is.
+    pub fn cell(&self, image: usize) -> usize {
+        self.cells.get(image).copied().unwrap_or(0)
     }
 
     /// The figure of a point, and its number there.
@@ -112,8 +153,10 @@ impl Passages {
         self.figure(point).map_or_else(Vector3::zeros, |(own, k)| own.shift(k, &common(own.common)))
     }
 
-    /// The common unknowns that the image of a point steps with.
-    pub fn commons(&self, point: usize) -> Own {
-        self.figure(point).map(|(own, _)| own.common).into_iter().collect()
+    /// The common unknowns that an image of a point by a photo steps with.
+    pub fn commons(&self, image: usize, point: usize, photo: usize) -> Own {
+        let figure = self.figure(point).map(|(own, _)| own.common);
+        let film = self.film(photo).map(|own| own.commons(self.cell(image))).unwrap_or_default();
+        figure.into_iter().chain(film.into_iter().map(|(own, _)| own)).collect()
     }
 }
