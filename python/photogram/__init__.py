@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from photogram import comparator as comparator
     from photogram import diagnosis as diagnosis
     from photogram import distributed as distributed
+    from photogram import film as film
     from photogram import formats as formats
     from photogram import giant as giant
     from photogram import perspective_center as perspective_center
@@ -195,6 +196,7 @@ MODULES = (
     "comparator",
     "diagnosis",
     "distributed",
+    "film",
     "formats",
     "giant",
     "perspective_center",

@@ -95,6 +95,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
             "compare": "comparator.compare",
         },
     ),
+    "certificate": (
+        "Check a camera's certificate: typing errors, marks from distances, lens from its table.",
+        "certificate.certificate",
+    ),
     "stellar-camera": (
         "Calibrate a camera by a plate with stars, or by exposures of the sky.",
         {

@@ -35,14 +35,13 @@ from photogram.statistics.distributions import (
     log_fisher,
 )
 from photogram.statistics.findings import Systematic
+from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
 
 __all__ = ["Change", "History", "Series", "history"]
 
 MOST = 3
 """Changes of one quantity that are told apart."""
-BLIND = 1e-8
-"""A hypothesis that the model explains up to this part of its length cannot be tested."""
 
 
 @dataclass(frozen=True)
@@ -236,8 +235,8 @@ def history(
         for j in range(m)
     )
     mean = np.tile(np.eye(m), (k, 1))
-    r = _Fit.of(x.ravel(), c.reshape(k * m, k * m), mean).residuals
-    constancy = global_test(float(r @ r), (k - 1) * m, level, freedom)
+    whole = Fit.of(x.ravel(), c.reshape(k * m, k * m), mean)
+    constancy = global_test(whole.omega, (k - 1) * m, level, freedom)
     assert constancy is not None
     limit = critical_student(bonferroni(level, tests), freedom)
     return History(named, t, series, constancy, tests, level, limit)
@@ -283,37 +282,6 @@ def _hypotheses(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """A weighted fit, whitened: x = A p + r."""
-
-    root: Floats
-    basis: Floats
-    residuals: Floats
-    parameters: Floats
-    cofactors: Floats
-
-    @classmethod
-    def of(cls, x: Floats, covariance: Floats, columns: Floats) -> _Fit:
-        scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        try:
-            root = scale[:, np.newaxis] * np.linalg.cholesky(covariance / np.outer(scale, scale))
-        except (np.linalg.LinAlgError, FloatingPointError):
-            raise InputError("the covariance is not positive definite") from None
-        a, y = np.linalg.solve(root, columns), np.linalg.solve(root, x)
-        q, upper = np.linalg.qr(a)
-        inverse = np.linalg.inv(upper)
-        return cls(root, q, y - q @ (q.T @ y), inverse @ (q.T @ y), inverse @ inverse.T)
-
-    def tested(self, columns: Floats) -> tuple[Floats, Floats]:
-        """Return sizes of more columns, one at a time, and their standard deviations; NaN of blind ones."""
-        z = np.linalg.solve(self.root, columns)
-        left = z - self.basis @ (self.basis.T @ z)
-        squares = (left**2).sum(axis=0)
-        squares[squares < BLIND * (z**2).sum(axis=0)] = math.nan
-        return left.T @ self.residuals / squares, 1 / np.sqrt(squares)
-
-
 def _log10_p(t: float, freedom: float) -> float:
     log_p = log_chi_square(t**2, 1.0) if math.isinf(freedom) else log_fisher(t**2, 1.0, freedom)
     return float(log_p) / math.log(10)
@@ -331,7 +299,7 @@ def _series(
     """Test one quantity, accept what is found, the most certain first, and fit all of it together."""
     k = len(x)
     with np.errstate(invalid="raise", divide="raise"):
-        first = fit = _Fit.of(x, covariance, np.ones((k, 1)))
+        first = fit = Fit.of(x, covariance, np.ones((k, 1)))
     sizes, deviations = fit.tested(hypotheses.columns)
     t = sizes / deviations
     steps, drift = np.full(k - 1, math.nan), (math.nan, math.nan)
@@ -349,7 +317,7 @@ def _series(
             break
         accepted.append((best, float(t[best])))
         columns = hypotheses.columns[:, [column for column, _ in accepted]]
-        fit = _Fit.of(x, covariance, np.column_stack([np.ones(k), columns]))
+        fit = Fit.of(x, covariance, np.column_stack([np.ones(k), columns]))
         sizes, deviations = fit.tested(hypotheses.columns)
         t = sizes / deviations
     changes = []
@@ -366,12 +334,12 @@ def _series(
         sd=np.sqrt(np.diag(covariance)),
         mean=float(first.parameters[0]),
         mean_sd=math.sqrt(float(first.cofactors[0, 0])),
-        model=x - fit.root @ fit.residuals,
+        model=x - fit.residuals,
         off=off,
         off_sd=off_sd,
         drift=drift[0],
         drift_sd=drift[1],
         steps=steps,
-        test=global_test(float(first.residuals @ first.residuals), k - 1, reference_dof=freedom),
+        test=global_test(first.omega, k - 1, reference_dof=freedom),
         changes=tuple(changes),
     )
