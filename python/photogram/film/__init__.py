@@ -1,29 +1,36 @@
-"""Film and plates: certificates of their cameras, what years make of these."""
+"""Film and plates: certificates of their cameras, what years make of these, interior orientations."""
 
 from photogram.arguments.annotations import check_arguments
 from photogram.film.certificate import CalibratedMarks, Certificate
 from photogram.film.certificate_check import DistanceDifference, Explanation
 from photogram.film.decentring import Tangential
 from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
+from photogram.film.interior import Affine, Interior, interior_orientation
 from photogram.film.lens_table import Curve, LensParameters, RadialTable
+from photogram.film.which import WhichMark, which_mark
 
 __all__ = [
     "AdjustedMarks",
+    "Affine",
     "CalibratedMarks",
     "Certificate",
     "Crossing",
     "Curve",
     "DistanceDifference",
     "Explanation",
+    "Interior",
     "LensParameters",
     "MarkDistance",
     "RadialTable",
     "RightAngle",
     "Tangential",
+    "WhichMark",
     "adjust_distances",
+    "interior_orientation",
+    "which_mark",
 ]
 
-check_arguments(globals(), ["adjust_distances"])
+check_arguments(globals(), ["adjust_distances", "interior_orientation", "which_mark"])
 
 WAYS = {
     "document_of": ("certificate_document",),

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, shaped, shown
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.network.cameras import Camera
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Unknown
 
@@ -33,6 +34,7 @@ __all__ = [
     "Scanner",
     "ScannerCurve",
     "Weights",
+    "check_scans",
 ]
 
 PATTERNS = ("none", "w1 w2", "ebner", "grid")
@@ -217,12 +219,19 @@ class Film:
     mirrored: bool = False
 
     def __post_init__(self) -> None:
-        parts = (("placement", FilmPlacement), ("size", FilmSize), ("scanner", Scanner), ("readings", Readings))
+        parts = (
+            ("placement", FilmPlacement),
+            ("size", FilmSize),
+            ("scanner", Scanner),
+            ("readings", Readings),
+        )
         for name, kind in parts:
             if not isinstance(getattr(self, name), kind):
                 raise InputError(f"the {name} of a film is no {kind.__name__}: {shown(getattr(self, name))}")
         if len(self.curves) not in (0, 6):
-            raise InputError(f"a scanner has six curves of three coefficients, or none, not {len(self.curves)}")
+            raise InputError(
+                f"a scanner has six curves of three coefficients, or none, not {len(self.curves)}"
+            )
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -280,3 +289,40 @@ class Scan(Passage):
     def numbers(self) -> Floats:
         """Return those of its film."""
         return self.film.numbers()
+
+
+def check_scans(
+    passages: Sequence[Passage],
+    photos: Sequence[str],
+    cameras: Sequence[Camera],
+    photo_cameras: Indices | None,
+) -> None:
+    """Refuse scans of photos whose camera has no frame of marks, and two of one photo.
+
+    Raises
+    ------
+    InputError
+        A camera in pixels, of a comparator of its own, or with residuals where readings are corrected.
+    """
+    scans = [each for each in passages if isinstance(each, Scan)]
+    rows = {name: row for row, name in enumerate(photos)} if scans else {}
+    seen: set[str] = set()
+    for each in scans:
+        if each.photo in seen:
+            raise InputError(f"the photo {each.photo} is scanned twice")
+        seen.add(each.photo)
+        if photo_cameras is None:
+            continue
+        camera = cameras[int(photo_cameras[rows[each.photo]])]
+        if camera.unit != "mm" or camera.image_y == "down":
+            raise InputError(f"the photo {each.photo} is a scanned film: its camera is in mm, y up")
+        if camera.model.startswith("on_comparator"):
+            raise InputError(
+                f"the photo {each.photo} is a scanned film, and its camera is on_comparator, which has a"
+                " scanner of its own: brown, with the comparator as a scanner"
+            )
+        if camera.direction == "backward" and camera.weights == "corrected":
+            raise InputError(
+                f"the photo {each.photo} is a scanned film: residuals are those of readings, and its camera"
+                " has weights corrected: measured is needed"
+            )

@@ -59,6 +59,9 @@ class AdjustedUnknown:
         zero for held ones, NaN without covariances.
     covariance
         (k, k) cofactors times the variance of unit weight.
+    with_former
+        (k, j) cofactors with the unknown before it where both are adjusted as one: the size of a film with
+        its placement; j is 0 of all others.
     redundancy
         (k,) redundancy numbers of weighted components as observations; 0 unless weighted.
     observations
@@ -73,6 +76,7 @@ class AdjustedUnknown:
     attitude: Floats
     cofactors: Floats
     covariance: Floats
+    with_former: Floats
     redundancy: Floats
     observations: int
 
@@ -84,6 +88,7 @@ class AdjustedUnknown:
             self.attitude,
             self.cofactors,
             self.covariance,
+            self.with_former,
             self.redundancy,
         ):
             array.flags.writeable = False
@@ -136,7 +141,7 @@ def adjusted_unknowns(
     # What line rates are multiplied by is of the type of readout times, but a plain number.
     factors = {id(each.rate) for each in block.timed if each.rate is not None}
     for given, row in zip(block.unknowns, solution.adjusted_unknowns, strict=True):
-        change, position, attitude, cofactors, redundancy, observations = row
+        change, position, attitude, cofactors, with_former, redundancy, observations = row
         k = len(change)
         matrix = np.array(cofactors).reshape(k, k)
         found.append(
@@ -149,6 +154,7 @@ def adjusted_unknowns(
                 attitude=np.array(attitude).reshape(3, 3),
                 cofactors=matrix,
                 covariance=matrix * scale,
+                with_former=np.array(with_former).reshape(k, len(with_former) // k),
                 redundancy=np.array(redundancy),
                 observations=observations,
             )

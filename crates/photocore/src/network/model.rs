@@ -322,11 +322,25 @@ impl Bundle {
 
     /// The cofactors of a common unknown; none where it is known.
     pub fn cofactors_of_common(&self, all: &Cofactors, common: usize) -> DMatrix<f64> {
-        let Some(InBlock { block, first, width }) = self.blocks.of_common[common] else {
+        self.cofactors_in_block(all, common, common)
+    }
+
+    /// The cofactors of a common unknown with another of its block; none where it is known.
+    pub fn cofactors_in_block(&self, all: &Cofactors, common: usize, other: usize) -> DMatrix<f64> {
+        let (Some(own), Some(to)) = (self.blocks.of_common[common], self.blocks.of_common[other]) else {
             return DMatrix::zeros(0, 0);
         };
-        let (own, count) = (self.cofactors_of_block(all, block), self.commons[common].kind.unknowns().len());
-        DMatrix::from_fn(count, count, |i, j| own[width * (first + i) + first + j])
+        let square = self.cofactors_of_block(all, own.block);
+        let [rows, columns] = [common, other].map(|own| self.commons[own].kind.unknowns().len());
+        DMatrix::from_fn(rows, columns, |i, j| square[own.width * (own.first + i) + to.first + j])
+    }
+
+    /// The common unknown before another in their block.
+    pub fn former_in_block(&self, common: usize) -> Option<usize> {
+        let InBlock { block, .. } = self.blocks.of_common[common]?;
+        let own = &self.blocks.commons[block - self.cameras.len() - self.blocks.shared.len()];
+        let place = own.iter().position(|&other| other == common)?;
+        Some(own[place.checked_sub(1)?])
     }
 
     /// The orientation of a photo, its pose given, with the columns of its unknowns.

@@ -71,7 +71,7 @@ class Fiducial(Observation):
         return self.photo, self.mark.name
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
-        """That of readings."""
+        """Return that of readings."""
         return ("mm" if self.film.readings.pitch == 1.0 else "px",) * 2
 
 
@@ -133,13 +133,19 @@ class KnownFilm(Observation):
         return (self.photo,)
 
     @property
+    def label(self) -> str:
+        """Those of which the same is known stand together."""
+        same = self.known == FILM[3:]
+        return self.KIND if same else f"{self.KIND}, {' '.join(self.known)}"
+
+    @property
     def own_components(self) -> tuple[str, ...]:
         """Those that are known; m about the roll's."""
         about = "m" if self.roll is None else "m - roll"
         return tuple(about if name == "m" else name for name in self.known)
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
-        """Those of the six."""
+        """Return those of the six."""
         return tuple({"t1": "mm", "t2": "mm", "theta": "rad"}.get(name, "") for name in self.known)
 
 
@@ -199,7 +205,7 @@ class KnownTogether(Observation):
         return self.title
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
-        """Those of the unknowns."""
+        """Return those of the unknowns."""
         return tuple(unit for each in self.joined for unit in each.units(linear_unit))
 
     @property
