@@ -124,7 +124,10 @@ def test_distances_alone_need_places_to_start_from(written):
     designed = written(f"{text}[certificate.design]\nml = [-110, 0]\nmr = [110, 0]\n")
     # Two marks have one distance: their figure is free.
     assert designed.fiducials().adjusted.free == 3
-    assert written(text.replace("[certificate.d", 'type = "RC 8"\n[certificate.d')).fiducials().adjusted is not None
+    assert (
+        written(text.replace("[certificate.d", 'type = "RC 8"\n[certificate.d')).fiducials().adjusted
+        is not None
+    )
 
 
 def test_distances_of_another_unit_are_found(written):

@@ -224,9 +224,7 @@ class _Reader:
         if not self.before:
             found.observations.extend(self._known_marks(marks))
             machines = {id(each.machine): each.machine for each in self.photos}
-            found.observations.extend(
-                each.known for each in machines.values() if each.known is not None
-            )
+            found.observations.extend(each.known for each in machines.values() if each.known is not None)
 
     def _remark(self, photo: _Photo) -> None:
         """Say it where a film stands on what is known of it beforehand."""

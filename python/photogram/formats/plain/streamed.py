@@ -286,7 +286,9 @@ class Streamed:
         # The column is ours, and no remark is due.
         images = read_images(Tables(settings, []), self._photos)
         cameras = np.asarray(self._photos.cameras)
-        xy, sd = image_coordinates(settings, images, self._cameras, cameras, np.zeros(len(cameras), dtype=bool))
+        xy, sd = image_coordinates(
+            settings, images, self._cameras, cameras, np.zeros(len(cameras), dtype=bool)
+        )
         if sd is None:
             sd = np.asarray(ASSUMED_SD[self._cameras.cameras[0].unit or "px"])
         names = list(dict.fromkeys([*self._tied, *images.point_names])) if not number else images.point_names
