@@ -18,6 +18,7 @@ PROGRAMS = (
     "absolute_orientation",
     "comparator",
     "stellar",
+    "targets",
     "film",
 )
 FLOORS = (

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from photogram import planning as planning
     from photogram import plots as plots
     from photogram import stellar as stellar
+    from photogram import targets as targets
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
@@ -203,6 +204,7 @@ MODULES = (
     "planning",
     "plots",
     "stellar",
+    "targets",
 )
 """The packages that users know by name: loaded when they are first asked for, too."""
 

@@ -291,7 +291,7 @@ fn points_without_initial_values_start_where_their_rays_meet() {
 fn cameras_of_both_kinds_and_held_ones_stand_in_one_network() {
     // The exact photos with known cameras, the first a perspective of the same focal length without distortion.
     let mut network = collection(9, 80, 0.0);
-    network.cameras.iter_mut().skip(1).for_each(|camera| *camera = Camera::held(camera.camera));
+    network.cameras.iter_mut().skip(1).for_each(|camera| *camera = Camera::held(camera.camera.clone()));
     network.cameras[0] = Camera::new(Perspective { principal_distance: -1000.0 }.into(), vec![f64::INFINITY]);
     for image in network.images.iter_mut().filter(|image| image.photo == 0) {
         let ideal = network.cameras[1].camera.direction(image.xy).unwrap();

@@ -507,7 +507,7 @@ fn what_is_not_determined_is_named_by_parameters_and_parts_of_poses() {
         let sd = (0..5).map(|k| if free.contains(&k) { FREE } else { 0.0 }).collect();
         let mut network = Network {
             poses: PoseNumbers::Angles(sense),
-            cameras: vec![Camera::new(lens, sd)],
+            cameras: vec![Camera::new(lens.clone(), sd)],
             photos: vec![],
             points: places.iter().map(|&coordinates| Point { coordinates, sd: [0.0; 3] }).collect(),
             images: vec![],

@@ -23,7 +23,7 @@ fn atan(z: C) -> C {
 }
 
 /// The whole model once more, from place to plate, for complex arguments: place (2), attitude (3), common parameters (17).
-fn image(kind: Kind, time: f64, unknowns: &[C]) -> [C; 2] {
+fn image(kind: &Kind, time: f64, unknowns: &[C]) -> [C; 2] {
     let (ra, dec) = (unknowns[0], unknowns[1]);
     let (sp, cp) = LATITUDE.sin_cos();
     let hour = C::from(time) - ra;
@@ -53,7 +53,7 @@ fn image(kind: Kind, time: f64, unknowns: &[C]) -> [C; 2] {
     plate(kind, [m, n], &unknowns[5..])
 }
 
-fn plate(kind: Kind, [m, n]: [C; 2], p: &[C]) -> [C; 2] {
+fn plate(kind: &Kind, [m, n]: [C; 2], p: &[C]) -> [C; 2] {
     let (cx, cy) = (p[3], if kind.common_scale { p[3] } else { p[4] });
     let (bx, by, sx, sy) = match kind.form {
         Form::ScaleFirst => (cx, cy, C::from(1.0), C::from(1.0)),
@@ -85,11 +85,11 @@ fn values(decentering: Decentering) -> [f64; 22] {
     ]
 }
 
-fn calibration(kind: Kind, values: &[f64; 22], time: f64) -> Calibration {
+fn calibration(kind: &Kind, values: &[f64; 22], time: f64) -> Calibration {
     let common: [f64; COMMON] = std::array::from_fn(|k| values[5 + k]);
     Calibration {
         station: Station::new(LATITUDE, ABERRATION, Air::new(TEMPERATURE, PRESSURE)),
-        kind,
+        kind: kind.clone(),
         pointings: vec![[values[2], values[3], values[4]]],
         common,
         fixed: vec![false; 3 + COMMON],
@@ -120,14 +120,14 @@ fn partials_are_exact() {
             for common_scale in [false, true] {
                 let kind = Kind { lens: None, form, decentering, common_scale };
                 for time in [1.0, 1.35, 1.7] {
-                    check_partials(kind, &values(decentering), time);
+                    check_partials(&kind, &values(decentering), time);
                 }
             }
         }
     }
 }
 
-fn check_partials(kind: Kind, values: &[f64; 22], time: f64) {
+fn check_partials(kind: &Kind, values: &[f64; 22], time: f64) {
     let rows = calibration(kind, values, time).equations().unwrap()[0];
     let exact = image(kind, time, &values.map(C::from));
     for i in 0..2 {
@@ -155,7 +155,7 @@ fn check_partials(kind: Kind, values: &[f64; 22], time: f64) {
 fn a_direction_comes_back() {
     let kind =
         Kind { lens: None, form: Form::ScaleFirst, decentering: Decentering::Polar, common_scale: false };
-    let mut calibration = calibration(kind, &values(kind.decentering), 1.2);
+    let mut calibration = calibration(&kind, &values(kind.decentering), 1.2);
     calibration.images[0].xy = [-0.07, 0.05];
     calibration.stars[0].place = calibration.directions().unwrap()[0];
     let rows = calibration.equations().unwrap()[0];
@@ -211,5 +211,5 @@ fn the_camera_sees_nothing_behind_it() {
     interior[3] = 0.3;
     interior[4] = 0.3;
     let attitude = Attitude::new([2.0, 0.0, 0.0]);
-    assert!(Camera::new(kind, interior).linearize(&attitude, [0.0, 0.0]).xy[0].is_nan());
+    assert!(Camera::new(&kind, interior).linearize(&attitude, [0.0, 0.0]).xy[0].is_nan());
 }

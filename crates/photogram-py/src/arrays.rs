@@ -130,7 +130,7 @@ pub fn check_lengths(first: (&str, usize), others: &[(&str, usize)]) -> PyResult
     }
 }
 
-fn values(array: &PyReadonlyArrayDyn<'_, f64>) -> Vec<f64> {
+pub fn values(array: &PyReadonlyArrayDyn<'_, f64>) -> Vec<f64> {
     let view = array.as_array();
     view.as_slice().map_or_else(|| view.iter().copied().collect(), <[f64]>::to_vec)
 }

@@ -82,10 +82,10 @@ fn kind(camera: CameraKind) -> PyResult<Kind> {
 /// A camera of plates or of another model; it must have room for the parameters of the latter.
 fn camera_of(camera: CameraKind, interior: &Array<'_>) -> PyResult<Camera> {
     let kind = kind(camera)?;
-    if kind.lens.is_some_and(|lens| lens.parameter_names().len() > INTERIOR) {
+    if kind.lens.as_ref().is_some_and(|lens| lens.parameter_names().len() > INTERIOR) {
         return Err(failure(&Failure::Lens));
     }
-    Ok(Camera::new(kind, fixed_size("interior", interior)?))
+    Ok(Camera::new(&kind, fixed_size("interior", interior)?))
 }
 
 fn fixed_size<const N: usize>(name: &str, array: &Array<'_>) -> PyResult<[f64; N]> {

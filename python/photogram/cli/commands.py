@@ -31,6 +31,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "Adjust a block in whatever files it lies: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...",
         "adjust.adjust",
     ),
+    "calibrate": (
+        "Calibrate cameras and rigs with pictures of a board: cameras with their uncertainty.",
+        "calibrate.calibrate",
+    ),
     "check": (
         "Look for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.",
         "check_project.check_project",

@@ -41,6 +41,7 @@ FORMATS: dict[str, Format] = {
         "aicon",
         "giant",
         "isis",
+        "targets",
         "results",
     )
 }

@@ -75,7 +75,8 @@ impl<C: CameraModel> View<C> {
 
     /// The image position of a lifted point and its partials, those of the lift included.
     pub fn linearize_lifted(&self, point: &Point, lift: &Lift) -> Projection<C::Parameters> {
-        Self { orientation: self.orientation.under(lift), camera: self.camera }.linearize(&point.lifted(lift))
+        Self { orientation: self.orientation.under(lift), camera: self.camera.clone() }
+            .linearize(&point.lifted(lift))
     }
 
     /// The ray of an image position; None where no direction has it.

@@ -42,14 +42,18 @@ impl Network {
             refraction: self
                 .refraction
                 .map(|refraction| Refraction { datum: refraction.datum + origin[2], ..refraction }),
-            cameras: self.photos.iter().map(|photo| self.camera(photo).camera).collect(),
+            cameras: self.photos.iter().map(|photo| self.camera(photo).camera.clone()).collect(),
             blocks: Blocks::new(self, self.shared_cameras(&selected.surroundings)),
             camera_priors: vec![],
             commons: self.placed_commons(selected, &mounts, (&images, &image_times), middle),
             datum: self.given_datum(selected, &mounts),
             mounts,
             image_times,
-            passages: Passages::new(self, &selected.points),
+            passages: Passages::new(
+                &self.passages,
+                (&selected.points, self.points.len()),
+                self.photos.iter().map(|photo| photo.camera),
+            ),
             origin,
             locals: selected.locals,
             points,
@@ -67,7 +71,6 @@ impl Network {
         };
         bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();
         bundle.find_cells();
-        bundle.count_passed();
         bundle.observations = self.tied_observations(selected, &bundle)?;
         Ok(bundle)
     }

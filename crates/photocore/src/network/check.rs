@@ -4,6 +4,7 @@ use std::mem::discriminant;
 
 use super::mounts::AT_PHOTO;
 use super::observations::{Fault, Observation};
+use super::passages::Facts;
 use super::surroundings::{BlockOf, Surroundings};
 use super::{CommonKind, Image, Mount, Network, NetworkError, Passage, Trajectory};
 use crate::geometry::{ObjectSpace, PoseNumbers};
@@ -41,7 +42,6 @@ impl Network {
         }
         self.check_trajectories()?;
         self.check_mounts()?;
-        self.check_passages()?;
         let flies = self.flies();
         for (index, observation) in self.observations.iter().enumerate() {
             let checked = observation
@@ -49,6 +49,7 @@ impl Network {
                 .and_then(|()| check_motion(observation, &flies));
             checked.map_err(|fault| NetworkError::Observation { index, kind: observation.kind(), fault })?;
         }
+        self.check_passages()?;
         let cartesian = self.space == ObjectSpace::Rectangular && self.refraction.is_none();
         if self.poses == PoseNumbers::Vectors && !cartesian { Err(NetworkError::Vectors) } else { Ok(()) }
     }
@@ -118,7 +119,16 @@ impl Network {
         let of_type = |(common, kind): (usize, CommonKind)| {
             self.commons.get(common).is_some_and(|own| own.kind == kind)
         };
-        let bad = |own: &Passage| !own.unknowns().into_iter().all(of_type) || !own.is_of(self);
+        if self.passages.is_empty() {
+            return Ok(());
+        }
+        let mut given: Vec<bool> = self.points.iter().map(|point| point.sd == [0.0; 3]).collect();
+        let touched = self.observations.iter().flat_map(|own| own.touches().points);
+        touched.for_each(|point| given[point] = false);
+        let cameras = self.cameras.iter().map(|own| &own.camera).collect();
+        let photos = self.photos.iter().map(|own| own.camera).collect();
+        let facts = Facts { space: self.space, given, cameras, photos };
+        let bad = |own: &Passage| !own.unknowns().into_iter().all(of_type) || !own.is_of(&facts);
         self.passages.iter().position(bad).map_or(Ok(()), |index| Err(NetworkError::Passage(index)))
     }
 

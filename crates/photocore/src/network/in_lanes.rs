@@ -141,7 +141,7 @@ impl<C: CameraModel> WithSimd for Compute<'_, '_, C> {
     fn with_simd<S: Simd>(self, _: S) {
         let Self { input, places, count, rows, .. } = self;
         // Copies: nothing that is written can be one of them, so that the compiler makes vectors of the lanes.
-        let (pose, camera) = (*self.pose, *self.camera);
+        let (pose, camera) = (*self.pose, self.camera.clone());
         let Input { point, image, sd } = *input;
         let (mut x, mut y) = (Columns::ZERO, Columns::ZERO);
         for t in 0..LANES {

@@ -60,11 +60,9 @@ impl Bundle {
             };
             let mut pose = Composed::new(false);
             let compose = |mounted: &Mounted| self.compose(mounted, commons, image, &mut pose);
-            if mounted.as_ref().is_some_and(compose) {
-                Station { orientation: pose.orientation, ..*photo }.ray(xy)
-            } else {
-                photo.ray(xy)
-            }
+            let composed = mounted.as_ref().is_some_and(compose);
+            let orientation = if composed { &pose.orientation } else { &photo.orientation };
+            photo.camera.direction(xy).map(|direction| orientation.ray(&direction))
         };
         (self.point_images.start[point]..self.point_images.start[point + 1]).filter_map(ray)
     }

@@ -163,7 +163,8 @@ impl Camera {
 
     /// A camera whose parameters are known.
     pub fn held(camera: geometry::Camera) -> Self {
-        Self::new(camera, vec![0.0; camera.parameter_names().len()])
+        let count = camera.parameter_names().len();
+        Self::new(camera, vec![0.0; count])
     }
 
     /// Whether its parameters are known.

@@ -1,7 +1,7 @@
 //! The observation equations of a network.
 
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::DMatrix;
 
@@ -250,20 +250,22 @@ impl Bundle {
 
     /// Photos and common unknowns at given values of the unknowns of photos, shared cameras and common unknowns.
     pub fn placed(&self, unknowns: &[f64]) -> Placed {
+        let commons = self.common_states(unknowns);
+        let lenses = self.passages.lenses().iter().map(|own| own.commons.iter());
+        let knots: Vec<Arc<[[f64; 2]]>> =
+            lenses.map(|own| own.map(|&knot| commons[knot].vector().xy().into()).collect()).collect();
         let photo = |photo: usize| {
             let (pose, camera) =
                 unknowns[self.blocks.first[photo]..self.blocks.first[photo + 1]].split_at(POSE);
             let pose = std::array::from_fn(|k| pose[k]);
             let shared = self.blocks.of_camera[photo]
                 .map(|block| self.blocks.first[block]..self.blocks.first[block + 1]);
-            let (own, camera) = (self.cameras[photo], shared.map_or(camera, |range| &unknowns[range]));
-            Station {
-                orientation: self.orientation(photo, &pose),
-                camera: own.with_parameters(camera).unwrap_or(own),
-            }
+            let (own, camera) = (&self.cameras[photo], shared.map_or(camera, |range| &unknowns[range]));
+            let camera = own.with_parameters(camera).unwrap_or_else(|| own.clone());
+            let bent = self.passages.lens(photo).and_then(|lens| camera.with_knots(knots[lens].clone()));
+            Station { orientation: self.orientation(photo, &pose), camera: bent.unwrap_or(camera) }
         };
         let mut photos: Vec<Station> = (0..self.cameras.len()).map(photo).collect();
-        let commons = self.common_states(unknowns);
         let mounted = self.mount_all(&mut photos, &commons);
         let films = self.passages.films(&commons);
         Placed { photos, commons, mounted, films }

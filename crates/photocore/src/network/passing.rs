@@ -10,8 +10,13 @@ use super::model::Bundle;
 use super::mounts::Composed;
 use super::passages::Own;
 use super::stations::{Bent, Stations};
-use crate::geometry::Matrix3;
+use crate::geometry::camera::SplinedStereographic;
+use crate::geometry::{Camera, CameraModel, Matrix3, Vector3};
 use crate::normals::{Cofactors, GroupRows};
+use crate::parallel;
+
+/// How far an image may move, in distances of knots, before it depends on others than those that it may step with.
+const MARGIN: f64 = 0.25;
 
 /// Where the columns of a block are among those that an image has in common with others; None of the main block.
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +48,59 @@ impl Columns<'_, '_> {
 impl Bundle {
     /// The common unknowns that an image steps with by what it passes.
     fn passed_by(&self, image: usize) -> Own {
-        self.passages.commons(image, self.point_of(image), self.images[image].photo)
+        let photo = self.images[image].photo;
+        self.passages.commons((image, photo, self.point_of(image)), columns(&self.cameras[photo]))
+    }
+
+    /// Finds the knots that images may step with, from where points and photos stand at given values of the unknowns, and counts which common
+    /// unknowns they step with by what they pass.
+    pub(super) fn open_windows(&mut self, unknowns: &[f64]) {
+        if self.passages.is_empty() {
+            return;
+        }
+        if !self.passages.lenses().is_empty() {
+            let windows = self.of_seen(unknowns, |own, u| own.window(u, MARGIN));
+            self.passages.open(windows);
+        }
+        let all: Vec<Own> = (0..self.images.len()).map(|image| self.passed_by(image)).collect();
+        all.into_iter().flatten().for_each(|common| self.commons[common].uses += 1);
+    }
+
+    /// Whether there are images of which the knots are others than those that they may step with.
+    pub(super) fn is_beyond_windows(&self, unknowns: &[f64]) -> bool {
+        if self.passages.lenses().is_empty() {
+            return false;
+        }
+        let patches = self.of_seen(unknowns, |own, u| own.patch(u));
+        patches.iter().enumerate().any(|(image, patch)| {
+            let window = self.passages.window(image);
+            patch.is_some_and(|patch| window.is_none_or(|window| !window.has(&patch)))
+        })
+    }
+
+    /// Takes something of each image with a lens of knots, by its camera and by what that sees of the point.
+    fn of_seen<T: Send>(
+        &self,
+        unknowns: &[f64],
+        take: impl Fn(&SplinedStereographic, &Vector3) -> Option<T> + Sync,
+    ) -> Vec<Option<T>> {
+        let stations = self.evaluated(unknowns);
+        let Some(bent) = &stations.bent else { return vec![] };
+        let of_point = |point: usize| {
+            let images = self.point_images.start[point]..self.point_images.start[point + 1];
+            let of_image = |image: usize| {
+                let photo = self.images[image].photo;
+                self.passages.lens(photo)?;
+                match &stations.photos[photo].camera {
+                    Camera::SplinedStereographic(own) => {
+                        take(own, &self.sight_bent((&stations, bent), image, point))
+                    }
+                    _ => None,
+                }
+            };
+            images.map(of_image).collect::<Vec<_>>()
+        };
+        parallel::map(self.points.len(), 64, of_point).into_iter().flatten().collect()
     }
 
     /// The retained blocks of these, each once.
@@ -60,15 +117,6 @@ impl Bundle {
             }
         }
         blocks
-    }
-
-    /// Counts which common unknowns images step with by what they pass.
-    pub(super) fn count_passed(&mut self) {
-        if self.passages.is_empty() {
-            return;
-        }
-        let all: Vec<Own> = (0..self.images.len()).map(|image| self.passed_by(image)).collect();
-        all.into_iter().flatten().for_each(|common| self.commons[common].uses += 1);
     }
 
     /// Writes the equations of an image that passes more than pose and camera: those of pose, point and camera first.
@@ -116,6 +164,7 @@ impl Bundle {
                 }
             });
         }
+        self.step_knots((stations, bent), group, local, &mut columns);
     }
 
     /// Finds in which cells of patterns images are, at the values that are given.
@@ -130,6 +179,30 @@ impl Bundle {
         let cell =
             |image: &Image| films[image.photo].as_ref().map_or(0, |film| film.cell_of_reading(image.xy));
         self.passages.cells = self.images.iter().map(cell).collect();
+    }
+
+    /// The partials by the knots of a lens.
+    fn step_knots(
+        &self,
+        (stations, bent): (&Stations, &Bent),
+        group: usize,
+        local: usize,
+        columns: &mut Columns<'_, '_>,
+    ) {
+        let photo = self.images[group].photo;
+        let (Some(lens), Camera::SplinedStereographic(camera)) =
+            (self.passages.lens(photo), &stations.photos[photo].camera)
+        else {
+            return;
+        };
+        let Some(patch) = camera.patch(&self.sight_bent((stations, bent), group, local)) else { return };
+        let [fx, fy, ..] = camera.parameters();
+        for (knot, weight) in patch.knots(camera.columns()) {
+            if let Some(place) = self.blocks.of_common[self.passages.lenses()[lens].commons[knot]] {
+                columns.add(place, 0, [fx * weight, 0.0]);
+                columns.add(place, 1, [0.0, fy * weight]);
+            }
+        }
     }
 
     /// The partials by the numbers of a figure: by the point, times how that is shifted.
@@ -162,5 +235,13 @@ impl Bundle {
             Some(own) => shifts * own.fixed_view::<2, 2>(0, 0) * shifts.transpose(),
         };
         Some((std::array::from_fn(|i| given[i] + shift[i]), found))
+    }
+}
+
+/// How many knots a camera has in a row.
+fn columns(camera: &Camera) -> usize {
+    match camera {
+        Camera::SplinedStereographic(own) => own.columns(),
+        _ => 0,
     }
 }

@@ -7,7 +7,7 @@ use super::mounts::Composed;
 use crate::geometry::camera::each_camera;
 use crate::geometry::film::Reading;
 use crate::geometry::{
-    self, Camera, CameraModel, ObjectSpace, Orientation, POSE, Ray, Refraction, Vector3, Vertical,
+    self, Camera, CameraModel, ObjectSpace, Orientation, POSE, Refraction, Vector3, Vertical,
 };
 use crate::normals::GroupRows;
 
@@ -59,17 +59,10 @@ pub struct Placed {
 }
 
 /// A photo at given values of its unknowns.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Station {
     pub orientation: Orientation,
     pub camera: Camera,
-}
-
-impl Station {
-    /// The ray of an image position; None where no direction has it.
-    pub fn ray(&self, xy: [f64; 2]) -> Option<Ray> {
-        self.camera.direction(xy).map(|direction| self.orientation.ray(&direction))
-    }
 }
 
 /// What refraction needs besides.

@@ -1,17 +1,27 @@
-//! Golden data for networks, read where they are at hand.
+//! Golden data, read where they are at hand.
 
 // Each test takes what it needs.
 #![allow(dead_code)]
 
 use serde_json::Value;
 
-/// A file of the golden data; None, visibly, where they are not at hand.
+/// A file of the golden data for networks; None, visibly, where they are not at hand.
 pub fn golden(name: &str) -> Option<Value> {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/network/");
-    match std::fs::read_to_string(format!("{path}{name}")) {
-        Ok(text) => Some(serde_json::from_str(&text).unwrap()),
+    golden_of("network", name)
+}
+
+/// A file of the golden data of a folder.
+pub fn golden_of(folder: &str, name: &str) -> Option<Value> {
+    golden_text(folder, name).map(|text| serde_json::from_str(&text).unwrap())
+}
+
+/// The text of such a file.
+pub fn golden_text(folder: &str, name: &str) -> Option<String> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
+    match std::fs::read_to_string(format!("{path}/{folder}/{name}")) {
+        Ok(text) => Some(text),
         Err(error) => {
-            eprintln!("skipped: {path}{name}: {error}");
+            eprintln!("skipped: {path}/{folder}/{name}: {error}");
             None
         }
     }

@@ -162,8 +162,9 @@ fn collection_network(
         sd: std::array::from_fn(|k| sd[k]),
         camera,
     };
-    let own =
-        |((_, camera), sd): (&(_, geometry::Camera), &Vec<f64>)| Camera::new(*camera, sd[POSE..].to_vec());
+    let own = |((_, camera), sd): (&(_, geometry::Camera), &Vec<f64>)| {
+        Camera::new(camera.clone(), sd[POSE..].to_vec())
+    };
     let network = Network {
         poses: PoseNumbers::Vectors,
         cameras: given.iter().zip(&sd).map(own).collect(),

@@ -229,6 +229,9 @@ def _quoted(text: str) -> str:
 
 def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
     """Return the columns of the cameras of a project."""
+    for each in cameras:
+        if each.knots is not None:
+            raise InputError(f"the camera {each.title} has knots, which tables of cameras cannot hold")
     columns: dict[str, Any] = {
         "camera": [each.name for each in cameras],
         "model": [each.model for each in cameras],

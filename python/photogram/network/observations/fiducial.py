@@ -187,7 +187,8 @@ class KnownTogether(Observation):
         self._set("joined", own)
         super().__post_init__()
         self._set("unknowns", own)
-        self._set("observed", np.array([len(each.components) for each in own], dtype=float))
+        widths = [len(each.components) for each in own] if len(own) > 1 else []
+        self._set("observed", np.array(widths, dtype=float))
 
     @property
     def of(self) -> tuple[str, ...]:

@@ -5,15 +5,19 @@
 
 pub mod backward;
 pub(super) mod inverse;
+mod knots;
 mod model;
 mod projections;
 mod radial_tangential;
 mod table;
 
+use std::sync::Arc;
+
 use super::axes::Vector3;
 
 pub use brown::{BrownCorrection, BrownTerms};
 pub use inverse::{Matrix2, RadialLimit};
+pub use knots::{Patch, Window};
 pub use measured::Measured;
 pub use model::{CameraModel, Image, LensDirection, ModelFacts, Unit};
 pub use orthogonal::{Ebner12, Gruen44, Orthogonal, OrthogonalSet};
@@ -28,9 +32,9 @@ macro_rules! cameras {
     };
     (@kinds $d:tt $($name:ident)*) => {
         /// A camera of any kind.
-        // Behind a pointer the 48 numbers of the largest could not be copied as all others are.
+        // Behind a pointer the 48 numbers of the largest would be looked up for each image.
         #[allow(clippy::large_enum_variant)]
-        #[derive(Debug, Clone, Copy, PartialEq)]
+        #[derive(Debug, Clone, PartialEq)]
         pub enum Camera {
             $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
         }
@@ -88,6 +92,7 @@ cameras! { $
     plate::Plate;
     on_comparator::OnComparator;
     opencv_tilted::OpencvTilted;
+    splined_stereographic::SplinedStereographic;
     [brown] {
         Brown;
         BrownAffinityAfter;
@@ -156,12 +161,24 @@ impl Camera {
         each_camera!(self, camera => of(camera))
     }
 
-    /// A camera of the same kind with other parameters; None unless they are as many.
+    /// The same camera with other parameters; None unless they are as many.
     pub fn with_parameters(&self, parameters: &[f64]) -> Option<Self> {
-        fn of<C: CameraModel + Into<Camera>>(_: &C, parameters: &[f64]) -> Option<Camera> {
-            Some(C::with_parameters(parameters.try_into().ok()?).into())
-        }
-        each_camera!(self, camera => of(camera, parameters))
+        each_camera!(self, camera => Some(camera.with_others(parameters.try_into().ok()?).into()))
+    }
+
+    /// See [`CameraModel::knots`].
+    pub fn knots(&self) -> Option<&[[f64; 2]]> {
+        each_camera!(self, camera => camera.knots())
+    }
+
+    /// See [`CameraModel::with_knots`].
+    pub fn with_knots(&self, knots: Arc<[[f64; 2]]>) -> Option<Self> {
+        each_camera!(self, camera => camera.with_knots(knots).map(Into::into))
+    }
+
+    /// See [`CameraModel::patch`].
+    pub fn patch(&self, u: &Vector3) -> Option<Patch> {
+        each_camera!(self, camera => camera.patch(u))
     }
 
     /// Its parameters.

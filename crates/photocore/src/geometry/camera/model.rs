@@ -1,6 +1,9 @@
 //! What each camera is and says.
 
+use std::sync::Arc;
+
 use super::inverse::RadialLimit;
+use super::knots::Patch;
 use crate::geometry::axes::Vector3;
 
 /// How a camera maps u, a point in the photo's axes (it looks along -z), to image coordinates.
@@ -10,7 +13,7 @@ use crate::geometry::axes::Vector3;
 /// A **forward** camera has a lens whose terms are functions of ideal coordinates: it maps u to what is measured. That of a **backward**
 /// one has terms that are functions of measured coordinates: it corrects what is measured, and compares that with the central perspective
 /// of u ([`super::backward::BackwardModel`]).
-pub trait CameraModel: Copy {
+pub trait CameraModel: Clone {
     /// Its interior parameters, an array of numbers.
     type Parameters: Copy + AsRef<[f64]> + AsMut<[f64]> + for<'a> TryFrom<&'a [f64]>;
 
@@ -34,6 +37,28 @@ pub trait CameraModel: Copy {
 
     /// Its parameters.
     fn parameters(&self) -> Self::Parameters;
+
+    /// The same camera with other parameters: what it has beside them stays.
+    #[inline]
+    fn with_others(&self, parameters: Self::Parameters) -> Self {
+        Self::with_parameters(parameters)
+    }
+
+    /// Its displacements at the knots of a spline, row by row; None of cameras without one.
+    fn knots(&self) -> Option<&[[f64; 2]]> {
+        None
+    }
+
+    /// The same camera with other displacements there; None unless it has as many.
+    fn with_knots(&self, _knots: Arc<[[f64; 2]]>) -> Option<Self> {
+        None
+    }
+
+    /// The knots that the image of u depends on; None of cameras without them.
+    #[inline]
+    fn patch(&self, _u: &Vector3) -> Option<Patch> {
+        None
+    }
 
     /// What a small angle near the axis is multiplied by, without sign: the principal distance in the unit of the image.
     fn scale(&self) -> f64;

@@ -124,6 +124,8 @@ kinds! {
     GyroBias = "gyro bias", Stays, [("x", 0, Rate), ("y", 1, Rate), ("z", 2, Rate)];
     /// The readout time of all rows of a rolling shutter, or the factor of the line rates of a scanner, which is about 1.
     Readout = "readout", Stays, [("time", 0, Time)];
+    /// A knot of the spline of a lens: its displacements along columns and rows, in the unit of the tangent of half the angle, twice.
+    Knot = "knot", Stays, [("x", 0, Ratio), ("y", 1, Ratio)];
     /// w of a figure: how far a target bends, in the middle along its first and along its second axis.
     Bend = "bend", Stays, [("x", 0, Length), ("y", 1, Length)];
     /// Where the film of a photo lay on a scanner: t and theta.

@@ -276,7 +276,8 @@ fn common_unknowns_of_other_types_are_refused() {
     assert_eq!(check(level(2).into()), Some(Fault::NoCommon(2)));
     let prior = |components: usize| {
         let precision = Precision::Deviations(vec![1.0; components]);
-        check(super::Prior { commons: vec![1], components: vec![components], precision }.into())
+        let (commons, components) = (vec![1], vec![components]);
+        check(super::Prior { commons, components, observed: vec![], precision }.into())
     };
     assert_eq!(prior(3), None);
     assert_eq!(prior(1), Some(Fault::Deviations { components: 3, given: 1 }));

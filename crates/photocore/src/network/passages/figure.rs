@@ -2,9 +2,9 @@
 
 use nalgebra::Matrix3x2;
 
-use super::PassageModel;
+use super::{Facts, PassageModel};
 use crate::geometry::{ObjectSpace, Vector3};
-use crate::network::{CommonKind, Network};
+use crate::network::commons::CommonKind;
 
 /// Points that stand where they are given, and beside it by `w_1 e_1 + w_2 e_2`: w is a common unknown, e of each point given. A
 /// chessboard that bends has the deflection of its middle along x and along y for w (mrcal: two parabolas).
@@ -41,13 +41,10 @@ impl PassageModel for Figure {
     }
 
     /// A point that observations touch would have to move for these, too.
-    fn is_of(&self, network: &Network) -> bool {
-        let touched = |point| network.observations.iter().any(|own| own.touches().points.contains(point));
-        let given = |&point: &usize| network.points.get(point).is_some_and(|own| own.sd == [0.0; 3]);
+    fn is_of(&self, network: &Facts<'_>) -> bool {
         network.space == ObjectSpace::Rectangular
             && self.points.len() == self.shifts.len()
-            && self.points.iter().all(given)
-            && !self.points.iter().any(touched)
+            && self.points.iter().all(|&point| network.given.get(point) == Some(&true))
             && self.shifts.iter().all(|own| own.iter().all(|value| value.is_finite()))
     }
 }

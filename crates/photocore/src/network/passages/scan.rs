@@ -1,8 +1,8 @@
 //! Photos that are scanned films, or plates measured on a comparator.
 
-use super::PassageModel;
+use super::{Facts, PassageModel};
+use crate::network::commons::CommonKind;
 use crate::network::film::FilmOf;
-use crate::network::{CommonKind, Network};
 
 /// The images of a photo are readings: those that its film, its scanner have where its camera has the image.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,8 +38,9 @@ impl PassageModel for Scan {
         vec![own.collect(), scanner.collect(), weights]
     }
 
-    /// Its camera is one of plane images in mm.
-    fn is_of(&self, network: &Network) -> bool {
-        self.photo < network.photos.len() && self.film.is_sound()
+    /// Knots of a lens step with images of the camera alone.
+    fn is_of(&self, network: &Facts<'_>) -> bool {
+        let camera = network.photos.get(self.photo).map(|&camera| network.cameras[camera]);
+        camera.is_some_and(|own| own.knots().is_none()) && self.film.is_sound()
     }
 }

@@ -121,7 +121,7 @@ impl Calibration {
         if self.axis.is_some_and(|axis| axis.pointing >= counts.1) {
             return Err(StellarError::Index("the axis".into()));
         }
-        if self.kind.lens.is_some_and(|lens| lens.parameter_names().len() > INTERIOR) {
+        if self.kind.lens.as_ref().is_some_and(|lens| lens.parameter_names().len() > INTERIOR) {
             return Err(StellarError::Lens);
         }
         let Weights { parameters, values, root } = &self.weights;

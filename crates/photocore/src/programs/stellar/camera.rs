@@ -9,7 +9,7 @@ use crate::geometry::{
 pub use crate::geometry::plate_lens::{Decentering, Form, INTERIOR};
 
 /// The kind of a camera: what is not estimated.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Kind {
     /// Another model than that of plates: the interior parameters are its own, then as many zeros as are left; x counts right, y down.
     /// Its values do not matter.
@@ -30,7 +30,7 @@ impl Kind {
 }
 
 /// A camera at given values of its interior parameters.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Camera {
     kind: Kind,
     /// With epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3; or the parameters of the lens.
@@ -74,15 +74,16 @@ impl Attitude {
 
 impl Camera {
     /// A camera with the given interior parameters.
-    pub fn new(kind: Kind, mut interior: [f64; INTERIOR]) -> Self {
+    pub fn new(kind: &Kind, mut interior: [f64; INTERIOR]) -> Self {
         if kind.common_scale {
             let [x, y] = kind.scales();
             interior[y] = interior[x];
         }
-        let lens = kind.lens.and_then(|lens| lens.with_parameters(&interior[..lens.parameter_names().len()]));
-        let Kind { form, decentering, common_scale, .. } = kind;
+        let with_own = |lens: &Lens| lens.with_parameters(&interior[..lens.parameter_names().len()]);
+        let lens = kind.lens.as_ref().and_then(with_own);
+        let &Kind { form, decentering, common_scale, .. } = kind;
         let of_plate = plate_lens::Kind { form, decentering, common_scale: common_scale && lens.is_none() };
-        Self { kind, plate: PlateLens::new(of_plate, interior), lens }
+        Self { kind: kind.clone(), plate: PlateLens::new(of_plate, interior), lens }
     }
 
     /// epsilon, xp, yp, cx, cy, dx, dy, and the rest.

@@ -22,7 +22,7 @@
 //! let mut common = [0.0; COMMON];
 //! (common[3], common[4]) = (0.3, 0.3); // principal distances in metres
 //! common[COMMON - 4..].copy_from_slice(&REFRACTION);
-//! let camera = Camera::new(kind, std::array::from_fn(|k| common[k]));
+//! let camera = Camera::new(&kind, std::array::from_fn(|k| common[k]));
 //!
 //! let (mut stars, mut images) = (vec![], vec![]);
 //! for star in 0..9 {

@@ -88,7 +88,7 @@ impl Sight {
         let (pointings, common) = parameters.split_at(3 * calibration.pointings.len());
         let interior = std::array::from_fn::<_, INTERIOR, _>(|k| common[k]);
         Self {
-            camera: Camera::new(calibration.kind, interior),
+            camera: Camera::new(&calibration.kind, interior),
             attitudes: pointings.as_chunks().0.iter().map(|&angles| Attitude::new(angles)).collect(),
             tau: std::array::from_fn(|k| common[INTERIOR + k]),
             places,
@@ -131,7 +131,7 @@ impl Sight {
         let axis = calibration.axis?;
         let interior = std::array::from_fn(|k| if k < 5 { self.camera.interior()[k] } else { 0.0 });
         let PlateImage { xy, pointing, interior, .. } =
-            Camera::new(calibration.kind, interior).linearize(&self.attitudes[axis.pointing], axis.standard);
+            Camera::new(&calibration.kind, interior).linearize(&self.attitudes[axis.pointing], axis.standard);
         let common = |i: usize| std::array::from_fn(|k| if k < 5 { interior[i][k] } else { 0.0 });
         Some(Rows {
             constant: [axis.xy[0] - xy[0], axis.xy[1] - xy[1]],
