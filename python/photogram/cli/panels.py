@@ -22,6 +22,7 @@ PANELS = {
     " water_refraction water_level water_index limits invert extrapolate components regularise"
     " together calibrate",
     "Gross errors": "snoop level fdr unit_weight outliers",
+    "Uncertainty": "map_distance map_datum noise_only need cross_validate compare_with suggest",
     "Features": "distance line plane circle sphere cylinder k coverage",
     "Statement": "standard class_h class_v class_3d area without independent language text budget project"
     " client firm surveyor statement",
