@@ -17,6 +17,7 @@ from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option
 from photogram.cli.progress import shown
 from photogram.cli.projects import Deviations, OriginName, with_options
+from photogram.cli.uncertainty import AS_USUAL, Uncertainty
 
 if TYPE_CHECKING:
     from photogram.targets import Board, Calibrated, Calibration
@@ -203,6 +204,7 @@ def _pair(text: str, option: str) -> tuple[int, int]:
 
 @with_job
 @with_options("snooping", Snooping)
+@with_options("uncertainty", Uncertainty)
 @with_options("seen", Seen)
 @with_options("documents", Documents, *OF_NETWORKS)
 def calibrate(
@@ -229,6 +231,7 @@ def calibrate(
         PriorName | None,
         typer.Option(help="Take corners out as mrcal does, to reproduce its results.", show_default=False),
     ] = None,
+    uncertainty: Uncertainty = AS_USUAL,
     threads: Threads = None,
     strict: Strict = False,
     quiet: Quiet = False,
@@ -248,15 +251,23 @@ def calibrate(
             calibration = seen.read(path)
         for message in calibration.messages if not quiet else ():
             print_remark(str(message))
-        how = {"loss": None if loss is LossName.NONE else loss.value, "outliers": outliers and outliers.value}
-        found = _adjusted(job, calibration, how, threads, snooping)
+        how: dict[str, Any] = {
+            "loss": None if loss is LossName.NONE else loss.value,
+            "outliers": outliers and outliers.value,
+        }
+        uncertainty.asked()
+        found = uncertainty.told(
+            job,
+            _adjusted(job, calibration, how, threads, snooping),
+            lambda other: seen.read(other).adjust(**how, threads=threads),
+        )
         files = _files(found)
         page = documents.page(job, "calibrate", target, partial(_page, found))
         job.finish(
             {target / name: content for name, content in files.items()} | pictures.of(found.result) | page,
             documents.as_json(found),
             summary=lambda: _summarise(found),
-            code=found.verdict.exit_code(strict=strict),
+            code=uncertainty.exit_code(found, found.verdict.exit_code(strict=strict)),
         )
 
 
@@ -281,11 +292,14 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
     from photogram.targets.tables import views
+    from photogram.targets.worth_files import worth_files
 
     files = {"report.txt": found.report().encode(), **table_files(found.result)}
     files["views.csv"] = csv_text(frame(views(found)))
     plain = to_files(adjusted_project(found), "plain")
     files |= {f"adjusted/{name}": content for name, content in plain.items()}
+    if found.worth is not None:
+        files |= worth_files(found.worth)
     if found.snooped is not None:
         files["removed.csv"] = found.snooped.table().to_csv(index=False).encode()
     return files

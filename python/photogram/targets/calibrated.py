@@ -24,6 +24,9 @@ from photogram.statistics.verdict import Verdict
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 
+if TYPE_CHECKING:
+    from photogram.targets.worth import Worth
+
 __all__ = ["STEPS", "Calibrated", "Part", "UnknownWeight", "with_unknown_weight"]
 
 Part = Literal["cameras", "sensors", "board", "views"]
@@ -62,12 +65,15 @@ class Calibrated(Brief, Shown):
         The adjustment without priors of cameras, where there are any: what these have moved.
     snooped
         What was taken out, where gross errors were looked for; `result` is what is left.
+    worth
+        Maps of uncertainty, cross-validation and what else was asked for, which reports show.
     """
 
     calibration: Start
     result: Result
     unregularised: Result | None = None
     snooped: Snooped | None = None
+    worth: Worth | None = None
 
     def brief(self) -> tuple[str, Rows]:
         """Return how the adjustment ended in a few lines."""

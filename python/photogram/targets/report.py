@@ -29,7 +29,9 @@ def report(calibrated: Calibrated) -> str:
 
 def calibration_summary(calibrated: Calibrated) -> list[Section]:
     """Return what a reader wants first: the summary of the block, the board, its views."""
+    worth = calibrated.worth
     return [
+        ("Uncertainty of projection", [] if worth is None else worth.sentences),
         *summary(calibrated.result),
         *([] if calibrated.snooped is None else calibrated.snooped.sections()[ON_TOP:]),
         ("Board", [*fact_lines(board_facts(calibrated)), *worst_points(calibrated)]),
