@@ -86,7 +86,7 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
     """
     seen = Sightings.of_corners(board, corners)
     without = {corners.pictures[row]: IN_A_PLANE for row in np.flatnonzero(seen.in_a_plane()).tolist()}
-    without |= corners.poor()
+    without |= corners.poor(board.places)
     usable = np.array([name not in without for name in corners.pictures], dtype=bool)
     cameras, remarks = _cameras(seen, corners, usable, without, model)
     hidden = usable & (rays_shown(seen, corners.cameras, cameras) < FEWEST)
