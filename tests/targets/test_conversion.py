@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from golden_boards import GOLDEN, needs_golden
+
 from photogram import Camera
 from photogram.errors import InputError
 from photogram.targets import convert_lens
