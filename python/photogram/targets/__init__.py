@@ -4,13 +4,26 @@ from photogram.arguments.annotations import check_arguments
 from photogram.targets.board import Board
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.calibration import Calibration
+from photogram.targets.conversion import Conversion, convert_lens
 from photogram.targets.corners import Corners
 from photogram.targets.first import FirstCalibration, first_values
+from photogram.targets.output.formats import camera_files
 from photogram.targets.reading import read
 
-__all__ = ["Board", "Calibrated", "Calibration", "Corners", "FirstCalibration", "first_values", "read"]
+__all__ = [
+    "Board",
+    "Calibrated",
+    "Calibration",
+    "Conversion",
+    "Corners",
+    "FirstCalibration",
+    "camera_files",
+    "convert_lens",
+    "first_values",
+    "read",
+]
 
-check_arguments(globals(), set(__all__) - {"Calibrated", "FirstCalibration"})
+check_arguments(globals(), set(__all__) - {"Calibrated", "Conversion", "FirstCalibration"})
 
 WAYS = {
     "document_of": ("document",),
