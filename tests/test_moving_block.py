@@ -9,7 +9,7 @@ from moving_blocks import rolling, scanned
 from photogram import Camera, InputError
 from photogram.network.chosen import of_photos
 from photogram.network.motion import at_rest, flown_by, focal_images, of_pictures, scanners, timed_photos
-from photogram.network.observations import Attitude, Position, Rate, Smoothness, Velocity
+from photogram.network.observations import Attitude, Position, Range, Rate, Smoothness, Velocity
 from photogram.network.timed import Timed
 from photogram.network.trajectories import Clock, Polynomial, Table, Trajectory
 from photogram.network.unknowns import Sensor
@@ -29,6 +29,7 @@ RECORDS = {
     Attitude: {"attitude": np.eye(3)},
     Velocity: {"velocity": [0.0, 0.0, 0.0]},
     Rate: {"rate": [0.0, 0.0, 0.0]},
+    Range: {"point": "P", "length": 1.0},
 }
 
 
