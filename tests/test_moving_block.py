@@ -33,6 +33,17 @@ RECORDS = {
 }
 
 
+def test_weights_of_samples_and_lines_are_refused():
+    """They were taken for those of places before the lens, in mm."""
+    block = scanned(photos=True)
+    lens = Camera("brown", {"c": -60.0, "K1": 1e-6}, name="lens")
+    measured = lens.replace(weights="measured", name="measured")
+    with pytest.raises(InputError, match="measured is a scanner's: standard deviations of its images are"):
+        block.replace(cameras=[measured, lens])
+    # Of a frame they are what they say.
+    block.replace(cameras=[lens, measured])
+
+
 @pytest.mark.parametrize("kind", RECORDS)
 @pytest.mark.parametrize(
     ("changes", "said"),
