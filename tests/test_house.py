@@ -11,7 +11,16 @@ import photogram
 from rust_files import imports as rust_imports
 
 SOURCES = Path(photogram.__file__).parent
-PROGRAMS = ("giant", "collection", "perspective_center", "absolute_orientation", "comparator", "stellar")
+PROGRAMS = (
+    "giant",
+    "collection",
+    "perspective_center",
+    "absolute_orientation",
+    "comparator",
+    "stellar",
+    "targets",
+    "film",
+)
 FLOORS = (
     ("cli",),
     ("formats",),

@@ -11,12 +11,14 @@ if TYPE_CHECKING:
     from photogram import comparator as comparator
     from photogram import diagnosis as diagnosis
     from photogram import distributed as distributed
+    from photogram import film as film
     from photogram import formats as formats
     from photogram import giant as giant
     from photogram import perspective_center as perspective_center
     from photogram import planning as planning
     from photogram import plots as plots
     from photogram import stellar as stellar
+    from photogram import targets as targets
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
@@ -195,12 +197,14 @@ MODULES = (
     "comparator",
     "diagnosis",
     "distributed",
+    "film",
     "formats",
     "giant",
     "perspective_center",
     "planning",
     "plots",
     "stellar",
+    "targets",
 )
 """The packages that users know by name: loaded when they are first asked for, too."""
 

@@ -199,6 +199,33 @@ def level_of_equal_power(noncentrality: float, power: float, dof: float) -> tupl
     be.
     """
 
+def film_readings(
+    numbers: _Floats, vectors: _Floats, places: _Floats
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return readings of places in a camera's frame, and their partials.
+
+    Parameters
+    ----------
+    numbers
+        What is never unknown of a film: mirrored, rows down, pitch, o1, o2, hx, hy; 0, 1 or 2 for nothing, h
+        or g; whether it has a roll and curves; the number of its pattern and what that takes.
+    vectors
+        (k, 3) the numbers of its unknowns: placement, size, h or g, roll, scanner, curves, weights.
+    places
+        (n, 2) mm.
+
+    Returns
+    -------
+    (n, 2) readings, and (n, 2, 10) partials by x, y, t1, t2, theta, m, b1, b2 and both of h or g; NaN where
+    the scanner has no reading.
+    """
+
+def film_places(numbers: _Floats, vectors: _Floats, readings: _Floats) -> NDArray[np.float64]:
+    """Return (n, 2) the places in a camera's frame that have readings (n, 2); NaN where there are none.
+
+    `numbers` and `vectors` as of :func:`film_readings`.
+    """
+
 def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str, str]]]:
     """Return the models of cameras, `CAMERAS`, by their names.
 
@@ -209,7 +236,7 @@ def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, st
     direction: `forward`, lens terms are functions of ideal coordinates, or `backward`, of measured ones.
     """
 
-def camera_images(model: str, parameters: _Floats, u: _Floats) -> _Floats:
+def camera_images(model: str, parameters: _Floats, u: _Floats, knots: _Floats | None = None) -> _Floats:
     """Images of directions.
 
     Parameters
@@ -220,6 +247,8 @@ def camera_images(model: str, parameters: _Floats, u: _Floats) -> _Floats:
         (k,) in the order of the model.
     u
         (n, 3) in the axes of the photo: x right, y up, z back towards the viewer; the camera looks along -z.
+    knots
+        Of a splined model: dx, dy of each, row by row, of any shape; None for zeros.
 
     Returns
     -------
@@ -231,7 +260,7 @@ def camera_images(model: str, parameters: _Floats, u: _Floats) -> _Floats:
         A model that there is not, other shapes or numbers of parameters.
     """
 
-def camera_rays(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
+def camera_rays(model: str, parameters: _Floats, xy: _Floats, knots: _Floats | None = None) -> _Floats:
     """Directions of image positions; arguments as in :func:`camera_images`.
 
     Returns
@@ -257,7 +286,9 @@ def camera_correct(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
         A model that there is not or that is forward, other shapes or numbers of parameters.
     """
 
-def camera_partials(model: str, parameters: _Floats, u: _Floats) -> tuple[_Floats, _Floats, _Floats]:
+def camera_partials(
+    model: str, parameters: _Floats, u: _Floats, knots: _Floats | None = None
+) -> tuple[_Floats, _Floats, _Floats]:
     """Images of directions with their partials; arguments as in :func:`camera_images`.
 
     Returns
@@ -270,6 +301,20 @@ def camera_partials(model: str, parameters: _Floats, u: _Floats) -> tuple[_Float
     ------
     ValueError
         A model that there is not, other shapes or numbers of parameters.
+    """
+
+def camera_patches(model: str, parameters: _Floats, u: _Floats) -> tuple[_Indices, _Floats]:
+    """Knots that images depend on; arguments as in :func:`camera_images`.
+
+    Returns
+    -------
+    (n, s) numbers of knots, row by row, and (n, s) their weights, s = 16 of order 3, 9 of order 2: partials
+    of the image by a knot are diag(fx, fy) times its weight.
+
+    Raises
+    ------
+    ValueError
+        A model without knots, constants that are none of a spline, other shapes or numbers of parameters.
     """
 
 def radial_domain(model: str, parameters: _Floats) -> tuple[float, float] | None:
@@ -619,7 +664,7 @@ def block_network(
     photo_position_sd: _Floats,
     photo_attitude_sd: _Floats,
     photo_cameras: _Indices,
-    cameras: list[tuple[str, list[float], list[float], list[float] | None]],
+    cameras: list[tuple[str, list[float], list[float], list[float] | None, list[float] | None]],
     point_positions: _Floats,
     point_sd: _Floats,
     image_photos: _Indices,
@@ -666,7 +711,7 @@ def block_network(
         (P,) indices into the cameras; photos with the same one share its unknowns.
     cameras
         Model, parameters in its order and their standard deviations, covariance matrix of those that are
-        weighted row by row, None where these were observed one by one.
+        weighted row by row, None where these were observed one by one; knots, None where there are none.
     point_positions, point_sd
         (n, 3) coordinates, NaN where unknown, and standard deviations, finite for held components.
     image_photos, image_points
@@ -1484,11 +1529,12 @@ class BlockSolution(_NetworkSolution):
     @property
     def adjusted_unknowns(
         self,
-    ) -> list[tuple[list[float], list[float], list[float], list[float], list[float], int]]:
+    ) -> list[tuple[list[float], list[float], list[float], list[float], list[float], list[float], int]]:
         """The adjusted common unknowns, in the order in which they were given.
 
         Change from what was given, position (3), rotation matrix row by row (9), cofactors row by row for
-        rotations about the adjusted axes, redundancy numbers, and the number of observations and images.
+        rotations about the adjusted axes, the same with the unknowns of the one before in its block (none of
+        the first), redundancy numbers, and the number of observations and images.
         """
 
     @property

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from photogram import Attitudes, Block, Camera, InnerConstraints, MinimumConstraints, Spheroid, _photocore
 from photogram.network import geometry
+from photogram.network.knots import KNOTTED
 from photogram.network.observations import (
     Attitude,
     Base,
@@ -44,7 +45,7 @@ __all__ = ["DATUMS", "KINDS", "MODELS", "RandomNetwork", "random_network"]
 
 Floats = NDArray[np.float64]
 
-MODELS = tuple(name for name in _photocore.CAMERAS if not name.endswith("_measured"))
+MODELS = tuple(name for name in _photocore.CAMERAS if not name.endswith("_measured") and name != KNOTTED)
 DATUMS = ("control", "control and poses", "positions", "minimum", "points", "points and photos", "attitudes")
 KINDS = (
     "distance",

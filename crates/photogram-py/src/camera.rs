@@ -1,11 +1,11 @@
 //! Cameras by the names of their models; their documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
-use photocore::geometry::camera::{LensDirection, ModelFacts, RadialLimit};
+use photocore::geometry::camera::{LensDirection, ModelFacts, Patch, RadialLimit};
 use photocore::geometry::{Camera, Unit};
 use pyo3::prelude::*;
 
-use crate::arrays::{InputError, numbers, rows, table};
+use crate::arrays::{InputError, numbers, rows, table, values};
 use crate::options::unknown;
 
 /// Adds the functions to the extension module.
@@ -15,6 +15,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(camera_rays, module)?)?;
     module.add_function(wrap_pyfunction!(camera_correct, module)?)?;
     module.add_function(wrap_pyfunction!(camera_partials, module)?)?;
+    module.add_function(wrap_pyfunction!(camera_patches, module)?)?;
     module.add_function(wrap_pyfunction!(radial_domain, module)?)
 }
 
@@ -50,26 +51,49 @@ pub fn named(model: &str, parameters: &[f64]) -> PyResult<Camera> {
     })
 }
 
+/// The same with its knots, where there are any: dx, dy of each, row by row.
+pub fn knotted(model: &str, parameters: &[f64], knots: Option<Vec<f64>>) -> PyResult<Camera> {
+    let camera = named(model, parameters)?;
+    let Some(knots) = knots else { return Ok(camera) };
+    camera.with_knots(knots.as_chunks().0.into()).ok_or_else(|| {
+        let needed = camera.knots().map_or(0, |own| 2 * own.len());
+        InputError::new_err(format!("the camera {model} has {needed} values of knots, not {}", knots.len()))
+    })
+}
+
+/// The camera of what Python gives.
+fn given(
+    model: &str,
+    parameters: &PyReadonlyArrayDyn<'_, f64>,
+    knots: Option<&PyReadonlyArrayDyn<'_, f64>>,
+) -> PyResult<Camera> {
+    knotted(model, &numbers("parameters", parameters)?, knots.map(values))
+}
+
 #[pyfunction]
+#[pyo3(signature = (model, parameters, u, knots=None))]
 fn camera_images<'py>(
     py: Python<'py>,
     model: &str,
     parameters: PyReadonlyArrayDyn<'py, f64>,
     u: PyReadonlyArrayDyn<'py, f64>,
+    knots: Option<PyReadonlyArrayDyn<'py, f64>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let camera = named(model, &numbers("parameters", &parameters)?)?;
+    let camera = given(model, &parameters, knots.as_ref())?;
     let images = rows("u", &u)?.into_iter().map(|u: [f64; 3]| camera.image(&u.into()));
     table(py, images.collect())
 }
 
 #[pyfunction]
+#[pyo3(signature = (model, parameters, xy, knots=None))]
 fn camera_rays<'py>(
     py: Python<'py>,
     model: &str,
     parameters: PyReadonlyArrayDyn<'py, f64>,
     xy: PyReadonlyArrayDyn<'py, f64>,
+    knots: Option<PyReadonlyArrayDyn<'py, f64>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let camera = named(model, &numbers("parameters", &parameters)?)?;
+    let camera = given(model, &parameters, knots.as_ref())?;
     let ray = |xy: [f64; 2]| camera.direction(xy).map_or([f64::NAN; 3], Into::into);
     table(py, rows("xy", &xy)?.into_iter().map(ray).collect())
 }
@@ -94,14 +118,15 @@ fn camera_correct<'py>(
 type Partials<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>);
 
 #[pyfunction]
+#[pyo3(signature = (model, parameters, u, knots=None))]
 fn camera_partials<'py>(
     py: Python<'py>,
     model: &str,
     parameters: PyReadonlyArrayDyn<'py, f64>,
     u: PyReadonlyArrayDyn<'py, f64>,
+    knots: Option<PyReadonlyArrayDyn<'py, f64>>,
 ) -> PyResult<Partials<'py>> {
-    let values = numbers("parameters", &parameters)?;
-    let camera = named(model, &values)?;
+    let camera = given(model, &parameters, knots.as_ref())?;
     let images: Vec<_> = rows("u", &u)?.into_iter().map(|u: [f64; 3]| camera.linearize(&u.into())).collect();
     let by_u = images.iter().flat_map(|image| image.by_u).flat_map(<[f64; 3]>::from).collect();
     let by_parameters = images.iter().flat_map(|image| image.by_parameters.concat()).collect();
@@ -109,8 +134,36 @@ fn camera_partials<'py>(
     Ok((
         table(py, images.iter().map(|image| image.xy).collect())?,
         PyArray1::from_vec(py, by_u).reshape([count, 2, 3])?,
-        PyArray1::from_vec(py, by_parameters).reshape([count, 2, values.len()])?,
+        PyArray1::from_vec(py, by_parameters).reshape([count, 2, camera.parameter_names().len()])?,
     ))
+}
+
+/// Numbers of knots and their weights, of each direction.
+type Patches<'py> = (Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<f64>>);
+
+#[pyfunction]
+fn camera_patches<'py>(
+    py: Python<'py>,
+    model: &str,
+    parameters: PyReadonlyArrayDyn<'py, f64>,
+    u: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Patches<'py>> {
+    let camera = given(model, &parameters, None)?;
+    let patch = |u: [f64; 3]| {
+        let refused = || InputError::new_err(format!("the camera {model} has no knots"));
+        camera.patch(&u.into()).ok_or_else(refused)
+    };
+    let patches: Vec<Patch> = rows("u", &u)?.into_iter().map(patch).collect::<PyResult<_>>()?;
+    let each = patches.first().map_or(0, |patch| patch.nodes * patch.nodes);
+    // The numbers of columns and rows are the sixth and the seventh parameter.
+    let columns = camera.parameters().get(5).map_or(0, |&columns| columns as usize);
+    let (numbers, weights) = patches
+        .iter()
+        .flat_map(|patch| patch.knots(columns))
+        .map(|(knot, weight)| (knot as i64, weight))
+        .unzip();
+    let shape = [patches.len(), each];
+    Ok((PyArray1::from_vec(py, numbers).reshape(shape)?, PyArray1::from_vec(py, weights).reshape(shape)?))
 }
 
 #[pyfunction]

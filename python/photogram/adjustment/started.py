@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.adjustment.known import Cartesian, Known
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network import geometry
 from photogram.network.block import Block
+from photogram.network.cameras import rays_of_row
 from photogram.network.observations import Attitude, Observation
 from photogram.network.rays import meet
 from photogram.network.rigs import Mount
@@ -109,8 +109,7 @@ class _Sites:
         cameras, of_photo = block.core_cameras()
         for row in np.unique(of_photo[photos]):
             own = of_photo[photos] == row
-            model, values, *_ = cameras[row]
-            inner[own] = _photocore.camera_rays(model, np.array(values), block.image_xy[images[own]])
+            inner[own] = rays_of_row(cameras[row], block.image_xy[images[own]])
         seen = np.isfinite(inner).all(axis=1)
         images, photos = images[seen], photos[seen]
         rays = np.einsum("mij,mj->mi", known.attitudes[photos], inner[seen])

@@ -31,6 +31,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "Adjust a block in whatever files it lies: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...",
         "adjust.adjust",
     ),
+    "calibrate": (
+        "Calibrate cameras and rigs with pictures of a board: cameras with their uncertainty.",
+        "calibrate.calibrate",
+    ),
     "check": (
         "Look for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.",
         "check_project.check_project",
@@ -75,6 +79,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "Write a simulated block as a GIANT project, or as tables if it moves, and its truth as truth.json.",
         "simulate.simulate",
     ),
+    "certificate": (
+        "Check a camera's certificate: typing errors, marks from distances, lens from its table.",
+        "certificate.certificate",
+    ),
     "giant": (
         "Adjust or check a GIANT project.",
         {"adjust": "giant.giant", "check": "check.check"},
@@ -94,6 +102,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
             "correct": "comparator.correct",
             "compare": "comparator.compare",
         },
+    ),
+    "camera": (
+        "Compare calibrations of cameras over years.",
+        {"compare": "camera.compare"},
     ),
     "stellar-camera": (
         "Calibrate a camera by a plate with stars, or by exposures of the sky.",

@@ -14,6 +14,7 @@ from photogram.arguments.arrays import indices, shaped
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.network.knots import KNOTTED
 from photogram.network.observations import Observation
 from photogram.network.tables import numbered
 from photogram.show.brief import Brief, Rows
@@ -82,8 +83,10 @@ class Collection(Valued, Brief):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        if self.camera not in _photocore.CAMERAS:
-            raise InputError(f"camera is one of {', '.join(_photocore.CAMERAS)}, not {self.camera!r}")
+        # What has knots is more than its parameters.
+        known = [name for name in _photocore.CAMERAS if name != KNOTTED]
+        if self.camera not in known:
+            raise InputError(f"camera is one of {', '.join(known)}, not {self.camera!r}")
         photos, points, images = (
             len(np.atleast_1d(rows)) for rows in (self.photo_parameters, self.point_positions, self.image_xy)
         )

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from photogram.formats.project import Project
-from photogram.formats.tree import read_json
 from photogram.io.delimited import ColumnTable
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place
+from photogram.io.tree import read_json
 from photogram.messages import Message
 
 __all__ = ["ControlList", "read_control_list", "system_of"]

@@ -21,10 +21,12 @@ from photogram.network.cameras import Camera
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation
+from photogram.network.passages import Passage
 from photogram.network.rigs import Mount
 from photogram.network.timed import Timed
 from photogram.results.features import Definition
 from photogram.show.brief import Brief
+from photogram.targets.board import Board
 
 __all__ = ["DatumName", "Frame", "Options", "Project", "Size", "assembled"]
 
@@ -106,6 +108,8 @@ class Project(Brief):
         What is to be fitted to adjusted points, as :func:`photogram.features` takes it.
     statement
         What is asked of its accuracy statement, as :meth:`photogram.Result.statement` takes it.
+    boards
+        What its control is the points of, where photos show a board: by name.
     """
 
     block: Block
@@ -123,6 +127,7 @@ class Project(Brief):
     repeated: Repeated = field(default_factory=Repeated)
     features: Mapping[str, Definition] = field(default_factory=dict)
     statement: Mapping[str, Any] = field(default_factory=dict)
+    boards: Mapping[str, Board] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         given = self.block.in_frame(self.frame)
@@ -177,6 +182,7 @@ def assembled(
     observations: Sequence[Observation] = (),
     mounts: Sequence[Mount] = (),
     timed: Sequence[Timed] = (),
+    passages: Sequence[Passage] = (),
     frame: Frame | None = None,
     options: Options | None = None,
     lacks: Sequence[str] = (),
@@ -200,7 +206,7 @@ def assembled(
     name
         Of the project.
     cameras, photo_ids, photo_cameras, point_ids, image_photos, image_points, image_xy, observations, mounts,
-    timed
+    timed, passages
         As in :class:`photogram.Block`.
     point_positions, point_sd, point_check_sd, photo_position_sd, photo_attitude_sd, linear_unit, spheroid,
     photo_to_ground
@@ -263,6 +269,7 @@ def assembled(
             observations=observations,
             mounts=mounts,
             timed=timed,
+            passages=passages,
             linear_unit=linear_unit,
             title=name,
             spheroid=spheroid,

@@ -17,7 +17,8 @@ from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import listed
-from photogram.network.cameras import Camera, CameraRow, camera_rows, checked_cameras, photo_indices
+from photogram.network.cameras import Camera, CameraRow, camera_rows
+from photogram.network.films import check_scans
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import (
@@ -28,8 +29,10 @@ from photogram.network.observations import (
     observation_rows,
     of_records,
 )
+from photogram.network.observations.knots import with_knots
 from photogram.network.observations.smoothness import with_smoothness
 from photogram.network.passages import Figure, Passage, checked_passages
+from photogram.network.photo_cameras import checked_cameras, photo_indices
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.rigs import Mount, checked_mounts
 from photogram.network.tables import (
@@ -426,8 +429,11 @@ class Block(Valued, Brief):
         self._check_motions()
         self._set("passages", checked_passages(self.passages, self.point_ids, self.photo_ids))
         self._set("observations", with_smoothness(self.observations, self.trajectories))
+        self._set("observations", with_knots(self.observations, self.cameras))
         observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
         self._check_figures()
+        of_photos = self.photo_cameras if self.cameras else None
+        check_scans(self.passages, self.photo_ids, self.cameras, of_photos)
 
     def _check_figures(self) -> None:
         named = {
@@ -507,7 +513,8 @@ class Block(Valued, Brief):
         of_times = [scalar for each in self.timed for scalar in each.scalars]
         coefficients = [each for own in self.trajectories for all_ in own.coefficients for each in all_]
         records = of_records(self.observations)
-        passed = [own for each in self.passages for own in each.unknowns]
+        passed: list[Unknown] = [own for each in self.passages for own in each.unknowns]
+        passed += [knot for camera in self.cameras for knot in camera.knot_unknowns]
         return different_unknowns([*sensors, *of_times, *coefficients, *records, *passed, *of_observations])
 
     @property
@@ -532,7 +539,7 @@ class Block(Valued, Brief):
             return camera_rows(self.cameras), self.photo_cameras
         distances = self.known_distances("the adjustment").tolist()
         places = {distance: row for row, distance in enumerate(dict.fromkeys(distances))}
-        rows: list[CameraRow] = [("perspective", [distance], [0.0], None) for distance in places]
+        rows: list[CameraRow] = [("perspective", [distance], [0.0], None, None) for distance in places]
         return rows, np.array([places[distance] for distance in distances], dtype=np.int64)
 
     def known_distances(self, what: str) -> Floats:

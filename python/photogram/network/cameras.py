@@ -6,8 +6,8 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from typing import Any, Literal, Self, get_args
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,9 +17,10 @@ from photogram.arguments.arrays import is_covariance, number, one_of, shaped, sh
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.network.knots import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
 from photogram.show.brief import Brief, Rows
 
-__all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "checked_cameras", "images_of", "photo_indices"]
+__all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "images_of", "rays_of_row"]
 
 Weights = Literal["corrected", "measured"]
 """Of a backward camera: what the standard deviations of images are those of."""
@@ -32,11 +33,12 @@ _SQUARED = math.sqrt(sys.float_info.max)
 ImageUnit = Literal["mm", "px"]
 """What image coordinates are measured in."""
 
-CameraRow = tuple[str, list[float], list[float], list[float] | None]
-"""Model, parameters, their standard deviations, and the covariance matrix of those that are weighted, row by
-row, where these are correlated: as the core takes a camera."""
+CameraRow = tuple[str, list[float], list[float], list[float] | None, list[float] | None]
+"""Model, parameters, their standard deviations, the covariance matrix of those that are weighted, row by row,
+where these are correlated, and the knots, where there are any: as the core takes a camera."""
 
-_GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b", "beta", "hx", "hy"})
+_SPLINE = ("order", "nx", "ny", "fov_x_deg")
+_GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b", "beta", "hx", "hy", *_SPLINE})
 """Parameters that no camera is without; all others are terms of its lens, or 0 in most cameras. Where w and h
 are given, cx and cy are counted from the middle of the picture, and may be missing."""
 
@@ -79,13 +81,20 @@ class Camera(Valued, Brief):
         Of a backward model. `corrected`: standard deviations of images are those of the corrected position,
         where residuals are. `measured`: they are those of what was measured, and residuals are what was
         measured less the image of the point. Forward models are `measured` by nature, and take the default.
+    knots
+        Of `splined_stereographic`: (ny, nx, 2) displacements dx, dy at the knots, rows by rows, in units of
+        the stereographic image; None for 0.
+    knot_sd
+        Their standard deviations along and across the radius from the middle, as those of parameters: one
+        for all, (2,), or (ny, nx, 2) radial and tangential.
 
     Raises
     ------
     InputError
         A model or a parameter that there is not, a principal distance that is missing or zero, values that
         are not finite, negative standard deviations, a constant of the model that is not held, a matrix
-        that is not symmetric and positive definite or contradicts `sd`.
+        that is not symmetric and positive definite or contradicts `sd`, knots of another shape or of a model
+        without them.
     """
 
     model: str
@@ -95,6 +104,22 @@ class Camera(Valued, Brief):
     unit: ImageUnit | None = None
     covariance: tuple[Sequence[str], ArrayLike] | None = None
     weights: Weights = "corrected"
+    knots: Floats | None = None
+    knot_sd: Floats | None = None
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            model: str,
+            parameters: Mapping[str, float],
+            sd: Mapping[str, float] | float = 0.0,
+            name: str = "",
+            unit: ImageUnit | None = None,
+            covariance: tuple[Sequence[str], ArrayLike] | None = None,
+            weights: Weights = "corrected",
+            knots: ArrayLike | None = None,
+            knot_sd: ArrayLike | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         if not isinstance(self.model, str) or self.model not in _names():
@@ -111,6 +136,9 @@ class Camera(Valued, Brief):
         self._set("parameters", self._checked_parameters())
         self._set("covariance", self._checked_covariance())
         self._set("sd", self._checked_sd())
+        self._set("knots", checked_knots(self.title, self.model, self.parameters, self.knots))
+        given = 0.0 if self.knot_sd is None else self.knot_sd
+        self._set("knot_sd", checked_knot_sd(self.title, self.knots, given))
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
@@ -125,12 +153,25 @@ class Camera(Valued, Brief):
                 rows.append((name, f"{value:.8g} {self.unit_of(name)}".rstrip() + known))
         if len(rows) < len(self.names):
             rows.append(("", f"all {len(self.names) - len(rows)} others are 0 and held"))
+        if self.knots is not None:
+            height, width, _ = self.knots.shape
+            rows.append(("knots", f"{width} x {height}" + ("" if np.any(self.knot_sd) else ", held")))
         return f"{title}, {self.unit}", rows
 
     @property
     def names(self) -> tuple[str, ...]:
         """The k parameters of the model, in their order."""
         return tuple(name for name, _ in self._facts[1])
+
+    @property
+    def knot_names(self) -> tuple[str, ...]:
+        """`dx_i_j`, `dy_i_j` of each knot, row by row, i along columns from 0; none without knots."""
+        return knot_names(self.knots)
+
+    @cached_property
+    def knot_unknowns(self) -> tuple[Knot, ...]:
+        """The knots as unknowns of a block, row by row; none where they are held."""
+        return knot_unknowns(self.title, self.knots, self.knot_sd)
 
     @property
     def powers(self) -> dict[str, int]:
@@ -174,7 +215,7 @@ class Camera(Valued, Brief):
     @property
     def is_held(self) -> bool:
         """Whether all parameters are known."""
-        return not self.deviations.any()
+        return not self.deviations.any() and not np.any(self.knot_sd)
 
     @property
     def scale(self) -> float:
@@ -305,7 +346,7 @@ class Camera(Valued, Brief):
             Another shape, or what is no number.
         """
         given = shaped("u", u, (len(np.atleast_1d(np.asarray(u))), 3), missing=True)
-        return _photocore.camera_images(self.model, self.values, given)
+        return _photocore.camera_images(self.model, self.values, given, self.knots)
 
     def rays(self, xy: ArrayLike) -> Floats:
         """Return the directions of image positions.
@@ -325,75 +366,37 @@ class Camera(Valued, Brief):
             Another shape, or what is no number.
         """
         given = shaped("xy", xy, (len(np.atleast_1d(np.asarray(xy))), 2), missing=True)
-        return _photocore.camera_rays(self.model, self.values, given)
+        return _photocore.camera_rays(self.model, self.values, given, self.knots)
 
+    def partials(self, u: ArrayLike) -> tuple[Floats, Floats, Floats]:
+        """Return the images of directions with their partials.
 
-def checked_cameras(cameras: object) -> tuple[Camera, ...]:
-    """Return the cameras of a block.
+        Parameters
+        ----------
+        u
+            (n, 3) as for :meth:`project`.
 
-    Raises
-    ------
-    InputError
-        What is no list of cameras, equal names, different units.
-    """
-    if not isinstance(cameras, Sequence):
-        raise InputError(f"cameras is no list: {shown(cameras)}")
-    for each in cameras:
-        if not isinstance(each, Camera):
-            raise InputError(f"cameras holds what is no Camera: {shown(each)}")
-    names = [each.name for each in cameras if each.name]
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InputError(f"cameras: {twice!r} stands there more than once")
-    units = {each.unit for each in cameras}
-    if len(units) > 1:
-        raise InputError("cameras: image coordinates of one block are in one unit, mm or px")
-    return tuple(cameras)
+        Returns
+        -------
+        (n, 2) images, (n, 2, 3) partials by u, and (n, 2, k) by the parameters, behind them those by the
+        knots, in the order of `names` and `knot_names`; not finite where there are none. Those by constants
+        are 0 or without meaning.
 
-
-def photo_indices(given: object, cameras: Sequence[Camera], photos: int) -> Indices:
-    """Return (P,) which camera each photo has.
-
-    Parameters
-    ----------
-    given
-        (P,) indices or names of cameras, one for all photos, or None: the only camera there is, or one for
-        each photo.
-    cameras
-        The cameras.
-    photos
-        P.
-
-    Raises
-    ------
-    InputError
-        Cameras that are not there, another number of photos, None where it does not say which.
-    """
-    if given is None:
-        if len(cameras) not in (1, photos):
-            raise InputError("photo_cameras must say which photo has which camera")
-        return np.zeros(photos, dtype=np.int64) if len(cameras) == 1 else np.arange(photos)
-    whole = [given] * photos if isinstance(given, str | int) else given
-    try:
-        listed = list(whole)  # type: ignore[call-overload]
-    except TypeError:
-        raise InputError(f"photo_cameras is no list of cameras: {shown(given)}") from None
-    if len(listed) != photos:
-        raise InputError(f"photo_cameras has {len(listed)} rows, but there are {photos} photos")
-    places: dict[object, int] = {each.name: row for row, each in enumerate(cameras) if each.name}
-    found = np.empty(photos, dtype=np.int64)
-    for row, each in enumerate(listed):
-        place = places.get(each) if isinstance(each, str) else _index(each, len(cameras))
-        if place is None:
-            raise InputError(f"photo_cameras: there is no camera {shown(each)}")
-        found[row] = place
-    return found
-
-
-def _index(each: object, count: int) -> int | None:
-    if isinstance(each, bool | np.bool_) or not isinstance(each, int | np.integer):
-        return None
-    return int(each) if 0 <= each < count else None
+        Raises
+        ------
+        InputError
+            Another shape, or what is no number.
+        """
+        given = shaped("u", u, (len(np.atleast_1d(np.asarray(u))), 3), missing=True)
+        images, by_u, own = _photocore.camera_partials(self.model, self.values, given, self.knots)
+        if self.knots is None:
+            return images, by_u, own
+        # d image / d knot = diag(fx, fy) times its weight.
+        numbers, weights = _photocore.camera_patches(self.model, self.values, given)
+        by_knots = np.zeros((len(given), 2, self.knots.size // 2, 2))
+        for axis, scale in enumerate(self.values[:2].tolist()):
+            np.put_along_axis(by_knots[:, axis, :, axis], numbers, scale * weights, axis=1)
+        return images, by_u, np.concatenate([own, by_knots.reshape(len(given), 2, -1)], axis=2)
 
 
 def images_of(cameras: Sequence[Camera], which: Indices, directions: Floats) -> Floats:
@@ -423,6 +426,13 @@ def camera_rows(cameras: Sequence[Camera]) -> list[CameraRow]:
             each.values.tolist(),
             each.deviations.tolist(),
             None if each.prior_covariance is None else each.prior_covariance.ravel().tolist(),
+            None if each.knots is None else each.knots.ravel().tolist(),
         )
         for each in cameras
     ]
+
+
+def rays_of_row(row: CameraRow, xy: Floats) -> Floats:
+    """Return (n, 3) the directions of image positions (n, 2), as :meth:`Camera.rays` has them."""
+    model, parameters, _, _, knots = row
+    return _photocore.camera_rays(model, np.array(parameters), xy, None if knots is None else np.array(knots))

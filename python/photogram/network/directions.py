@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.network.block import Block
+from photogram.network.cameras import rays_of_row
 from photogram.network.chosen import kept_images
 from photogram.network.motion import focal_images, scanners
 
@@ -30,8 +30,8 @@ def image_directions(block: Block) -> Floats:
     order = np.argsort(of_images, kind="stable")
     ends = np.searchsorted(of_images[order], np.arange(len(cameras)), side="right")
     directions, places = np.full((len(order), 3), np.nan), focal_images(block)
-    for (model, parameters, *_), own in zip(cameras, np.split(order, ends[:-1]), strict=True):
-        directions[own] = _photocore.camera_rays(model, np.array(parameters), places[own])
+    for row, own in zip(cameras, np.split(order, ends[:-1]), strict=True):
+        directions[own] = rays_of_row(row, places[own])
     return directions
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.network.block import Block
-from photogram.network.cameras import Camera, checked_cameras, images_of
+from photogram.network.cameras import Camera, images_of
+from photogram.network.photo_cameras import checked_cameras
 
 __all__ = ["photographed"]
 

@@ -15,8 +15,9 @@ from photogram.errors import InputError
 from photogram.messages import counted
 from photogram.network import geometry
 from photogram.network.block import Block
-from photogram.network.cameras import Camera, checked_cameras
+from photogram.network.cameras import Camera
 from photogram.network.geometry import Spheroid
+from photogram.network.photo_cameras import checked_cameras
 from photogram.network.refraction import Refraction
 from photogram.network.simulated_cameras import photographed
 from photogram.network.simulated_frames import photograph, seen_side

@@ -12,8 +12,9 @@ from photogram.arguments.arrays import names, shaped, shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import listed
-from photogram.network.cameras import Camera, photo_indices
+from photogram.network.cameras import Camera
 from photogram.network.geometry import Spheroid
+from photogram.network.photo_cameras import photo_indices
 
 __all__ = [
     "ATTITUDE_COLUMNS",

@@ -112,6 +112,27 @@ class Covariances:
         found *= self._scale
         return found
 
+    def combined(self, partials: Floats, selection: Selection) -> Floats:
+        """Return the (m, m) covariance matrix of m linear combinations of a selection, J Q J' scaled.
+
+        It takes as many solutions as there are combinations, however many unknowns these are of.
+
+        Parameters
+        ----------
+        partials
+            (m, k) J: a column for each unknown of the selection.
+        selection
+            What is combined; rotation steps, too.
+
+        Raises
+        ------
+        InputError, OutOfMemoryError, KeyboardInterrupt
+            As :meth:`covariance`.
+        """
+        rows = self._adjusted.selected(selection).rows
+        found = self._asked(lambda: self._core.propagate(partials, rows, threads=0, progress=None))
+        return np.asarray(found * self._scale)
+
     def correlation(self, a: Selection, b: Selection | None = None) -> Floats:
         """Return correlation coefficients in place of covariances; NaN for what is held.
 

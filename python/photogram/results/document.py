@@ -20,13 +20,13 @@ from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show.quantity import Quantity, Table, chosen, records
 from photogram.show.ways import document_of
 
-__all__ = ["network_members", "to_json"]
+__all__ = ["block_members", "network_members", "to_json"]
 
 
 @document_of.register(Result)
 def to_json(result: Result) -> bytes:
     """Return the whole result as JSON (UTF-8). What is not a number is null."""
-    return json.to_json(_document(result))
+    return json.to_json(block_members(result))
 
 
 def network_members(result: AdjustedNetwork, photo_members: Table = ()) -> dict[str, Any]:
@@ -63,7 +63,8 @@ def network_members(result: AdjustedNetwork, photo_members: Table = ()) -> dict[
     }
 
 
-def _document(result: Result) -> dict[str, Any]:
+def block_members(result: Result) -> dict[str, Any]:
+    """Return the members of the document of an adjusted block."""
     sums = result.sums_of_squares
     return {
         **network_members(result, _of_photos(result)),

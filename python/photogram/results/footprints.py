@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.network.block import Block
+from photogram.network.cameras import camera_rows, rays_of_row
 from photogram.network.motion import of_pictures, scanners
 from photogram.network.rays import LocalAxes, local_axes
 from photogram.results.result import Result
@@ -82,8 +82,10 @@ def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ())
     cameras, photo_cameras = block.core_cameras()
     frames = picture_frames(block, sizes)
     rays = np.full((len(cameras), 4 * SIDE + 1, 3), np.nan)
-    for row, (model, parameters, *_) in enumerate(_adjusted_cameras(result, cameras)):
-        rays[row] = _photocore.camera_rays(model, np.array(parameters), _outline(frames[row]))
+    if result.cameras:
+        cameras = camera_rows([each.camera for each in result.cameras])
+    for row, own in enumerate(cameras):
+        rays[row] = rays_of_row(own, _outline(frames[row]))
     directions = np.einsum("pij,pvj->pvi", turns, rays[photo_cameras])
     horizontal = np.hypot(directions[..., 0], directions[..., 1])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -156,12 +158,3 @@ def _outline(frame: Floats) -> Floats:
     corners = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])
     steps = np.arange(4 * SIDE + 1) / SIDE
     return np.column_stack([np.interp(steps, np.arange(5), corner) for corner in corners.T])
-
-
-def _adjusted_cameras(
-    result: Result, cameras: Sequence[tuple[str, list[float], list[float], list[float] | None]]
-) -> list[tuple[str, list[float]]]:
-    """Return models and adjusted parameters of the cameras as the core takes them."""
-    if not result.cameras:
-        return [(model, parameters) for model, parameters, *_ in cameras]
-    return [(model, each.values.tolist()) for (model, *_), each in zip(cameras, result.cameras, strict=True)]

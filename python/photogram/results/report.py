@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.network.geometry import lengths_of_units
-from photogram.network.observations import Observation, Smoothness
+from photogram.network.knots import Knot
+from photogram.network.observations import Observation, Prior, Smoothness
 from photogram.network.structuring import structure
 from photogram.results.axes import image_axes, point_axes
 from photogram.results.calibration_report import calibration_sections
@@ -54,6 +55,7 @@ FLOWN, WORST = 100, 20
 __all__ = [
     "ORDERINGS",
     "bandwidths",
+    "details",
     "first_sections",
     "problems_of",
     "reliability_lines",
@@ -77,8 +79,14 @@ ORDERINGS = {
 @np.errstate(over="ignore")  # what is too large for its unit is infinite
 def report(result: Result) -> str:
     """Return the report of an adjusted block."""
-    sections = [
-        *summary(result),
+    sections = [*summary(result), *details(result)]
+    return composed(headline("block adjustment", result.block.title), sections)
+
+
+@np.errstate(over="ignore")
+def details(result: Result) -> list[Section]:
+    """Return what a report says behind its summary, as titled sections."""
+    return [
         ("Redundancy by kind of observation", _redundancy(result)),
         ("Reliability", reliability_lines(result, result.block.linear_unit)),
         ("Iterations", iteration_lines(iterations(result), ".6f")),
@@ -109,7 +117,6 @@ def report(result: Result) -> str:
         ("Image points: observed minus computed, redundancy, standardized residual", image_lines(result)),
         ("Work", _work(result)),
     ]
-    return composed(headline("block adjustment", result.block.title), sections)
 
 
 @np.errstate(over="ignore")
@@ -292,8 +299,9 @@ def _kind(result: Result, kind: ObservedKind) -> list[str]:
 
 
 def _is_flown(observation: Observation) -> bool:
-    """Whether an observation is of a trajectory: there may be thousands in a minute."""
-    return observation.moment is not None or isinstance(observation, Smoothness)
+    """Whether an observation is of a trajectory or of a knot: there may be thousands."""
+    of_knot = isinstance(observation, Prior) and isinstance(observation.unknown, Knot)
+    return of_knot or observation.moment is not None or isinstance(observation, Smoothness)
 
 
 def _width(names: Iterable[str], least: int) -> int:

@@ -33,6 +33,7 @@ __all__ = [
     "Section",
     "Table",
     "Text",
+    "Tone",
     "decimals_of",
     "fixed",
     "significant",

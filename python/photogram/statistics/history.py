@@ -21,12 +21,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.messages import counted
 from photogram.statistics.distributions import (
     LEVEL,
     bonferroni,
@@ -35,14 +37,15 @@ from photogram.statistics.distributions import (
     log_fisher,
 )
 from photogram.statistics.findings import Systematic
+from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
 
-__all__ = ["Change", "History", "Series", "history"]
+__all__ = ["Change", "Dates", "History", "Series", "changed_of", "dates_of", "history", "unchanged_of"]
 
+YEAR = 365.2425
+"""Days."""
 MOST = 3
 """Changes of one quantity that are told apart."""
-BLIND = 1e-8
-"""A hypothesis that the model explains up to this part of its length cannot be tested."""
 
 
 @dataclass(frozen=True)
@@ -167,6 +170,39 @@ class History:
         )
 
 
+@dataclass(frozen=True)
+class Dates:
+    """When k occasions were, in years, and what they are called."""
+
+    years: list[float]
+    names: list[str]
+
+
+def dates_of(days: Sequence[date], names: Sequence[str]) -> Dates:
+    """Return the dates of occasions: days, with the names of their files where two are of one day."""
+    written = [day.isoformat() for day in days]
+    called = [
+        day if written.count(day) == 1 else f"{day} ({name})"
+        for day, name in zip(written, names, strict=True)
+    ]
+    return Dates([day.year + (day - date(day.year, 1, 1)).days / YEAR for day in days], called)
+
+
+def changed_of(histories: Mapping[str, History]) -> list[str]:
+    """Return what a verdict says of what changed, each thing by its name."""
+    return [f"{whose}: {text}" for whose, own in histories.items() for text in own.changed]
+
+
+def unchanged_of(histories: Mapping[str, History]) -> list[str]:
+    """Return the sentences on things of which nothing changed."""
+    return [
+        f"{whose}: nothing changed between {own.occasions[0]} and {own.occasions[-1]}"
+        f" ({counted(len(own.occasions), 'calibration')}, {len(own.series)} quantities)"
+        for whose, own in histories.items()
+        if not own.changed
+    ]
+
+
 @dataclass(frozen=True, eq=False)
 class _Hypotheses:
     """Columns of what may change (k, c), and what each is."""
@@ -236,8 +272,8 @@ def history(
         for j in range(m)
     )
     mean = np.tile(np.eye(m), (k, 1))
-    r = _Fit.of(x.ravel(), c.reshape(k * m, k * m), mean).residuals
-    constancy = global_test(float(r @ r), (k - 1) * m, level, freedom)
+    whole = Fit.of(x.ravel(), c.reshape(k * m, k * m), mean)
+    constancy = global_test(whole.omega, (k - 1) * m, level, freedom)
     assert constancy is not None
     limit = critical_student(bonferroni(level, tests), freedom)
     return History(named, t, series, constancy, tests, level, limit)
@@ -283,37 +319,6 @@ def _hypotheses(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """A weighted fit, whitened: x = A p + r."""
-
-    root: Floats
-    basis: Floats
-    residuals: Floats
-    parameters: Floats
-    cofactors: Floats
-
-    @classmethod
-    def of(cls, x: Floats, covariance: Floats, columns: Floats) -> _Fit:
-        scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        try:
-            root = scale[:, np.newaxis] * np.linalg.cholesky(covariance / np.outer(scale, scale))
-        except (np.linalg.LinAlgError, FloatingPointError):
-            raise InputError("the covariance is not positive definite") from None
-        a, y = np.linalg.solve(root, columns), np.linalg.solve(root, x)
-        q, upper = np.linalg.qr(a)
-        inverse = np.linalg.inv(upper)
-        return cls(root, q, y - q @ (q.T @ y), inverse @ (q.T @ y), inverse @ inverse.T)
-
-    def tested(self, columns: Floats) -> tuple[Floats, Floats]:
-        """Return sizes of more columns, one at a time, and their standard deviations; NaN of blind ones."""
-        z = np.linalg.solve(self.root, columns)
-        left = z - self.basis @ (self.basis.T @ z)
-        squares = (left**2).sum(axis=0)
-        squares[squares < BLIND * (z**2).sum(axis=0)] = math.nan
-        return left.T @ self.residuals / squares, 1 / np.sqrt(squares)
-
-
 def _log10_p(t: float, freedom: float) -> float:
     log_p = log_chi_square(t**2, 1.0) if math.isinf(freedom) else log_fisher(t**2, 1.0, freedom)
     return float(log_p) / math.log(10)
@@ -331,7 +336,7 @@ def _series(
     """Test one quantity, accept what is found, the most certain first, and fit all of it together."""
     k = len(x)
     with np.errstate(invalid="raise", divide="raise"):
-        first = fit = _Fit.of(x, covariance, np.ones((k, 1)))
+        first = fit = Fit.of(x, covariance, np.ones((k, 1)))
     sizes, deviations = fit.tested(hypotheses.columns)
     t = sizes / deviations
     steps, drift = np.full(k - 1, math.nan), (math.nan, math.nan)
@@ -349,7 +354,7 @@ def _series(
             break
         accepted.append((best, float(t[best])))
         columns = hypotheses.columns[:, [column for column, _ in accepted]]
-        fit = _Fit.of(x, covariance, np.column_stack([np.ones(k), columns]))
+        fit = Fit.of(x, covariance, np.column_stack([np.ones(k), columns]))
         sizes, deviations = fit.tested(hypotheses.columns)
         t = sizes / deviations
     changes = []
@@ -366,12 +371,12 @@ def _series(
         sd=np.sqrt(np.diag(covariance)),
         mean=float(first.parameters[0]),
         mean_sd=math.sqrt(float(first.cofactors[0, 0])),
-        model=x - fit.root @ fit.residuals,
+        model=x - fit.residuals,
         off=off,
         off_sd=off_sd,
         drift=drift[0],
         drift_sd=drift[1],
         steps=steps,
-        test=global_test(float(first.residuals @ first.residuals), k - 1, reference_dof=freedom),
+        test=global_test(first.omega, k - 1, reference_dof=freedom),
         changes=tuple(changes),
     )

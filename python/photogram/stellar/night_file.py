@@ -13,6 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
+from photogram.io.toml_tables import Document, Table, read_document
 from photogram.show.angles import ARCSEC
 from photogram.stellar.camera_yaml import read_yaml
 from photogram.stellar.catalogue import Catalogue
@@ -24,7 +25,7 @@ from photogram.stellar.places import Earth, epoch
 from photogram.stellar.pointing import attitude_of
 from photogram.stellar.skies import Exposure
 from photogram.stellar.sky_cameras import SkyCamera
-from photogram.stellar.tomlfile import Document, Table, effects, pole_arcsec, read_document, site
+from photogram.stellar.tomlfile import effects, pole_arcsec, site
 
 __all__ = ["AUTO", "inputs", "read_night"]
 

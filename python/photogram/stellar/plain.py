@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
+from photogram.io.toml_tables import Document, Table, read_document
 from photogram.messages import listed
 from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import PlateCamera
@@ -25,7 +26,7 @@ from photogram.stellar.places import sidereal_time
 from photogram.stellar.problem import Axis, Problem, default_parameters
 from photogram.stellar.rejection import rejected
 from photogram.stellar.sky import Site
-from photogram.stellar.tomlfile import Document, Table, effects, pole_arcsec, read_document, site
+from photogram.stellar.tomlfile import effects, pole_arcsec, site
 
 __all__ = ["inputs", "read_plain"]
 

@@ -49,7 +49,11 @@ impl Network {
             datum: self.given_datum(selected, &mounts),
             mounts,
             image_times,
-            passages: Passages::new(&self.passages, &selected.points, self.points.len()),
+            passages: Passages::new(
+                &self.passages,
+                (&selected.points, self.points.len()),
+                self.photos.iter().map(|photo| photo.camera),
+            ),
             origin,
             locals: selected.locals,
             points,
@@ -66,7 +70,7 @@ impl Network {
             CameraPrior::of(camera, self.first_parameter(&bundle, index)?)
         };
         bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();
-        bundle.count_passed();
+        bundle.find_cells();
         bundle.observations = self.tied_observations(selected, &bundle)?;
         Ok(bundle)
     }

@@ -125,7 +125,9 @@ impl Network {
         let mut given: Vec<bool> = self.points.iter().map(|point| point.sd == [0.0; 3]).collect();
         let touched = self.observations.iter().flat_map(|own| own.touches().points);
         touched.for_each(|point| given[point] = false);
-        let facts = Facts { space: self.space, given };
+        let cameras = self.cameras.iter().map(|own| &own.camera).collect();
+        let photos = self.photos.iter().map(|own| own.camera).collect();
+        let facts = Facts { space: self.space, given, cameras, photos };
         let bad = |own: &Passage| !own.unknowns().into_iter().all(of_type) || !own.is_of(&facts);
         self.passages.iter().position(bad).map_or(Ok(()), |index| Err(NetworkError::Passage(index)))
     }

@@ -2,13 +2,21 @@
 
 use smallvec::{SmallVec, smallvec};
 
+use super::Image;
+use super::commons::CommonState;
+use super::film::FilmOf;
 use super::in_block::InBlock;
 use super::model::Bundle;
 use super::mounts::Composed;
 use super::passages::Own;
 use super::stations::{Bent, Stations};
-use crate::geometry::Matrix3;
+use crate::geometry::camera::SplinedStereographic;
+use crate::geometry::{Camera, CameraModel, Matrix3, Vector3};
 use crate::normals::{Cofactors, GroupRows};
+use crate::parallel;
+
+/// How far an image may move, in distances of knots, before it depends on others than those that it may step with.
+const MARGIN: f64 = 0.25;
 
 /// Where the columns of a block are among those that an image has in common with others; None of the main block.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +48,59 @@ impl Columns<'_, '_> {
 impl Bundle {
     /// The common unknowns that an image steps with by what it passes.
     fn passed_by(&self, image: usize) -> Own {
-        self.passages.commons(self.point_of(image))
+        let photo = self.images[image].photo;
+        self.passages.commons((image, photo, self.point_of(image)), columns(&self.cameras[photo]))
+    }
+
+    /// Finds the knots that images may step with, from where points and photos stand at given values of the unknowns, and counts which common
+    /// unknowns they step with by what they pass.
+    pub(super) fn open_windows(&mut self, unknowns: &[f64]) {
+        if self.passages.is_empty() {
+            return;
+        }
+        if !self.passages.lenses().is_empty() {
+            let windows = self.of_seen(unknowns, |own, u| own.window(u, MARGIN));
+            self.passages.open(windows);
+        }
+        let all: Vec<Own> = (0..self.images.len()).map(|image| self.passed_by(image)).collect();
+        all.into_iter().flatten().for_each(|common| self.commons[common].uses += 1);
+    }
+
+    /// Whether there are images of which the knots are others than those that they may step with.
+    pub(super) fn is_beyond_windows(&self, unknowns: &[f64]) -> bool {
+        if self.passages.lenses().is_empty() {
+            return false;
+        }
+        let patches = self.of_seen(unknowns, |own, u| own.patch(u));
+        patches.iter().enumerate().any(|(image, patch)| {
+            let window = self.passages.window(image);
+            patch.is_some_and(|patch| window.is_none_or(|window| !window.has(&patch)))
+        })
+    }
+
+    /// Takes something of each image with a lens of knots, by its camera and by what that sees of the point.
+    fn of_seen<T: Send>(
+        &self,
+        unknowns: &[f64],
+        take: impl Fn(&SplinedStereographic, &Vector3) -> Option<T> + Sync,
+    ) -> Vec<Option<T>> {
+        let stations = self.evaluated(unknowns);
+        let Some(bent) = &stations.bent else { return vec![] };
+        let of_point = |point: usize| {
+            let images = self.point_images.start[point]..self.point_images.start[point + 1];
+            let of_image = |image: usize| {
+                let photo = self.images[image].photo;
+                self.passages.lens(photo)?;
+                match &stations.photos[photo].camera {
+                    Camera::SplinedStereographic(own) => {
+                        take(own, &self.sight_bent((&stations, bent), image, point))
+                    }
+                    _ => None,
+                }
+            };
+            images.map(of_image).collect::<Vec<_>>()
+        };
+        parallel::map(self.points.len(), 64, of_point).into_iter().flatten().collect()
     }
 
     /// The retained blocks of these, each once.
@@ -59,15 +119,6 @@ impl Bundle {
         blocks
     }
 
-    /// Counts which common unknowns images step with by what they pass.
-    pub(super) fn count_passed(&mut self) {
-        if self.passages.is_empty() {
-            return;
-        }
-        let all: Vec<Own> = (0..self.images.len()).map(|image| self.passed_by(image)).collect();
-        all.into_iter().flatten().for_each(|common| self.commons[common].uses += 1);
-    }
-
     /// Writes the equations of an image that passes more than pose and camera: those of pose, point and camera first.
     pub(super) fn observe_passing(
         &self,
@@ -77,7 +128,7 @@ impl Bundle {
         rows: &mut GroupRows<'_>,
         own: &mut Composed,
     ) {
-        let photo = self.images[group].photo;
+        let (photo, cell) = (self.images[group].photo, self.passages.cell(group));
         let (main, all) = (self.main_block(group), rows.shared.len() / 2);
         let mut slots: SmallVec<[Slot; 32]> = smallvec![Slot { block: main, first: None }];
         let mut place = |blocks: &mut dyn Iterator<Item = usize>, mut first: usize| {
@@ -94,13 +145,65 @@ impl Bundle {
         let (constant, point, retained) = (&mut *rows.constant, &mut *rows.local, &mut *rows.retained);
         let mut inner = GroupRows { constant, local: point, retained, shared: &mut shared };
         let timed = self.compose_timed((stations, bent), group, own);
-        bent.write(self.space, stations, timed.then_some(&*own), &self.images[group], local, &mut inner);
-        for (to, from) in rows.shared.chunks_exact_mut(all).zip(shared.chunks(plain.max(1))) {
+        let own = timed.then_some(&*own);
+        let read = bent.write(self.space, stations, own, (&self.images[group], cell), local, &mut inner);
+        for (row, to) in rows.shared.chunks_exact_mut(all.max(1)).enumerate() {
+            let from = &shared[plain * row..][..plain];
             to[..poses].copy_from_slice(&from[..poses]);
             to[poses..passed].fill(0.0);
             to[passed..].copy_from_slice(&from[poses..]);
         }
-        self.step_figure(local, &mut Columns { rows, slots });
+        let mut columns = Columns { rows, slots };
+        self.step_figure(local, &mut columns);
+        if let (Some(film), Some(read)) = (self.passages.film(photo), read) {
+            let commons = film.commons(cell);
+            film.partials(&read, |slot, by| {
+                let common = commons[slot].0;
+                let Some(place) = self.blocks.of_common[common] else { return };
+                for (k, &(_, component, _)) in self.commons[common].kind.unknowns().iter().enumerate() {
+                    columns.add(place, k, [by[(0, component)], by[(1, component)]]);
+                }
+            });
+        }
+        self.step_knots((stations, bent), group, local, &mut columns);
+    }
+
+    /// Finds in which cells of patterns images are, at the values that are given.
+    pub(super) fn find_cells(&mut self) {
+        let grid = |photo| self.passages.film(photo).is_some_and(FilmOf::has_cells);
+        if !(0..self.cameras.len()).any(grid) {
+            return;
+        }
+        let given: Vec<CommonState> =
+            self.commons.iter().map(|own| own.at(&vec![0.0; own.kind.unknowns().len()])).collect();
+        let films = self.passages.films(&given);
+        let cell =
+            |image: &Image| films[image.photo].as_ref().map_or(0, |film| film.cell_of_reading(image.xy));
+        self.passages.cells = self.images.iter().map(cell).collect();
+    }
+
+    /// The partials by the knots of a lens.
+    fn step_knots(
+        &self,
+        (stations, bent): (&Stations, &Bent),
+        group: usize,
+        local: usize,
+        columns: &mut Columns<'_, '_>,
+    ) {
+        let photo = self.images[group].photo;
+        let (Some(lens), Camera::SplinedStereographic(camera)) =
+            (self.passages.lens(photo), &stations.photos[photo].camera)
+        else {
+            return;
+        };
+        let Some(patch) = camera.patch(&self.sight_bent((stations, bent), group, local)) else { return };
+        let [fx, fy, ..] = camera.parameters();
+        for (knot, weight) in patch.knots(camera.columns()) {
+            if let Some(place) = self.blocks.of_common[self.passages.lenses()[lens].commons[knot]] {
+                columns.add(place, 0, [fx * weight, 0.0]);
+                columns.add(place, 1, [0.0, fy * weight]);
+            }
+        }
     }
 
     /// The partials by the numbers of a figure: by the point, times how that is shifted.
@@ -133,5 +236,13 @@ impl Bundle {
             Some(own) => shifts * own.fixed_view::<2, 2>(0, 0) * shifts.transpose(),
         };
         Some((std::array::from_fn(|i| given[i] + shift[i]), found))
+    }
+}
+
+/// How many knots a camera has in a row.
+fn columns(camera: &Camera) -> usize {
+    match camera {
+        Camera::SplinedStereographic(own) => own.columns(),
+        _ => 0,
     }
 }

@@ -176,15 +176,19 @@ impl Network {
             Some(reached) => selected.points.iter().map(|&point| reached.points[point]).collect(),
             None => self.start(options.start, &selected, &model, &placed)?,
         };
+        // Local points, photos and shared cameras, points that observations touch.
+        let locals = model.locals;
+        let unknowns = |points: &[[f64; 3]], stations: &[f64]| {
+            let (local, tied) = points.split_at(locals);
+            [local.as_flattened(), stations, tied.as_flattened()].concat()
+        };
+        if !model.passages.is_empty() {
+            model.open_windows(&unknowns(&start, &values));
+        }
         let of_points =
             |each: fn(&Point) -> [f64; 3]| -> Vec<[f64; 3]> { model.points.iter().map(each).collect() };
         let observed = self.station_values(&model, |photo| local(self.observed_pose(photo)));
         let station_sd = self.station_sd(&model, &selected.surroundings, unused);
-        // Local points, photos and shared cameras, points that observations touch.
-        let unknowns = |points: &[[f64; 3]], stations: &[f64]| {
-            let (local, tied) = points.split_at(model.locals);
-            [local.as_flattened(), stations, tied.as_flattened()].concat()
-        };
         let (mut initial, mut prior, mut sd) = (vec![], vec![], vec![]);
         parallel::join(&mut || initial = unknowns(&start, &values), &mut || {
             parallel::join(

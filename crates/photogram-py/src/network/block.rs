@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use super::block_network::BlockNetwork;
 use super::{images, points};
 use crate::arrays::{check_lengths, indices, numbers, rows};
-use crate::camera::named;
+use crate::camera::knotted;
 use crate::commons::{CommonRow, MountRow, common, mount};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
 use crate::memory::LOADED;
@@ -23,15 +23,15 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(block_network, module)?)
 }
 
-/// Model, parameters and their standard deviations of a camera, covariance matrix of the weighted ones row by row.
-type CameraRow = (String, Vec<f64>, Vec<f64>, Option<Vec<f64>>);
+/// Model, parameters and their standard deviations of a camera, covariance matrix of the weighted ones row by row, knots.
+type CameraRow = (String, Vec<f64>, Vec<f64>, Option<Vec<f64>>, Option<Vec<f64>>);
 
-fn camera((model, parameters, sd, covariance): CameraRow) -> PyResult<Camera> {
+fn camera((model, parameters, sd, covariance, knots): CameraRow) -> PyResult<Camera> {
     let square = |values: Vec<f64>| {
         let count = values.len().isqrt();
         DMatrix::from_row_iterator(count, count, values.into_iter().take(count * count))
     };
-    Ok(Camera { covariance: covariance.map(square), ..Camera::new(named(&model, &parameters)?, sd) })
+    Ok(Camera { covariance: covariance.map(square), ..Camera::new(knotted(&model, &parameters, knots)?, sd) })
 }
 
 /// Kind; indices of common unknowns; of points, photos or cameras; numbers.

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.tree import Tree
+from photogram.io.tree import Tree
 from photogram.network.timed import Lines
 
 __all__ = ["Drift", "fitting", "read_drift", "read_lines"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.image_axes import from_tables, in_unit
 from photogram.formats.plain.photos import Photos
@@ -15,7 +15,10 @@ from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
 from photogram.messages import Message
 
-__all__ = ["Images", "image_coordinates", "read_images"]
+__all__ = ["Images", "image_coordinates", "read_images", "sd_is_given"]
+
+
+_SD = ("sd", "sd_column", "sd_row", "sd_x", "sd_y")
 
 
 @dataclass(frozen=True)
@@ -70,17 +73,17 @@ def _check_twice(table: ColumnTable, photos: Indices, points: Indices, count: in
 
 
 def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
-    own = [
-        name
-        for pair in (("sd_column", "sd_row"), ("sd_x", "sd_y"))
-        if pair[0] in table or pair[1] in table
-        for name in pair
-    ]
+    pairs = (_SD[1:3], _SD[3:])
+    own = [name for pair in pairs if pair[0] in table or pair[1] in table for name in pair]
     if "correlation" in table and table.numbers("correlation", 0.0).any():
         raise table.head.error("column correlation: images with correlated coordinates cannot be adjusted")
-    if not own and "sd" not in table and "images" not in tables.settings.sd:
+    found = np.ones((table.count, 2))
+    if sd_is_given(tables, table):
+        found = tables.deviations(table, "images", own[:2] or ["sd_x", "sd_y"])
+    elif "level" not in table:
         return None
-    found = tables.deviations(table, "images", own[:2] or ["sd_x", "sd_y"])
+    if "level" in table and not own and "sd" not in table:
+        found = found * 2.0 ** table.numbers("level", 0.0)[:, np.newaxis]
     bad = np.argwhere(~((found > 0) & np.isfinite(found)))
     if len(bad):
         row = int(bad[0][0])
@@ -89,12 +92,18 @@ def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
     return found
 
 
+def sd_is_given(tables: Tables, table: ColumnTable) -> bool:
+    """Return whether standard deviations of images are given, in the table or for all; levels are ratios."""
+    return "images" in tables.settings.sd or any(name in table for name in _SD)
+
+
 def image_coordinates(
-    settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices
+    settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices, scanned: Bools
 ) -> tuple[Floats, Floats | None]:
     """Return image coordinates and standard deviations in the unit and along the axes of the cameras.
 
-    Those of scanners are samples and lines, whatever the unit of images: their deviations are in this.
+    Those of line scanners are samples and lines, whatever the unit of images: their deviations are in this.
+    Those of scanned films are readings, as they are.
     """
     sd = images.sd if images.sd is None or settings.image != "um" else images.sd * 1e-3
     pixels = settings.image == "px" and settings.image_y == "down"
@@ -106,4 +115,6 @@ def image_coordinates(
             found[own] = in_unit(settings, images.xy[own], pixels=True)
         else:
             found[own] = from_tables(settings, camera, cameras.sizes[row], found[own])
+    own = scanned[images.photos]
+    found[own] = images.xy[own] * (1e-3 if settings.image == "um" else 1.0)
     return found, sd

@@ -4,7 +4,8 @@
 //! `cameras!` below.
 
 pub mod backward;
-mod inverse;
+pub(super) mod inverse;
+mod knots;
 mod model;
 mod projections;
 mod radial_tangential;
@@ -16,10 +17,10 @@ use super::axes::Vector3;
 
 pub use brown::{BrownCorrection, BrownTerms};
 pub use inverse::{Matrix2, RadialLimit};
+pub use knots::{Patch, Window};
 pub use measured::Measured;
 pub use model::{CameraModel, Image, LensDirection, ModelFacts, Unit};
 pub use orthogonal::{Ebner12, Gruen44, Orthogonal, OrthogonalSet};
-pub use splined_stereographic::Patch;
 
 macro_rules! cameras {
     ($d:tt $($file:ident::$name:ident;)* $([$family:ident] { $($member:ident;)* })*) => {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::inverse::RadialLimit;
-use super::splined_stereographic::Patch;
+use super::knots::Patch;
 use crate::geometry::axes::Vector3;
 
 /// How a camera maps u, a point in the photo's axes (it looks along -z), to image coordinates.
@@ -15,7 +15,7 @@ use crate::geometry::axes::Vector3;
 /// of u ([`super::backward::BackwardModel`]).
 pub trait CameraModel: Clone {
     /// Its interior parameters, an array of numbers.
-    type Parameters: Copy + AsRef<[f64]> + for<'a> TryFrom<&'a [f64]>;
+    type Parameters: Copy + AsRef<[f64]> + AsMut<[f64]> + for<'a> TryFrom<&'a [f64]>;
 
     /// What the model is called.
     const NAME: &'static str;

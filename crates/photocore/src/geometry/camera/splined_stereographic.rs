@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use super::inverse::{Matrix2, inverted, times};
+use super::knots::{NODES, Patch, Window};
 use super::model::{CameraModel, Image, Unit};
 use super::projections::{RayProjection, Stereographic};
 use crate::geometry::Vector3;
 
-/// Nodes of a spline that a place lies between, along one axis, at the most.
-const NODES: usize = 4;
 /// Knots of an axis at the most.
 const MOST: f64 = 10_000.0;
 /// Steps of Newton's method at the most, what one is cut to, and after which one it ends: the next would be of its square.
@@ -43,26 +42,6 @@ struct Grid {
     size: [usize; 2],
     /// s: from one knot to the next is its reciprocal.
     per_place: f64,
-}
-
-/// The knots that an image depends on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Patch {
-    /// The first of them, by column and row.
-    pub first: [usize; 2],
-    /// How many there are along columns and rows, each.
-    pub nodes: usize,
-    /// What each has of the displacement, row by row: d image / d knot = diag(fx, fy) times that. Zero beyond nodes^2.
-    pub weights: [f64; NODES * NODES],
-}
-
-impl Patch {
-    /// The knots, numbered row by row of so many columns, with their weights.
-    pub fn knots(&self, columns: usize) -> impl Iterator<Item = (usize, f64)> + use<'_> {
-        let ([first, row], nodes) = (self.first, self.nodes);
-        let number = move |k: usize| (row + k / nodes) * columns + first + k % nodes;
-        self.weights[..nodes * nodes].iter().enumerate().map(move |(k, &weight)| (number(k), weight))
-    }
 }
 
 /// The values of the splines that are not zero at a place along an axis, their slopes, and the first knot.
@@ -151,6 +130,23 @@ impl SplinedStereographic {
     fn seen(u: &Vector3) -> ([f64; 2], [[f64; 3]; 2]) {
         let seen = Stereographic::project([u.x, -u.y, -u.z], [0.0; 2]);
         (seen.ab, seen.by_ray)
+    }
+
+    /// The knots that images depend on which are nearer to that of u than so many distances of knots; None where constants are none of a
+    /// spline.
+    pub fn window(&self, u: &Vector3, margin: f64) -> Option<Window> {
+        let Grid { nodes, per_place, .. } = self.grid;
+        if nodes == 0 {
+            return None;
+        }
+        let (place, _) = Self::seen(u);
+        let at = |off: f64| self.grid.bases(place.map(|own| own + off / per_place)).map(|own| own.first);
+        Some(Window { first: at(-margin), end: at(margin).map(|first| first + nodes) })
+    }
+
+    /// How many knots there are in a row.
+    pub fn columns(&self) -> usize {
+        self.grid.size[0]
     }
 
     /// The place of the stereographic image that is moved to the given one.

@@ -41,7 +41,7 @@ impl PassageModel for Figure {
     }
 
     /// A point that observations touch would have to move for these, too.
-    fn is_of(&self, network: &Facts) -> bool {
+    fn is_of(&self, network: &Facts<'_>) -> bool {
         network.space == ObjectSpace::Rectangular
             && self.points.len() == self.shifts.len()
             && self.points.iter().all(|&point| network.given.get(point) == Some(&true))

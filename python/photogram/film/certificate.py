@@ -1,0 +1,401 @@
+"""Certificates of film cameras: marks, distances between them, principal distance, lens."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import date
+from functools import cached_property
+from pathlib import Path
+from typing import Literal, Self
+
+import numpy as np
+
+from photogram.arguments.arrays import one_of
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.film.certificate_check import DistanceDifference, difference_of
+from photogram.film.certificate_file import REFERENCES, read_toml
+from photogram.film.certificate_table import read_table
+from photogram.film.decentring import Tangential
+from photogram.film.distances import (
+    AdjustedMarks,
+    Crossing,
+    MarkDistance,
+    RightAngle,
+    adjust_distances,
+)
+from photogram.film.lens_table import (
+    Curve,
+    LensParameters,
+    RadialTable,
+    backward,
+    chosen,
+    curves_of,
+    fit_curve,
+    forward,
+)
+from photogram.film.marks import usual_places
+from photogram.messages import listed
+from photogram.network.cameras import Camera
+from photogram.show.brief import Brief, Rows
+from photogram.show.ways import Shown
+
+__all__ = ["CalibratedMarks", "Certificate"]
+
+SD_PLACE = 0.002
+"""Of a coordinate that is printed to 0.001 mm."""
+SD_DESIGN = 0.02
+SD_C = 0.003
+SD_PRINCIPAL_POINT = 0.003
+SD_UNKNOWN_POINT = 0.02
+"""Of a principal point that nothing says, or that distances alone leave uncertain against the marks (mm)."""
+PRINTED = 2e-3
+"""Millimetres by which printed coefficients may differ from the table of distortion."""
+
+
+@dataclass(frozen=True, eq=False)
+class CalibratedMarks:
+    """Places of n fiducial marks.
+
+    Attributes
+    ----------
+    names
+        By side, the data strip at the left.
+    xy, covariance
+        (n, 2) mm, and (2n, 2n) mm^2, x and y of a mark behind each other; singular where the figure is free.
+    adjusted
+        The adjustment of distances that they are from; None where coordinates are given.
+    """
+
+    names: tuple[str, ...]
+    xy: Floats
+    covariance: Floats
+    adjusted: AdjustedMarks | None = None
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Certificate(Shown, Brief):
+    """A certificate, mm, the data strip at the left. :meth:`read` reads files.
+
+    Parameters
+    ----------
+    name
+        The camera.
+    camera_type
+        As `Wild RC10`: for the usual places of its marks.
+    day
+        Of the calibration.
+    c, sd_c
+        Calibrated focal length, and its standard deviation (0.003).
+    reference
+        What coordinates refer to: `fiducial-centre`, `autocollimation` or `symmetry`.
+    autocollimation, symmetry
+        In the frame of the marks.
+    sd_principal_point
+        Of these (0.003).
+    places
+        Of marks by name.
+    sd_places, covariance
+        Of coordinates (0.002), or all of them as names `ll.x` .. with their matrix.
+    distances
+        Between marks.
+    design, sd_design
+        Where marks are meant to be, and how near they are to that (0.02): by default as is usual of the type.
+    lines
+        How and where lines of marks cross.
+    radial, tangential
+        The table of distortion that belongs to c; decentring.
+    radial_coefficients
+        K0, K1 ... as a report prints them: mm, with r in mm.
+    typed
+        Figures as they were typed, by fields: `ll.x`, `ml-mr`; those that are missing are written anew.
+    remarks
+        What was said while it was read.
+    file
+        From which it was read.
+
+    Raises
+    ------
+    InputError
+        A reference that is not known; a principal point that is the origin, and elsewhere.
+    """
+
+    name: str = ""
+    camera_type: str = ""
+    day: date | None = None
+    c: float | None = None
+    sd_c: float | None = None
+    reference: Literal["fiducial-centre", "autocollimation", "symmetry"] = "fiducial-centre"
+    autocollimation: tuple[float, float] | None = None
+    symmetry: tuple[float, float] | None = None
+    sd_principal_point: float | None = None
+    places: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    sd_places: float | None = None
+    covariance: Floats | None = None
+    distances: tuple[MarkDistance, ...] = ()
+    design: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    sd_design: float | None = None
+    lines: tuple[RightAngle | Crossing, ...] = ()
+    radial: RadialTable | None = None
+    tangential: Tangential | None = None
+    radial_coefficients: tuple[float, ...] = ()
+    typed: Mapping[str, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+    file: Path | None = None
+
+    def __post_init__(self) -> None:
+        one_of("reference", self.reference, REFERENCES)
+        own = {"autocollimation": self.autocollimation, "symmetry": self.symmetry}.get(self.reference)
+        if own is not None and any(own):
+            raise self._error(
+                f"coordinates refer to the point of {self.reference}, which is then the origin, not {own}:"
+                " say where the others are from there"
+            )
+
+    @classmethod
+    def read(cls, path: Path | str, camera: str | None = None) -> Self:
+        """Read a certificate.
+
+        Parameters
+        ----------
+        path
+            TOML, or a table `fiducials` (docs/certificates.md).
+        camera
+            Which one, where a table has several.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read, or has what is not known or cannot be used.
+        """
+        file = Path(path)
+        if file.suffix.lower() == ".toml":
+            if camera is not None:
+                raise InputError("is the certificate of one camera: none is to be chosen", file=file)
+            return cls(**read_toml(file))
+        return cls(**read_table(file, camera))
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return what it is in a few lines."""
+        rows = [
+            ("marks", listed(list(self.places) or self._of_distances())),
+            ("distances", f"{len(self.distances)}"),
+            ("verdict", self.verdict.headline),
+        ]
+        if self.c is not None:
+            rows.insert(0, ("c", f"{self.c:.4f} mm"))
+        return f"Certificate {self.name}, {self.day or 'without a date'}", rows
+
+    def check(self) -> tuple[DistanceDifference, ...]:
+        """Compare distances with coordinates where both are given; explain those beyond 0.010 mm."""
+        return self._checked
+
+    @cached_property
+    def _checked(self) -> tuple[DistanceDifference, ...]:
+        figures = {
+            f"{mark}.{axis}": repr(v)
+            for mark, xy in self.places.items()
+            for axis, v in zip("xy", xy, strict=True)
+        }
+        figures |= {each.name: repr(each.length) for each in self.distances}
+        figures |= self.typed
+        usual = self._usual(list(self.places))
+        return tuple(
+            difference_of(each.first, each.second, figures, usual)
+            for each in self.distances
+            if {each.first, each.second} <= self.places.keys()
+        )
+
+    def _usual(self, names: list[str]) -> dict[str, tuple[float, float]]:
+        usual = usual_places(self.camera_type)
+        return {**({} if usual is None else usual.places(names)), **self.design}
+
+    def fiducials(self) -> CalibratedMarks:
+        """Return the places of the marks with their covariance: as given, or from distances.
+
+        Raises
+        ------
+        InputError
+            There are neither coordinates nor distances; marks of distances without a design place.
+        AdjustmentError
+            Distances that do not belong to the design places.
+        """
+        return self._marks
+
+    @cached_property
+    def _marks(self) -> CalibratedMarks:
+        if self.places:
+            names, xy = tuple(self.places), np.array([*self.places.values()])
+            sd = SD_PLACE if self.sd_places is None else self.sd_places
+            given = self.covariance
+            return CalibratedMarks(names, xy, sd**2 * np.eye(xy.size) if given is None else given)
+        marks = self._of_distances()
+        if not marks:
+            raise self._error("has neither coordinates of marks nor distances between them")
+        places = self._usual(marks)
+        if missing := [name for name in marks if name not in places]:
+            raise self._error(
+                f"has distances alone, and nothing says where about {listed(missing)} are: give the type of"
+                " the camera, or places in [certificate.design]"
+            )
+        adjusted = adjust_distances(
+            marks,
+            np.array([places[name] for name in marks]),
+            self.distances,
+            design_sd=np.array([self._sd_design(name) for name in marks]),
+            conditions=self.lines,
+        )
+        return CalibratedMarks(adjusted.names, adjusted.xy, adjusted.covariance, adjusted)
+
+    def _of_distances(self) -> list[str]:
+        named = [mark for each in self.distances for mark in (each.first, each.second)]
+        return list(dict.fromkeys([*named, *(mark for each in self.lines for mark in each.marks)]))
+
+    def _sd_design(self, mark: str) -> float:
+        usual = usual_places(self.camera_type)
+        if self.sd_design is not None:
+            return self.sd_design
+        return SD_DESIGN if usual is None or mark in self.design else usual.sd(mark)
+
+    def curves(self) -> tuple[Curve, ...]:
+        """Return the fits of the table of distortion with one odd term, two, three.
+
+        Raises
+        ------
+        InputError
+            There is no table, or one that is too short.
+        """
+        return self._curves
+
+    @cached_property
+    def _curves(self) -> tuple[Curve, ...]:
+        if self.radial is None or self.c is None:
+            raise self._error("has no table of radial distortion with a focal length")
+        return curves_of(self.radial, self.c, self._sd_c)
+
+    @property
+    def _sd_c(self) -> float:
+        return SD_C if self.sd_c is None else self.sd_c
+
+    def curve(self, terms: int | None = None) -> Curve:
+        """Return the fitted curve of distortion with some odd terms; as many as the table asks for when None.
+
+        Raises
+        ------
+        InputError
+            As :meth:`curves`; fewer angles than unknowns.
+        """
+        if terms is None:
+            return chosen(self.curves())
+        if self.radial is None or self.c is None:
+            raise self._error("has no table of radial distortion with a focal length")
+        return fit_curve(self.radial, self.c, self._sd_c, terms)
+
+    @property
+    def principal_point(self) -> tuple[tuple[float, float], float, str]:
+        """Where it is in the frame of the marks (mm), its standard deviation, and which point that is."""
+        given = {"autocollimation": self.autocollimation, "symmetry": self.symmetry}
+        if self.reference in given:
+            given[self.reference] = (0.0, 0.0)
+        known = SD_PRINCIPAL_POINT if self.sd_principal_point is None else self.sd_principal_point
+        for what, place in given.items():
+            if place is not None:
+                return place, known if self.places else max(known, SD_UNKNOWN_POINT), what
+        return (0.0, 0.0), max(known, SD_UNKNOWN_POINT), "fiducial-centre"
+
+    def lens(
+        self, model: Literal["brown_forward", "brown"] = "brown_forward", terms: int | None = None
+    ) -> LensParameters:
+        """Return c and the radial terms with their covariance; without a table c alone.
+
+        Raises
+        ------
+        InputError
+            There is no focal length; as :meth:`curve`.
+        """
+        one_of("model", model, ("brown_forward", "brown"))
+        if self.c is None:
+            raise self._error("has no focal length c")
+        if self.radial is None:
+            return LensParameters(model, ("c",), np.array([-self.c]), np.array([[self._sd_c**2]]))
+        return (forward if model == "brown_forward" else backward)(self.curve(terms))
+
+    def camera(
+        self, model: Literal["brown_forward", "brown"] = "brown_forward", terms: int | None = None
+    ) -> Camera:
+        """Return the camera as blocks take it: c, principal point, lens, observed with their covariance.
+
+        Parameters
+        ----------
+        model
+            `brown_forward`: the same mapping as the curve of distortion; `brown`: corrections, converted.
+        terms
+            Odd terms of the curve; as many as the table asks for when None.
+
+        Raises
+        ------
+        InputError
+            There is no focal length, a table that does not determine the terms, decentring for `brown`.
+        """
+        lens = self.lens(model, terms)
+        (xp, yp), sd, _ = self.principal_point
+        names, values = [*lens.names, "xp", "yp"], [*lens.values.tolist(), xp, yp]
+        variances = [sd**2] * 2
+        if self.tangential is not None:
+            if model == "brown":
+                raise self._error("has decentring, which is converted to brown_forward only")
+            names, values = [*names, "B1", "B2"], [*values, *self.tangential.terms]
+            variances += [self.tangential.sd_j1**2] * 2
+        n = len(lens.names)
+        covariance = np.diag([*np.zeros(n), *variances])
+        covariance[:n, :n] = lens.covariance
+        return Camera(
+            model,
+            dict(zip(names, values, strict=True)),
+            name=self.name,
+            covariance=(names, covariance),
+            unit="mm",
+        )
+
+    def printed_coefficients(self) -> float | None:
+        """Return by how much K0, K1 ... as printed differ from the table at most, mm; None without either."""
+        if not self.radial_coefficients or self.radial is None or self.c is None:
+            return None
+        radius = self.c * np.tan(self.radial.angle)
+        powers = radius[:, np.newaxis] ** (2 * np.arange(len(self.radial_coefficients)) + 1)
+        return float(np.abs(powers @ self.radial_coefficients - self.radial.distortion).max())
+
+    def told(self) -> list[str]:
+        """Return what a user should know beside the verdict, as sentences."""
+        said = [*self.remarks]
+        apart = self.printed_coefficients()
+        if apart is not None and apart > PRINTED:
+            said.append(
+                f"the printed coefficients differ from the table of distortion by up to {1e3 * apart:.1f} um"
+            )
+        if self.radial_coefficients and self.radial is None:
+            said.append("printed coefficients without a table of distortion are not used")
+        if self.c is not None:
+            _, sd, what = self.principal_point
+            if what == "fiducial-centre":
+                said.append(f"nothing says where the principal point is: the fiducial centre, sd {sd:g} mm")
+            elif not self.places:
+                said.append(f"distances leave the principal point against the marks uncertain: sd {sd:g} mm")
+            if self.autocollimation is not None and self.symmetry is not None:
+                apart = math.dist(self.autocollimation, self.symmetry)
+                said.append(
+                    f"the point of symmetry is {1e3 * apart:.0f} um from that of autocollimation, about which"
+                    " distortion is taken"
+                )
+        if self.places and (left := [m for m in self._of_distances() if m not in self.places]):
+            said.append(
+                f"marks with distances alone beside others with coordinates are left out: {listed(left)}"
+            )
+        return said
+
+    def _error(self, message: str) -> InputError:
+        return InputError(
+            message if self.file else f"the certificate {self.name} {message}".rstrip(), file=self.file
+        )

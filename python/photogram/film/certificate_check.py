@@ -1,0 +1,196 @@
+"""Calibrated distances beside calibrated coordinates: which differ, and what single change would explain it.
+
+Certificates were typed, and typed again. Of a distance and the four coordinates that give it, every variant
+that one slip of the hand makes is tried: neighbouring digits exchanged, the sign, one digit, one digit lost
+or added. No figure is ever changed: people are told.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+__all__ = ["DistanceDifference", "Explanation", "difference_of", "explained"]
+
+How = Literal["exchange", "sign", "digit", "lost or extra"]
+
+LIMIT = 0.010
+"""Millimetres: a distance that differs by more from its coordinates is named."""
+EXPLAINED = 0.0035
+"""Millimetres: what may be left of a difference that a change explains."""
+SAME = 1e-9
+"""Millimetres: what is left of differences alike but for rounding."""
+_LEADING_ZERO = re.compile(r"[-+]?0\d")
+"""What nobody meant to type."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One change of one typed figure that explains a difference.
+
+    Attributes
+    ----------
+    field
+        `ml.x`, or the distance, `ml-mr`.
+    typed, perhaps
+        The figure as it stands there, and as it was perhaps meant.
+    how
+        `exchange` of neighbouring digits, `sign`, `digit`, `lost or extra`.
+    remaining
+        What the difference then is, mm.
+    from_usual
+        The changed coordinate less that of the usual place of the mark, mm; None where that is not known.
+    """
+
+    field: str
+    typed: str
+    perhaps: str
+    how: How
+    remaining: float
+    from_usual: float | None = None
+
+    def __str__(self) -> str:
+        return f"{self.field} {self.perhaps} for {self.typed} ({self.how})"
+
+
+@dataclass(frozen=True)
+class DistanceDifference:
+    """A distance beside the coordinates of its marks.
+
+    Attributes
+    ----------
+    name
+        `ml-mr`.
+    distance, from_coordinates
+        Millimetres.
+    explanations
+        Single changes of a figure that explain a difference beyond 0.010 mm, the likeliest first.
+    """
+
+    name: str
+    distance: float
+    from_coordinates: float
+    explanations: tuple[Explanation, ...] = ()
+
+    @property
+    def difference(self) -> float:
+        """Distance less that from coordinates, mm."""
+        return self.distance - self.from_coordinates
+
+    @property
+    def beyond(self) -> bool:
+        """Whether it is larger than 0.010 mm."""
+        return abs(self.difference) > LIMIT
+
+    def __str__(self) -> str:
+        said = f"{self.name} is {self.distance:.3f} mm, by coordinates {self.from_coordinates:.3f} mm"
+        if not self.explanations:
+            return f"{said}; no single change of a typed figure explains it" if self.beyond else said
+        first, *others = self.explanations
+        more = (
+            f", or {len(others)} other single changes"
+            if len(others) > 1
+            else f", or {others[0]}"
+            if others
+            else ""
+        )
+        return f"{said}; perhaps {first}{more}"
+
+
+def difference_of(
+    first: str,
+    second: str,
+    typed: Mapping[str, str],
+    usual: Mapping[str, tuple[float, float]],
+) -> DistanceDifference:
+    """Compare a distance with the coordinates of its marks; explain what differs by more than 0.010 mm.
+
+    Parameters
+    ----------
+    first, second
+        The marks.
+    typed
+        All figures as they stand in the certificate, by their fields.
+    usual
+        Usual places of marks (mm), where they are known.
+    """
+    name = f"{first}-{second}"
+    fields = [*(f"{mark}.{axis}" for mark in (first, second) for axis in "xy"), name]
+    own = {field: typed[field] for field in fields}
+    found = DistanceDifference(name, float(own[name]), _from_coordinates(fields, own))
+    if not found.beyond:
+        return found
+    places = {field: usual[field[:-2]]["xy".index(field[-1])] for field in fields[:4] if field[:-2] in usual}
+    return replace(found, explanations=explained(fields, own, places))
+
+
+def explained(
+    fields: Sequence[str], typed: Mapping[str, str], places: Mapping[str, float]
+) -> tuple[Explanation, ...]:
+    """Return the single changes that bring a distance and four coordinates together.
+
+    In the order of the kinds of slips and, among changes of a kind, by how far from its usual place the
+    farthest of both marks then is; where these are not known, by what is left.
+
+    Parameters
+    ----------
+    fields
+        x and y of the one and of the other mark, then the distance.
+    typed
+        The figures by these.
+    places
+        Usual coordinates by the same fields, as far as they are known.
+    """
+    found: list[tuple[tuple[int, float, int, int], Explanation]] = []
+    kinds = get_args(How)
+    for order, field in enumerate(fields):
+        for how, perhaps in _variants(typed[field]):
+            changed = {**typed, field: perhaps}
+            left = float(changed[fields[-1]]) - _from_coordinates(fields, changed)
+            if abs(left) < EXPLAINED:
+                usual = float(perhaps) - places[field] if field in places else None
+                far = max((abs(float(changed[each]) - places[each]) for each in places), default=0.0)
+                rank = kinds.index(how), far, round(abs(left) / SAME), order
+                found.append((rank, Explanation(field, typed[field], perhaps, how, left, usual)))
+    return tuple(each for _, each in sorted(found, key=lambda pair: pair[0]))
+
+
+def _from_coordinates(fields: Sequence[str], typed: Mapping[str, str]) -> float:
+    x1, y1, x2, y2 = (float(typed[field]) for field in fields[:4])
+    return math.hypot(x2 - x1, y2 - y1)
+
+
+def _variants(text: str) -> Iterator[tuple[How, str]]:
+    """Yield what one slip makes of a typed number, each other number once a kind."""
+    seen: set[tuple[How, str]] = set()
+    for how, variant in _slips(text):
+        if (how, variant) not in seen and _other_number(variant, text):
+            seen.add((how, variant))
+            yield how, variant
+
+
+def _slips(text: str) -> Iterator[tuple[How, str]]:
+    digits = [place for place, letter in enumerate(text) if letter.isdigit()]
+    for place in digits:
+        if place + 1 in digits:
+            yield "exchange", text[:place] + text[place + 1] + text[place] + text[place + 2 :]
+    yield "sign", text[1:] if text[0] in "+-" else f"-{text}"
+    for place in digits:
+        for digit in "0123456789":
+            yield "digit", text[:place] + digit + text[place + 1 :]
+    for place in digits:
+        yield "lost or extra", text[:place] + text[place + 1 :]
+        for digit in "0123456789":
+            for added in (text[:place] + digit + text[place:], text[: place + 1] + digit + text[place + 1 :]):
+                if not _LEADING_ZERO.match(added):
+                    yield "lost or extra", added
+
+
+def _other_number(variant: str, text: str) -> bool:
+    try:
+        return float(variant) != float(text)
+    except ValueError:
+        return False

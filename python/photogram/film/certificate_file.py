@@ -1,0 +1,266 @@
+"""Certificates as TOML (docs/certificates.md): what stands there, the data strip turned to the left."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from datetime import date
+from pathlib import Path
+from typing import Any, cast, get_args
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.film.decentring import SEMI_DIAGONALS, Tangential, of_profile, of_semi_diagonals
+from photogram.film.distances import Crossing, MarkDistance, RightAngle
+from photogram.film.lens_table import RadialTable
+from photogram.film.marks import DataStrip, by_side, turned, turned_name
+from photogram.io.toml import TomlFile
+from photogram.io.toml_tables import Table, read_document
+from photogram.messages import quoted
+from photogram.show.page import significant
+
+__all__ = ["read_toml"]
+
+UM = 1e-3
+"""In millimetres."""
+SD_DISTANCE = 0.002
+SD_DISTORTION_UM = 1.5
+SD_TANGENTIAL_UM = 2.0
+LARGEST = 1e4
+"""Millimetres of a camera."""
+
+_KEYS = (
+    *("camera", "type", "date", "data_strip", "unit", "c", "sd_c", "principal_point", "autocollimation"),
+    *("symmetry", "sd_principal_point", "sd_fiducials", "sd_distances", "sd_design", "radial_coefficients"),
+    *("fiducials", "distances", "design", "lines", "radial", "tangential", "tangential_sign"),
+)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the fields of a :class:`~photogram.film.certificate.Certificate` from a file.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is no TOML, or has what is not known or cannot be used.
+    """
+    table = read_document(path, {"certificate": _KEYS}).table("certificate")
+    if (unit := table.text("unit", "mm")) != "mm":
+        raise table.error("unit", f"is {quoted(unit)}: certificates are read in mm")
+    strip = _choice(table, "data_strip", "left", get_args(DataStrip))
+    frame = _Frame(cast(DataStrip, strip), path)
+    found: dict[str, Any] = {
+        "name": table.word("camera", path.stem),
+        "camera_type": table.text("type", ""),
+        "day": _day(table),
+        "c": abs(table.number("c", low=-LARGEST, high=LARGEST)) if "c" in table else None,
+        "sd_c": _positive(table, "sd_c"),
+        "reference": _choice(table, "principal_point", "fiducial-centre", REFERENCES),
+        "autocollimation": frame.place(table, "autocollimation"),
+        "symmetry": frame.place(table, "symmetry"),
+        "sd_principal_point": _positive(table, "sd_principal_point"),
+        "places": frame.places(table.table("fiducials")),
+        "sd_places": _positive(table, "sd_fiducials"),
+        "distances": frame.distances(table.table("distances"), table.positive("sd_distances", SD_DISTANCE)),
+        "design": frame.places(table.table("design")),
+        "sd_design": _positive(table, "sd_design"),
+        "lines": frame.lines(table),
+        "typed": frame.typed,
+        "file": path,
+    }
+    if found["c"] == 0:
+        raise table.error("c", "is zero")
+    found |= _radial(table, found["c"], frame)
+    found["tangential"] = _tangential(table, found["c"], found.get("radial"), frame)
+    return found
+
+
+REFERENCES = ("fiducial-centre", "autocollimation", "symmetry")
+"""What coordinates of marks may refer to."""
+
+
+class _Frame:
+    """Marks and places as a file has them, turned; and the figures as they were typed."""
+
+    def __init__(self, data_strip: DataStrip, path: Path) -> None:
+        self.data_strip, self.typed = data_strip, dict[str, str]()
+        text = "\n".join(TomlFile(path).lines)
+        self._typed: Mapping[str, Any] = tomllib.loads(text, parse_float=str)["certificate"]
+
+    def mark(self, name: str) -> str:
+        return turned_name(by_side(name), self.data_strip)
+
+    def place(self, table: Table, key: str) -> tuple[float, float] | None:
+        if key not in table:
+            return None
+        x, y = turned(_numbers(table, key, 2), self.data_strip).tolist()
+        return x, y
+
+    def places(self, table: Table) -> dict[str, tuple[float, float]]:
+        found: dict[str, tuple[float, float]] = {}
+        section = table.name.rpartition(".")[2]
+        for key in table.values:
+            name, place = self.mark(key), self.place(table, key)
+            if name in found:
+                raise table.error(key, f"is the mark {name}, which is there already")
+            assert place is not None
+            found[name] = place
+            if section == "fiducials":
+                self._keep(name, [_text(each) for each in self._typed[section][key]])
+        return found
+
+    def _keep(self, name: str, texts: list[str]) -> None:
+        """Keep coordinates as they were typed: turned, they have changed places and signs."""
+        x, y = texts
+        if self.data_strip == "top":
+            x, y = (y[1:] if y.startswith("-") else f"-{y.removeprefix('+')}"), x
+        self.typed |= {f"{name}.x": x, f"{name}.y": y}
+
+    def distances(self, table: Table, sd: float) -> tuple[MarkDistance, ...]:
+        found: dict[frozenset[str], MarkDistance] = {}
+        for key in table.values:
+            parts = [self.mark(part) for part in key.split("-")]
+            if len(parts) != 2 or not all(parts) or parts[0] == parts[1]:
+                raise table.error(key, "is no pair of marks: a distance is called ml-mr")
+            length = table.number(key, low=0, high=LARGEST)
+            each = MarkDistance(parts[0], parts[1], length, sd)
+            if not length:
+                raise table.error(key, "is 0")
+            if frozenset(parts) in found:
+                raise table.error(key, f"is the distance {each.name}, which is there already")
+            found[frozenset(parts)] = each
+            self.typed[each.name] = _text(self._typed["distances"][key])
+        return tuple(found.values())
+
+    def lines(self, table: Table) -> tuple[RightAngle | Crossing, ...]:
+        found: list[RightAngle | Crossing] = []
+        for number, row in enumerate(table.items("lines", []), 1):
+            if not isinstance(row, dict):
+                raise table.error("lines", "is no list of tables")
+            own = Table(row, f"certificate.lines {number}", table.file)
+            own.only(("marks", "angle", "sd_angle_arcmin", "place", "sd_place"))
+            names = [self.mark(each) for each in own.words("marks")]
+            if len(names) != 4 or len(set(names)) < 4:
+                raise own.error("marks", "are four: those of the first line, then of the second")
+            marks = (names[0], names[1], names[2], names[3])
+            if "sd_angle_arcmin" in own:
+                sd = math.radians(own.positive("sd_angle_arcmin") / 60)
+                found.append(RightAngle(marks, sd, math.radians(own.number("angle", 90.0, low=1, high=179))))
+            if "sd_place" in own:
+                place = self.place(own, "place") or (0.0, 0.0)
+                found.append(Crossing(marks, own.positive("sd_place"), place))
+            if not {"sd_angle_arcmin", "sd_place"} & own.values.keys():
+                raise own.error("marks", "say nothing without sd_angle_arcmin or sd_place")
+        return tuple(found)
+
+
+def _text(value: Any) -> str:
+    """Return a number as it was typed."""
+    return str(value).replace("_", "")
+
+
+def _choice(table: Table, key: str, default: str, known: tuple[str, ...]) -> str:
+    value = table.text(key, default)
+    if value not in known:
+        raise table.error(key, f"is {quoted(value)}, not one of {', '.join(known)}")
+    return value
+
+
+def _positive(table: Table, key: str) -> float | None:
+    return table.positive(key) if key in table else None
+
+
+def _day(table: Table) -> date | None:
+    value = table.values.get("date")
+    if value is None:
+        return None
+    try:
+        return value if type(value) is date else date.fromisoformat(value)
+    except (TypeError, ValueError):
+        raise table.error("date", f"is {quoted(str(value))}, not a day such as 1983-05-11") from None
+
+
+def _numbers(table: Table, key: str, count: int | None = None) -> Floats:
+    """Return a list of finite numbers, so many where that is said."""
+    found = np.array(table.numbers(key, len(table.items(key)) if count is None else count))
+    if not np.isfinite(found).all():
+        raise table.error(key, "has what is not a finite number")
+    return found
+
+
+def _angles(own: Table, c: float | None) -> Floats:
+    """Return angles from the axis, rad, of a table that has these in degrees or radii in mm."""
+    if ("angle" in own) == ("radius" in own):
+        raise own.error("angle", "or radius: one of them is needed")
+    key = "angle" if "angle" in own else "radius"
+    values = _numbers(own, key)
+    if key == "radius":
+        if c is None:
+            raise own.error("radius", "needs c, to which radii refer")
+        values = np.degrees(np.arctan2(values, c))
+    if not ((values > 0) & (values < 90)).all():
+        raise own.error(key, "has values that are not between the axis and 90 degrees from it")
+    return np.radians(values)
+
+
+def _radial(table: Table, c: float | None, frame: _Frame) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    if "radial_coefficients" in table:
+        found["radial_coefficients"] = tuple(_numbers(table, "radial_coefficients").tolist())
+    if "radial" not in table:
+        return found
+    own = table.table("radial")
+    own.only(("angle", "radius", "distortion", "sd_um", "correlation", *SEMI_DIAGONALS))
+    if c is None:
+        raise own.error("distortion", "needs c, the focal length that it belongs to")
+    angle = _angles(own, c)
+    correlation = own.number("correlation", 0.0, low=0.0, high=0.999)
+    if "distortion" in own:
+        values = UM * _numbers(own, "distortion", len(angle))
+        return found | {
+            "radial": RadialTable(angle, values, UM * own.positive("sd_um", SD_DISTORTION_UM), correlation)
+        }
+    singly = {frame.mark(name): UM * _numbers(own, name, len(angle)) for name in SEMI_DIAGONALS}
+    try:
+        mean, largest, sd = of_semi_diagonals(
+            angle, singly, UM * own.positive("sd_um") if "sd_um" in own else None
+        )
+    except InputError as error:
+        raise own.error("ll", error.message) from None
+    said = (
+        f"opposite semi-diagonals show decentring of up to {significant(largest / UM, 2)} um"
+        f" (sd {significant(sd / UM, 2)} um)"
+    )
+    radial = RadialTable(mean.angle, mean.distortion, mean.sd, correlation)
+    return found | {"radial": radial, "remarks": (said,)}
+
+
+def _tangential(
+    table: Table, c: float | None, radial: RadialTable | None, frame: _Frame
+) -> Tangential | None:
+    if "tangential" not in table:
+        return None
+    sign = table.values.get("tangential_sign")
+    if sign not in (1, -1) or isinstance(sign, bool):
+        raise table.error(
+            "tangential_sign",
+            "must say 1 or -1: laboratories count the profile either way, it is not guessed",
+        )
+    own = table.table("tangential")
+    own.only(("J1", "phi0", "angle", "radius", "displacement", "sd_um"))
+    phi0 = math.radians(own.number("phi0")) + (math.pi / 2 if frame.data_strip == "top" else 0.0)
+    sd = UM * own.positive("sd_um", SD_TANGENTIAL_UM)
+    if "J1" in own:
+        if radial is None or c is None:
+            raise own.error("J1", "needs the table of radial distortion, whose edge sd_um refers to")
+        edge = c * math.tan(float(radial.angle.max()))
+        return Tangential(own.number("J1"), phi0, sign, sd / edge**2)
+    if c is None:
+        raise own.error("displacement", "needs c")
+    angle = _angles(own, c)
+    values = UM * _numbers(own, "displacement", len(angle))
+    j1, sd_j1 = of_profile(c * np.tan(angle), values, sd)
+    return Tangential(j1, phi0, sign, sd_j1)

@@ -1,0 +1,291 @@
+"""Places of fiducial marks from distances between them, by least squares in the plane.
+
+Observations are distances s = |q_j - q_i|, and where a report says so the angle in which lines through
+opposite marks cross, and the place where they do. Where these determine the figure it is free: of all places
+that fit alike those nearest to the design (inner constraints), with the pseudo-inverse as their cofactors.
+Where they do not, design places are weighted observations besides.
+
+The engine of blocks adjusts points that photos show, and knows no angle between lines: this is a dense fit of
+some tens of unknowns (`photogram.statistics.fits`), linearised anew until nothing moves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import AdjustmentError
+from photogram.statistics.fits import Fit
+from photogram.statistics.limits import GlobalTest, global_test
+
+__all__ = ["AdjustedMarks", "Crossing", "MarkDistance", "RightAngle", "adjust_distances"]
+
+STEPS = 50
+CLOSE = 1e-13
+"""Millimetres: where steps end."""
+DETERMINED = 1e-6
+"""Least part of the largest singular value by which a movement of the marks is seen."""
+
+
+@dataclass(frozen=True)
+class MarkDistance:
+    """A calibrated distance.
+
+    Attributes
+    ----------
+    first, second
+        Marks.
+    length, sd
+        Millimetres.
+    """
+
+    first: str
+    second: str
+    length: float
+    sd: float
+
+    @property
+    def name(self) -> str:
+        """What certificates call it: `ml-mr`."""
+        return f"{self.first}-{self.second}"
+
+
+@dataclass(frozen=True)
+class RightAngle:
+    """The angle from the line first -> second to the line third -> fourth (radians, counter-clockwise)."""
+
+    marks: tuple[str, str, str, str]
+    sd: float
+    angle: float = math.pi / 2
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where the line of two marks crosses that of two others (mm), with the sd of each coordinate."""
+
+    marks: tuple[str, str, str, str]
+    sd: float
+    place: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class AdjustedMarks:
+    """Adjusted places of n marks, with their covariance and the tests of all r observed numbers.
+
+    Attributes
+    ----------
+    names
+        The marks.
+    xy
+        (n, 2) mm.
+    covariance
+        (2n, 2n) mm^2 for a priori unit weight, x and y of a mark behind each other; of a free figure of rank
+        2n less its defects.
+    free
+        How many movements the observations leave open, taken from the design by inner constraints.
+    rows
+        Names of the observed numbers: `ml-mr`, `angle ..`, `crossing .. x`, `ll.x` of design places.
+    observed, sd, residuals
+        (r,) mm, angles in radians; residuals are observed minus computed.
+    redundancy, standardized
+        (r,) redundancy numbers and Baarda's w.
+    test
+        The global test; None without degrees of freedom.
+    """
+
+    names: tuple[str, ...]
+    xy: Floats
+    covariance: Floats
+    free: int
+    rows: tuple[str, ...]
+    observed: Floats
+    sd: Floats
+    residuals: Floats
+    redundancy: Floats
+    standardized: Floats
+    test: GlobalTest | None
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Rows less unknowns, movements that are left open counted as known."""
+        return len(self.rows) - self.xy.size + self.free
+
+
+@dataclass(frozen=True)
+class _Row:
+    """An observed number: computed value and partials (2n,) at places (n, 2)."""
+
+    name: str
+    observed: float
+    sd: float
+    at: Callable[[Floats], tuple[float, Floats]]
+
+
+def adjust_distances(
+    names: Sequence[str],
+    design: Floats,
+    distances: Sequence[MarkDistance],
+    *,
+    design_sd: Floats,
+    conditions: Sequence[RightAngle | Crossing] = (),
+) -> AdjustedMarks:
+    """Adjust distances between marks.
+
+    Parameters
+    ----------
+    names
+        The marks.
+    design
+        (n, 2) places where they are meant to be, mm.
+    distances, conditions
+        What was calibrated.
+    design_sd
+        (n,) standard deviations of single coordinates of design places, mm: they are observed where the
+        distances alone do not determine the figure.
+
+    Raises
+    ------
+    AdjustmentError
+        The iteration does not come to rest: design and distances are of other marks.
+    """
+    of = {name: row for row, name in enumerate(names)}
+    rows = [_distance(each, of, len(names)) for each in distances]
+    for each in conditions:
+        rows += [_angle(each, of)] if isinstance(each, RightAngle) else _crossing(each, of)
+    open_ = _open(_partials(rows, design), design)
+    if open_ is None:
+        rows += _design(names, design, design_sd)
+        open_ = np.zeros((2 * len(names), 0))
+    xy, fit, within = _adjusted(rows, design, free=open_.shape[1] > 0)
+    redundancy = fit.redundancy
+    freedom = len(rows) - xy.size + open_.shape[1]
+    return AdjustedMarks(
+        names=tuple(names),
+        xy=xy,
+        covariance=within @ fit.cofactors @ within.T,
+        free=open_.shape[1],
+        rows=tuple(each.name for each in rows),
+        observed=np.array([each.observed for each in rows]),
+        sd=np.array([each.sd for each in rows]),
+        residuals=fit.residuals,
+        redundancy=redundancy,
+        standardized=fit.standardized,
+        test=global_test(fit.omega, freedom) if freedom else None,
+    )
+
+
+def _adjusted(rows: Sequence[_Row], design: Floats, *, free: bool) -> tuple[Floats, Fit, Floats]:
+    """Return places, the last fit, and the directions (2n, u) in which its parameters are."""
+    xy = design.astype(float)
+    variances = np.diag([each.sd**2 for each in rows])
+    for _ in range(STEPS):
+        a = _partials(rows, xy)
+        misfit = np.array([each.observed - each.at(xy)[0] for each in rows])
+        left = _open(a, xy) if free else np.zeros((xy.size, 0))
+        if left is None:
+            break
+        within = np.linalg.qr(left, mode="complete")[0][:, left.shape[1] :]
+        fit = Fit.of(misfit, variances, a @ within)
+        # Movements that nothing observes take the figure as near to the design as it comes.
+        step = within @ fit.parameters + left @ (left.T @ (design - xy).ravel())
+        xy = xy + step.reshape(-1, 2)
+        if np.abs(step).max() < CLOSE * np.abs(design).max():
+            return xy, fit, within
+        if not np.isfinite(xy).all():
+            break
+    raise AdjustmentError(
+        "the distances between marks do not fit their design places: other marks, or another unit?"
+    )
+
+
+def _partials(rows: Sequence[_Row], xy: Floats) -> Floats:
+    return np.array([each.at(xy)[1] for each in rows])
+
+
+def _open(partials: Floats, xy: Floats) -> Floats | None:
+    """Return (2n, d) orthonormal movements of the whole that no row sees; None where rows see too little."""
+    n = len(xy)
+    ones, zeros = np.ones(n), np.zeros(n)
+    shifts = [np.column_stack(each).ravel() for each in ((ones, zeros), (zeros, ones))]
+    turn = np.column_stack([-xy[:, 1], xy[:, 0]]).ravel()
+    whole = np.linalg.qr(np.column_stack([*shifts, turn]))[0]
+    seen, size = np.linalg.svd(partials @ whole, full_matrices=True)[2], _sizes(partials @ whole, 3)
+    largest = np.linalg.norm(partials, ord=2)
+    left = whole @ seen[size < DETERMINED * largest].T
+    rank = int((_sizes(partials, 2 * n) > DETERMINED * largest).sum())
+    return left if rank == 2 * n - left.shape[1] else None
+
+
+def _sizes(matrix: Floats, count: int) -> Floats:
+    """Return singular values of all `count` columns, zero of those beyond the rows."""
+    found = np.linalg.svd(matrix, compute_uv=False)
+    return np.concatenate([found, np.zeros(count - len(found))])
+
+
+def _spread(n: int, parts: dict[int, Floats]) -> Floats:
+    row = np.zeros((n, 2))
+    for mark, part in parts.items():
+        row[mark] += part
+    return row.ravel()
+
+
+def _distance(each: MarkDistance, of: dict[str, int], n: int) -> _Row:
+    i, j = of[each.first], of[each.second]
+
+    def at(xy: Floats) -> tuple[float, Floats]:
+        apart = xy[j] - xy[i]
+        length = float(np.hypot(*apart))
+        return length, _spread(n, {i: -apart / length, j: apart / length})
+
+    return _Row(each.name, each.length, each.sd, at)
+
+
+def _angle(each: RightAngle, of: dict[str, int]) -> _Row:
+    i, j, k, m = (of[name] for name in each.marks)
+
+    def at(xy: Floats) -> tuple[float, Floats]:
+        a, b = xy[j] - xy[i], xy[m] - xy[k]
+        by_a, by_b = (np.array([-v[1], v[0]]) / (v @ v) for v in (a, b))
+        parts = _spread(len(xy), {i: by_a, j: -by_a}) + _spread(len(xy), {k: -by_b, m: by_b})
+        return math.atan2(a[0] * b[1] - a[1] * b[0], float(a @ b)), parts
+
+    first, second = (f"{each.marks[row]}-{each.marks[row + 1]}" for row in (0, 2))
+    return _Row(f"angle {first} to {second}", each.angle, each.sd, at)
+
+
+def _crossing(each: Crossing, of: dict[str, int]) -> list[_Row]:
+    i, j, k, m = (of[name] for name in each.marks)
+
+    def at(xy: Floats, axis: int) -> tuple[float, Floats]:
+        a, b, apart = xy[j] - xy[i], xy[m] - xy[k], xy[k] - xy[i]
+        normal_a, normal_b = np.array([-a[1], a[0]]), np.array([-b[1], b[0]])
+        along_a, along_b = float(apart @ normal_b / (a @ normal_b)), float(-apart @ normal_a / (b @ normal_a))
+        # Both lines pass through the place: their normals' rows say how it moves.
+        back = np.linalg.inv(np.array([normal_a, normal_b]))[axis]
+        of_a, of_b = back[0] * normal_a, back[1] * normal_b
+        parts = _spread(len(xy), {i: (1 - along_a) * of_a, j: along_a * of_a})
+        parts += _spread(len(xy), {k: (1 - along_b) * of_b, m: along_b * of_b})
+        return float((xy[i] + along_a * a)[axis]), parts
+
+    name = f"crossing {each.marks[0]}-{each.marks[1]} with {each.marks[2]}-{each.marks[3]}"
+    return [
+        _Row(f"{name} {letter}", each.place[axis], each.sd, lambda xy, axis=axis: at(xy, axis))  # type: ignore[misc]
+        for axis, letter in enumerate("xy")
+    ]
+
+
+def _design(names: Sequence[str], design: Floats, sd: Floats) -> list[_Row]:
+    return [
+        _Row(
+            f"{name}.{'xy'[axis]}",
+            float(design[row, axis]),
+            float(sd[row]),
+            lambda xy, row=row, axis=axis: (float(xy[row, axis]), _spread(len(xy), {row: np.eye(2)[axis]})),  # type: ignore[misc]
+        )
+        for row, name in enumerate(names)
+        for axis in (0, 1)
+    ]

@@ -1,0 +1,249 @@
+"""A lens from the table of its radial distortion, with covariance.
+
+The laboratory measures where rays of known angles alpha come to lie: dr = measured minus ideal radius, with
+r = c0 tan alpha and c0 its calibrated focal length. The curve is
+
+    dr(r) = k0 r + k1 r^3 + k2 r^5 + k3 r^7.
+
+k0 belongs to c: c0 balances the curve by the laboratory's choice. With |c| = c0 (1 + k0) and
+A_j = k_j / (1 + k0)^(2j + 1) the forward camera `brown_forward` is the same mapping.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.statistics.distributions import critical_chi_square
+from photogram.statistics.fits import Fit
+from photogram.statistics.limits import GlobalTest, global_test
+
+__all__ = [
+    "Curve",
+    "LensParameters",
+    "RadialTable",
+    "backward",
+    "chosen",
+    "curves_of",
+    "fit_curve",
+    "forward",
+]
+
+MOST_TERMS = 3
+"""Odd terms that cameras have."""
+LEVEL = 0.01
+"""Of the test by which a term is taken in."""
+STEP = 0.01
+"""Of differences, in standard deviations."""
+
+
+@dataclass(frozen=True, eq=False)
+class RadialTable:
+    """A table of radial distortion.
+
+    Attributes
+    ----------
+    angle
+        (n,) rad from the axis.
+    distortion
+        (n,) mm, positive outwards, measured minus ideal.
+    sd
+        Of a value, mm.
+    correlation
+        Between any two values.
+    """
+
+    angle: Floats
+    distortion: Floats
+    sd: float = 1.5e-3
+    correlation: float = 0.0
+
+    @property
+    def covariance(self) -> Floats:
+        """(n, n) mm^2: sd^2 ((1 - rho) I + rho 11')."""
+        n = len(self.angle)
+        return self.sd**2 * ((1 - self.correlation) * np.eye(n) + self.correlation)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A fitted curve of distortion with t odd terms.
+
+    Attributes
+    ----------
+    focal_length, sd_focal_length
+        c0, mm, that the angles refer to.
+    radius
+        (n,) c0 tan alpha of the table, mm.
+    coefficients, covariance
+        (1 + t,) k0, k1 ..., of mm in powers of mm.
+    residuals, redundancy, standardized
+        (n,) mm; w.
+    omega, test
+        Weighted sum of squares, and its test; None without degrees of freedom.
+    """
+
+    focal_length: float
+    sd_focal_length: float
+    radius: Floats
+    coefficients: Floats
+    covariance: Floats
+    residuals: Floats
+    redundancy: Floats
+    standardized: Floats
+    omega: float
+    test: GlobalTest | None
+
+    @property
+    def terms(self) -> int:
+        """How many odd terms it has beside k0."""
+        return len(self.coefficients) - 1
+
+    def at(self, radius: Floats) -> Floats:
+        """Return the distortion (m,) at radii (m,), mm."""
+        return np.asarray(_columns(np.asarray(radius, float), self.terms) @ self.coefficients)
+
+    def sd_at(self, radius: Floats) -> Floats:
+        """Return its standard deviation there: sqrt(j Q j')."""
+        j = _columns(np.asarray(radius, float), self.terms)
+        return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", j, self.covariance, j)))
+
+
+@dataclass(frozen=True, eq=False)
+class LensParameters:
+    """What of a camera is of its lens.
+
+    Attributes
+    ----------
+    model
+        `brown_forward` or `brown`.
+    names, values, covariance
+        c (negative) and the radial terms, mm in powers of mm.
+    apart
+        What the camera and the curve differ by at most within the table, mm; 0 of the same mapping.
+    """
+
+    model: str
+    names: tuple[str, ...]
+    values: Floats
+    covariance: Floats
+    apart: float = 0.0
+
+
+def fit_curve(table: RadialTable, focal_length: float, sd_focal_length: float, terms: int) -> Curve:
+    """Fit a table by k0 and some odd terms.
+
+    Raises
+    ------
+    InputError
+        There are fewer values than unknowns, or two of one angle that leave these undetermined.
+    """
+    radius = focal_length * np.tan(table.angle)
+    if len(np.unique(radius)) < terms + 1:
+        raise InputError(f"a table of {len(radius)} angles does not determine k0 and {terms} odd terms")
+    fit = Fit.of(table.distortion, table.covariance, _columns(radius, terms))
+    freedom = len(radius) - terms - 1
+    return Curve(
+        focal_length=focal_length,
+        sd_focal_length=sd_focal_length,
+        radius=radius,
+        coefficients=fit.parameters,
+        covariance=fit.cofactors,
+        residuals=fit.residuals,
+        redundancy=fit.redundancy,
+        standardized=fit.standardized,
+        omega=fit.omega,
+        test=global_test(fit.omega, freedom) if freedom else None,
+    )
+
+
+def curves_of(table: RadialTable, focal_length: float, sd_focal_length: float) -> tuple[Curve, ...]:
+    """Return the curves with one odd term, two ...: at most n - 3 of n angles, and three.
+
+    Raises
+    ------
+    InputError
+        Fewer than four angles.
+    """
+    most = min(MOST_TERMS, len(np.unique(table.angle)) - 3)
+    if most < 1:
+        raise InputError(f"a table of {len(table.angle)} angles is too short for a curve: it takes four")
+    return tuple(fit_curve(table, focal_length, sd_focal_length, terms) for terms in range(1, most + 1))
+
+
+def chosen(curves: Sequence[Curve]) -> Curve:
+    """Return the curve with so many terms that another gains no more than chi-square(0.99; 1) in Omega."""
+    limit = critical_chi_square(LEVEL, 1)
+    for curve, more in pairwise(curves):
+        if curve.omega - more.omega <= limit:
+            return curve
+    return curves[-1]
+
+
+def forward(curve: Curve) -> LensParameters:
+    """Return c and A1 ... of `brown_forward`: the same mapping, r0 = 0."""
+    c0, (k0, *odd) = curve.focal_length, curve.coefficients.tolist()
+    grown = 1 + k0
+    powers = np.array([2 * j + 1 for j in range(1, curve.terms + 1)])
+    terms = np.array(odd) / grown**powers
+    # Rows: c, A1 ...; columns: c0, k0, k1 ...
+    by = np.zeros((1 + curve.terms, 2 + curve.terms))
+    by[0, :2] = -grown, -c0
+    by[1:, 1] = -powers * terms / grown
+    by[1:, 2:] = np.diag(grown ** -powers.astype(float))
+    return LensParameters(
+        "brown_forward",
+        ("c", *(f"A{j}" for j in range(1, curve.terms + 1))),
+        np.array([-c0 * grown, *terms]),
+        by @ _with_focal_length(curve) @ by.T,
+    )
+
+
+def backward(curve: Curve) -> LensParameters:
+    """Return c and K1 ... of `brown`: corrections -dr fitted at the distorted radius, on the same radii."""
+
+    def fitted(given: Floats) -> Floats:
+        c0, coefficients = given[0], given[1:]
+        ideal = curve.radius / curve.focal_length * c0
+        distorted = ideal + _columns(ideal, curve.terms) @ coefficients
+        columns = _columns(distorted, curve.terms)
+        size = np.linalg.norm(columns, axis=0)
+        k = np.linalg.lstsq(columns / size, ideal - distorted, rcond=None)[0] / size
+        return np.array([-c0 / (1 + k[0]), *(k[1:] / (1 + k[0]))])
+
+    given = np.array([curve.focal_length, *curve.coefficients])
+    covariance = _with_focal_length(curve)
+    values = fitted(given)
+    by = _differences(fitted, given, np.sqrt(np.diag(covariance)))
+    distorted = curve.radius + curve.at(curve.radius)
+    corrected = _columns(distorted, curve.terms)[:, 1:] @ values[1:] + distorted
+    apart = corrected - -values[0] / curve.focal_length * curve.radius
+    names = ("c", *(f"K{j}" for j in range(1, curve.terms + 1)))
+    return LensParameters("brown", names, values, by @ covariance @ by.T, float(np.abs(apart).max()))
+
+
+def _with_focal_length(curve: Curve) -> Floats:
+    """Return the covariance of c0, k0, k1 ...: the table says nothing of the first."""
+    whole = np.zeros((2 + curve.terms,) * 2)
+    whole[0, 0] = curve.sd_focal_length**2
+    whole[1:, 1:] = curve.covariance
+    return whole
+
+
+def _differences(function: Callable[[Floats], Floats], at: Floats, sd: Floats) -> Floats:
+    """Return partials by central differences."""
+    columns = []
+    for k, step in enumerate(STEP * np.where(sd > 0, sd, np.abs(at))):
+        moved = np.zeros(len(at))
+        moved[k] = step
+        columns.append((function(at + moved) - function(at - moved)) / (2 * step))
+    return np.column_stack(columns)
+
+
+def _columns(radius: Floats, terms: int) -> Floats:
+    return np.asarray(radius)[:, np.newaxis] ** (2 * np.arange(terms + 1) + 1)

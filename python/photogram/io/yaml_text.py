@@ -1,0 +1,216 @@
+"""YAML as OpenCV, ROS and Kalibr write it: mappings, sequences, flow lists, plain and quoted values, tags.
+
+Anchors, block text and several documents are refused by the line where they stand: a reader of few forms that
+says what it does not understand. Tags are read and left out: what `!!opencv-matrix` marks has its own keys.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from photogram.errors import InputError
+from photogram.io.files import read_lines
+from photogram.io.places import Place
+
+__all__ = ["read_yaml_text"]
+
+DEEPEST = 50
+"""Brackets and indents within each other."""
+_KEY = re.compile(
+    r"""("(?:[^"\\]|\\.)*"|'[^']*'|[^\s#'"\[\]{},&*!|>%@`-][^#:]*?|-[^\s#:][^#:]*?)\s*:(?:\s+|$)"""
+)
+_TAG = re.compile(r"!\S*\s*")
+_TOKEN = re.compile(
+    r"""\s*(?:([\[\]{},])|("(?:[^"\\]|\\.)*"|'(?:[^']|'')*')|([^\s\[\]{},:][^\[\]{},:]*(?::[^\s\[\]{},][^\[\]{},:]*)*)|(:))"""
+)
+_COMMENT = re.compile(r"(^|\s)#.*$")
+_WORDS: Mapping[str, Any] = {"": None, "~": None, "null": None, "true": True, "false": False}
+
+
+class _Line:
+    """A line with something in it: its indent, its text without comments, its number."""
+
+    def __init__(self, place: Place, text: str) -> None:
+        self.place = place
+        self.text = text.strip()
+        self.indent = len(text) - len(text.lstrip())
+
+
+def read_yaml_text(path: Path) -> dict[str, Any]:
+    """Return the mapping that a file is.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is no mapping, or has a form that is not taken: names the line.
+    """
+    lines = []
+    for record, text in enumerate(read_lines(path), 1):
+        place = Place(path, record, text)
+        if text.startswith("%YAML") or text.rstrip() in ("---", "..."):
+            continue
+        if "\t" in text[: len(text) - len(text.lstrip())]:
+            raise place.error("is indented by tabs")
+        bare = text if '"' in text or "'" in text else _COMMENT.sub("", text)
+        if bare.strip() and not bare.lstrip().startswith("#"):
+            lines.append(_Line(place, bare))
+    if not lines:
+        raise InputError("is empty", file=path)
+    reader = _Reader(lines)
+    found = reader.block(lines[0].indent, 0)
+    if reader.at < len(lines):
+        raise lines[reader.at].place.error("is indented unlike the lines before")
+    if not isinstance(found, dict):
+        raise InputError("is no mapping of keys to values", file=path)
+    return found
+
+
+class _Reader:
+    def __init__(self, lines: list[_Line]) -> None:
+        self.lines, self.at = lines, 0
+
+    def block(self, indent: int, depth: int) -> Any:
+        """Return the mapping or sequence whose lines begin at an indent."""
+        if depth > DEEPEST:
+            raise self.lines[self.at].place.error("is nested too deeply")
+        if self.lines[self.at].text.startswith(("- ", "-\n")) or self.lines[self.at].text == "-":
+            return self._sequence(indent, depth)
+        found: dict[str, Any] = {}
+        while self.at < len(self.lines) and self.lines[self.at].indent == indent:
+            line = self.lines[self.at]
+            key = _KEY.match(line.text)
+            if key is None:
+                raise line.place.error("is no `key: value`")
+            name = _scalar_text(key[1])
+            if name in found:
+                raise line.place.error(f"the key {name} is there twice")
+            found[name] = self._value(line.text[key.end() :], indent, depth)
+        return found
+
+    def _sequence(self, indent: int, depth: int) -> list[Any]:
+        found = []
+        while self.at < len(self.lines) and self.lines[self.at].indent == indent:
+            line = self.lines[self.at]
+            if not (line.text.startswith("- ") or line.text == "-"):
+                break
+            rest = line.text[1:]
+            inner = rest.lstrip()
+            if _KEY.match(inner) and not inner.startswith(("[", "{")):
+                # A mapping that begins behind the dash.
+                line.indent, line.text = indent + len(line.text) - len(inner), inner
+                found.append(self.block(line.indent, depth + 1))
+            else:
+                found.append(self._value(inner, indent, depth))
+        return found
+
+    def _value(self, text: str, indent: int, depth: int) -> Any:
+        """Return what stands behind a key or dash, or in the lines below that are indented more."""
+        line = self.lines[self.at]
+        text = _TAG.sub("", text, count=1) if text.startswith("!") else text
+        if text[:1] in ("&", "*", "|", ">", "@", "`"):
+            raise line.place.error(f"has a form of YAML that is not taken: {text[:1]}")
+        if text[:1] in ("[", "{"):
+            return self._flow(text)
+        self.at += 1
+        if text:
+            return _scalar(text)
+        if self.at == len(self.lines):
+            return None
+        below = self.lines[self.at]
+        dashed = below.text == "-" or below.text.startswith("- ")
+        if below.indent > indent or (below.indent == indent and dashed):
+            return self.block(below.indent, depth + 1)
+        return None
+
+    def _flow(self, text: str) -> Any:
+        """Return a list or mapping in brackets, which may go on over several lines."""
+        first = self.lines[self.at].place
+        self.at += 1
+        tokens = _tokens(text, first)
+        while (missing := _open(tokens, first)) > 0:
+            if self.at == len(self.lines):
+                raise first.error("has a bracket that is not closed")
+            tokens += _tokens(self.lines[self.at].text, self.lines[self.at].place)
+            self.at += 1
+            if missing > DEEPEST:
+                raise first.error("is nested too deeply")
+        value, end = _item(tokens, 0, first)
+        if end < len(tokens):
+            raise first.error("goes on behind its last bracket")
+        return value
+
+
+_Tokens = list[tuple[str, str]]
+"""What each is (a bracket, `,` or `:` by itself; `text`), and its text."""
+
+
+def _tokens(text: str, place: Place) -> _Tokens:
+    found: _Tokens = []
+    at, end = 0, len(text.rstrip())
+    while at < end:
+        match = _TOKEN.match(text, at)
+        if match is None:
+            raise place.error("has a form of YAML that is not taken")
+        mark, quoted, plain, colon = match.groups()
+        found.append((mark or colon, mark or colon) if mark or colon else ("text", quoted or plain.strip()))
+        at = match.end()
+    return found
+
+
+def _open(tokens: _Tokens, place: Place) -> int:
+    """Return how many brackets are not closed."""
+    kinds = [kind for kind, _ in tokens]
+    depth = sum(kind in "[{" for kind in kinds) - sum(kind in "]}" for kind in kinds)
+    if depth < 0:
+        raise place.error("closes a bracket that was not opened")
+    return depth
+
+
+def _item(tokens: _Tokens, at: int, place: Place) -> tuple[Any, int]:
+    kind, text = tokens[at] if at < len(tokens) else ("", "")
+    if kind == "text":
+        return _scalar(text), at + 1
+    if kind not in ("[", "{"):
+        raise place.error("has a list or mapping in brackets that is not well formed")
+    close = "]" if kind == "[" else "}"
+    items: list[Any] = []
+    pairs: dict[str, Any] = {}
+    at += 1
+    while at < len(tokens) and tokens[at][0] != close:
+        value, at = _item(tokens, at, place)
+        if close == "}":
+            if at >= len(tokens) or tokens[at][0] != ":":
+                raise place.error(f"has no value for {value}")
+            pairs[str(value)], at = _item(tokens, at + 1, place)
+        else:
+            items.append(value)
+        if at < len(tokens) and tokens[at][0] == ",":
+            at += 1
+        elif at < len(tokens) and tokens[at][0] != close:
+            raise place.error("has a list or mapping in brackets that is not well formed")
+    if at >= len(tokens):
+        raise place.error("has a list or mapping in brackets that is not well formed")
+    return (items if close == "]" else pairs), at + 1
+
+
+def _scalar_text(text: str) -> str:
+    if text[:1] == '"':
+        return re.sub(r"\\(.)", r"\1", text[1:-1])
+    return text[1:-1].replace("''", "'") if text[:1] == "'" else text
+
+
+def _scalar(text: str) -> Any:
+    """Return a value: text in quotes, a number, true, false, nothing, or plain text."""
+    if text[:1] in ("'", '"'):
+        return _scalar_text(re.sub(r"""(["'])\s+#.*$""", r"\1", text))
+    if text.lower() in _WORDS:
+        return _WORDS[text.lower()]
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text

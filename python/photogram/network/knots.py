@@ -1,0 +1,166 @@
+"""Knots of splined cameras: displacements on a grid over the stereographic image, beside the parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import frozen, numbers, shaped
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.network.unknowns import Unknown
+
+__all__ = ["KNOTTED", "Knot", "checked_knot_sd", "checked_knots", "knot_names", "knot_unknowns"]
+
+KNOTTED = "splined_stereographic"
+"""The model that has knots."""
+MOST = 10_000
+"""Knots along columns or rows, at the most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Knot(Unknown):
+    """Displacements dx, dy at one knot of a camera, in units of the stereographic image.
+
+    Parameters
+    ----------
+    name
+        The camera and the knot.
+    value
+        (2,) where the adjustment starts from.
+    sd
+        (2,) 0 held, infinite free or weighted by `covariance`.
+    covariance
+        (2, 2) of the observation that both are 0; None without.
+    """
+
+    KIND = "knot"
+
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+    covariance: Floats | None = None
+
+    def _position(self) -> Floats:
+        return np.append(shaped(f"value of {self.title}", self.value, (2,)), 0.0)
+
+
+def knot_unknowns(camera: str, knots: Floats | None, sd: Floats | None) -> tuple[Knot, ...]:
+    """Return the knots of a camera as unknowns, row by row; none where all are held.
+
+    Parameters
+    ----------
+    camera
+        Its name.
+    knots, sd
+        (ny, nx, 2) as of :class:`photogram.Camera`; None of a model without them.
+    """
+    if knots is None or sd is None or not sd.any():
+        return ()
+    rows, columns, _ = knots.shape
+    j, i = np.mgrid[:rows, :columns]
+    away = np.stack([2 * i - columns + 1, 2 * j - rows + 1], axis=2).astype(float)
+    away[(away == 0).all(axis=2)] = (1.0, 0.0)
+    radial = away / np.linalg.norm(away, axis=2, keepdims=True)
+    across = radial[..., ::-1] * [-1.0, 1.0]
+    axes = np.stack([radial, across], axis=3)
+    with np.errstate(invalid="ignore"):
+        covariances = np.einsum("jiak,jik,jibk->jiab", axes, sd**2, axes)
+    return tuple(
+        Knot(
+            f"{camera} {column}_{row}",
+            knots[row, column],
+            np.inf if own.any() else 0.0,
+            covariances[row, column] if 0 < own[0] < np.inf else None,
+        )
+        for row in range(rows)
+        for column, own in enumerate(sd[row])
+    )
+
+
+def checked_knots(
+    title: str, model: str, parameters: Mapping[str, float], knots: ArrayLike | None
+) -> Floats | None:
+    """Return (ny, nx, 2) knots; None of a model without them.
+
+    Raises
+    ------
+    InputError
+        Constants that are none of a spline, knots of a model without them, another shape, values that are
+        not finite.
+    """
+    if model != KNOTTED:
+        if knots is not None:
+            raise InputError(f"the camera {title}: {model} has no knots; {KNOTTED} has")
+        return None
+    order, fov = parameters["order"], parameters["fov_x_deg"]
+    if order not in (2.0, 3.0):
+        raise InputError(f"order of the camera {title} is 2 or 3, not {order:g}")
+    for name in ("nx", "ny"):
+        count = parameters[name]
+        if not (count.is_integer() and order < count <= MOST):
+            raise InputError(
+                f"{name} of the camera {title}: splines of order {order:g} have {order + 1:g} to {MOST} knots"
+                f" along an axis, not {count:g}"
+            )
+    if not 0 < fov < 360:
+        raise InputError(f"fov_x_deg of the camera {title} is between 0 and 360 degrees, not {fov:g}")
+    shape = (int(parameters["ny"]), int(parameters["nx"]), 2)
+    found = shaped(f"knots of the camera {title}", 0.0 if knots is None else knots, shape)
+    if not np.isfinite(found).all():
+        raise InputError(f"knots of the camera {title} are not all finite")
+    return found
+
+
+def checked_knot_sd(title: str, knots: Floats | None, given: ArrayLike) -> Floats | None:
+    """Return (ny, nx, 2) standard deviations of knots, radial and tangential; None of a model without them.
+
+    Raises
+    ------
+    InputError
+        Standard deviations of what is not there, of another shape, or negative.
+    """
+    what = f"knot_sd of the camera {title}"
+    found = numbers(what, given)
+    if knots is None:
+        if found.any():
+            raise InputError(f"{what}: it has no knots")
+        return None
+    if found.shape == (2,):
+        found = np.broadcast_to(found, knots.shape)
+    found = shaped(what, found, knots.shape)
+    if not (found >= 0).all():
+        raise InputError(f"{what} holds what is no standard deviation: {float(found[~(found >= 0)][0])}")
+    kinds = np.sign(found) + np.isinf(found)
+    if (kinds[..., 0] != kinds[..., 1]).any():
+        raise InputError(f"{what}: a knot is held, weighted or free in both directions")
+    return frozen(found)
+
+
+def knot_names(knots: Floats | None) -> tuple[str, ...]:
+    """Return what knots are called, row by row: `dx_i_j`, `dy_i_j`, i along columns; none without them."""
+    if knots is None:
+        return ()
+    rows, columns, _ = knots.shape
+    return tuple(f"d{axis}_{i}_{j}" for j in range(rows) for i in range(columns) for axis in "xy")
+
+
+def outside(parameters: Mapping[str, float], u: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    """Return (n,) whether directions lie beyond the knots, where the polynomials at the edge go on.
+
+    Parameters
+    ----------
+    parameters
+        Of the splined camera.
+    u
+        (n, 3) in the axes of the photo.
+    """
+    order = parameters["order"]
+    places = 2 * u[:, :2] * [1, -1] / (np.linalg.norm(u, axis=1) - u[:, 2])[:, np.newaxis]
+    per_place = (parameters["nx"] - order) / (4 * math.tan(math.radians(parameters["fov_x_deg"]) / 4))
+    reach = (np.array([parameters["nx"], parameters["ny"]]) - order) / 2 / per_place
+    found: np.ndarray[tuple[int, ...], np.dtype[np.bool_]] = ~(np.abs(places) <= reach).all(axis=1)
+    return found

@@ -1,0 +1,261 @@
+"""Boards: targets in a known order on a plane, or points anywhere on a rigid thing.
+
+Points of a board are numbered row by row, x fastest, from 0. The origin is point 0; x runs along the columns,
+y along the rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, Self, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import frozen, length, names, number, one_of, shaped, text, whole_number
+from photogram.arguments.equality import Valued
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.show.brief import Brief, Rows
+
+__all__ = ["Board", "BoardKind", "Shape"]
+
+BoardKind = Literal["chessboard", "charuco", "aprilgrid", "circles", "asymmetric_circles", "points"]
+Shape = Literal["held", "bend", "points"]
+"""What of a board is unknown: nothing, the two deflections of its middle lines, or every point."""
+
+MANY_VIEWS = 8
+"""Views from which the points of a board are adjusted, where nobody says what its shape is."""
+PLANE_PARTS, SPACING_PARTS = 200.0, 500.0
+"""Parts of the spacing that a target is expected to be out of the plane, and out of its place in it."""
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Board(Valued, Brief):
+    """A board with its targets.
+
+    Parameters
+    ----------
+    kind
+        `chessboard`, `charuco` (corners of a chessboard), `aprilgrid`, `circles`, `asymmetric_circles`, or
+        `points` anywhere.
+    columns, rows
+        Corners along x and y (not squares), or circles; of an AprilGrid tags; of `points` nothing counts.
+    spacing
+        From one corner to the next along x and y, one number for both; in `unit`. Of asymmetric circles from
+        one row to the next. An AprilGrid has `tag_size` and `tag_spacing` in its place.
+    unit
+        Of all lengths.
+    tag_size, tag_spacing
+        Of an AprilGrid: the edge of a tag, and the gap between tags over the edge.
+    points, point_names
+        Of `points`: (n, 3) nominal positions, and names; None: numbers from 0.
+    shape
+        `held`, `bend` (two parabolas: :meth:`bent`), or `points`: each coordinate is an unknown that is
+        observed with its nominal value. None: `points` where there are 8 views or more, else `held`.
+    sd_plane, sd_spacing
+        Standard deviations of z, and of x and y, of each point for `points`. None: 1/200 and 1/500 of the
+        spacing.
+    point_sd
+        (n, 3) in the place of these; None: these.
+
+    Raises
+    ------
+    InputError
+        Another kind or shape, fewer than 2 columns or rows, lengths that are not positive, what does not
+        belong to the kind, a bend of points that lie anywhere.
+    """
+
+    kind: BoardKind = "chessboard"
+    columns: int = 0
+    rows: int = 0
+    spacing: tuple[float, float] | float | None = None
+    unit: str = "m"
+    tag_size: float | None = None
+    tag_spacing: float | None = None
+    points: ArrayLike | None = None
+    point_names: Sequence[str] | None = None
+    shape: Shape | None = None
+    sd_plane: float | None = None
+    sd_spacing: float | None = None
+    point_sd: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        one_of("kind of a board", self.kind, get_args(BoardKind))
+        if self.shape is not None:
+            one_of("shape of a board", self.shape, get_args(Shape))
+        text("unit", self.unit)
+        if self.kind == "points":
+            self._check_points()
+        else:
+            self._check_grid()
+        if self.point_sd is not None:
+            sd = shaped("point_sd", self.point_sd, (len(self.places), 3))
+            if not ((sd >= 0) & np.isfinite(sd)).all():
+                raise InputError("point_sd of a board are not standard deviations")
+            self._set("point_sd", sd)
+        for name in ("sd_plane", "sd_spacing"):
+            if getattr(self, name) is not None:
+                self._set(name, _length(name, getattr(self, name)))
+
+    def _set(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
+
+    def _refuse(self, *fields: str) -> None:
+        for name in fields:
+            if getattr(self, name) is not None:
+                raise InputError(f"a board of the kind {self.kind} has no {name}")
+
+    def _check_grid(self) -> None:
+        self._refuse("points", "point_names")
+        least = 1 if self.kind == "aprilgrid" else 2
+        for name in ("columns", "rows"):
+            count = whole_number(f"{name} of a board", getattr(self, name))
+            if count < least:
+                raise InputError(f"a board has {least} or more {name}, not {count}")
+            self._set(name, count)
+        if self.kind == "aprilgrid":
+            self._check_tags()
+            return
+        self._refuse("tag_size", "tag_spacing")
+        if self.spacing is None:
+            raise InputError("the spacing of a board must be given")
+        both = self.spacing if isinstance(self.spacing, Sequence) else (self.spacing, self.spacing)
+        if len(both) != 2:
+            raise InputError(f"the spacing of a board is one number, or two, not {len(both)}")
+        self._set("spacing", (_length("spacing", both[0]), _length("spacing", both[1])))
+
+    def _check_tags(self) -> None:
+        for name in ("tag_size", "tag_spacing"):
+            if getattr(self, name) is None:
+                raise InputError(f"an AprilGrid has a {name}")
+            self._set(name, _length(name, getattr(self, name)))
+        assert self.tag_size is not None
+        assert self.tag_spacing is not None
+        pitch = self.tag_size * (1 + self.tag_spacing)
+        if self.spacing not in (None, pitch, (pitch, pitch)):
+            raise InputError("the spacing of an AprilGrid is that of tag_size and tag_spacing")
+        self._set("spacing", (pitch, pitch))
+
+    def _check_points(self) -> None:
+        self._refuse("tag_size", "tag_spacing", "spacing")
+        if self.points is None:
+            raise InputError("a board of the kind points has points")
+        if self.shape == "bend":
+            raise InputError("a bend is that of a board with columns and rows, not of points")
+        count = length("points", self.points)
+        self._set("points", shaped("points", self.points, (count, 3)))
+        if not np.isfinite(np.asarray(self.points)).all():
+            raise InputError("points of a board are not finite numbers")
+        if self.point_names is not None:
+            given = names("point_names", self.point_names)
+            if len(given) != count or len(set(given)) < count:
+                raise InputError(f"point_names of a board are not {count} different names")
+            self._set("point_names", tuple(given))
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return what the board is in a few lines."""
+        return f"Board: {self.described}", [
+            ("points", str(len(self.places))),
+            ("shape", self.shape or "points with 8 views or more, else held"),
+        ]
+
+    @property
+    def described(self) -> str:
+        """What it is in a line: kind, columns and rows, spacing."""
+        if self.kind == "points":
+            return f"{len(self.places)} points, {self.unit}"
+        size = f"{self.columns} x {self.rows}"
+        if self.kind == "aprilgrid":
+            return f"aprilgrid, {size} tags of {self.tag_size:g} {self.unit}, gap {self.tag_spacing:g}"
+        x, y = self.pitch
+        apart = f"{x:g}" if x == y else f"{x:g} x {y:g}"
+        return f"{self.kind}, {size} points, spacing {apart} {self.unit}"
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Points along x and y: twice the tags of an AprilGrid; of points anywhere their number, and 1."""
+        if self.kind == "points":
+            return len(self.places), 1
+        return (2 * self.columns, 2 * self.rows) if self.kind == "aprilgrid" else (self.columns, self.rows)
+
+    @property
+    def pitch(self) -> tuple[float, float]:
+        """From one column to the next, and from one row to the next; of points anywhere what is typical."""
+        if isinstance(self.spacing, tuple):
+            return self.spacing
+        places = self.places
+        extent = float(np.linalg.norm(np.ptp(places, axis=0)))
+        typical = extent / max(np.sqrt(len(places)) - 1, 1.0)
+        return typical, typical
+
+    @property
+    def places(self) -> Floats:
+        """(n, 3) nominal positions of the points."""
+        if self.points is not None:
+            return np.asarray(self.points)
+        x, y = self.pitch
+        columns, rows = self.grid
+        i, j = np.tile(np.arange(columns), rows), np.repeat(np.arange(rows), columns)
+        if self.kind == "aprilgrid":
+            assert self.tag_size is not None
+            plane = [each // 2 * x + each % 2 * self.tag_size for each in (i, j)]
+        elif self.kind == "asymmetric_circles":
+            plane = [(2 * i + j % 2) * x, j * y]
+        else:
+            plane = [i * x, j * y]
+        return frozen(np.stack([*plane, np.zeros(len(i))], axis=1))
+
+    @property
+    def names(self) -> list[str]:
+        """N names of the points: their numbers, unless they have others."""
+        return [str(k) for k in range(len(self.places))] if self.point_names is None else [*self.point_names]
+
+    def bent(self, x: float, y: float) -> Floats:
+        """Return (n, 3) positions on the board with two parabolas: z = 4 x a (1 - a) + 4 y b (1 - b).
+
+        Parameters
+        ----------
+        x, y
+            The deflections in the middle along the columns and along the rows; a and b go from 0 to 1 there.
+        """
+        found: Floats = self.places + np.einsum("nki,k->ni", self.shifts(), [x, y])
+        return found
+
+    def shifts(self) -> Floats:
+        """Return (n, 2, 3) how points move with a deflection of one along the columns, and along the rows."""
+        places = self.places
+        a, b = (places[:, :2] / places[:, :2].max(axis=0)).T
+        found = np.zeros((len(places), 2, 3))
+        found[:, 0, 2], found[:, 1, 2] = 4 * a * (1 - a), 4 * b * (1 - b)
+        return found
+
+    def shape_of(self, views: int) -> Shape:
+        """Return what of the board is unknown where it is seen in so many views."""
+        return self.shape or ("points" if views >= MANY_VIEWS else "held")
+
+    def deviations(self, views: int) -> Floats:
+        """Return (n, 3) standard deviations of the points: those of their shape, 0 where they are held."""
+        count = len(self.places)
+        if self.shape_of(views) != "points":
+            return np.zeros((count, 3))
+        if self.point_sd is not None:
+            return np.asarray(self.point_sd)
+        typical = min(self.pitch)
+        plane = typical / PLANE_PARTS if self.sd_plane is None else self.sd_plane
+        spacing = typical / SPACING_PARTS if self.sd_spacing is None else self.sd_spacing
+        return np.tile([spacing, spacing, plane], (count, 1))
+
+    def replace(self, **changes: Any) -> Self:
+        """Return the board with some fields replaced, checked anew."""
+        if self.kind == "aprilgrid":
+            changes = {"spacing": None} | changes
+        return replace(self, **changes)
+
+
+def _length(name: str, value: object) -> float:
+    found = number(name, value)
+    if not 0 < found < np.inf:
+        raise InputError(f"{name} of a board is a positive number, not {found:g}")
+    return found

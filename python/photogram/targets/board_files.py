@@ -1,0 +1,165 @@
+"""Descriptions of boards: `board.toml`, and the target files of Kalibr."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from photogram.errors import InputError
+from photogram.io.delimited import read_columns
+from photogram.io.files import read_text
+from photogram.io.toml import TomlFile
+from photogram.io.tree import Tree
+from photogram.io.yaml_text import read_yaml_text
+from photogram.messages import nearest
+from photogram.targets.board import Board
+
+__all__ = ["BOARD_FILE", "is_board", "picture_size", "read_board"]
+
+BOARD_FILE = "board.toml"
+_WORDS = ("kind", "unit", "shape")
+_COUNTS = ("columns", "rows")
+_LENGTHS = ("tag_size", "tag_spacing", "sd_plane", "sd_spacing")
+_KEYS = (*_WORDS, *_COUNTS, "spacing", "spacing_x", "spacing_y", *_LENGTHS, "points", "picture_size")
+_SD = ("sd_x", "sd_y", "sd_z")
+
+
+def is_board(path: Path) -> bool:
+    """Return whether a file describes a board: by its name, or by the type of a target of Kalibr."""
+    if path.name == BOARD_FILE:
+        return True
+    return path.suffix.lower() in (".yaml", ".yml") and "target_type" in read_text(path)
+
+
+def read_board(path: Path) -> Board:
+    """Read a `board.toml`, or a target of Kalibr.
+
+    Raises
+    ------
+    InputError
+        Keys that there are not, values of another kind, what is no board: names file and line.
+    """
+    return _of_toml(path) if path.suffix.lower() == ".toml" else _of_kalibr(path)
+
+
+def picture_size(path: Path) -> tuple[int, int] | None:
+    """Return width and height of the pictures that a `board.toml` was seen in, where it says them.
+
+    Raises
+    ------
+    InputError
+        Something else than two whole numbers.
+    """
+    if path.suffix.lower() != ".toml" or "picture_size" not in (file := TomlFile(path)).content:
+        return None
+    value = file.content["picture_size"]
+    if not (isinstance(value, list) and len(value) == 2 and all(type(each) is int for each in value)):
+        raise file.error("picture_size", "picture_size is a width and a height: [640, 480]")
+    return value[0], value[1]
+
+
+def _of_toml(path: Path) -> Board:
+    file = TomlFile(path)
+    content = file.content
+    for key in content:
+        if key not in _KEYS:
+            raise file.error(key, f"a board has no {key}{nearest(key, _KEYS)}")
+    given: dict[str, Any] = {key: _text(file, key) for key in _WORDS if key in content}
+    given |= {key: _count(file, key) for key in _COUNTS if key in content}
+    given |= {key: _number(file, key) for key in _LENGTHS if key in content}
+    both = [key for key in ("spacing_x", "spacing_y") if key in content]
+    if both and ("spacing" in content or len(both) == 1):
+        raise file.error(both[0], "spacing, or spacing_x and spacing_y, say what a board has")
+    if both:
+        given["spacing"] = (_number(file, "spacing_x"), _number(file, "spacing_y"))
+    elif "spacing" in content:
+        given["spacing"] = _number(file, "spacing")
+    if "points" in content:
+        given |= _points(file, path.parent / _text(file, "points"))
+    try:
+        return Board(**given)
+    except InputError as error:
+        raise InputError(error.message, file=path) from None
+
+
+def _points(file: TomlFile, path: Path) -> dict[str, Any]:
+    """Return points of a table: point, x, y, z; sd, or sd_x, sd_y, sd_z."""
+    if not path.is_file():
+        raise file.error("points", f"points: there is no file {path.name}")
+    table = read_columns(path, known=("point",), numbers=("x", "y", "z", "sd", *_SD))
+    table.require("point", "x", "y", "z")
+    places = table.vectors(("x", "y", "z"))
+    table.check_given(places, ("x", "y", "z"))
+    found: dict[str, Any] = {"points": places, "point_names": table.names_once("point")}
+    if "sd" in table or set(_SD) & {*table.columns}:
+        sd = table.vectors(_SD)
+        sd = np.where(np.isnan(sd), table.numbers("sd")[:, np.newaxis], sd)
+        table.check_given(sd, _SD)
+        found["point_sd"] = sd
+    return found
+
+
+def _text(file: TomlFile, key: str) -> str:
+    value = file.content[key]
+    if not isinstance(value, str):
+        raise file.error(key, f"{key} is text between quotation marks")
+    return value
+
+
+def _count(file: TomlFile, key: str) -> int:
+    value = file.content[key]
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise file.error(key, f"{key} is a whole number")
+    return value
+
+
+def _number(file: TomlFile, key: str) -> float:
+    value = file.content[key]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise file.error(key, f"{key} is a number")
+    return float(value)
+
+
+def _of_kalibr(path: Path) -> Board:
+    """Read a target of Kalibr: `aprilgrid`, `checkerboard` or `circlegrid`, in metres."""
+    content = Tree(read_yaml_text(path), path)
+    kind = content["target_type"].text()
+    if kind not in _KALIBR:
+        raise content["target_type"].error(f"{kind} is none of {', '.join(_KALIBR)}")
+    size = (
+        {"columns": content["targetCols"].whole(1), "rows": content["targetRows"].whole(1)}
+        if (kind != "aprilgrid")
+        else {"columns": content["tagCols"].whole(1), "rows": content["tagRows"].whole(1)}
+    )
+    try:
+        return _KALIBR[kind](content, size)
+    except InputError as error:
+        raise (error if error.file else InputError(error.message, file=path)) from None
+
+
+def _aprilgrid(content: Tree, size: Mapping[str, int]) -> Board:
+    tag_size, tag_spacing = content["tagSize"].number(), content["tagSpacing"].number()
+    return Board(kind="aprilgrid", **cast("Any", size), tag_size=tag_size, tag_spacing=tag_spacing)
+
+
+def _checkerboard(content: Tree, size: Mapping[str, int]) -> Board:
+    spacing = content["colSpacingMeters"].number(), content["rowSpacingMeters"].number()
+    return Board(kind="chessboard", **cast("Any", size), spacing=spacing)
+
+
+def _circlegrid(content: Tree, size: Mapping[str, int]) -> Board:
+    skewed = content.get("asymmetricGrid", False).value
+    if not isinstance(skewed, bool):
+        raise content["asymmetricGrid"].error("is true or false")
+    kind = "asymmetric_circles" if skewed else "circles"
+    return Board(kind=cast("Any", kind), **cast("Any", size), spacing=content["spacingMeters"].number())
+
+
+_KALIBR: Mapping[str, Callable[[Tree, Mapping[str, int]], Board]] = {
+    "aprilgrid": _aprilgrid,
+    "checkerboard": _checkerboard,
+    "circlegrid": _circlegrid,
+}

@@ -1,0 +1,211 @@
+"""Corners of boards in pictures: what every reader and detector hands over."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import frozen, indices, length, names, shaped, whole_number
+from photogram.arguments.equality import Valued
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
+from photogram.show.brief import Brief, Rows, few
+
+__all__ = ["Corners"]
+
+FEWEST = 6
+"""Corners with which a view says something of the camera."""
+_FLAT = 1e-3
+"""What the corners of a view may be wide, over their length, to count as lying on one line."""
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Corners(Valued, Brief):
+    """Corners of a board in P pictures of K cameras in V views; n corners.
+
+    Parameters
+    ----------
+    pictures
+        P names.
+    cameras
+        (P,) which camera took each picture.
+    views
+        (P,) the view of each picture, from 0: pictures of one view show the board in one pose.
+    times
+        (P,) seconds; None where they are not known.
+    camera_names
+        K names.
+    sizes
+        Width and height of the pictures of each camera, pixels; None where they are not known.
+    picture, point
+        (n,) the picture of each corner, and the number of the board's point.
+    xy
+        (n, 2) pixels from 0 at the centre of the first pixel: x to the right, y down.
+    sd
+        (n,) standard deviation of each corner over that of a corner of level 0: 1, 2, 4 ...
+    use
+        (n,) whether a corner counts; others were left out by whoever measured them.
+
+    Raises
+    ------
+    InputError
+        Arrays of other shapes, indices out of range, names that repeat, values that are not finite, standard
+        deviations that are not positive, a corner that is twice in a picture, two pictures of one camera in
+        one view.
+    """
+
+    pictures: Sequence[str]
+    cameras: Indices
+    views: Indices
+    camera_names: Sequence[str]
+    sizes: Sequence[tuple[int, int] | None]
+    picture: Indices
+    point: Indices
+    xy: Floats
+    sd: Floats = field(default_factory=lambda: np.array(1.0))
+    use: Bools = field(default_factory=lambda: np.array(True))
+    times: Floats | None = None
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            pictures: Sequence[str],
+            cameras: ArrayLike,
+            views: ArrayLike,
+            camera_names: Sequence[str],
+            sizes: Sequence[tuple[int, int] | None],
+            picture: ArrayLike,
+            point: ArrayLike,
+            xy: ArrayLike,
+            sd: ArrayLike = ...,
+            use: ArrayLike = ...,
+            times: ArrayLike | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        for name in ("pictures", "camera_names"):
+            given = names(name, getattr(self, name))
+            if len(set(given)) < len(given):
+                raise InputError(f"{name}: a name is there twice")
+            self._set(name, tuple(given))
+        pictures, corners = len(self.pictures), length("picture", self.picture)
+        self._set("sizes", tuple(map(_size, self.sizes)))
+        if len(self.sizes) != len(self.camera_names):
+            raise InputError(f"sizes: there are {len(self.camera_names)} cameras, not {len(self.sizes)}")
+        self._set("cameras", indices("cameras", self.cameras, pictures, len(self.camera_names)))
+        self._set("views", indices("views", self.views, pictures, pictures))
+        self._set("picture", indices("picture", self.picture, corners, pictures))
+        self._set("point", indices("point", self.point, corners, 2**31))
+        self._set("xy", shaped("xy", self.xy, (corners, 2)))
+        self._set("sd", shaped("sd", self.sd, (corners,)))
+        self._set("use", frozen(np.broadcast_to(np.asarray(self.use, dtype=bool), (corners,)).copy()))
+        if self.times is not None:
+            self._set("times", shaped("times", self.times, (pictures,)))
+        self._check_values()
+
+    def _set(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
+
+    def _check_values(self) -> None:
+        for what, bad in (
+            ("is not a finite position", ~np.isfinite(self.xy).all(axis=1)),
+            ("has no positive standard deviation", ~((self.sd > 0) & np.isfinite(self.sd))),
+        ):
+            if bad.any():
+                raise InputError(f"{self.title(int(np.argmax(bad)))} {what}")
+        for row in _again(self.picture, self.point):
+            raise InputError(f"{self.title(row)} is there twice")
+        for row in _again(self.views, self.cameras):
+            camera = self.camera_names[self.cameras[row]]
+            raise InputError(
+                f"the picture {self.pictures[row]} is the second of the camera {camera} in its view"
+            )
+
+    def title(self, row: int) -> str:
+        """Return what a corner is called."""
+        return f"corner {self.point[row]} of {self.pictures[self.picture[row]]}"
+
+    @property
+    def view_count(self) -> int:
+        """V."""
+        return int(self.views.max(initial=-1)) + 1
+
+    def view_names(self) -> list[str]:
+        """Return V names: those of the first pictures of the views."""
+        found = [""] * self.view_count
+        for name, view in zip(reversed(self.pictures), self.views[::-1].tolist(), strict=True):
+            found[view] = name
+        return found
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return what they are in a few lines."""
+        return "Corners", [
+            ("pictures", few(list(self.pictures))),
+            ("cameras", few(list(self.camera_names))),
+            ("views", str(self.view_count)),
+            ("corners", f"{len(self.xy):,}, {np.count_nonzero(~self.use)} of them left out"),
+        ]
+
+    def replace(self, **changes: Any) -> Self:
+        """Return corners with some fields replaced, checked anew."""
+        return replace(self, **changes)
+
+    def of_pictures(self, keep: Bools) -> Corners:
+        """Return the corners of some pictures (P,) alone; views are numbered anew, cameras stay."""
+        pictures = np.flatnonzero(keep).tolist()
+        place = np.full(len(self.pictures), -1)
+        place[pictures] = np.arange(len(pictures))
+        own = keep[self.picture]
+        return self.replace(
+            pictures=[self.pictures[row] for row in pictures],
+            cameras=self.cameras[pictures],
+            views=np.unique(self.views[pictures], return_inverse=True)[1].reshape(-1),
+            times=None if self.times is None else self.times[pictures],
+            picture=place[self.picture[own]],
+            point=self.point[own],
+            xy=self.xy[own],
+            sd=self.sd[own],
+            use=self.use[own],
+        )
+
+    def poor(self, places: Floats) -> dict[str, str]:
+        """Return the pictures that say nothing of a camera, and why.
+
+        Too few corners, or all on one line: of the picture, or of the board, whose points (b, 3) are given.
+        """
+        found = {}
+        for row, name in enumerate(self.pictures):
+            own = self.use & (self.picture == row)
+            if np.count_nonzero(own) < FEWEST:
+                found[name] = f"{np.count_nonzero(own)} corners, fewer than {FEWEST}"
+            elif _on_a_line(self.xy[own]) or _on_a_line(places[self.point[own]]):
+                found[name] = "all corners lie on one line"
+        return found
+
+
+def _on_a_line(places: Floats) -> bool:
+    long, wide = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)[:2]
+    return not wide > _FLAT * long
+
+
+def _size(given: object) -> tuple[int, int] | None:
+    if given is None:
+        return None
+    if not (isinstance(given, Sequence) and len(given) == 2):
+        raise InputError("the size of pictures is a width and a height")
+    width, height = (whole_number("size of pictures", each) for each in given)
+    if min(width, height) < 1:
+        raise InputError(f"pictures have a width and a height of 1 or more, not {width} x {height}")
+    return width, height
+
+
+def _again(first: Indices, second: Indices) -> list[int]:
+    """Return rows whose pair of indices stands in an earlier row."""
+    pairs = np.stack([first, second], axis=1)
+    kept = np.unique(pairs, axis=0, return_index=True)[1] if len(pairs) else pairs[:, 0]
+    return [int(row) for row in np.setdiff1d(np.arange(len(pairs)), kept)]

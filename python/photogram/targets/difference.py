@@ -1,0 +1,168 @@
+"""Difference of two calibrations: where each images the same points, once the motion between them is out.
+
+With the rays r_a of camera a at pixels q and the motion T of the axes,  d(q) = f_b(T d r_a(q)) - q.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.network.cameras import Camera
+from photogram.targets.housing import transformed
+from photogram.targets.imaging import imaged, motion_partials, rays
+
+__all__ = ["Criterion", "Fitted", "differences_at", "fitted_motion", "points_at"]
+
+Criterion = Literal["pixels", "mrcal"]
+"""What is least: squares of the differences in pixels, or fourth powers of angles as mrcal 2 has it."""
+
+STEPS = 200
+CLOSE = 1e-11
+"""Radians, and of the shortest distance: a motion that changes by less is found."""
+FEWEST = 10
+"""Pixels that a motion is fitted to."""
+HUBER = np.radians(5.0) ** 2
+"""theta^2 beyond which mrcal's criterion grows more slowly."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The motion between the axes of two cameras.
+
+    Attributes
+    ----------
+    motion
+        (4, 4) axes of camera a -> axes of camera b.
+    finite
+        Whether the translation was fitted: all distances are finite.
+    points
+        How many pixels took part, counted at every distance.
+    """
+
+    motion: Floats
+    finite: bool
+    points: int
+
+
+def points_at(camera: Camera, pixels: Floats, distances: Sequence[float]) -> Floats:
+    """Return (D n, 3) where pixels look, in axes of a camera, at each distance; directions at infinity."""
+    towards = rays(camera, pixels)
+    return np.concatenate([towards * (each if np.isfinite(each) else 1.0) for each in distances])
+
+
+def differences_at(a: Camera, b: Camera, fitted: Fitted, pixels: Floats, distance: float) -> Floats:
+    """Return (n, 2) d(q) at (n, 2) pixels of camera a; NaN where one of the two sees nothing."""
+    points = points_at(a, pixels, [distance])
+    moved = transformed(fitted.motion, points) if np.isfinite(distance) else points @ fitted.motion[:3, :3].T
+    return np.asarray(imaged(b, moved).xy - pixels)
+
+
+def fitted_motion(
+    a: Camera,
+    b: Camera,
+    pixels: Floats,
+    distances: Sequence[float],
+    criterion: Criterion = "pixels",
+    weights: Floats | None = None,
+) -> Fitted:
+    """Return the motion by which two cameras differ least.
+
+    Parameters
+    ----------
+    a, b
+        The cameras.
+    pixels
+        (n, 2) of camera a, where they are compared; those that one of the two does not see do not count.
+    distances
+        At which; a translation is fitted where all are finite, and arbitrary along the rays with one.
+    criterion
+        What is least.
+    weights
+        Of each pixel at each distance, one after the other: (D n, 2, 2) W of differences in pixels, (D n,) w
+        of mrcal's criterion; NaN where a pixel does not count. None: equal weights.
+
+    Raises
+    ------
+    InputError
+        The two see too few pixels in common.
+    """
+    finite = bool(np.isfinite(distances).all())
+    towards = points_at(a, pixels, distances)
+    aims, places = (np.concatenate([each] * len(distances)) for each in (rays(b, pixels), pixels))
+    if weights is None:
+        weights = np.tile(np.eye(2), (len(towards), 1, 1)) if criterion == "pixels" else np.ones(len(towards))
+    numbers = np.column_stack([towards, aims, weights.reshape(len(towards), -1)])
+    usable = np.isfinite(numbers).all(axis=1)
+    if (count := int(np.count_nonzero(usable))) < FEWEST:
+        raise InputError(f"the two cameras both see {count} of the pixels: too few to compare them")
+    towards, aims, places, weights = towards[usable], aims[usable], places[usable], weights[usable]
+    motion, free = np.eye(4), slice(0 if finite else 3, 6)
+    motion[:3, :3] = _turned_onto(_unit(towards), aims)
+    for _ in range(STEPS):
+        moved = transformed(motion, towards)
+        by_motion = motion_partials(moved, finite)[:, :, free]
+        if criterion == "pixels":
+            normal, right = _pixel_step(b, moved, places, weights, by_motion)
+        else:
+            normal, right = _angle_step(moved, aims, weights**2, by_motion)
+        step = np.zeros(6)
+        step[free] = np.linalg.solve(normal, right)
+        motion[:3] = _stepped(motion, step)
+        if np.abs(step[3:]).max() < CLOSE and np.abs(step[:3]).max() < CLOSE * np.min(distances):
+            break
+    return Fitted(motion, finite, count)
+
+
+def _stepped(motion: Floats, step: Floats) -> Floats:
+    turn = _photocore.vector_rotations(step[np.newaxis, 3:])[0]
+    moved = turn @ motion[:3, 3] + step[:3]
+    return np.column_stack([turn @ motion[:3, :3], moved])
+
+
+def _pixel_step(
+    b: Camera, moved: Floats, places: Floats, weights: Floats, by_motion: Floats
+) -> tuple[Floats, Floats]:
+    """Return normal equations of sum d' W d."""
+    images = imaged(b, moved)
+    known = np.isfinite(images.xy).all(axis=1)
+    partials = (images.by_point @ by_motion)[known]
+    weighted = (weights[known] @ partials).reshape(-1, partials.shape[2])
+    apart = (places - images.xy)[known].ravel()
+    return weighted.T @ partials.reshape(weighted.shape), weighted.T @ apart
+
+
+def _angle_step(moved: Floats, aims: Floats, weights: Floats, by_motion: Floats) -> tuple[Floats, Floats]:
+    """Return Newton's equations of sum w^2 rho(theta^4), theta^2 = |u - v|^2 of unit vectors u, v.
+
+    With e = theta^2 and D = du: the gradient of e^2 is 4 e D' (u - v), its second derivatives
+    8 (D' (u - v))^2 + 4 e D' D, without the curvature of u. Huber beyond k: 2 k |e| - k^2 in place of e^2.
+    """
+    length = np.linalg.norm(moved, axis=1)
+    unit = moved / length[:, np.newaxis]
+    across = (np.eye(3) - unit[:, :, np.newaxis] * unit[:, np.newaxis]) / length[:, np.newaxis, np.newaxis]
+    turned = across @ by_motion
+    apart = unit - aims
+    e = (apart**2).sum(axis=1)
+    slope = np.einsum("nij,ni->nj", turned, apart)
+    inside = e < HUBER
+    level = weights * np.where(inside, e, HUBER)
+    normal = 2 * np.einsum("n,ni,nj->ij", weights * inside, slope, slope)
+    normal += np.einsum("n,nki,nkj->ij", level, turned, turned)
+    return normal, -np.einsum("n,ni->i", level, slope)
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, np.newaxis])
+
+
+def _turned_onto(vectors: Floats, onto: Floats) -> Floats:
+    """Return the rotation that turns vectors nearest onto others (Kabsch)."""
+    u, _, v = np.linalg.svd(onto.T @ vectors)
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v)

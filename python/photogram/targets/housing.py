@@ -1,0 +1,142 @@
+"""Cameras in one housing as a calibration leaves them: values, cofactors, and what was seen of the board.
+
+Everything that is told of a calibration beyond its adjustment (maps of uncertainty, differences, new views,
+triangulation) is computed from these arrays; steps are R <- Exp(w) R, t <- t + dt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.network.cameras import Camera
+from photogram.targets.imaging import unknown_of
+from photogram.targets.vision import cross_matrices
+
+__all__ = ["Housing", "Seen", "mean_motion", "transformed"]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The m corners that took part.
+
+    Attributes
+    ----------
+    cameras, views, points
+        (m,) which camera saw which point of the board in which view.
+    xy
+        (m, 2) where, pixels.
+    sd
+        (m,) their standard deviations a priori, pixels.
+    """
+
+    cameras: Indices
+    views: Indices
+    points: Indices
+    xy: Floats
+    sd: Floats
+
+    def __getitem__(self, which: Bools) -> Seen:
+        """Return some of them."""
+        return Seen(
+            self.cameras[which], self.views[which], self.points[which], self.xy[which], self.sd[which]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Housing:
+    """K cameras that are fixed to one another, and what is known of them.
+
+    The c common unknowns are, in this order: of each camera its parameters, and knots of its lens, with a
+    standard deviation that is not zero, of each but the first its sensor (dt, w), and what is unknown of the
+    board.
+
+    Attributes
+    ----------
+    cameras
+        As adjusted; their `sd` say which parameters were unknown.
+    sensors
+        (K, 4, 4) camera 0 -> camera k; the first is the identity.
+    poses
+        (V, 4, 4) board -> camera 0, of each view.
+    points
+        (n, 3) the points of the board, adjusted.
+    points_by_board
+        (n, 3, b) their partials by what is unknown of the board.
+    seen
+        The corners.
+    cofactors
+        (c + 6, c + 6) of the common unknowns and of the mean motion of the boards (:func:`mean_motion`), for
+        a priori unit weight.
+    weights
+        (c, c) of what was known of the common unknowns before: inverse covariances, 0 without.
+    variance
+        Of unit weight, by which cofactors become covariances.
+    """
+
+    cameras: tuple[Camera, ...]
+    sensors: Floats
+    poses: Floats
+    points: Floats
+    points_by_board: Floats
+    seen: Seen
+    cofactors: Floats
+    weights: Floats
+    variance: float = 1.0
+
+    @property
+    def common(self) -> int:
+        """How many unknowns the views have in common."""
+        return len(self.weights)
+
+    @property
+    def mean_motion(self) -> slice:
+        """Rows of the mean motion of the boards in the cofactors."""
+        return slice(self.common, self.common + 6)
+
+    @property
+    def board(self) -> slice:
+        """Rows of what is unknown of the board."""
+        return slice(self.common - self.points_by_board.shape[2], self.common)
+
+    def parameters(self, camera: int) -> slice:
+        """Return the rows of a camera's parameters."""
+        counts = [np.count_nonzero(unknown_of(each)) for each in self.cameras]
+        start = sum(counts[:camera])
+        return slice(start, start + counts[camera])
+
+    def sensor(self, camera: int) -> slice:
+        """Return the rows of a camera's sensor; those of the first are none."""
+        end = self.parameters(len(self.cameras) - 1).stop + 6 * camera
+        return slice(end - 6 if camera else end, end)
+
+    def noise_only(self) -> Housing:
+        """Return it with the cofactors that the errors of the corners alone cause: Q - Q P Q."""
+        to_common = self.cofactors[:, : self.common]
+        return replace(self, cofactors=self.cofactors - to_common @ self.weights @ to_common.T)
+
+    def places(self, camera: int) -> tuple[Floats, Floats]:
+        """Return (m, 3) where the corners that a camera saw were in its axes, and (m,) their sd in pixels."""
+        seen = self.seen[self.seen.cameras == camera]
+        to_camera = self.sensors[camera] @ self.poses
+        return transformed(to_camera[seen.views], self.points[seen.points]), seen.sd
+
+
+def transformed(poses: Floats, points: Floats) -> Floats:
+    """Return (n, 3) points by a pose (4, 4), or each by its own (n, 4, 4)."""
+    return np.asarray(np.einsum("...ij,...j->...i", poses[..., :3, :3], points) + poses[..., :3, 3])
+
+
+def mean_motion(poses: Sequence[Floats] | Floats) -> Floats:
+    """Return (V, 6, 6) what the steps (dt_i, w_i) of each pose add to the mean motion of the boards.
+
+    p at the place p - t_i of the board moves by dt_i + w_i x (p - t_i): the mean of these is the motion
+    (1/V) sum (dt_i + [t_i]x w_i, w_i) of all p.
+    """
+    moved = np.asarray(poses)
+    found = np.tile(np.eye(6), (len(moved), 1, 1))
+    found[:, :3, 3:] = cross_matrices(moved[:, :3, 3])
+    return found / len(moved)

@@ -1,0 +1,162 @@
+"""From adjusted calibrations to the arrays that their products are computed from."""
+
+from __future__ import annotations
+
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from photogram.arguments.arrays import shown
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.targets.calibrated import Calibrated
+from photogram.targets.housing import Housing, Seen, mean_motion
+
+__all__ = ["camera_number", "housed_with", "housing_of", "size_of"]
+
+
+def camera_number(calibrated: Calibrated, camera: int | str) -> int:
+    """Return the number of a camera by its number or name.
+
+    Raises
+    ------
+    InputError
+        There is no such camera.
+    """
+    names = [each.name for each in calibrated.cameras]
+    if isinstance(camera, str) and camera in names:
+        return names.index(camera)
+    if isinstance(camera, str) or not 0 <= camera < len(names):
+        raise InputError(f"the calibration has the cameras {', '.join(names)}, not {shown(camera)}")
+    return camera
+
+
+def size_of(calibrated: Calibrated, camera: int) -> tuple[int, int]:
+    """Return width and height of the pictures of a camera.
+
+    Raises
+    ------
+    InputError
+        Nobody has said.
+    """
+    size = calibrated.calibration.corners.sizes[camera]
+    if size is None:
+        name = calibrated.cameras[camera].name
+        raise InputError(f"how large the pictures of {name} are is not known: a map needs their size")
+    return size
+
+
+_MADE: WeakKeyDictionary[Calibrated, dict[int, Housing]] = WeakKeyDictionary()
+"""Housings of results that are still there: each takes a solution for every unknown that views share."""
+
+
+def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
+    """Return the housing of a camera, and the camera's number in it."""
+    cameras = housed_with(calibrated, camera)
+    made = _MADE.setdefault(calibrated, {})
+    if cameras[0] not in made:
+        made[cameras[0]] = _housing(calibrated, cameras)
+    return made[cameras[0]], cameras.index(camera)
+
+
+def housed_with(calibrated: Calibrated, camera: int) -> list[int]:
+    """Return the cameras that are tied to one, the reference first, with itself among them."""
+    references = np.asarray(calibrated.calibration.references)
+    reference = int(references[camera])
+    others = np.flatnonzero((references == reference) & (np.arange(len(references)) != reference))
+    return [reference, *others.tolist()]
+
+
+def _housing(calibrated: Calibrated, cameras: list[int]) -> Housing:
+    corners = calibrated.calibration.corners
+    views = np.unique(corners.views[np.isin(corners.cameras, cameras)])
+    poses = calibrated.poses[views]
+    return Housing(
+        cameras=tuple(calibrated.cameras[each].camera for each in cameras),
+        sensors=calibrated.sensors[cameras],
+        poses=poses,
+        points=calibrated.points,
+        points_by_board=_points_by_board(calibrated),
+        seen=_seen(calibrated, cameras, views),
+        cofactors=_cofactors(calibrated, cameras, views, poses),
+        weights=_weights(calibrated, cameras),
+        variance=calibrated.result.covariance_scale,
+    )
+
+
+def _board_rows(calibrated: Calibrated) -> list[int]:
+    """Return the points of the board that are unknowns."""
+    if calibrated.calibration.shape != "points":
+        return []
+    return np.flatnonzero(calibrated.result.used_points).tolist()
+
+
+def _board_size(calibrated: Calibrated) -> int:
+    """Return how many unknowns the board has: coordinates of its points, or the two of its bend."""
+    return 3 * len(_board_rows(calibrated)) if calibrated.bend is None else 2
+
+
+def _points_by_board(calibrated: Calibrated) -> Floats:
+    if calibrated.bend is not None:
+        return calibrated.calibration.board.shifts().transpose(0, 2, 1)
+    rows = _board_rows(calibrated)
+    found = np.zeros((len(calibrated.points), 3, len(rows), 3))
+    found[rows, :, np.arange(len(rows))] = np.eye(3)
+    return found.reshape(len(found), 3, -1)
+
+
+def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> Seen:
+    """Return the corners that took part; views and cameras are numbered within the housing."""
+    result, corners = calibrated.result, calibrated.calibration.corners
+    block = result.block
+    used = result.used_images & np.isin(corners.cameras[block.image_photos], cameras)
+    used &= result.image_weights > 0
+    photos = block.image_photos[used]
+    return Seen(
+        cameras=np.array([cameras.index(each) for each in corners.cameras[photos].tolist()], dtype=np.int64),
+        views=np.searchsorted(views, corners.views[photos]),
+        points=block.image_points[used],
+        xy=block.image_xy[used],
+        sd=block.image_sd[used, 0] / np.sqrt(result.image_weights[used]),
+    )
+
+
+def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses: Floats) -> Floats:
+    """Return the cofactors of common unknowns and of the mean motion of the boards."""
+    lengths = [len(each.names) for each in calibrated.cameras]
+    starts = np.concatenate([[0], np.cumsum(lengths)])
+    kept = [starts[each] + np.flatnonzero(calibrated.cameras[each].camera.deviations > 0) for each in cameras]
+    sensors, board = calibrated.sensors_adjusted(), _board_size(calibrated)
+    kept += [starts[-1] + 6 * sensors.index(each) + np.arange(6) for each in cameras[1:]]
+    kept.append(starts[-1] + 6 * len(sensors) + np.arange(board))
+    columns = np.concatenate(kept)
+    before = starts[-1] + 6 * len(sensors) + board
+    partials = np.zeros((len(columns) + 6, before + 6 * len(calibrated.poses)))
+    partials[np.arange(len(columns)), columns] = 1.0
+    for view, each in zip(views.tolist(), mean_motion(poses), strict=True):
+        partials[len(columns) :, before + 6 * view : before + 6 * view + 6] = each
+    parts = ("cameras", "sensors", *(("board",) if board else ()), "views")
+    return calibrated.combined(partials, parts)
+
+
+def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
+    """Return the inverse covariances of what was known before: priors of cameras, nominal points."""
+    block, rows = calibrated.result.block, _board_rows(calibrated)
+    blocks = []
+    for each in cameras:
+        sd = block.cameras[each].deviations
+        weighted = np.isfinite(sd[sd > 0])
+        own = np.diag(np.where(weighted, 1 / sd[sd > 0] ** 2, 0.0))
+        covariance = block.cameras[each].prior_covariance
+        if covariance is not None:
+            own[np.ix_(weighted, weighted)] = np.linalg.inv(covariance)
+        blocks.append(own)
+    blocks += [np.zeros((6, 6))] * (len(cameras) - 1)
+    points = np.diag(1 / block.point_sd[rows].ravel() ** 2)
+    blocks.append(points if calibrated.bend is None else np.zeros((2, 2)))
+    found = np.zeros((sum(map(len, blocks)),) * 2)
+    start = 0
+    for own in blocks:
+        found[start : start + len(own), start : start + len(own)] = own
+        start += len(own)
+    return found

@@ -1,0 +1,185 @@
+"""`.cameramodel` of mrcal: text of a Python dictionary that may hold a whole calibration.
+
+`optimization_inputs` is base 85 (RFC 1924) of an archive of NumPy arrays: corners with weights, indices of
+views, cameras and sensors, poses, lenses, the bend of the board. Nothing is unpickled or evaluated.
+"""
+
+from __future__ import annotations
+
+import ast
+import base64
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.io.files import read_text
+from photogram.network.cameras import Camera
+from photogram.targets.board import Board
+from photogram.targets.calibration import Calibration
+from photogram.targets.corners import Corners
+from photogram.targets.npz_arrays import Arrays, read_arrays
+from photogram.targets.vision import inverted, of_vectors
+
+__all__ = ["KEY", "read_model"]
+
+KEY = "optimization_inputs"
+INDICES = "indices_frame_camintrinsics_camextrinsics"
+PREFIX = "LENSMODEL_"
+OPENCV = "opencv_pinhole"
+_LENSES = {
+    "PINHOLE": ("pinhole", 4),
+    "STEREOGRAPHIC": ("stereographic", 4),
+    **{f"OPENCV{terms}": (OPENCV, 4 + terms) for terms in (4, 5, 8, 12)},
+}
+"""Models of mrcal by the name here, with as many of its parameters."""
+
+
+@dataclass(frozen=True)
+class _Free:
+    """What of a calibration was optimized."""
+
+    core: bool
+    lens: bool
+    warp: bool
+
+
+def read_model(path: Path) -> Calibration:
+    """Read the calibration that a `.cameramodel` holds: corners, board, and its values as the start.
+
+    Raises
+    ------
+    InputError
+        The file is no such text, holds no corners, or what is not taken: lenses that there are not, points
+        that were observed one by one, cameras that moved, values that were held.
+    """
+    arrays = read_arrays(path, _packed(path))
+    for name in ("observations_point", "observations_point_triangulated"):
+        if name in arrays:
+            raise arrays.error(name, "is not taken: corners of a board are")
+    seen = arrays.arrays["observations_board"] if "observations_board" in arrays else None
+    if seen is None or seen.ndim != 4:
+        raise InputError(f"its {KEY} hold no corners of a board", file=path)
+    observed = arrays.numbers("observations_board", None, None, None, 3)
+    indices = _indices(arrays, len(observed))
+    free = _freed(arrays)
+    cameras = _cameras(arrays, free)
+    sensors, poses = _poses(arrays, indices, len(cameras))
+    warp = arrays.numbers("calobject_warp", 2) if "calobject_warp" in arrays else np.zeros(2)
+    board = Board(
+        columns=observed.shape[2],
+        rows=observed.shape[1],
+        spacing=float(arrays.numbers("calibration_object_spacing")),
+        shape="bend" if free.warp else "held",
+    )
+    sizes = arrays.numbers("imagersizes", len(cameras), 2).astype(int).tolist()
+    return Calibration(
+        board=board,
+        corners=_corners(observed, indices, [(width, height) for width, height in sizes]),
+        cameras=cameras,
+        poses=poses,
+        sensors=sensors,
+        bend=(float(warp[0]), float(warp[1])),
+        regularise="mrcal" if arrays.says("do_apply_regularization") else None,
+    )
+
+
+def _packed(path: Path) -> bytes:
+    text = read_text(path)
+    try:
+        # Literals only: names, calls and operations are refused.
+        content: Any = ast.literal_eval(text.lstrip())
+    except (ValueError, SyntaxError, MemoryError, RecursionError) as error:
+        record = getattr(error, "lineno", None)
+        raise InputError(f"is no dictionary of Python: {error}", file=path, record=record) from None
+    if not isinstance(content, dict) or "lensmodel" not in content:
+        raise InputError("is no camera model of mrcal: it has no lensmodel", file=path)
+    packed = content.get(KEY)
+    if not isinstance(packed, bytes):
+        raise InputError(f"holds a camera, but no corners: it has no {KEY}", file=path)
+    try:
+        return base64.b85decode(packed)
+    except ValueError as error:
+        raise InputError(f"its {KEY} are damaged: {error}", file=path) from None
+
+
+def _indices(arrays: Arrays, count: int) -> Indices:
+    """Return (P, 3) view, camera and sensor of each picture; sensor -1 is at the reference."""
+    if INDICES not in arrays:
+        raise InputError(f"its {KEY} have no {INDICES}", file=arrays.path)
+    found = arrays.numbers(INDICES, count, 3).astype(np.int64)
+    if (found[:, :2] < 0).any() or (found[:, 2] < -1).any():
+        raise arrays.error(INDICES, "counts from 0, sensors from -1")
+    return found
+
+
+def _freed(arrays: Arrays) -> _Free:
+    core = arrays.first("do_optimize_intrinsics_core", "do_optimize_intrinsic_core")
+    lens = arrays.first("do_optimize_intrinsics_distortions", "do_optimize_intrinsic_distortions")
+    for held in ("do_optimize_frames", "do_optimize_extrinsics"):
+        if held in arrays and not arrays.says(held):
+            raise arrays.error(held, "is false: poses that were held are not taken")
+    return _Free(arrays.says(core), arrays.says(lens), arrays.says("do_optimize_calobject_warp"))
+
+
+def _cameras(arrays: Arrays, free: _Free) -> list[Camera]:
+    lens = arrays.text("lensmodel")
+    own = _LENSES.get(lens.removeprefix(PREFIX))
+    if own is None:
+        names = ", ".join(_LENSES)
+        raise arrays.error("lensmodel", f"{lens} is none of those that are calibrated: {names}")
+    model, count = own
+    rows = arrays.numbers("intrinsics", None, count)
+    cameras = []
+    for number, values in enumerate(rows.tolist()):
+        terms = Camera(model, {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0}).names[:count]
+        freed = (terms[:4] if free.core else ()) + (terms[4:] if free.lens else ())
+        given = dict(zip(terms, values, strict=True))
+        cameras.append(Camera(model, given, dict.fromkeys(freed, np.inf), name=f"camera {number}"))
+    return cameras
+
+
+def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats]:
+    """Return (K, 4, 4) sensors, camera 0 -> camera k, and (V, 4, 4) views, board -> camera 0."""
+    views = of_vectors(arrays.numbers(arrays.first("frames_rt_toref", "rt_ref_frame"), None, 6))
+    mounted = [each for each in ("extrinsics_rt_fromref", "rt_cam_ref") if each in arrays]
+    to_camera = of_vectors(arrays.numbers(mounted[0], None, 6)) if mounted else np.zeros((0, 4, 4))
+    if indices[:, 0].max() >= len(views) or indices[:, 2].max() >= len(to_camera):
+        raise arrays.error(INDICES, "names a view or a sensor that is not there")
+    if set(indices[:, 1].tolist()) != set(range(count)):
+        raise arrays.error(INDICES, f"does not name each of the {count} cameras")
+    from_reference = np.empty((count, 4, 4))
+    for camera in range(count):
+        of = np.unique(indices[indices[:, 1] == camera, 2])
+        if len(of) > 1:
+            raise arrays.error(INDICES, f"has the camera {camera} in several places: a camera that moves")
+        from_reference[camera] = np.eye(4) if of[0] < 0 else to_camera[of[0]]
+    first = from_reference[0]
+    seen = np.unique(indices[:, 0])
+    return from_reference @ inverted(first), first @ views[seen]
+
+
+def _corners(observed: Floats, indices: Indices, sizes: list[tuple[int, int]]) -> Corners:
+    pictures, points = len(observed), observed.shape[1] * observed.shape[2]
+    rows = observed.reshape(-1, 3)
+    weight = rows[:, 2]
+    use = weight > 0
+    mounted = len(sizes) > 1
+    return Corners(
+        pictures=[
+            f"view{view:03d}-{camera}" if mounted else f"view{view:03d}"
+            for view, camera in indices[:, :2].tolist()
+        ],
+        cameras=indices[:, 1],
+        views=np.unique(indices[:, 0], return_inverse=True)[1].reshape(-1),
+        camera_names=[f"camera {number}" for number in range(len(sizes))],
+        sizes=sizes,
+        picture=np.repeat(np.arange(pictures), points),
+        point=np.tile(np.arange(points), pictures),
+        xy=rows[:, :2],
+        sd=np.where(use, 1 / np.where(use, weight, 1.0), 1.0),
+        use=use,
+    )

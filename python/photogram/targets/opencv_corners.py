@@ -1,0 +1,225 @@
+"""Corners in files of OpenCV: `image_points` in YAML, XML or JSON; arrays of `objpoints` and `imgpoints`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.io.files import read_bytes
+from photogram.io.tree import Tree, read_json
+from photogram.io.yaml_text import read_yaml_text
+from photogram.messages import Message
+from photogram.targets.board import Board
+from photogram.targets.measured import Measured
+from photogram.targets.npz_arrays import read_arrays
+
+__all__ = ["is_npz", "is_storage", "read_npz", "read_storage"]
+
+POINTS = "image_points"
+BEGIN = 1 << 20
+"""Bytes in which the name of the points is looked for."""
+NEAR = 1e-6
+"""Of the spacing: what points may be off a grid to be those of one."""
+
+
+def is_storage(path: Path) -> bool:
+    """Return whether a file of OpenCV holds corners: by the name of their matrix."""
+    if path.suffix.lower() not in (".yml", ".yaml", ".xml", ".json"):
+        return False
+    with path.open("rb") as file:
+        return POINTS.encode() in file.read(BEGIN)
+
+
+def is_npz(path: Path) -> bool:
+    """Return whether a file is an archive of arrays by its name."""
+    return path.suffix.lower() == ".npz"
+
+
+def read_storage(path: Path, board: Board | None) -> Measured:
+    """Read `image_points` (views x corners x 2), and the board of `board_width`, `square_size` ...
+
+    Raises
+    ------
+    InputError
+        Matrices that are missing or of another shape, another number of corners than the board has points.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".json":
+        content = read_json(path)
+    else:
+        content = Tree(_xml(path) if suffix == ".xml" else read_yaml_text(path), path)
+    xy = _matrix(content[POINTS])
+    if xy.ndim != 3 or xy.shape[2] != 2:
+        raise content[POINTS].error("is no matrix of views by corners of x and y")
+    size = None
+    if "image_width" in content and "image_height" in content:
+        size = tuple(content[f"image_{side}"].whole(1) for side in ("width", "height"))
+    own = _board(content) if board is None else board
+    grid = _matrix(content["grid_points"]) if "grid_points" in content else None
+    if own is not None and grid is not None and board is None:
+        _check_grid(content["grid_points"], own, grid)
+    return _measured(path, xy, own, {} if size is None else {"": (size[0], size[1])}, _told(path, own, board))
+
+
+def _told(path: Path, own: Board | None, given: Board | None) -> list[Message]:
+    if own is None or given is not None:
+        return []
+    return [Message("does not say the unit of its board: metres are assumed (--unit)", path)]
+
+
+def _board(content: Tree) -> Board | None:
+    if not ("board_width" in content and "board_height" in content and "square_size" in content):
+        return None
+    return Board(
+        columns=content["board_width"].whole(),
+        rows=content["board_height"].whole(),
+        spacing=content["square_size"].number(),
+    )
+
+
+def _check_grid(tree: Tree, board: Board, grid: Floats) -> None:
+    places = grid.reshape(-1, 3) if grid.shape[-1] == 3 else None
+    if places is None or places.shape != board.places.shape:
+        raise tree.error(f"are not the points of the board, {board.described}")
+    if np.abs(places - board.places).max() > NEAR * min(board.pitch):
+        raise tree.error(
+            f"lie elsewhere than those of the board, {board.described}: write them to a table for a"
+            " board.toml of the kind points"
+        )
+
+
+def _measured(
+    path: Path,
+    xy: Floats,
+    board: Board | None,
+    sizes: dict[str, tuple[int, int]],
+    messages: Sequence[Message],
+) -> Measured:
+    views, points = xy.shape[:2]
+    if board is not None and len(board.places) != points:
+        raise InputError(
+            f"has {points} corners in each view, but the board has {len(board.places)}: {board.described}",
+            file=path,
+        )
+    rows = xy.reshape(-1, 2)
+    # A corner that was not found is NaN.
+    found = np.isfinite(rows).all(axis=1)
+    image, point = np.repeat(np.arange(views), points), np.tile(np.arange(points), views)
+    count = int(found.sum())
+    return Measured(
+        path=path,
+        images=[f"view{view:03d}" for view in range(views)],
+        image=image[found],
+        point=point[found],
+        xy=rows[found],
+        sd=np.ones(count),
+        use=np.ones(count, dtype=bool),
+        sizes=sizes,
+        board=board,
+        messages=messages,
+    )
+
+
+def _matrix(tree: Tree) -> Floats:
+    """Return a matrix of OpenCV: rows x cols x channels, the last axis left out where it is 1."""
+    rows, cols = tree["rows"].whole(), tree["cols"].whole()
+    kind = tree["dt"].text() if isinstance(tree["dt"].value, str) else str(tree["dt"].value)
+    match = re.fullmatch(r"\"?(\d*)([fd])\"?", kind.strip())
+    if match is None:
+        raise tree["dt"].error("is no matrix of floating-point numbers")
+    channels = int(match[1] or 1)
+    data = tree["data"]
+    given = data.value if isinstance(data.value, list) else None
+    if given is None or len(given) != rows * cols * channels:
+        raise data.error(f"is not {rows} x {cols} x {channels} numbers")
+    numbers = np.array([_number(data, each) for each in given])
+    return numbers.reshape((rows, cols, channels) if channels > 1 else (rows, cols))
+
+
+def _number(data: Tree, value: Any) -> float:
+    if isinstance(value, str) and value.lower() in (".nan", "nan"):
+        return np.nan
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise data.error(f"holds {value!r}, which is no number")
+    return float(value)
+
+
+def _xml(path: Path) -> dict[str, Any]:
+    """Return what a storage in XML holds: matrices with their numbers, plain values as text or numbers."""
+    try:
+        root = ElementTree.fromstring(read_bytes(path))
+    except ElementTree.ParseError as error:
+        raise InputError(f"is no XML: {error}", file=path, record=error.position[0]) from None
+    return {each.tag: _element(each) for each in root}
+
+
+def _element(element: ElementTree.Element) -> Any:
+    if len(element):
+        return {
+            each.tag: [_value(word) for word in (each.text or "").split()]
+            if each.tag == "data"
+            else _element(each)
+            for each in element
+        }
+    return _value((element.text or "").strip())
+
+
+def _value(word: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(word)
+        except ValueError:
+            continue
+    return word
+
+
+def read_npz(path: Path, board: Board | None) -> Measured:
+    """Read arrays `imgpoints` (views x corners x 2), and `objpoints`, a grid, where no board is given.
+
+    Raises
+    ------
+    InputError
+        No such arrays, those of Python objects, points of the board that are no grid, or differ in views.
+    """
+    arrays = read_arrays(path, read_bytes(path))
+    name = arrays.first("imgpoints", "image_points")
+    shape = arrays.arrays[name].shape
+    if len(shape) == 4 and shape[2] == 1:
+        xy = arrays.numbers(name, None, None, 1, 2)[:, :, 0]
+    else:
+        xy = arrays.numbers(name, None, None, 2)
+    size = None
+    for key in ("image_size", "imgsize"):
+        if key in arrays:
+            width, height = arrays.numbers(key, 2).astype(int).tolist()
+            size = width, height
+    own = board
+    if own is None:
+        own = _gridded(
+            path, arrays.numbers(arrays.first("objpoints", "object_points"), len(xy), xy.shape[1], 3)
+        )
+    return _measured(path, xy, own, {} if size is None else {"": size}, _told(path, own, board))
+
+
+def _gridded(path: Path, places: Floats) -> Board:
+    """Return the chessboard whose points are given once for each view."""
+    first = places[0]
+    columns = int(np.argmax(first[:, 1] != first[0, 1])) or len(first)
+    spacing = (float(first[1, 0] - first[0, 0]), float(first[min(columns, len(first) - 1), 1] - first[0, 1]))
+    try:
+        board = Board(columns=columns, rows=len(first) // columns, spacing=spacing)
+    except InputError:
+        board = None
+    far = np.inf
+    if board is not None and len(board.places) == len(first):
+        far = float(np.abs(places - first[0] - board.places).max())
+    if board is None or far > NEAR * min(spacing):
+        raise InputError("objpoints are no grid, row by row, alike in all views: give the board", file=path)
+    return board

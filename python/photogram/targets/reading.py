@@ -1,0 +1,272 @@
+"""Calibrations from what lies at a path: corners in files of any format, a board, values to start from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from photogram.errors import InputError
+from photogram.io.files import read_text, reading
+from photogram.messages import counted, listed
+from photogram.targets.board import Board, Shape
+from photogram.targets.board_files import is_board, picture_size, read_board
+from photogram.targets.calibration import Calibration
+from photogram.targets.corner_tables import (
+    is_headless,
+    is_table,
+    is_vnl,
+    read_headless,
+    read_table,
+    read_vnl,
+)
+from photogram.targets.first import first_values
+from photogram.targets.measured import Grouping, Measured, ViewBy, grouped
+from photogram.targets.mrcal_model import KEY, read_model
+from photogram.targets.opencv_corners import is_npz, is_storage, read_npz, read_storage
+from photogram.targets.start import Regularisation, Synchronisation
+
+__all__ = ["holds_targets", "read"]
+
+NO_BOARD = "corners, but no board: write board.toml or give --board 10x10 --spacing 0.077"
+MODEL = ".cameramodel"
+MOST = 2000
+"""Files of a folder that are looked at."""
+
+
+@dataclass(frozen=True)
+class _Form:
+    """A format of corners: how its files are known, and read; `clear` where nothing else looks like it."""
+
+    title: str
+    knows: Callable[[Path], bool]
+    read: Callable[[Path, Board | None], Measured]
+    clear: bool = True
+
+
+def _of_model(path: Path) -> bool:
+    return path.suffix == MODEL or (path.suffix == ".txt" and KEY in read_text(path))
+
+
+_FORMS = (
+    _Form("corners of mrcal", is_vnl, read_vnl),
+    _Form("storage of OpenCV", is_storage, read_storage),
+    _Form("table of corners", is_table, read_table, clear=False),
+    _Form("rows of corners", is_headless, read_headless, clear=False),
+    _Form("arrays of OpenCV", is_npz, read_npz, clear=False),
+)
+
+
+def _files(path: Path) -> list[Path]:
+    """Return the files at a path: itself, or those of a folder and of the folders in it."""
+    with reading(path):
+        if not path.is_dir():
+            path.stat()
+            return [path]
+        inside = sorted(path.iterdir())[:MOST]
+        below = [file for each in inside if each.is_dir() for file in sorted(each.iterdir())[:MOST]]
+        return [each for each in [*inside, *below] if each.is_file()]
+
+
+def _sorted(path: Path) -> tuple[list[Path], list[Path], dict[_Form, list[Path]]]:
+    """Return models of mrcal, descriptions of boards, and files of corners by their formats."""
+    models, boards = [], []
+    corners: dict[_Form, list[Path]] = {}
+    for each in _files(path):
+        if each.suffix.lower() not in (
+            ".vnl",
+            ".csv",
+            ".tsv",
+            ".txt",
+            ".yml",
+            ".yaml",
+            ".xml",
+            ".json",
+            ".npz",
+            ".toml",
+            MODEL,
+        ):
+            continue
+        if is_board(each):
+            boards.append(each)
+        elif _of_model(each):
+            models.append(each)
+        elif (form := next((own for own in _FORMS if own.knows(each)), None)) is not None:
+            corners.setdefault(form, []).append(each)
+    return models, boards, corners
+
+
+def holds_targets(path: Path) -> bool:
+    """Return whether corners of a board lie at a path, beside a board or in a format that only they have."""
+    with reading(path):
+        if path.is_dir() and (path / "project.toml").exists():
+            return False
+        models, boards, corners = _sorted(path)
+    if boards and not path.is_dir():
+        return False
+    return bool(models or (boards and corners) or any(form.clear for form in corners))
+
+
+def read(
+    path: Path,
+    *,
+    board: Board | Path | None = None,
+    shape: Shape | None = None,
+    unit: str | None = None,
+    model: str | None = None,
+    cameras: Sequence[str] = (),
+    views: ViewBy = "name",
+    within: float = 0.005,
+    sync: Synchronisation = "known",
+    pixel_origin: str = "center",
+    size: tuple[int, int] | None = None,
+    sd0: float | None = None,
+    regularise: Regularisation | None = None,
+) -> Calibration:
+    """Read corners of a board, and find values to start from.
+
+    Parameters
+    ----------
+    path
+        A file of corners (`.vnl` and `.cameramodel` of mrcal, tables, YAML, XML, JSON or `.npz` of OpenCV),
+        or a folder with such files and the description of a board.
+    board
+        The board, or a file that describes it. None: that in the folder, or in the file of corners.
+    shape, unit
+        In the place of those of the board.
+    model
+        The lens, as of :func:`first_values`.
+    cameras, views, within, pixel_origin, size
+        How images are grouped, and how pixels count: see docs/targets.md.
+    sync
+        `known`: images of one view were taken at one time; `none`: each has a pose of its own.
+    sd0, regularise
+        As of :class:`Calibration`.
+
+    Raises
+    ------
+    InputError
+        Nothing that is known, corners without a board, several formats at once, or whatever a format refuses:
+        names the file and the record.
+    """
+    path = Path(path)
+    models, boards, corners = _sorted(path)
+    described = [board] if isinstance(board, Path) else boards if board is None else []
+    own = board if isinstance(board, Board) else _only_board(described)
+    size = size or next(map(picture_size, described), None)
+    if models:
+        given = _given(path, models, corners, own)
+        given = given.replace(regularise=regularise or given.regularise, sd0=sd0)
+        if sync == "none":
+            raise InputError(
+                f"{models[0].name} says which pictures are of one view: --sync none goes without", file=path
+            )
+        return given if shape is None else given.replace(board=given.board.replace(shape=shape))
+    how = Grouping(
+        cameras, views, within, sync == "none", size, "corner" if pixel_origin == "corner" else "center"
+    )
+    found = _measured(path, corners, own)
+    own = found.board if own is None else own
+    if own is None:
+        raise InputError(NO_BOARD, file=path)
+    if shape is not None:
+        own = own.replace(shape=shape)
+    if unit is not None:
+        own = own.replace(unit=unit)
+    seen, told = grouped(found, how)
+    start = first_values(own, seen, model)
+    poses = start.picture_poses if sync == "none" else start.poses
+    return Calibration(
+        board=own,
+        corners=start.corners,
+        cameras=start.cameras,
+        poses=poses,
+        sensors=None if sync == "none" else start.sensors,
+        references=None if sync == "none" else start.references,
+        sd0=sd0,
+        sync=sync,
+        regularise=regularise,
+        messages=[*found.messages, *told, *start.remarks],
+    )
+
+
+def _only_board(boards: Sequence[Path]) -> Board | None:
+    if len(boards) > 1:
+        names = listed([each.name for each in boards])
+        raise InputError(
+            f"there are {len(boards)} boards, {names}: several boards that are fixed to each other are one of"
+            " the kind points; those whose relative pose is unknown are not taken yet",
+            file=boards[1],
+        )
+    return read_board(boards[0]) if boards else None
+
+
+def _given(
+    path: Path, models: Sequence[Path], corners: dict[_Form, list[Path]], board: Board | None
+) -> Calibration:
+    """Return the calibration of the one model of mrcal that lies there; those of one solution are alike."""
+    if corners or board is not None:
+        raise InputError(
+            f"{models[0].name} has corners and a board of its own, and others lie beside it", file=path
+        )
+    found = read_model(models[0])
+    for other in models[1:]:
+        if read_model(other) != found:
+            raise InputError(
+                f"{models[0].name} and {other.name} are of different calibrations: give one of them",
+                file=path,
+            )
+    return found
+
+
+def _measured(path: Path, corners: dict[_Form, list[Path]], board: Board | None) -> Measured:
+    """Return the corners of all files of the one format that lies there."""
+    if not corners:
+        raise InputError(
+            "holds no corners of a board in any format that is known (docs/targets.md)", file=path
+        )
+    if len(corners) > 1:
+        told = " and ".join(f"{form.title} ({files[0].name})" for form, files in corners.items())
+        raise InputError(f"holds {told}: give the file that is meant", file=path)
+    ((form, files),) = corners.items()
+    if board is None and form.clear is False and form.read is not read_npz:
+        raise InputError(NO_BOARD, file=path)
+    found = [form.read(each, board) for each in files]
+    return found[0] if len(found) == 1 else _together(path, files, found)
+
+
+def _together(path: Path, files: Sequence[Path], parts: Sequence[Measured]) -> Measured:
+    """Return the corners of several files: a camera each, which its file or folder is named for."""
+    apart = len({each.stem for each in files}) == len(files)
+    names = [each.stem if apart else f"{each.parent.name}" for each in files]
+    if len(set(names)) < len(names):
+        raise InputError(
+            f"holds {counted(len(files), 'file')} of corners whose names tell no cameras apart", file=path
+        )
+    if any(each.times is None for each in parts) and not all(each.times is None for each in parts):
+        raise InputError("has times of corners in some files, but not in all", file=path)
+    boards = [each.board for each in parts if each.board is not None]
+    if any(each != boards[0] for each in boards[1:]):
+        raise InputError("has files of corners with different boards", file=path)
+    starts = np.cumsum([0, *(len(each.images) for each in parts)])[:-1].tolist()
+    views = [own for each in parts for own in (each.views or each.images)]
+    times = None
+    if all(each.times is not None for each in parts):
+        times = np.concatenate([each.times for each in parts if each.times is not None])
+    return Measured(
+        path=path,
+        images=[own for each in parts for own in each.images],
+        image=np.concatenate([each.image + start for each, start in zip(parts, starts, strict=True)]),
+        point=np.concatenate([each.point for each in parts]),
+        xy=np.concatenate([each.xy for each in parts]),
+        sd=np.concatenate([each.sd for each in parts]),
+        use=np.concatenate([each.use for each in parts]),
+        cameras=[name for each, name in zip(parts, names, strict=True) for _ in each.images],
+        views=views,
+        times=times,
+        sizes={name: each.sizes[""] for each, name in zip(parts, names, strict=True) if "" in each.sizes},
+        board=boards[0] if boards else None,
+        messages=[*dict.fromkeys(own for each in parts for own in each.messages)],
+    )

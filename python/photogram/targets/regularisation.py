@@ -1,0 +1,71 @@
+"""Priors of cameras as mrcal 2.2 has them: weak observations that lens terms are 0 and the centre is central.
+
+With n = 2 (corners of the board) (pictures), whatever is missing, and n_d lens terms of all cameras:
+
+    lambda p = 0,  lambda^2 = 0.0025 n / (4 n_d)         every lens term; 5 lambda for k4, k5, k6
+    mu (cx - (w - 1)/2) = 0,  mu^2 = 0.0025 n / (2 K 500^2)       likewise cy; K cameras
+
+as rows of unit weight in pixels, whatever the standard deviation of corners.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from photogram.errors import InputError
+from photogram.network.cameras import Camera
+
+__all__ = ["SPLINED", "regularised"]
+
+SPLINED = "splined_stereographic"
+CORE = ("fx", "fy", "f", "cx", "cy")
+DENOMINATOR = ("k4", "k5", "k6")
+SHARE, ROUGH, FAR = 0.0025, 4.0, 500.0
+FIRMER = 5.0
+
+
+def regularised(
+    cameras: Sequence[Camera], sizes: Sequence[tuple[int, int] | None], observed: int
+) -> list[Camera]:
+    """Return cameras with the priors of mrcal on what is free in them.
+
+    Parameters
+    ----------
+    cameras
+        The cameras.
+    sizes
+        Width and height of their pictures.
+    observed
+        n: two for each corner of the board and picture.
+
+    Raises
+    ------
+    InputError
+        A camera whose pictures have no known size; a splined one, which has priors of its own.
+    """
+    terms = [[name for name in each.names if name not in CORE and _free(each, name)] for each in cameras]
+    count = sum(map(len, terms))
+    mu = math.sqrt(SHARE * observed / (2 * len(cameras) * FAR**2))
+    found = []
+    for camera, size, own in zip(cameras, sizes, terms, strict=True):
+        if camera.model == SPLINED:
+            raise InputError(f"the camera {camera.title} is splined: its knots have priors of their own")
+        if size is None:
+            raise InputError(f"the camera {camera.title}: the centre of its pictures needs their size")
+        firm = math.sqrt(SHARE * observed / (ROUGH * count)) if count else math.inf
+        priors = {name: (0.0, 1 / (firm * (FIRMER if name in DENOMINATOR else 1.0))) for name in own}
+        priors |= {
+            name: ((extent - 1) / 2, 1 / mu)
+            for name, extent in zip(("cx", "cy"), size, strict=True)
+            if _free(camera, name)
+        }
+        values = {name: value for name, (value, _) in priors.items()}
+        sd = {name: each for name, (_, each) in priors.items()}
+        given = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
+        found.append(camera.replace(parameters={**camera.parameters, **values}, sd={**given, **sd}))
+    return found
+
+
+def _free(camera: Camera, name: str) -> bool:
+    return float(camera.deviations[camera.names.index(name)]) > 0

@@ -1,0 +1,129 @@
+"""Tables of a calibration, quantity by quantity: what text, page, JSON and CSV are written from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.show.page import Fact, Tone, significant
+from photogram.show.quantity import Axis, Quantity
+from photogram.targets.board_fit import STRETCHES, board_fit
+from photogram.targets.calibrated import Calibrated
+
+__all__ = ["board_facts", "view_rms", "views", "worst_points"]
+
+LISTED = 10
+"""Points of the board that a report names at most: those that fit worst."""
+NOTABLE = 3.0
+"""Standardized differences beyond are named."""
+_PIXELS = (Axis.of("px", "px"),)
+
+
+def views(calibrated: Calibrated) -> list[Quantity]:
+    """Return the views: pictures, corners used and left out, rms, redundancy, chi2, largest standardized."""
+    corners, result = calibrated.calibration.corners, calibrated.result
+    count, of_picture = corners.view_count, corners.views
+    use = corners.use
+    view = of_picture[corners.picture[use]]
+    weighted = (result.residuals / result.image_given_sd) ** 2
+    used = np.bincount(view, minlength=count)
+    rms = view_rms(view, result.residuals, count)
+    largest = np.zeros(count)
+    np.maximum.at(largest, view, np.nan_to_num(np.abs(result.standardized)).max(axis=1, initial=0.0))
+    left_out = np.bincount(of_picture[corners.picture[~use]], minlength=count)
+    return [
+        Quantity(
+            np.array(corners.view_names(), dtype=object),
+            (),
+            "name",
+            "view",
+            "name",
+            "first picture of the view",
+            head="View",
+        ),
+        Quantity(
+            np.bincount(of_picture, minlength=count), (), "number", "pictures", "pictures", head="Pictures"
+        ),
+        Quantity(used, (), "number", "corners", "corners", head="Corners"),
+        Quantity(left_out, (), "number", "left_out", "left_out", head="Left out"),
+        Quantity(rms, _PIXELS, "value", "rms_px", "rms_px", head="rms"),
+        Quantity(
+            _sums(view, result.redundancy, count), (), "number", "redundancy", "redundancy", head="Redundancy"
+        ),
+        Quantity(_sums(view, weighted, count), (), "number", "chi2", "chi2", head="chi²", figures=4),
+        Quantity(
+            largest,
+            (),
+            "number",
+            "largest_standardized",
+            "largest_standardized",
+            head="Largest standardized",
+            marked=largest > NOTABLE,
+        ),
+    ]
+
+
+def view_rms(view: Indices, residuals: Floats, count: int) -> Floats:
+    """Return the root mean squares of (m, 2) residuals over the corners of each view, or picture."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.sqrt(_sums(view, residuals**2, count) / (2 * np.bincount(view, minlength=count)))
+
+
+def _sums(view: Indices, values: Floats, count: int) -> Floats:
+    """Return the sums of (m, 2) values over the corners of each view."""
+    found: Floats = np.bincount(view, weights=values.sum(axis=1), minlength=count).astype(float)
+    return found
+
+
+def board_facts(calibrated: Calibrated) -> list[Fact]:
+    """Return what is to be said of the board, figure by figure."""
+    calibration = calibrated.calibration
+    board, unit = calibration.board, calibration.board.unit
+    found = [
+        Fact("Board", board.described),
+        Fact("Shape", _SHAPES[calibration.shape]),
+        Fact(
+            "Scale", "from the spacing", note="nothing checks it: its relative error is that of every length"
+        ),
+    ]
+    where = "cx, cy and pixels count from 0 at the centre of the first; COLMAP has 0.5 more"
+    found.append(Fact("Pixels", "centre is 0", note=where))
+    if (bend := calibrated.bend) is not None:
+        for name, value, sd in zip(_BENDS, bend.position.tolist(), bend.sd.tolist(), strict=False):
+            found.append(Fact(name, significant(value, 4), unit, f"sd {significant(sd, 2)} {unit}"))
+    fit = board_fit(calibrated)
+    if fit is None:
+        return found
+    found.append(Fact("Out of its plane, rms", significant(fit.rms_out_of_plane, 3), unit))
+    for name, value, sd in zip(STRETCHES, fit.stretch.tolist(), fit.sd.tolist(), strict=True):
+        tone: Tone = "look" if abs(value) > NOTABLE * sd else ""
+        found.append(Fact(f"Spacing, {name}", f"{value:.0f}", "ppm", f"sd {sd:.0f} ppm", tone))
+    return found
+
+
+_BENDS = ("Deflection along x (bend_x)", "Deflection along y (bend_y)")
+_SHAPES = {
+    "held": "held: every point is taken for where it should be",
+    "bend": "two parabolas, whose deflections in the middle are unknowns",
+    "points": "every point is an unknown, observed with its nominal place",
+}
+
+
+def worst_points(calibrated: Calibrated) -> list[str]:
+    """Return the points of the board that are farthest from their places, in sentences, largest first."""
+    result = calibrated.result
+    if calibrated.calibration.shape != "points":
+        return []
+    tests = np.nan_to_num(np.abs(result.point_standardized))
+    worst = np.argsort(-tests.max(axis=1), kind="stable")[:LISTED]
+    return [_told(calibrated, row, tests[row]) for row in worst.tolist() if tests[row].max() > NOTABLE]
+
+
+def _told(calibrated: Calibrated, row: int, tests: Floats) -> str:
+    result, unit = calibrated.result, calibrated.calibration.board.unit
+    off: Sequence[float] = result.point_differences[row].tolist()
+    apart = ", ".join(f"{axis} {value:+.2g}" for axis, value in zip("xyz", off, strict=True))
+    name, much = result.block.point_ids[row], f"{tests.max():.1f} standard deviations"
+    return f"point {name}: {apart} {unit} off its place, {much}"

@@ -1,0 +1,170 @@
+"""Points from the images of several cameras in one housing, with the errors of their calibration.
+
+The point X of axes of camera 0 has the least squares of the residuals of its images q. With J and C the
+partials of the images by X and by the common unknowns b, it depends on both by
+
+    dX = (J'J)^-1 J' dq + E db,      E = -(J'J)^-1 J' C.
+
+Errors of pixels are those of each point alone, sigma^2 (J'J)^-1; those of the calibration, E Q E', all points
+have in common: no mean of many points is free of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.targets.housing import Housing
+from photogram.targets.imaging import imaged, motion_partials, rays
+
+__all__ = ["Triangulated", "triangulated"]
+
+STEPS = 30
+CLOSE = 1e-12
+"""Of the distance: a point that moves by less has arrived."""
+
+
+@dataclass(frozen=True, eq=False)
+class Triangulated:
+    """Points with the two parts of their covariance.
+
+    Attributes
+    ----------
+    points
+        (n, 3) in the axes of camera 0, in the unit of the board; NaN where rays do not meet in front.
+    residuals
+        (n, k, 2) measured less computed images, pixels.
+    by_pixels
+        (n, 3, 3) covariances that errors of the pixels cause.
+    by_calibration
+        (3 n, 3 n) covariance of all points together that errors of the calibration cause.
+    """
+
+    points: Floats
+    residuals: Floats
+    by_pixels: Floats
+    by_calibration: Floats
+
+    @property
+    def distances(self) -> Floats:
+        """(n,) from the centre of camera 0."""
+        return np.asarray(np.linalg.norm(self.points, axis=1))
+
+    @property
+    def sd_of_distances(self) -> Floats:
+        """(n, 2) along the rays of camera 0: by pixels, and by the calibration."""
+        count = len(self.points)
+        along = self.points / self.distances[:, np.newaxis]
+        own = self.by_calibration.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
+        variances = [np.einsum("ni,nij,nj->n", along, each, along) for each in (self.by_pixels, own)]
+        return np.asarray(np.sqrt(np.stack(variances, axis=1)))
+
+    @property
+    def covariance(self) -> Floats:
+        """(3 n, 3 n) of all points together, both parts."""
+        found, count = self.by_calibration.copy(), len(self.points)
+        blocks = found.reshape(count, 3, count, 3)
+        blocks[np.arange(count), :, np.arange(count)] += self.by_pixels
+        return found
+
+
+def triangulated(
+    housing: Housing, cameras: Sequence[int], pixels: Floats, pixel_sd: float, still: Floats | None = None
+) -> Triangulated:
+    """Return points by their images in k cameras.
+
+    Parameters
+    ----------
+    housing, cameras
+        The cameras, and the numbers of k of them, 2 or more.
+    pixels
+        (n, k, 2) images of n points.
+    pixel_sd
+        Standard deviation of an image coordinate, pixels.
+    still
+        (6, c + 6) the motion of the axes of camera 0 that goes with the unknowns
+        (:func:`photogram.targets.datums.housing_rows`), where points are fixed to the housing; None: they are
+        in the axes of camera 0 themselves.
+    """
+    points = _settled(housing, cameras, pixels, _met(housing, cameras, pixels))
+    residuals, by_point, by_common = _rows(housing, cameras, pixels, points)
+    with np.errstate(invalid="ignore"):
+        inverse = _inverses(by_point)
+        effects = -inverse @ by_point.transpose(0, 2, 1) @ by_common
+    if still is not None:
+        effects = effects - motion_partials(points) @ still[:, : housing.common]
+    effects = effects.reshape(-1, housing.common)
+    common = housing.variance * housing.cofactors[: housing.common, : housing.common]
+    return Triangulated(
+        points, residuals.reshape(pixels.shape), pixel_sd**2 * inverse, effects @ common @ effects.T
+    )
+
+
+def _met(housing: Housing, cameras: Sequence[int], pixels: Floats) -> Floats:
+    """Return (n, 3) the points that are nearest to all rays: sum (I - r r') (X - O) = 0."""
+    normal, right = np.zeros((len(pixels), 3, 3)), np.zeros((len(pixels), 3))
+    for number, camera in enumerate(cameras):
+        turn, shift = housing.sensors[camera, :3, :3], housing.sensors[camera, :3, 3]
+        looking = rays(housing.cameras[camera], pixels[:, number]) @ turn
+        across = np.eye(3) - looking[:, :, np.newaxis] * looking[:, np.newaxis]
+        normal += across
+        right -= across @ (turn.T @ shift)
+    return np.asarray((_inverted(normal) @ right[:, :, np.newaxis])[:, :, 0])
+
+
+def _settled(housing: Housing, cameras: Sequence[int], pixels: Floats, points: Floats) -> Floats:
+    """Return the points of least squares; NaN where steps do not end."""
+    moved = np.full(len(points), np.inf)
+    for _ in range(STEPS):
+        residuals, by_point, _ = _rows(housing, cameras, pixels, points)
+        right = by_point.transpose(0, 2, 1) @ residuals[:, :, np.newaxis]
+        step = (_inverses(by_point) @ right)[:, :, 0]
+        points = points + step
+        with np.errstate(invalid="ignore"):
+            moved = np.linalg.norm(step, axis=1) / np.linalg.norm(points, axis=1)
+        if not (moved > CLOSE).any():
+            break
+    found: Floats = np.where((moved <= 1e3 * CLOSE)[:, np.newaxis], points, np.nan)
+    return found
+
+
+def _rows(
+    housing: Housing, cameras: Sequence[int], pixels: Floats, points: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return (n, 2 k) observed less computed, and partials by points (n, 2 k, 3) and unknowns (n, 2 k, c)."""
+    count = len(points)
+    residuals = np.empty((count, len(cameras), 2))
+    by_point = np.empty((count, len(cameras), 2, 3))
+    by_common = np.zeros((count, len(cameras), 2, housing.common))
+    for number, camera in enumerate(cameras):
+        turn, shift = housing.sensors[camera, :3, :3], housing.sensors[camera, :3, 3]
+        turned = points @ turn.T
+        images = imaged(housing.cameras[camera], turned + shift)
+        residuals[:, number] = pixels[:, number] - images.xy
+        by_point[:, number] = images.by_point @ turn
+        by_common[:, number, :, housing.parameters(camera)] = images.by_parameters
+        if camera:
+            by_common[:, number, :, housing.sensor(camera)] = images.by_point @ motion_partials(turned)
+    rows = 2 * len(cameras)
+    return (
+        residuals.reshape(count, rows),
+        by_point.reshape(count, rows, 3),
+        by_common.reshape(count, rows, housing.common),
+    )
+
+
+def _inverses(by_point: Floats) -> Floats:
+    """Return (n, 3, 3) (J'J)^-1."""
+    return _inverted(by_point.transpose(0, 2, 1) @ by_point)
+
+
+def _inverted(matrices: Floats) -> Floats:
+    """Return inverses; NaN of what has none."""
+    rows = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
+    rows = rows[np.linalg.cond(matrices[rows]) < 1 / np.finfo(float).eps]
+    found = np.full_like(matrices, np.nan)
+    found[rows] = np.linalg.inv(matrices[rows])
+    return found

@@ -1,0 +1,188 @@
+"""How uncertain a calibrated camera is: at pixels, over its picture, against distance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import length, shaped
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.targets.calibrated import Calibrated
+from photogram.targets.datums import DatumName, datum_rows
+from photogram.targets.difference import points_at
+from photogram.targets.housing import Housing
+from photogram.targets.housings import camera_number, housing_of, size_of
+from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, image_grid
+from photogram.targets.projection import projection_cofactors, worst
+
+__all__ = ["checked_distance", "projection_uncertainty", "uncertainty_against_distance", "uncertainty_map"]
+
+IMAGE = (60, 40)
+"""Rays of the whole picture that hold still in the datum `image`."""
+
+
+def projection_uncertainty(
+    result: Calibrated,
+    camera: int | str,
+    pixels: ArrayLike,
+    distance: float = np.inf,
+    datum: DatumName = "corners",
+    noise_only: bool = False,
+) -> Floats:
+    """Return how far off a camera images points that stay fixed to its housing (docs/targets.md).
+
+    Parameters
+    ----------
+    result, camera
+        The adjusted calibration, and one of its cameras: number or name.
+    pixels
+        (n, 2) where, from 0 at the centre of the first pixel.
+    distance
+        Of the points from the centre of this camera, in the unit of the board; infinite: directions.
+    datum
+        What holds still: `corners`, where the camera has seen them; `mean-frames`, the mean of the boards, as
+        mrcal has it; `image`, rays of the whole picture at this distance; `axes`, those of the camera.
+    noise_only
+        Whether the errors of the corners alone count, and not those of priors, as mrcal has it. It falls
+        where only priors hold the lens.
+
+    Returns
+    -------
+    (n, 2, 2) covariances, square pixels, scaled by the variance of unit weight; NaN where a pixel sees
+    nothing.
+
+    Raises
+    ------
+    InputError
+        A camera that there is not, a distance that is not positive, other shapes.
+    """
+    where = shaped("pixels", pixels, (length("pixels", pixels), 2))
+    number = camera_number(result, camera)
+    housing, own = _with(result, number, noise_only)
+    rows = _rows(result, number, housing, own, datum, checked_distance(distance))
+    return housing.variance * projection_cofactors(housing, own, where, distance, rows)
+
+
+def uncertainty_map(
+    result: Calibrated,
+    camera: int | str = 0,
+    distance: float = np.inf,
+    grid: tuple[int, int] = (60, 40),
+    *,
+    datum: DatumName = "corners",
+    noise_only: bool = False,
+    model: str = "not tested against other views",
+) -> UncertaintyMap:
+    """Return the uncertainty of projection over the picture of a camera.
+
+    Parameters
+    ----------
+    result, camera, distance, datum, noise_only
+        As of :func:`projection_uncertainty`.
+    grid
+        Pixels across and down, from edge to edge.
+    model
+        What is known of the model of the lens: the verdict of :func:`cross_validate`.
+
+    Raises
+    ------
+    InputError
+        As of :func:`projection_uncertainty`; pictures whose size nobody knows.
+    """
+    number = camera_number(result, camera)
+    size = size_of(result, number)
+    columns, rows, pixels = image_grid(size, grid)
+    found = projection_uncertainty(result, number, pixels, distance, datum, noise_only)
+    housing, own = housing_of(result, number)
+    return UncertaintyMap(
+        camera=result.cameras[number].name,
+        size=size,
+        distance=float(distance),
+        unit=result.calibration.board.unit,
+        datum=datum,
+        noise_only=noise_only,
+        columns=columns,
+        rows=rows,
+        covariances=found.reshape(len(rows), len(columns), 2, 2),
+        corners=housing.seen.xy[housing.seen.cameras == own],
+        model=model,
+    )
+
+
+def uncertainty_against_distance(
+    result: Calibrated,
+    camera: int | str,
+    pixel: Sequence[float],
+    distances: ArrayLike,
+    *,
+    datum: DatumName = "corners",
+    noise_only: bool = False,
+) -> UncertaintyCurve:
+    """Return the uncertainty of projection of a pixel at several distances.
+
+    Parameters
+    ----------
+    result, camera, datum, noise_only
+        As of :func:`projection_uncertainty`.
+    pixel
+        Column and row.
+    distances
+        (n,) from the centre of the camera; infinite: directions.
+
+    Raises
+    ------
+    InputError
+        As of :func:`projection_uncertainty`.
+    """
+    number = camera_number(result, camera)
+    place = shaped("pixel", pixel, (2,))
+    away = shaped("distances", distances, (length("distances", distances),))
+    sd = [
+        worst(projection_uncertainty(result, number, place[np.newaxis], each, datum, noise_only))[0]
+        for each in away.tolist()
+    ]
+    return UncertaintyCurve(
+        camera=result.cameras[number].name,
+        pixel=(float(place[0]), float(place[1])),
+        unit=result.calibration.board.unit,
+        datum=datum,
+        distances=away,
+        sd=np.array(sd),
+    )
+
+
+def checked_distance(distance: float) -> float:
+    """Return a distance.
+
+    Raises
+    ------
+    InputError
+        It is not positive.
+    """
+    if not distance > 0:
+        raise InputError(f"a distance from the camera is positive, or infinite, not {distance:g}")
+    return float(distance)
+
+
+def _with(result: Calibrated, camera: int, noise_only: bool) -> tuple[Housing, int]:
+    housing, own = housing_of(result, camera)
+    return (housing.noise_only() if noise_only else housing), own
+
+
+def _rows(
+    result: Calibrated, camera: int, housing: Housing, own: int, datum: DatumName, distance: float
+) -> Floats:
+    """Return the datum of a camera; `image`: rays of the whole picture hold still at the distance."""
+    if datum != "image":
+        return datum_rows(housing, own, datum)
+    points = points_at(housing.cameras[own], image_grid(size_of(result, camera), IMAGE)[2], [distance])
+    points = points[np.isfinite(points).all(axis=1)]
+    equal = np.broadcast_to(np.eye(2), (len(points), 2, 2))
+    return datum_rows(housing, own, datum, (points, equal, bool(np.isfinite(distance))))
+
+
+check_arguments(globals(), ["projection_uncertainty", "uncertainty_against_distance", "uncertainty_map"])
