@@ -317,6 +317,11 @@ def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValu
 
 def _check_snooping(project: Project, choices: Choices, division: Division | None) -> None:
     """Refuse what does not go with taking gross errors out."""
+    from photogram import adjust
+    from photogram.formats import adjusting
+
+    if adjusting(project, adjust) is not adjust:
+        raise typer.BadParameter("goes without OUTLIER_REJECTION", param_hint="--snoop")
     if division is not None:
         raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--snoop")
     chosen = choices.datum is not None or choices.loss is not None
@@ -368,6 +373,7 @@ def adjusted_block(
     """Adjust a block as its project says, but for what a user chooses, with its features."""
     from photogram import FirstValues, InputError, adjust_started
     from photogram.diagnosis.adjusted import diagnosed, errors_explained
+    from photogram.formats import adjusting
     from photogram.formats.additions import repeated_remarks
     from photogram.results.fitting import with_features
 
@@ -380,7 +386,7 @@ def adjusted_block(
             "progress": shown(status, "weighted sum of squares", 1.0) if status is not None else None,
         }
         with errors_explained(block):
-            call = _call(chosen, choices.loss_of(project), division)
+            call = adjusting(project, _call(chosen, choices.loss_of(project), division))
             if isinstance(block, FirstValues):
                 result = adjust_started(block, by=call, **how)
             else:

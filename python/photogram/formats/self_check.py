@@ -16,7 +16,7 @@ from photogram.network.cameras import Camera, images_of
 from photogram.network.motion import on_shared
 from photogram.network.timed import Timed
 from photogram.network.trajectories import Trajectory
-from photogram.network.whereabouts import given_poses, reach
+from photogram.network.whereabouts import given_poses
 
 __all__ = ["Agreement", "agreement", "doubts"]
 
@@ -109,7 +109,7 @@ def _moving(own: Timed, trajectory: Trajectory, xy: Floats) -> tuple[Floats, Flo
     time, since, there = own.images(xy)
     scale = 1.0 if own.readout is None else float(own.readout.position[0])
     offset = 0.0 if own.offset is None else float(own.offset.position[0])
-    places, axes = given_poses(trajectory, np.clip(time + offset + scale * since, *reach(trajectory)))
+    places, axes = given_poses(trajectory, np.clip(time + offset + scale * since, *trajectory.reach))
     if own.sensor is not None:
         places, axes = places + axes @ own.sensor.position, axes @ own.sensor.attitude
     return places, axes, there

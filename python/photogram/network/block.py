@@ -369,6 +369,13 @@ class Block(Valued, Brief):
             raise InputError(
                 f"the photo {scanned[0]} is a scanner's: its camera is in mm, not {self.image_unit}"
             )
+        of_scanners = np.isin(self.photo_ids, scanned)
+        own = [] if self.photo_cameras is None else np.unique(self.photo_cameras[of_scanners]).tolist()
+        if measured := [self.cameras[row].title for row in own if self.cameras[row].weights == "measured"]:
+            raise InputError(
+                f"the camera {measured[0]} is a scanner's: standard deviations of its images are of the"
+                " corrected place in the focal plane, not of what was measured (docs/moving.md#images)"
+            )
         named = Counter(each.name for each in self.all_trajectories)
         twice = [name for name, count in named.items() if count > 1]
         if twice:

@@ -242,6 +242,17 @@ TABLES: Mapping[str, Schema] = {
         "`from`, `to`, `distance`; `sd`, `instrument`",
         deviations=(1,),
     ),
+    "ranges": Schema(
+        ("photo", "point", "range"),
+        ("photo", "trajectory", "point", "instrument", "clock"),
+        ("range", "sd", "time", "lever_x", "lever_y", "lever_z", *_CLOCK),
+        "`photo`, or `trajectory` and `time` (s), `point`, `range`; `sd`, `lever_x` .. (0; unit of length,"
+        " from the projection centre to the rangefinder, in the axes of the photo), `instrument`; of records"
+        " of trajectories `time_offset` (0; s), `sd_time_offset` (s; 0: known), `clock` (a name that groups"
+        " and photos share; default: `ranges`)",
+        deviations=(1,),
+        stands_in={"photo": "trajectory"},
+    ),
     "lengths": Schema(
         ("line", *_ENDS, "length"),
         ("line", *_ENDS),
