@@ -15,7 +15,6 @@ from photogram.film import interior_orientation, which_mark
 from photogram.formats import read
 from photogram.formats.project import Project
 from photogram.network.films import Readings, Scan, Scanner
-from photogram.results.films import film_cofactors, film_values
 from shared_data import SHARED
 
 FOLDER = SHARED / "film"
@@ -70,7 +69,7 @@ def test_golden_sums() -> None:
 
 def test_golden_values_of_photos_and_films() -> None:
     wanted, result = golden()["full"]["photos"], adjusted()
-    values, cofactors = film_values(result), film_cofactors(result)
+    values, cofactors = result.film, result.film_cofactors
     for row, name in enumerate(result.block.photo_ids):
         own = wanted[name]
         sd = np.array(own["sd_film"])
