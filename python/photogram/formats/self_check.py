@@ -14,6 +14,7 @@ from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
 from photogram.network.motion import on_shared
+from photogram.network.refined import camera_images
 from photogram.network.timed import Timed
 from photogram.network.trajectories import Trajectory
 from photogram.network.whereabouts import given_poses, reach
@@ -83,7 +84,7 @@ def _sample(project: Project) -> _Sample:
     photos = block.image_photos[rows]
     cameras, photo_cameras = known_cameras(block)
     by_photo = _rows_of_photos(block, photos) if block.timed else {}
-    places, axes, xy = block.photo_positions[photos], matrices[photos], block.image_xy[rows]
+    places, axes, xy = block.photo_positions[photos], matrices[photos], camera_images(block)[rows]
     for own, trajectory in zip(block.timed, block.trajectories, strict=True):
         of_photo = by_photo[own.photo]
         if len(of_photo):

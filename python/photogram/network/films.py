@@ -24,6 +24,7 @@ from photogram.network.unknowns import Unknown
 __all__ = [
     "Film",
     "FilmBend",
+    "FilmNumbers",
     "FilmPlacement",
     "FilmSize",
     "Mark",
@@ -42,7 +43,7 @@ PATTERNS = ("none", "w1 w2", "ebner", "grid")
 
 
 @dataclass(frozen=True, eq=False)
-class _Numbers(Unknown):
+class FilmNumbers(Unknown):
     """Up to three numbers and their standard deviations.
 
     Parameters
@@ -62,49 +63,49 @@ class _Numbers(Unknown):
 
 
 @dataclass(frozen=True, eq=False)
-class FilmPlacement(_Numbers):
+class FilmPlacement(FilmNumbers):
     """Where the film of a photo lay: t1, t2 in mm, theta in radians."""
 
     KIND: ClassVar[str] = "film placement"
 
 
 @dataclass(frozen=True, eq=False)
-class FilmSize(_Numbers):
+class FilmSize(FilmNumbers):
     """How the size of the film of a photo has changed: m, b1, b2."""
 
     KIND: ClassVar[str] = "film size"
 
 
 @dataclass(frozen=True, eq=False)
-class FilmBend(_Numbers):
+class FilmBend(FilmNumbers):
     """What is not affine in the film of a photo: h1, h2 or g1, g2 in 1/mm."""
 
     KIND: ClassVar[str] = "film bend"
 
 
 @dataclass(frozen=True, eq=False)
-class Roll(_Numbers):
+class Roll(FilmNumbers):
     """The mean change of size m of the films of a roll."""
 
     KIND: ClassVar[str] = "roll"
 
 
 @dataclass(frozen=True, eq=False)
-class Mark(_Numbers):
+class Mark(FilmNumbers):
     """The place of a fiducial mark in the frame of its camera, mm."""
 
     KIND: ClassVar[str] = "fiducial"
 
 
 @dataclass(frozen=True, eq=False)
-class Weights(_Numbers):
+class Weights(FilmNumbers):
     """Two weights of a pattern, mm."""
 
     KIND: ClassVar[str] = "pattern"
 
 
 @dataclass(frozen=True, eq=False)
-class Scanner(_Numbers):
+class Scanner(FilmNumbers):
     """Sx, Sy and alpha (radians) of a scanner or comparator."""
 
     KIND: ClassVar[str] = "scanner"
@@ -113,7 +114,7 @@ class Scanner(_Numbers):
 
 
 @dataclass(frozen=True, eq=False)
-class ScannerCurve(_Numbers):
+class ScannerCurve(FilmNumbers):
     """Three coefficients of the polynomials of a scanner, mm."""
 
     KIND: ClassVar[str] = "scanner curve"
