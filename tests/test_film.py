@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from photogram import Camera, InputError, Result, adjust, simulate
+from photogram import Camera, InputError, Result, adjust, diagnose, first_values, read_result, simulate
 from photogram.film import interior_orientation, which_mark
 from photogram.formats import read, to_files
 from photogram.formats.project import Project
@@ -299,3 +299,28 @@ def test_a_bilinear_film_and_a_grid_are_adjusted(tmp_path: Path) -> None:
 def project_again(folder: Path) -> Project:
     (folder / "project.toml").write_text('[project]\nformat = 1\n\n[units]\nimage = "mm"\n')
     return read(folder)
+
+
+def test_a_result_is_saved_and_read_and_told(tmp_path: Path) -> None:
+    result = adjusted()
+    result.to_parquet(tmp_path / "result")
+    again = read_result(tmp_path / "result")
+    np.testing.assert_array_equal(again.film, result.film)
+    np.testing.assert_array_equal(again.film_cofactors, result.film_cofactors)
+    np.testing.assert_array_equal(again.fiducial_residuals, result.fiducial_residuals)
+    assert isinstance(again.block.passages[0], Scan)
+    document = json.loads(result.to_json())
+    assert [each["photo"] for each in document["films"]] == result.block.photo_ids
+    np.testing.assert_array_equal([each["film"] for each in document["films"]], result.film)
+    assert "Film and fiducials" in result.report()
+    assert result.block.image_unit == "px"
+
+
+def test_films_leave_first_values_and_checks_to_the_images_of_cameras(tmp_path: Path) -> None:
+    """Photos without poses are started from readings that are brought back to the camera."""
+    block = project(tmp_path).block
+    unknown = block.replace(photo_positions=np.nan, photo_attitudes=np.nan)
+    started = first_values(unknown)
+    assert not started.missing
+    assert adjust(started.block).sum_and_freedom == pytest.approx(adjusted().sum_and_freedom, rel=1e-6)
+    assert not diagnose(block).grave

@@ -14,7 +14,7 @@ from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
 from photogram.network.motion import on_shared
-from photogram.network.refined import camera_images
+from photogram.network.refined import camera_images, camera_unit
 from photogram.network.timed import Timed
 from photogram.network.trajectories import Trajectory
 from photogram.network.whereabouts import given_poses, reach
@@ -147,7 +147,7 @@ def doubts(project: Project) -> list[Message]:
         )
     widths = [size[0] for size in project.sizes if size is not None]
     scale = float(np.median(project.block.camera_scales()))
-    limit = max(GROSS, PART * min(widths)) if widths and project.block.image_unit == "px" else PART * scale
+    limit = max(GROSS, PART * min(widths)) if widths and camera_unit(project.block) == "px" else PART * scale
     if found.median > limit:
         sample = _sample(project)
         helps = [name for name, change in _OTHERS.items() if change(sample).median() * BETTER < found.median]
@@ -155,7 +155,7 @@ def doubts(project: Project) -> list[Message]:
         messages.append(
             Message(
                 f"positions and images do not agree: the median residual is {found.median:.3g}"
-                f" {project.block.image_unit}{advice}"
+                f" {camera_unit(project.block)}{advice}"
             )
         )
     return messages

@@ -36,6 +36,7 @@ __all__ = [
     "ScannerCurve",
     "Weights",
     "check_scans",
+    "reads_pixels",
 ]
 
 PATTERNS = ("none", "w1 w2", "ebner", "grid")
@@ -292,18 +293,25 @@ class Scan(Passage):
         return self.film.numbers()
 
 
+def reads_pixels(passages: Sequence[Passage]) -> bool:
+    """Whether the readings of scanned films are pixels: a unit of them is no millimetre."""
+    return any(isinstance(each, Scan) and each.film.readings.pitch != 1.0 for each in passages)
+
+
 def check_scans(
     passages: Sequence[Passage],
     photos: Sequence[str],
     cameras: Sequence[Camera],
     photo_cameras: Indices | None,
+    image_photos: Indices,
 ) -> None:
     """Refuse scans of photos whose camera has no frame of marks, and two of one photo.
 
     Raises
     ------
     InputError
-        A camera in pixels, of a comparator of its own, or with residuals where readings are corrected.
+        A camera in pixels, of a comparator of its own, or with residuals where readings are corrected; images
+        in pixels of scans beside such in mm.
     """
     scans = [each for each in passages if isinstance(each, Scan)]
     rows = {name: row for row, name in enumerate(photos)} if scans else {}
@@ -327,3 +335,9 @@ def check_scans(
                 f"the photo {each.photo} is a scanned film: residuals are those of readings, and its camera"
                 " has weights corrected: measured is needed"
             )
+    read = {rows[each.photo] for each in scans if each.film.readings.pitch != 1.0}
+    if read and (others := set(np.unique(image_photos).tolist()) - read):
+        raise InputError(
+            f"the photo {photos[min(read)]} is read in pixels, and {photos[min(others)]} is not: images of a"
+            " block have one unit"
+        )

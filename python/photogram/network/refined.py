@@ -9,12 +9,17 @@ from photogram.arguments.types import Floats
 from photogram.network.block import Block
 from photogram.network.films import FilmNumbers, Scan
 
-__all__ = ["as_seen", "camera_images", "is_scanned"]
+__all__ = ["as_seen", "camera_images", "camera_unit", "is_scanned"]
 
 
 def is_scanned(block: Block) -> bool:
     """Whether images of a block are readings of scanned films or plates."""
     return any(isinstance(each, Scan) for each in block.passages)
+
+
+def camera_unit(block: Block) -> str:
+    """Return the unit of images in the frame of their cameras: that of films is mm, whatever readings are."""
+    return "mm" if is_scanned(block) else block.image_unit
 
 
 def camera_images(block: Block) -> Floats:
