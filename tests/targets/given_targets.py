@@ -72,7 +72,7 @@ def left_table(folder):
     board = data["board"]
     (folder / "board.toml").write_text(
         f"columns = {board['columns']}\nrows = {board['rows']}\nspacing = {board['spacing']}\nunit = 'mm'\n"
-        "shape = 'held'\n"
+        f"shape = 'held'\npicture_size = {data['image']}\n"
     )
     lines = ["image,point,x,y"]
     for picture, corners in data["corners"]["left"].items():

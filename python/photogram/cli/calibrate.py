@@ -17,6 +17,7 @@ from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option
 from photogram.cli.progress import shown
 from photogram.cli.projects import Deviations, OriginName, with_options
+from photogram.cli.uncertainty import AS_USUAL, Uncertainty
 
 if TYPE_CHECKING:
     from photogram.targets import Board, Calibrated, Calibration
@@ -50,6 +51,10 @@ class PriorName(StrEnum):
     """Whose priors cameras have."""
 
     MRCAL = "mrcal"
+
+
+PLAIN_GOES = "--shape, --sd, --regularise alone"
+"""Options that go with a plain project."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +130,8 @@ class Seen:
         """Read what lies at a path."""
         from photogram.targets import read
 
+        if (path / "project.toml").exists():
+            return self._of_project(path)
         given: dict[str, Any] = {
             "views": self.views.value,
             "sync": self.sync.value,
@@ -143,6 +150,21 @@ class Seen:
             sd0=self._sd0(),
             **given,
         )
+
+    def _of_project(self, path: Path) -> Calibration:
+        """Return the calibration that a plain project is, with what a user says otherwise."""
+        from photogram import formats
+        from photogram.formats.calibrations import calibration_of
+
+        found = calibration_of(formats.read(path))
+        if self != Seen(shape=self.shape, sd=self.sd, regularise=self.regularise):
+            raise typer.BadParameter("a project has board, views and lens", param_hint=PLAIN_GOES)
+        changes: dict[str, Any] = {"regularise": self.regularise and self.regularise.value}
+        if self.shape is not None:
+            changes["board"] = found.board.replace(shape=self.shape.value)
+        if self.sd is not None:
+            changes["sd0"] = self._sd0()
+        return found.replace(**changes)
 
     def _board(self) -> Board | Path | None:
         """Return the board of `--board` and `--spacing`, or the file that describes it."""
@@ -182,6 +204,7 @@ def _pair(text: str, option: str) -> tuple[int, int]:
 
 @with_job
 @with_options("snooping", Snooping)
+@with_options("uncertainty", Uncertainty)
 @with_options("seen", Seen)
 @with_options("documents", Documents, *OF_NETWORKS)
 def calibrate(
@@ -208,11 +231,12 @@ def calibrate(
         PriorName | None,
         typer.Option(help="Take corners out as mrcal does, to reproduce its results.", show_default=False),
     ] = None,
+    uncertainty: Uncertainty = AS_USUAL,
     threads: Threads = None,
     strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
-    """Calibrate cameras and rigs with pictures of a board: corners in, cameras with their uncertainty out.
+    """Calibrate cameras and rigs with pictures of a board: cameras with their uncertainty.
 
     Needs no start values. The report, tables of views, points, corners and cameras, and the adjusted project
     go to --out.
@@ -227,15 +251,23 @@ def calibrate(
             calibration = seen.read(path)
         for message in calibration.messages if not quiet else ():
             print_remark(str(message))
-        how = {"loss": None if loss is LossName.NONE else loss.value, "outliers": outliers and outliers.value}
-        found = _adjusted(job, calibration, how, threads, snooping)
+        how: dict[str, Any] = {
+            "loss": None if loss is LossName.NONE else loss.value,
+            "outliers": outliers and outliers.value,
+        }
+        uncertainty.asked()
+        found = uncertainty.told(
+            job,
+            _adjusted(job, calibration, how, threads, snooping),
+            lambda other: seen.read(other).adjust(**how, threads=threads),
+        )
         files = _files(found)
         page = documents.page(job, "calibrate", target, partial(_page, found))
         job.finish(
             {target / name: content for name, content in files.items()} | pictures.of(found.result) | page,
             documents.as_json(found),
             summary=lambda: _summarise(found),
-            code=found.verdict.exit_code(strict=strict),
+            code=uncertainty.exit_code(found, found.verdict.exit_code(strict=strict)),
         )
 
 
@@ -256,15 +288,18 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     """Make everything that goes to the directory, before anything is written."""
     from photogram.formats import to_files
     from photogram.formats.adjusted import table_files
-    from photogram.formats.targets import adjusted_project
+    from photogram.formats.calibrations import adjusted_project
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
     from photogram.targets.tables import views
+    from photogram.targets.worth_files import worth_files
 
     files = {"report.txt": found.report().encode(), **table_files(found.result)}
     files["views.csv"] = csv_text(frame(views(found)))
     plain = to_files(adjusted_project(found), "plain")
     files |= {f"adjusted/{name}": content for name, content in plain.items()}
+    if found.worth is not None:
+        files |= worth_files(found.worth)
     if found.snooped is not None:
         files["removed.csv"] = found.snooped.table().to_csv(index=False).encode()
     return files

@@ -8,14 +8,17 @@ from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, Righ
 from photogram.film.interior import Affine, Interior, interior_orientation
 from photogram.film.lens_table import Curve, LensParameters, RadialTable
 from photogram.film.which import WhichMark, which_mark
+from photogram.film.years import CameraComparison, DatedCamera, compare_cameras
 
 __all__ = [
     "AdjustedMarks",
     "Affine",
     "CalibratedMarks",
+    "CameraComparison",
     "Certificate",
     "Crossing",
     "Curve",
+    "DatedCamera",
     "DistanceDifference",
     "Explanation",
     "Interior",
@@ -26,11 +29,12 @@ __all__ = [
     "Tangential",
     "WhichMark",
     "adjust_distances",
+    "compare_cameras",
     "interior_orientation",
     "which_mark",
 ]
 
-check_arguments(globals(), ["adjust_distances", "interior_orientation", "which_mark"])
+check_arguments(globals(), ["adjust_distances", "compare_cameras", "interior_orientation", "which_mark"])
 
 WAYS = {
     "document_of": ("certificate_document",),

@@ -26,6 +26,7 @@ from photogram.network.rigs import Mount
 from photogram.network.timed import Timed
 from photogram.results.features import Definition
 from photogram.show.brief import Brief
+from photogram.targets.board import Board
 
 __all__ = ["DatumName", "Frame", "Options", "Project", "Size", "assembled"]
 
@@ -107,6 +108,8 @@ class Project(Brief):
         What is to be fitted to adjusted points, as :func:`photogram.features` takes it.
     statement
         What is asked of its accuracy statement, as :meth:`photogram.Result.statement` takes it.
+    boards
+        What its control is the points of, where photos show a board: by name.
     """
 
     block: Block
@@ -124,6 +127,7 @@ class Project(Brief):
     repeated: Repeated = field(default_factory=Repeated)
     features: Mapping[str, Definition] = field(default_factory=dict)
     statement: Mapping[str, Any] = field(default_factory=dict)
+    boards: Mapping[str, Board] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         given = self.block.in_frame(self.frame)

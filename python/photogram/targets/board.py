@@ -58,7 +58,7 @@ class Board(Valued, Brief):
         Standard deviations of z, and of x and y, of each point for `points`. None: 1/200 and 1/500 of the
         spacing.
     point_sd
-        Of `points`: (n, 3) in the place of these; None: these.
+        (n, 3) in the place of these; None: these.
 
     Raises
     ------
@@ -90,6 +90,11 @@ class Board(Valued, Brief):
             self._check_points()
         else:
             self._check_grid()
+        if self.point_sd is not None:
+            sd = shaped("point_sd", self.point_sd, (len(self.places), 3))
+            if not ((sd >= 0) & np.isfinite(sd)).all():
+                raise InputError("point_sd of a board are not standard deviations")
+            self._set("point_sd", sd)
         for name in ("sd_plane", "sd_spacing"):
             if getattr(self, name) is not None:
                 self._set(name, _length(name, getattr(self, name)))
@@ -103,7 +108,7 @@ class Board(Valued, Brief):
                 raise InputError(f"a board of the kind {self.kind} has no {name}")
 
     def _check_grid(self) -> None:
-        self._refuse("points", "point_names", "point_sd")
+        self._refuse("points", "point_names")
         least = 1 if self.kind == "aprilgrid" else 2
         for name in ("columns", "rows"):
             count = whole_number(f"{name} of a board", getattr(self, name))
@@ -148,11 +153,6 @@ class Board(Valued, Brief):
             if len(given) != count or len(set(given)) < count:
                 raise InputError(f"point_names of a board are not {count} different names")
             self._set("point_names", tuple(given))
-        if self.point_sd is not None:
-            sd = shaped("point_sd", self.point_sd, (count, 3))
-            if not ((sd >= 0) & np.isfinite(sd)).all():
-                raise InputError("point_sd of a board are not standard deviations")
-            self._set("point_sd", sd)
 
     def brief(self) -> tuple[str, Rows]:
         """Return what the board is in a few lines."""
@@ -220,9 +220,15 @@ class Board(Valued, Brief):
         x, y
             The deflections in the middle along the columns and along the rows; a and b go from 0 to 1 there.
         """
-        found = self.places.copy()
-        a, b = (found[:, :2] / found[:, :2].max(axis=0)).T
-        found[:, 2] = 4 * x * a * (1 - a) + 4 * y * b * (1 - b)
+        found: Floats = self.places + np.einsum("nki,k->ni", self.shifts(), [x, y])
+        return found
+
+    def shifts(self) -> Floats:
+        """Return (n, 2, 3) how points move with a deflection of one along the columns, and along the rows."""
+        places = self.places
+        a, b = (places[:, :2] / places[:, :2].max(axis=0)).T
+        found = np.zeros((len(places), 2, 3))
+        found[:, 0, 2], found[:, 1, 2] = 4 * a * (1 - a), 4 * b * (1 - b)
         return found
 
     def shape_of(self, views: int) -> Shape:

@@ -17,13 +17,13 @@ from photogram.io.yaml_text import read_yaml_text
 from photogram.messages import nearest
 from photogram.targets.board import Board
 
-__all__ = ["BOARD_FILE", "is_board", "read_board"]
+__all__ = ["BOARD_FILE", "is_board", "picture_size", "read_board"]
 
 BOARD_FILE = "board.toml"
 _WORDS = ("kind", "unit", "shape")
 _COUNTS = ("columns", "rows")
 _LENGTHS = ("tag_size", "tag_spacing", "sd_plane", "sd_spacing")
-_KEYS = (*_WORDS, *_COUNTS, "spacing", "spacing_x", "spacing_y", *_LENGTHS, "points")
+_KEYS = (*_WORDS, *_COUNTS, "spacing", "spacing_x", "spacing_y", *_LENGTHS, "points", "picture_size")
 _SD = ("sd_x", "sd_y", "sd_z")
 
 
@@ -43,6 +43,22 @@ def read_board(path: Path) -> Board:
         Keys that there are not, values of another kind, what is no board: names file and line.
     """
     return _of_toml(path) if path.suffix.lower() == ".toml" else _of_kalibr(path)
+
+
+def picture_size(path: Path) -> tuple[int, int] | None:
+    """Return width and height of the pictures that a `board.toml` was seen in, where it says them.
+
+    Raises
+    ------
+    InputError
+        Something else than two whole numbers.
+    """
+    if path.suffix.lower() != ".toml" or "picture_size" not in (file := TomlFile(path)).content:
+        return None
+    value = file.content["picture_size"]
+    if not (isinstance(value, list) and len(value) == 2 and all(type(each) is int for each in value)):
+        raise file.error("picture_size", "picture_size is a width and a height: [640, 480]")
+    return value[0], value[1]
 
 
 def _of_toml(path: Path) -> Board:

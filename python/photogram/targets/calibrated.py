@@ -12,17 +12,20 @@ import numpy as np
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.network.attitudes import Attitudes
+from photogram.network.passages import Bend
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
 from photogram.results.snooped import Snooped
+from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
-from photogram.targets.vision import FLIP, composed, sensor_steps, view_steps, vision_poses
+from photogram.targets.start import Start
+from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 
 if TYPE_CHECKING:
-    from photogram.targets.calibration import Calibration
+    from photogram.targets.worth import Worth
 
 __all__ = ["STEPS", "Calibrated", "Part", "UnknownWeight", "with_unknown_weight"]
 
@@ -62,12 +65,15 @@ class Calibrated(Brief, Shown):
         The adjustment without priors of cameras, where there are any: what these have moved.
     snooped
         What was taken out, where gross errors were looked for; `result` is what is left.
+    worth
+        Maps of uncertainty, cross-validation and what else was asked for, which reports show.
     """
 
-    calibration: Calibration
+    calibration: Start
     result: Result
     unregularised: Result | None = None
     snooped: Snooped | None = None
+    worth: Worth | None = None
 
     def brief(self) -> tuple[str, Rows]:
         """Return how the adjustment ended in a few lines."""
@@ -90,9 +96,7 @@ class Calibrated(Brief, Shown):
         found = np.tile(np.eye(4), (len(self.cameras), 1, 1))
         for each in self.result.unknowns:
             if each.kind == "sensor":
-                # A = F R'F, c = -F R't.
-                rotation = FLIP @ each.attitude.T @ FLIP
-                found[self._numbers[each.name]] = composed(rotation, -rotation @ FLIP @ each.position)
+                found[self._numbers[each.name]] = sensor_pose(each.position, each.attitude)
         return found
 
     @cached_property
@@ -114,8 +118,14 @@ class Calibrated(Brief, Shown):
     @property
     def points(self) -> Floats:
         """(n, 3) adjusted points of the board; nominal where no picture shows them."""
-        found = self.result.point_positions
-        return np.where(np.isnan(found), self.calibration.board.places, found)
+        found, board = self.result.point_positions, self.calibration.board
+        given = board.places if self.bend is None else board.bent(*self.bend.position[:2])
+        return np.where(np.isnan(found), given, found)
+
+    @property
+    def bend(self) -> AdjustedUnknown | None:
+        """The deflections of the middle of the board, where these are unknowns."""
+        return next((each for each in self.result.unknowns if each.kind == Bend.KIND), None)
 
     def sensors_adjusted(self) -> list[int]:
         """Return the cameras that have a sensor whose pose was adjusted."""
@@ -129,7 +139,7 @@ class Calibrated(Brief, Shown):
         parts
             In the order of rows: `cameras` (all parameters; held ones have zeros), `sensors` and `views` (six
             steps each: R <- Exp(w) R, t <- t + dt in vision axes; dt, then w), `board` (x, y, z of the points
-            that pictures show).
+            that pictures show, or `bend_x` and `bend_y`).
 
         Returns
         -------
@@ -197,6 +207,8 @@ class Calibrated(Brief, Shown):
         return names, ("unknown", own), [sensor_steps(self.sensors[row]) for row in rows]
 
     def _board(self) -> tuple[list[str], tuple[str, list[str]], list[Floats]]:
+        if self.bend is not None:
+            return ["bend_x", "bend_y"], ("unknown", [self.bend.name]), [np.eye(2)]
         seen = np.flatnonzero(self.result.used_points).tolist()
         own = [self.calibration.board.names[row] for row in seen]
         return [f"{name}.{axis}" for name in own for axis in "xyz"], ("point", own), [np.eye(3)] * len(own)

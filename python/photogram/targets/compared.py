@@ -15,7 +15,7 @@ from photogram.targets.agreement import Agreement
 from photogram.targets.datums import fixed_points
 from photogram.targets.difference import Criterion, Fitted, differences_at, fitted_motion, points_at
 from photogram.targets.housing import transformed
-from photogram.targets.imaging import imaged
+from photogram.targets.imaging import imaged, unknown_of, values_of
 from photogram.targets.maps import distance_text, image_grid
 from photogram.targets.projection import of_functions, point_partials, worst
 
@@ -166,6 +166,12 @@ class Difference(Brief):
         return self.title, rows + [("", each) for each in self.remarks]
 
     @property
+    def sentences(self) -> list[str]:
+        """The difference in lines of text."""
+        title, rows = self.brief()
+        return [title, *(f"{name}: {said}" if name else said for name, said in rows)]
+
+    @property
     def remarks(self) -> list[str]:
         """What limits the comparison, and what came out of its test."""
         said = []
@@ -309,9 +315,9 @@ class _Expected:
         a, b = self.a, self.b
         assert a.covariance is not None
         assert b.covariance is not None
-        unknown = a.camera.deviations > 0
-        if a.camera.model == b.camera.model and (unknown == (b.camera.deviations > 0)).all():
-            change = (b.camera.values - a.camera.values)[unknown]
+        unknown = unknown_of(a.camera)
+        if a.camera.model == b.camera.model and np.array_equal(unknown, unknown_of(b.camera)):
+            change = (values_of(b.camera) - values_of(a.camera))[unknown]
             chi2 = float(change @ np.linalg.solve(a.covariance + b.covariance, change))
             return Agreement.of("parameters of both cameras", chi2, len(change))
         pixels = image_grid(size, TESTED)[2]

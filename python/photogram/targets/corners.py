@@ -173,18 +173,24 @@ class Corners(Valued, Brief):
             use=self.use[own],
         )
 
-    def poor(self) -> dict[str, str]:
-        """Return the pictures that say nothing of a camera, and why: too few corners, or all on a line."""
+    def poor(self, places: Floats) -> dict[str, str]:
+        """Return the pictures that say nothing of a camera, and why.
+
+        Too few corners, or all on one line: of the picture, or of the board, whose points (b, 3) are given.
+        """
         found = {}
         for row, name in enumerate(self.pictures):
-            xy = self.xy[self.use & (self.picture == row)]
-            if len(xy) < FEWEST:
-                found[name] = f"{len(xy)} corners, fewer than {FEWEST}"
-                continue
-            long, wide = np.linalg.svd(xy - xy.mean(axis=0), compute_uv=False)[:2]
-            if not wide > _FLAT * long:
+            own = self.use & (self.picture == row)
+            if np.count_nonzero(own) < FEWEST:
+                found[name] = f"{np.count_nonzero(own)} corners, fewer than {FEWEST}"
+            elif _on_a_line(self.xy[own]) or _on_a_line(places[self.point[own]]):
                 found[name] = "all corners lie on one line"
         return found
+
+
+def _on_a_line(places: Floats) -> bool:
+    long, wide = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)[:2]
+    return not wide > _FLAT * long
 
 
 def _size(given: object) -> tuple[int, int] | None:

@@ -24,7 +24,10 @@ if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
     from photogram.results.result import Result
 
-__all__ = ["CrossValidation", "cross_validate"]
+__all__ = ["CrossValidation", "Into", "cross_validate"]
+
+Into = Literal["odd", "halves"] | int
+"""How views are split."""
 
 FEWEST = 3
 """Views of a part."""
@@ -103,7 +106,7 @@ class CrossValidation(Brief):
 
 def cross_validate(
     result: Calibrated,
-    into: Literal["odd", "halves"] | int = "odd",
+    into: Into = "odd",
     camera: int | str = 0,
     *,
     progress: Callable[[str], None] | None = None,

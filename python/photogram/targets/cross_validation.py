@@ -22,6 +22,7 @@ from photogram.arguments.types import Floats
 from photogram.targets.agreement import Agreement
 from photogram.targets.datums import datum_rows
 from photogram.targets.housing import Housing
+from photogram.targets.imaging import unknown_of, values_of
 from photogram.targets.projection import common_partials
 
 __all__ = ["CrossMap", "changes_between", "cross_map", "parts_agree", "splits"]
@@ -64,7 +65,7 @@ def changes_between(a: Housing, b: Housing) -> tuple[Floats, Floats]:
     """Return (c,) values of b less those of a, and their (c, c) cofactors; of the board none are compared."""
     found = np.zeros(a.common)
     for number, (first, second) in enumerate(zip(a.cameras, b.cameras, strict=True)):
-        found[a.parameters(number)] = (second.values - first.values)[first.deviations > 0]
+        found[a.parameters(number)] = (values_of(second) - values_of(first))[unknown_of(first)]
         if number:
             turn = b.sensors[number, :3, :3] @ a.sensors[number, :3, :3].T
             moved = b.sensors[number, :3, 3] - a.sensors[number, :3, 3]

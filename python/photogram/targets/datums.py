@@ -13,7 +13,8 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
 from photogram.targets.housing import Housing
-from photogram.targets.imaging import cross_matrices, imaged, motion_partials
+from photogram.targets.imaging import imaged, motion_partials, unknown_of
+from photogram.targets.vision import cross_matrices
 
 __all__ = ["DatumName", "datum_rows", "fixed_points", "housing_rows"]
 
@@ -74,7 +75,7 @@ def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool =
     finite
         Whether they are at finite distances.
     """
-    normal, right = np.zeros((6, 6)), np.zeros((6, np.count_nonzero(camera.deviations)))
+    normal, right = np.zeros((6, 6)), np.zeros((6, np.count_nonzero(unknown_of(camera))))
     for start in range(0, len(points), TOGETHER):
         part = slice(start, start + TOGETHER)
         images = imaged(camera, points[part])

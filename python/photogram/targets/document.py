@@ -14,6 +14,7 @@ from photogram.targets.board_fit import STRETCHES, board_fit
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.prior_shift import prior_shift
 from photogram.targets.tables import views
+from photogram.targets.worth_files import worth_members
 
 __all__ = ["calibration_document", "to_json"]
 
@@ -38,6 +39,7 @@ def calibration_document(calibrated: Calibrated) -> dict[str, Any]:
         **({"sensors": sensors} if sensors else {}),
         **({} if calibrated.snooped is None else {"snooping": calibrated.snooped.document()}),
         **({"moved_by_priors": records(moved)} if moved else {}),
+        **({} if calibrated.worth is None else worth_members(calibrated.worth)),
     }
 
 
@@ -59,6 +61,9 @@ def _board(calibrated: Calibrated) -> dict[str, Any]:
             ]
         ),
     }
+    if (bend := calibrated.bend) is not None:
+        found["bend"] = bend.position[:2].tolist()
+        found["bend_covariance"] = bend.covariance.tolist()
     if fit is not None:
         found["plane"] = fit.plane.tolist()
         found["rms_out_of_plane"] = fit.rms_out_of_plane

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import cycle
 from pathlib import Path
@@ -12,17 +13,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.plots.panels import Where, handed_out, note, panels, placed
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, COLOURS, FAINT, INK, ORDERED, VERMILION
 from photogram.targets.compared import Difference
+from photogram.targets.cross_validated import CrossValidation
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_difference", "draw_uncertainty", "draw_uncertainty_against_distance", "steps_of_125"]
+__all__ = [
+    "draw_cross_validation",
+    "draw_difference",
+    "draw_uncertainty",
+    "draw_uncertainty_against_distance",
+    "steps_of_125",
+]
 
 DOTS = 4000
 """Corners that are drawn: of more every so many-th."""
@@ -30,8 +38,6 @@ ARROWS = 24
 """Vectors along the longer side of a picture."""
 WIDTH = 7.6
 """Inches."""
-FARTHEST = 2.0
-"""Decades of contours below the largest."""
 SHADES = 4
 """Of colour from one contour to the next."""
 
@@ -85,6 +91,32 @@ def draw_difference(found: Difference, path: Path | None = None, ax: Where = Non
     return placed(partial(_difference, found), path, ax)
 
 
+def draw_cross_validation(
+    cross: CrossValidation, over: UncertaintyMap, path: Path | None = None, ax: Where = None
+) -> Any:
+    """Draw how the first two parts of a cross-validation differ, and that beside its covariance.
+
+    Parameters
+    ----------
+    cross
+        The cross-validation.
+    over
+        A map of the camera, whose grid and distance it is drawn at.
+    path, ax
+        As of :func:`draw_uncertainty`; two axes.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError, ModuleNotFoundError
+        As of :func:`draw_uncertainty`.
+    """
+    return placed(partial(_cross_validation, cross, over), path, ax)
+
+
 def draw_uncertainty_against_distance(
     curves: Sequence[UncertaintyCurve], path: Path | None = None, ax: Where = None
 ) -> Any:
@@ -111,7 +143,7 @@ def draw_uncertainty_against_distance(
 
 def steps_of_125(low: float, high: float) -> Floats:
     """Return values 1, 2, 5 times powers of ten that enclose what lies between two positive numbers."""
-    start = round_length(max(low, high / 10**FARTHEST))
+    start = round_length(low)
     powers = np.arange(math.floor(math.log10(start)), math.ceil(math.log10(high)) + 1)
     steps = np.concatenate([np.array([1.0, 2.0, 5.0]) * 10.0**power for power in powers])
     above = np.flatnonzero(steps >= high * (1 - 1e-9))
@@ -123,7 +155,8 @@ def _uncertainty(found: UncertaintyMap, ax: Where) -> Any:
         _contours(axes, found.columns, found.rows, found.sd, "px")
         _seen(axes, found.corners, found.coverage)
         _frame(axes, found.size)
-        axes.set_title(f"{found.title}\n{found.model}", fontsize=9.0)
+        said = found.model.replace("; ", "\n")
+        axes.set_title(f"{found.title}\n{said}", fontsize=9.0)
     return handed_out([axes])
 
 
@@ -131,23 +164,62 @@ def _difference(found: Difference, ax: Where) -> Any:
     chi2 = found.chi2
     rows = len(found.distances)
     columns = 1 if chi2 is None else 2
+    names = f"{found.cameras[1]} less {found.cameras[0]}"
     with panels(ax, rows, columns, WIDTH * columns, rows * _height(found.size)) as axes:
         for number, distance in enumerate(found.distances):
-            here = axes[number * columns]
-            _contours(here, found.columns, found.rows, found.lengths[number], "px")
-            _vectors(here, found, number)
-            _frame(here, found.size)
-            names = f"{found.cameras[1]} less {found.cameras[0]}"
-            here.set_title(f"{names} {distance_text(distance, found.unit)}, px", fontsize=9.0)
+            own = _Apart(found.size, found.columns, found.rows, found.vectors[number], found.inside)
+            own.draw(axes[number * columns], f"{names} {distance_text(distance, found.unit)}, px")
             if chi2 is not None:
-                beside = axes[number * columns + 1]
-                _contours(beside, found.columns, found.rows, chi2[number], "")
-                _frame(beside, found.size)
-                beside.set_title(
-                    "over what uncertainties explain: d' Q⁻¹ d / 2, about 1 where they do", fontsize=9.0
-                )
+                own.beside(axes[number * columns + 1], chi2[number])
         note(axes[-columns], found.remarks)
     return handed_out(axes)
+
+
+def _cross_validation(cross: CrossValidation, over: UncertaintyMap, ax: Where) -> Any:
+    found = cross.map(cross.cameras.index(over.camera), over.pixels.reshape(-1, 2), over.distance)
+    shape = over.sd.shape
+    own = _Apart(over.size, over.columns, over.rows, found.differences.reshape(*shape, 2), over.inside)
+    with panels(ax, 1, 2, 2 * WIDTH, _height(over.size)) as (left, right):
+        away = distance_text(over.distance, over.unit)
+        own.draw(left, f"{over.camera}: second part of the views less the first, {away}, px")
+        own.beside(right, found.chi2.reshape(shape) / 2)
+        note(left, [cross.verdict])
+    return handed_out([left, right])
+
+
+@dataclass(frozen=True, eq=False)
+class _Apart:
+    """Differences over a picture: (h, w, 2) vectors, and (h, w) where their lengths set the scale."""
+
+    size: tuple[int, int]
+    columns: Floats
+    rows: Floats
+    vectors: Floats
+    inside: Bools
+
+    @property
+    def lengths(self) -> Floats:
+        return np.asarray(np.hypot(self.vectors[..., 0], self.vectors[..., 1]))
+
+    def draw(self, axes: Axes, title: str) -> None:
+        """Draw lengths as contours, and some of the vectors, the longest as long as they are apart."""
+        _contours(axes, self.columns, self.rows, self.lengths, "px")
+        step = max(1, round(len(self.columns) / ARROWS))
+        every = (slice(None, None, step), slice(None, None, step))
+        places = np.stack(np.meshgrid(self.columns, self.rows), axis=-1)[every].reshape(-1, 2)
+        vectors = self.vectors[every].reshape(-1, 2)
+        largest = float(np.fmax.reduce(self.lengths[self.inside], initial=0.0)) or 1.0
+        known = np.hypot(*vectors.T) <= 2 * largest
+        spacing = step * (self.columns[1] - self.columns[0])
+        arrows(axes, places[known], vectors[known], scale=largest / spacing, color=BLUE, width=0.002)
+        _frame(axes, self.size)
+        axes.set_title(title, fontsize=9.0)
+
+    def beside(self, axes: Axes, chi2: Floats) -> None:
+        """Draw what they are beside their covariances."""
+        _contours(axes, self.columns, self.rows, chi2, "", lowest=0.1)
+        _frame(axes, self.size)
+        axes.set_title("beside its covariance: d' Q⁻¹ d / 2, about 1 where that explains it", fontsize=9.0)
 
 
 def _against_distance(curves: Sequence[UncertaintyCurve], ax: Where) -> Any:
@@ -182,22 +254,27 @@ def _height(size: tuple[int, int]) -> float:
     return 1.1 + 0.82 * WIDTH * size[1] / size[0]
 
 
-def _contours(axes: Axes, columns: Floats, rows: Floats, values: Floats, unit: str) -> None:
-    """Draw filled contours at 1, 2, 5 steps with their values on the lines."""
+def _contours(
+    axes: Axes, columns: Floats, rows: Floats, values: Floats, unit: str, lowest: float = 0.01
+) -> None:
+    """Draw filled contours at 1, 2, 5 steps with their values on the lines, from a share of the largest."""
     from matplotlib.colors import LogNorm
     from matplotlib.patheffects import withStroke
 
     positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
         return
-    levels = steps_of_125(float(positive.min()), float(positive.max()))
+    high = float(positive.max())
+    levels = steps_of_125(max(float(positive.min()), lowest * high), high)
     norm = LogNorm(levels[0], levels[-1])
     shown = np.ma.masked_invalid(values)
     places = np.arange(SHADES * (len(levels) - 1) + 1) / SHADES
     shades = np.exp(np.interp(places, np.arange(len(levels)), np.log(levels)))
     filled = axes.contourf(columns, rows, shown, shades, cmap=ORDERED, norm=norm, extend="min")
-    lines = axes.contour(columns, rows, shown, levels, colors=INK, linewidths=0.7)
+    filled.set_edgecolor("face")  # no seams between colours
+    lines = axes.contour(columns, rows, shown, levels, colors="white", linewidths=0.9)
     for text in axes.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8.0):
+        text.set_color(INK)
         text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
     bar = axes.figure.colorbar(filled, ax=axes, shrink=0.85, ticks=levels, format="%g")
     bar.ax.minorticks_off()
@@ -208,20 +285,8 @@ def _seen(axes: Axes, corners: Floats, coverage: Floats) -> None:
     if not len(corners):
         return
     step = -(-len(corners) // DOTS)
-    axes.plot(*corners[::step].T, ".", color=INK, markersize=2.5, alpha=0.6, markeredgewidth=0.0)
+    axes.plot(*corners[::step].T, ".", color="white", markersize=2.5, alpha=0.6, markeredgewidth=0.0)
     axes.plot(*np.vstack([coverage, coverage[:1]]).T, color=VERMILION, linewidth=1.2)
-
-
-def _vectors(axes: Axes, found: Difference, number: int) -> None:
-    """Draw some of the vectors, the longest where the board was seen as long as their distance."""
-    step = max(1, round(len(found.columns) / ARROWS))
-    every = (slice(None, None, step), slice(None, None, step))
-    places = np.stack(np.meshgrid(found.columns, found.rows), axis=-1)[every].reshape(-1, 2)
-    vectors = found.vectors[number][every].reshape(-1, 2)
-    largest = float(np.nanmax(np.where(found.inside, found.lengths[number], np.nan)))
-    known = np.hypot(*vectors.T) <= 2 * largest
-    spacing = step * (found.columns[1] - found.columns[0])
-    arrows(axes, places[known], vectors[known], scale=largest / spacing, color=BLUE, width=0.002)
 
 
 def _frame(axes: Axes, size: tuple[int, int]) -> None:
@@ -229,4 +294,4 @@ def _frame(axes: Axes, size: tuple[int, int]) -> None:
     axes.set(xlabel="column, px", ylabel="row, px")
 
 
-check_arguments(globals(), ["draw_difference", "draw_uncertainty", "draw_uncertainty_against_distance"])
+check_arguments(globals(), set(__all__) - {"steps_of_125"})

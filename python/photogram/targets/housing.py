@@ -13,7 +13,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network.cameras import Camera
-from photogram.targets.imaging import cross_matrices
+from photogram.targets.imaging import unknown_of
+from photogram.targets.vision import cross_matrices
 
 __all__ = ["Housing", "Seen", "mean_motion", "transformed"]
 
@@ -49,8 +50,9 @@ class Seen:
 class Housing:
     """K cameras that are fixed to one another, and what is known of them.
 
-    The c common unknowns are, in this order: of each camera its parameters with a standard deviation that is
-    not zero, of each but the first its sensor (dt, w), and what is unknown of the board.
+    The c common unknowns are, in this order: of each camera its parameters, and knots of its lens, with a
+    standard deviation that is not zero, of each but the first its sensor (dt, w), and what is unknown of the
+    board.
 
     Attributes
     ----------
@@ -102,7 +104,7 @@ class Housing:
 
     def parameters(self, camera: int) -> slice:
         """Return the rows of a camera's parameters."""
-        counts = [np.count_nonzero(each.deviations) for each in self.cameras]
+        counts = [np.count_nonzero(unknown_of(each)) for each in self.cameras]
         start = sum(counts[:camera])
         return slice(start, start + counts[camera])
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.network.cameras import Camera
+from photogram.targets.vision import FLIP, cross_matrices
 
-__all__ = ["Imaged", "cross_matrices", "imaged", "motion_partials", "rays"]
+__all__ = ["Imaged", "imaged", "motion_partials", "rays", "unknown_of", "values_of"]
 
-TURNED = np.array([1.0, -1.0, -1.0])
+TURNED: Floats = np.diag(FLIP)
 """From axes of vision to those of a photo, x right, y up, z back, and the other way."""
 
 
@@ -27,7 +27,8 @@ class Imaged:
     by_point
         (n, 2, 3) by the point: Pi.
     by_parameters
-        (n, 2, p) by the parameters of the camera that are unknown, in their order: K.
+        (n, 2, p) by the parameters of the camera that are unknown, in their order, then by its unknown knots:
+        K.
     """
 
     xy: Floats
@@ -37,22 +38,29 @@ class Imaged:
 
 def imaged(camera: Camera, points: Floats) -> Imaged:
     """Return the images of (n, 3) points, or directions, in the axes of a camera, with their partials."""
-    xy, by_u, by_parameters = _photocore.camera_partials(camera.model, camera.values, points * TURNED)
+    xy, by_u, by_parameters = camera.partials(points * TURNED)
+    return Imaged(xy, by_u * TURNED, by_parameters[:, :, unknown_of(camera)])
+
+
+def unknown_of(camera: Camera) -> Bools:
+    """Return which parameters of a camera are unknown, and behind them which of its knots."""
     unknown = camera.deviations > 0
-    return Imaged(xy, by_u * TURNED, by_parameters[:, :, unknown])
+    if camera.knots is None:
+        return unknown
+    knots = np.zeros(camera.knots.size, dtype=bool)
+    if camera.knot_sd is not None:
+        knots = camera.knot_sd.any(axis=2).repeat(2)
+    return np.append(unknown, knots)
+
+
+def values_of(camera: Camera) -> Floats:
+    """Return the parameters of a camera, and behind them its knots."""
+    return camera.values if camera.knots is None else np.append(camera.values, camera.knots)
 
 
 def rays(camera: Camera, pixels: Floats) -> Floats:
     """Return (n, 3) unit vectors, in the axes of a camera, to where (n, 2) pixels look; NaN without."""
     return np.asarray(camera.rays(pixels) * TURNED)
-
-
-def cross_matrices(vectors: Floats) -> Floats:
-    """Return (..., 3, 3) matrices [v]x of (..., 3) vectors: [v]x a = v x a."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    none = np.zeros_like(x)
-    rows = [[none, -z, y], [z, none, -x], [-y, x, none]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def motion_partials(points: Floats, finite: bool = True) -> Floats:

@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.arrays import shown
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.messages import nearest
 from photogram.network.cameras import Camera
+from photogram.network.knots import KNOTTED
+from photogram.targets import imaging
+from photogram.targets.least_lens import HELD, Moved, Points
+from photogram.targets.maps import image_grid
 
-__all__ = ["LENS_TERMS", "fitted", "grid_of_pixels", "is_perspective", "lens_of"]
+__all__ = [
+    "GRID",
+    "KNOTS",
+    "LENS_TERMS",
+    "fitted",
+    "fitted_in_stages",
+    "free_names",
+    "grid_of_pixels",
+    "is_perspective",
+    "lens_of",
+    "shows",
+    "within",
+]
 
 LENS_TERMS: Mapping[str, int] = MappingProxyType({"opencv4": 4, "opencv5": 5, "opencv8": 8, "opencv12": 12})
 """Names for `opencv_pinhole` with so many of its lens terms free."""
@@ -29,17 +44,23 @@ _STAGES = (frozenset({"k", "k0", "k1"}), frozenset({"k2"}), frozenset({"p0", "p1
 """Terms in the order in which they are freed, after these; the rest follow together."""
 _STARTS = (("alpha", 0.5), ("beta", 1.0), ("omega", 0.5))
 """Where terms begin that say nothing at 0."""
-STEPS, CLOSE = 100, 1e-10
-"""Steps of a fit at the most, and the relative fall of the sum of squares with which it ends."""
+KNOTS, ORDER = (30, 20), 3.0
+"""Knots along columns and rows of a splined lens, and its order, unless said."""
+BEYOND = 1.1
+"""The field of a splined lens over that of what it is to show."""
 
 
 def grid_of_pixels(size: tuple[int, int], radius: float = math.inf) -> Floats:
     """Return (m, 2) pixels over a picture, the outermost included, within a radius of its middle."""
-    last = np.array(size, dtype=np.float64) - 1
-    columns, rows = (np.linspace(0, end, count) for end, count in zip(last, GRID, strict=True))
-    found = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-    kept: Floats = found[np.hypot(*(found - last / 2).T) <= radius]
+    _, _, found = image_grid(size, GRID)
+    kept: Floats = found[within(found, size, radius)]
     return kept
+
+
+def within(pixels: Floats, size: tuple[int, int], radius: float) -> Bools:
+    """Return (m,) whether pixels lie within a radius of the middle of a picture."""
+    found: Bools = np.hypot(*(pixels - (np.array(size) - 1) / 2).T) <= radius
+    return found
 
 
 def is_perspective(camera: Camera) -> bool:
@@ -49,7 +70,7 @@ def is_perspective(camera: Camera) -> bool:
     return not column > camera.parameters["cx"]
 
 
-def lens_of(model: str, source: Camera, size: tuple[int, int]) -> Camera:
+def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int, int] = KNOTS) -> Camera:
     """Return a camera of a model with focal length and principal point of another, and no distortion.
 
     Parameters
@@ -60,6 +81,9 @@ def lens_of(model: str, source: Camera, size: tuple[int, int]) -> Camera:
         The camera that focal length, principal point, name and unit are taken from.
     size
         Width and height of its pictures, pixels.
+    knots
+        Along columns and rows, of a splined model; its field holds all pixels of the source, and a tenth
+        more. Its knots are free in place of its parameters.
 
     Raises
     ------
@@ -71,26 +95,48 @@ def lens_of(model: str, source: Camera, size: tuple[int, int]) -> Camera:
     if own not in models:
         raise InputError(f"model: there is no lens {shown(model)}{nearest(model, [*LENS_TERMS, *models])}")
     names = [name for name, _ in models[own][1]]
-    constants = {*names[len(names) - models[own][2] :]} - {"w", "h"}
+    splined = own == KNOTTED
+    constants = {*()} if splined else {*names[len(names) - models[own][2] :]} - {"w", "h"}
     if not ({"f", "fx"} & {*names} and "cx" in names) or constants:
         raise InputError(
             f"model: {model} has no focal length and principal point in pixels to begin with"
             + "".join(f", and a constant {each} that nothing says" for each in sorted(constants))
         )
-    given = source.parameters
-    fx, fy = given.get("fx", given.get("f")), given.get("fy", given.get("f"))
-    start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1]} | dict(_STARTS)
-    start |= _principal_point(source, "w" in names, size)
-    free = {*names} - {"w", "h"}
-    if count is not None:
-        free = {*names[: 4 + count]}
+    start = _start(source, size, "w" in names)
+    if splined:
+        start |= {"order": ORDER, "nx": knots[0], "ny": knots[1], "fov_x_deg": _field(source, size, knots)}
+    free = {*()} if splined else {*names} - {"w", "h"} if count is None else {*names[: 4 + count]}
     return Camera(
         own,
-        {name: value for name, value in start.items() if name in names and value is not None},
+        {name: value for name, value in start.items() if name in names},
         {name: math.inf for name in names if name in free},
         name=source.name,
         unit="px",
+        knot_sd=math.inf if splined else None,
     )
+
+
+def _start(source: Camera, size: tuple[int, int], from_middle: bool) -> dict[str, float]:
+    """Return where parameters begin: what the source says, and terms that say nothing."""
+    given = source.parameters
+    if "cx" not in given or not ({"f", "fx"} & {*given}):
+        raise InputError(
+            f"the camera {source.title}, {source.model}, has no focal length and principal point in pixels"
+        )
+    fx, fy = given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0))
+    start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1], **dict(_STARTS)}
+    return start | _principal_point(source, from_middle, size)
+
+
+def _field(source: Camera, size: tuple[int, int], knots: tuple[int, int]) -> float:
+    """Return the fov_x_deg (degrees) with which knots lie over all that a camera shows, and a tenth more."""
+    rays = source.rays(grid_of_pixels(size))
+    places = 2 * rays[:, :2] / (1 - rays[:, 2:])
+    inner = np.array(knots) - ORDER
+    if (inner < 1).any():
+        raise InputError(f"knots: a spline of order {ORDER:g} has {ORDER + 1:g} or more along an axis")
+    reach = float(np.nanmax(np.nanmax(np.abs(places), axis=0) * inner[0] / inner))
+    return min(BEYOND * math.degrees(4 * math.atan(reach / 2)), 359.0)
 
 
 def _principal_point(source: Camera, from_middle: bool, size: tuple[int, int]) -> dict[str, float]:
@@ -109,6 +155,7 @@ def fitted(
     held: Collection[str] = (),
     *,
     radius: float = math.inf,
+    knots: tuple[int, int] = KNOTS,
 ) -> Camera:
     """Return the camera of another model that shows the rays of a camera where this shows them.
 
@@ -128,6 +175,8 @@ def fitted(
         Parameters that stay: focal length and principal point those of the source, terms of the lens 0.
     radius
         Pixels farther from the middle of the picture do not count.
+    knots
+        Along columns and rows, of a splined model.
 
     Returns
     -------
@@ -138,25 +187,44 @@ def fitted(
     InputError
         A model that there is not, terms that it has not, or nothing of the picture that it can show.
     """
-    start = lens_of(model, source, size)
+    start = lens_of(model, source, size, knots)
     if unknown := sorted({*held} - {*start.names}):
         raise InputError(f"held: {start.model} has no {', '.join(unknown)}, but {', '.join(start.names)}")
     xy = grid_of_pixels(size, radius)
-    rays = source.rays(xy)
-    there = np.isfinite(rays).all(axis=1)
-    if is_perspective(start):
-        there &= -rays[:, 2] > NEARLY_ACROSS
-    fit = _Fit(start.model, rays[there], xy[there])
-    free = [name for name in start.names if start.deviations[start.names.index(name)] and name not in held]
-    if 2 * len(fit.xy) < len(free):
+    shown = Points(imaging.rays(source, xy), xy)
+    there = shows(start, shown.points)
+    free = [name for name in free_names(start) if name not in held]
+    if 2 * np.count_nonzero(there) < len(free) and start.knots is None:
         raise InputError(f"model: {model} shows nothing of what the camera {source.title} shows")
-    values = start.values
-    for stage in _stages(free):
-        values = fit.least(values, [start.names.index(name) for name in stage])
-    return start.replace(
-        parameters=dict(zip(start.names, values.tolist(), strict=True)),
-        sd=dict.fromkeys(free, math.inf),
+    return fitted_in_stages(Moved(start), Points(shown.points[there], xy[there]), free).camera.replace(
+        sd=dict.fromkeys([name for name in free if name in start.names], math.inf)
     )
+
+
+def shows(camera: Camera, points: Floats) -> Bools:
+    """Return (m,) whether a camera can show (m, 3) directions in vision axes; NaN cannot be shown."""
+    there = np.isfinite(points).all(axis=1)
+    if is_perspective(camera):
+        there = there & (points[:, 2] > NEARLY_ACROSS * np.linalg.norm(points, axis=1))
+    return np.asarray(there)
+
+
+def free_names(camera: Camera) -> list[str]:
+    """Return the free parameters of a camera, its free knots behind."""
+    own = [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd > 0]
+    return own + list(camera.knot_names if np.any(camera.knot_sd) else ())
+
+
+def fitted_in_stages(start: Moved, points: Points, free: Sequence[str], moving: slice = HELD) -> Moved:
+    """Return a lens, and at last its motion, fitted with more and more of its parameters free."""
+    at = start
+    numbers = {name: k for k, name in enumerate(at.names)}
+    stages = _stages(list(free))
+    for stage in stages:
+        at = points.least(at, [numbers[name] for name in stage])
+    if moving != HELD:
+        at = points.least(at, [numbers[name] for name in free], moving)
+    return at
 
 
 def _stages(free: list[str]) -> list[list[str]]:
@@ -169,46 +237,3 @@ def _stages(free: list[str]) -> list[list[str]]:
         if own and own not in found:
             found.append(own)
     return found
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """What a lens of a model is to show: (m, 3) rays at (m, 2) pixels."""
-
-    model: str
-    rays: Floats
-    xy: Floats
-
-    def least(self, values: Floats, free: list[int]) -> Floats:
-        """Return parameters with the least sum of squares, of free ones (Levenberg-Marquardt)."""
-        cost, rows, misses = self._linearized(values, free)
-        damping = 1e-6
-        for _ in range(STEPS):
-            scale = np.linalg.norm(rows, axis=0)
-            scale[scale == 0] = 1.0
-            normal = (rows / scale).T @ (rows / scale)
-            right = (rows / scale).T @ misses
-            trial = values.copy()
-            damped = normal + damping * np.eye(len(free))
-            trial[free] += np.linalg.lstsq(damped, right, rcond=None)[0] / scale
-            found, *others = self._linearized(trial, free)
-            if not found < cost:
-                damping *= 10
-                if damping > 1e8:
-                    break
-                continue
-            fall, values, cost, (rows, misses) = cost - found, trial, found, others
-            damping = max(damping / 10, 1e-14)
-            if fall <= CLOSE * cost:
-                break
-        return values
-
-    def _linearized(self, values: Floats, free: list[int]) -> tuple[float, Floats, Floats]:
-        """Return the sum of squares, infinite where an image is missing, partials and what is missed."""
-        images, _, by_values = _photocore.camera_partials(self.model, values, self.rays)
-        misses = (self.xy - images).reshape(-1)
-        cost = float(misses @ misses)
-        rows = by_values.reshape(len(misses), -1)[:, free]
-        if not (math.isfinite(cost) and np.isfinite(rows).all()):
-            cost = math.inf
-        return cost, rows, misses

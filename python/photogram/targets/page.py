@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.plots.panels import figure_of
 from photogram.show.cells import page_table
-from photogram.show.page import Facts, Page, Part, Remarks, Section
+from photogram.show.page import Drawing, Facts, Layers, Page, Part, Remarks, Section
 from photogram.show.ways import page_of
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.prior_shift import prior_shift
+from photogram.targets.residual_drawing import draw_board_residuals, draw_poorest_views
+from photogram.targets.residual_groups import Groups, residual_groups
 from photogram.targets.tables import board_facts, views, worst_points
+from photogram.targets.worth_page import worth_facts, worth_section
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["calibration_page"]
 
@@ -29,9 +38,47 @@ def calibration_page(calibrated: Calibrated) -> Page:
         "Pictures of one view show the board in one pose. chi² is the weighted sum of squares of its corners."
     )
     moved = prior_shift(calibrated)
+    worth = calibrated.worth
     sections = [
+        worth_section(worth),
         Section("board", "Board", board),
         Section("views", "Views", [page_table("Views", table)], intro),
+        Section("corners", "Residuals of corners", _residuals(calibrated)),
         Section("priors", "Priors of cameras", [page_table("What they have moved", moved)] if moved else []),
     ]
-    return replace(page, what="Calibration with targets", sections=[*sections, *page.sections])
+    highlights = [*([] if worth is None else worth_facts(worth)), *page.highlights]
+    return replace(
+        page,
+        what="Calibration with targets",
+        highlights=highlights,
+        sections=[*sections, *page.sections],
+    )
+
+
+def _residuals(calibrated: Calibrated) -> list[Part]:
+    """Return tables of residuals by groups, and pictures of them over the board and in the poorest views."""
+    figures = {
+        "board-residuals": ("On the board", "Mean residuals over all views: errors of the print.", _on_board),
+        "poorest-views": ("Poorest views", "Residuals of the pictures that fit worst.", _poorest),
+    }
+    drawings = [
+        Drawing(name, title, caption, partial(draw, calibrated))
+        for name, (title, caption, draw) in figures.items()
+    ]
+    tables = [page_table(title, residual_groups(calibrated, by)) for by, title in _GROUPS.items()]
+    return [Layers("corner-residuals", drawings), *(each for each in tables if len(each.rows) > 1)]
+
+
+_GROUPS: dict[Groups, str] = {
+    "camera": "By camera",
+    "level": "By level of the detector",
+    "radius": "By distance from the middle of the picture",
+}
+
+
+def _on_board(calibrated: Calibrated) -> Figure:
+    return figure_of(lambda ax: draw_board_residuals(calibrated, ax=ax))
+
+
+def _poorest(calibrated: Calibrated) -> Figure:
+    return figure_of(lambda ax: draw_poorest_views(calibrated, ax=ax))

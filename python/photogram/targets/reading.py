@@ -12,8 +12,8 @@ from photogram.errors import InputError
 from photogram.io.files import read_text, reading
 from photogram.messages import counted, listed
 from photogram.targets.board import Board, Shape
-from photogram.targets.board_files import is_board, read_board
-from photogram.targets.calibration import Calibration, Regularisation, Synchronisation
+from photogram.targets.board_files import is_board, picture_size, read_board
+from photogram.targets.calibration import Calibration
 from photogram.targets.corner_tables import (
     is_headless,
     is_table,
@@ -26,6 +26,7 @@ from photogram.targets.first import first_values
 from photogram.targets.measured import Grouping, Measured, ViewBy, grouped
 from photogram.targets.mrcal_model import KEY, read_model
 from photogram.targets.opencv_corners import is_npz, is_storage, read_npz, read_storage
+from photogram.targets.start import Regularisation, Synchronisation
 
 __all__ = ["holds_targets", "read"]
 
@@ -152,9 +153,9 @@ def read(
     """
     path = Path(path)
     models, boards, corners = _sorted(path)
-    own = read_board(board) if isinstance(board, Path) else board
-    if own is None and boards:
-        own = _only_board(boards)
+    described = [board] if isinstance(board, Path) else boards if board is None else []
+    own = board if isinstance(board, Board) else _only_board(described)
+    size = size or next(map(picture_size, described), None)
     if models:
         given = _given(path, models, corners, own)
         given = given.replace(regularise=regularise or given.regularise, sd0=sd0)
@@ -191,7 +192,7 @@ def read(
     )
 
 
-def _only_board(boards: Sequence[Path]) -> Board:
+def _only_board(boards: Sequence[Path]) -> Board | None:
     if len(boards) > 1:
         names = listed([each.name for each in boards])
         raise InputError(
@@ -199,7 +200,7 @@ def _only_board(boards: Sequence[Path]) -> Board:
             " the kind points; those whose relative pose is unknown are not taken yet",
             file=boards[1],
         )
-    return read_board(boards[0])
+    return read_board(boards[0]) if boards else None
 
 
 def _given(

@@ -29,7 +29,9 @@ def report(calibrated: Calibrated) -> str:
 
 def calibration_summary(calibrated: Calibrated) -> list[Section]:
     """Return what a reader wants first: the summary of the block, the board, its views."""
+    worth = calibrated.worth
     return [
+        ("Uncertainty of projection", [] if worth is None else worth.sentences),
         *summary(calibrated.result),
         *([] if calibrated.snooped is None else calibrated.snooped.sections()[ON_TOP:]),
         ("Board", [*fact_lines(board_facts(calibrated)), *worst_points(calibrated)]),
@@ -40,8 +42,8 @@ def calibration_summary(calibrated: Calibrated) -> list[Section]:
 
 def _views(table: list[Quantity]) -> list[str]:
     width = max(len(str(each)) for each in table[0].values)
-    forms = {"rms": ".3f", "redundancy": ".1f", "chi2": ".1f", "largest_standardized": ".2f"}
-    heads = {"left_out": "left out", "largest_standardized": "largest w", "rms": "rms px"}
+    forms = {"rms_px": ".3f", "redundancy": ".1f", "chi2": ".1f", "largest_standardized": ".2f"}
+    heads = {"left_out": "left out", "largest_standardized": "largest w", "rms_px": "rms px"}
     fields = field(table[0], max(width, 4), head="view")
     for each in table[1:]:
         name = str(each.name)

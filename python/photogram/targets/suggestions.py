@@ -158,7 +158,9 @@ def candidate_views(housing: Housing, camera: int, size: tuple[int, int], unit: 
     to_first = inverted(to_camera)
     found = []
     for place, towards in _cells(housing, camera, size):
-        for distance, tilt, turn in product(dict.fromkeys(f"{each:.2g}" for each in away), TILTS, TURNS):
+        for distance, tilt, turn in product(
+            dict.fromkeys(f"{float(f'{each:.2g}'):g}" for each in away), TILTS, TURNS
+        ):
             rotation = _facing(towards) @ _turned(*TILTS[tilt], TURNS[turn])
             pose = composed(rotation, float(distance) * towards - rotation @ middle)
             name = ", ".join(filter(None, (place, f"{distance} {unit}", tilt, turn)))

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.show.page import Fact, Tone, significant
 from photogram.show.quantity import Axis, Quantity
 from photogram.targets.board_fit import STRETCHES, board_fit
 from photogram.targets.calibrated import Calibrated
 
-__all__ = ["board_facts", "views", "worst_points"]
+__all__ = ["board_facts", "view_rms", "views", "worst_points"]
 
 LISTED = 10
 """Points of the board that a report names at most: those that fit worst."""
@@ -28,9 +28,8 @@ def views(calibrated: Calibrated) -> list[Quantity]:
     use = corners.use
     view = of_picture[corners.picture[use]]
     weighted = (result.residuals / result.image_given_sd) ** 2
-    with np.errstate(invalid="ignore", divide="ignore"):
-        used = np.bincount(view, minlength=count)
-        rms = np.sqrt(_sums(view, result.residuals**2, count) / (2 * used))
+    used = np.bincount(view, minlength=count)
+    rms = view_rms(view, result.residuals, count)
     largest = np.zeros(count)
     np.maximum.at(largest, view, np.nan_to_num(np.abs(result.standardized)).max(axis=1, initial=0.0))
     left_out = np.bincount(of_picture[corners.picture[~use]], minlength=count)
@@ -49,7 +48,7 @@ def views(calibrated: Calibrated) -> list[Quantity]:
         ),
         Quantity(used, (), "number", "corners", "corners", head="Corners"),
         Quantity(left_out, (), "number", "left_out", "left_out", head="Left out"),
-        Quantity(rms, _PIXELS, "value", "rms", "rms_px", head="rms"),
+        Quantity(rms, _PIXELS, "value", "rms_px", "rms_px", head="rms"),
         Quantity(
             _sums(view, result.redundancy, count), (), "number", "redundancy", "redundancy", head="Redundancy"
         ),
@@ -66,7 +65,13 @@ def views(calibrated: Calibrated) -> list[Quantity]:
     ]
 
 
-def _sums(view: np.ndarray, values: Floats, count: int) -> Floats:
+def view_rms(view: Indices, residuals: Floats, count: int) -> Floats:
+    """Return the root mean squares of (m, 2) residuals over the corners of each view, or picture."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.sqrt(_sums(view, residuals**2, count) / (2 * np.bincount(view, minlength=count)))
+
+
+def _sums(view: Indices, values: Floats, count: int) -> Floats:
     """Return the sums of (m, 2) values over the corners of each view."""
     found: Floats = np.bincount(view, weights=values.sum(axis=1), minlength=count).astype(float)
     return found
@@ -85,6 +90,9 @@ def board_facts(calibrated: Calibrated) -> list[Fact]:
     ]
     where = "cx, cy and pixels count from 0 at the centre of the first; COLMAP has 0.5 more"
     found.append(Fact("Pixels", "centre is 0", note=where))
+    if (bend := calibrated.bend) is not None:
+        for name, value, sd in zip(_BENDS, bend.position.tolist(), bend.sd.tolist(), strict=False):
+            found.append(Fact(name, significant(value, 4), unit, f"sd {significant(sd, 2)} {unit}"))
     fit = board_fit(calibrated)
     if fit is None:
         return found
@@ -95,6 +103,7 @@ def board_facts(calibrated: Calibrated) -> list[Fact]:
     return found
 
 
+_BENDS = ("Deflection along x (bend_x)", "Deflection along y (bend_y)")
 _SHAPES = {
     "held": "held: every point is taken for where it should be",
     "bend": "two parabolas, whose deflections in the middle are unknowns",

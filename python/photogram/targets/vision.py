@@ -14,9 +14,11 @@ from photogram.network.attitudes import Attitudes
 __all__ = [
     "FLIP",
     "composed",
+    "cross_matrices",
     "inverted",
     "of_vectors",
     "photo_poses",
+    "sensor_pose",
     "sensor_steps",
     "view_steps",
     "vision_poses",
@@ -55,10 +57,21 @@ def inverted(pose: Floats) -> Floats:
     return composed(turned, -turned @ pose[:3, 3])
 
 
-def crossing(vector: Floats) -> Floats:
-    """Return (3, 3) [v]x, with [v]x w = v x w."""
-    x, y, z = vector.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+def sensor_pose(position: Floats, attitude: Floats) -> Floats:
+    """Return (4, 4) the pose frame -> sensor of one with the position c and the attitude A on its frame.
+
+    A = F R'F and c = -F R't.
+    """
+    rotation = FLIP @ attitude.T @ FLIP
+    return composed(rotation, -rotation @ FLIP @ position)
+
+
+def cross_matrices(vectors: Floats) -> Floats:
+    """Return (..., 3, 3) matrices [v]x of (..., 3) vectors: [v]x a = v x a."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    none = np.zeros_like(x)
+    rows = [[none, -z, y], [z, none, -x], [-y, x, none]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def view_steps(pose: Floats) -> Floats:
@@ -80,6 +93,6 @@ def sensor_steps(pose: Floats) -> Floats:
 def _steps(pose: Floats, turned: Floats) -> Floats:
     found = np.zeros((6, 6))
     found[:3, :3] = -turned
-    found[:3, 3:] = crossing(pose[:3, 3]) @ FLIP
+    found[:3, 3:] = cross_matrices(pose[:3, 3]) @ FLIP
     found[3:, 3:] = -FLIP
     return found

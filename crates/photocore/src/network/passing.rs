@@ -147,7 +147,8 @@ impl Bundle {
         let timed = self.compose_timed((stations, bent), group, own);
         let own = timed.then_some(&*own);
         let read = bent.write(self.space, stations, own, (&self.images[group], cell), local, &mut inner);
-        for (to, from) in rows.shared.chunks_exact_mut(all).zip(shared.chunks(plain.max(1))) {
+        for (row, to) in rows.shared.chunks_exact_mut(all.max(1)).enumerate() {
+            let from = &shared[plain * row..][..plain];
             to[..poses].copy_from_slice(&from[..poses]);
             to[poses..passed].fill(0.0);
             to[passed..].copy_from_slice(&from[poses..]);

@@ -15,7 +15,10 @@ from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
 from photogram.messages import Message
 
-__all__ = ["Images", "image_coordinates", "read_images"]
+__all__ = ["Images", "image_coordinates", "read_images", "sd_is_given"]
+
+
+_SD = ("sd", "sd_column", "sd_row", "sd_x", "sd_y")
 
 
 @dataclass(frozen=True)
@@ -70,23 +73,28 @@ def _check_twice(table: ColumnTable, photos: Indices, points: Indices, count: in
 
 
 def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
-    own = [
-        name
-        for pair in (("sd_column", "sd_row"), ("sd_x", "sd_y"))
-        if pair[0] in table or pair[1] in table
-        for name in pair
-    ]
+    pairs = (_SD[1:3], _SD[3:])
+    own = [name for pair in pairs if pair[0] in table or pair[1] in table for name in pair]
     if "correlation" in table and table.numbers("correlation", 0.0).any():
         raise table.head.error("column correlation: images with correlated coordinates cannot be adjusted")
-    if not own and "sd" not in table and "images" not in tables.settings.sd:
+    found = np.ones((table.count, 2))
+    if sd_is_given(tables, table):
+        found = tables.deviations(table, "images", own[:2] or ["sd_x", "sd_y"])
+    elif "level" not in table:
         return None
-    found = tables.deviations(table, "images", own[:2] or ["sd_x", "sd_y"])
+    if "level" in table and not own and "sd" not in table:
+        found = found * 2.0 ** table.numbers("level", 0.0)[:, np.newaxis]
     bad = np.argwhere(~((found > 0) & np.isfinite(found)))
     if len(bad):
         row = int(bad[0][0])
         why = "is empty" if np.isnan(found[row]).any() else f"{found[row].min():g} is not positive and finite"
         raise table.error(row, f"standard deviation {why}")
     return found
+
+
+def sd_is_given(tables: Tables, table: ColumnTable) -> bool:
+    """Return whether standard deviations of images are given, in the table or for all; levels are ratios."""
+    return "images" in tables.settings.sd or any(name in table for name in _SD)
 
 
 def image_coordinates(

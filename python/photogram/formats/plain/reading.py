@@ -15,10 +15,11 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN
 from photogram.formats.format import Wishes
+from photogram.formats.plain.boards import ASSUMED, read_bends, read_boards
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.films import on_film, read_scanned
-from photogram.formats.plain.images import Images, image_coordinates, read_images
+from photogram.formats.plain.images import Images, image_coordinates, read_images, sd_is_given
 from photogram.formats.plain.moving import placed, read_timed
 from photogram.formats.plain.observed import Subjects, read_observations
 from photogram.formats.plain.photos import Photos, read_photos
@@ -43,6 +44,8 @@ from photogram.results.features import named_points
 __all__ = ["SETTINGS", "read", "read_control", "read_tables"]
 
 SETTINGS = "project.toml"
+LEVELS = "no standard deviation of an image of level 0: 1 px is assumed (--sd images=...)"
+"""What is told of images whose table has levels alone."""
 DIFFER = 1e-6
 """What the positions of a point in two tables may differ by."""
 _SD = tuple(f"sd_{axis}" for axis in AXES)
@@ -108,9 +111,12 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
             f" origin, and tables with a crs go into one that is {transform.frame}",
             file=settings.path,
         )
+    boards = read_boards(tables)
+    assumed = not sd_is_given(tables, images.table)
     project = assembled(
         path=settings.path,
         title="plain project",
+        lacks=[LEVELS] if assumed and sd is not None else [],
         name=settings.name,
         cameras=cameras.cameras,
         sizes=cameras.sizes,
@@ -135,12 +141,14 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         linear_unit=settings.length,
         spheroid=spheroid,
         photo_to_ground=settings.attitude == "omega_phi_kappa" and settings.rotation == "photo_to_object",
-        details={"settings": settings},
+        details={"settings": settings, ASSUMED: assumed},
     ).replace(
         sd_taken=True,
+        boards=boards,
         features=settings.features,
         statement=asked_of(tables, places, frozenset() if given is None else given.vegetated),
     )
+    project = project.replace(block=read_bends(tables, boards, project.block))
     _check_features(settings, points.names)
     if control is not None and given is not None:
         from photogram.formats.exchanged import check_systems

@@ -170,9 +170,9 @@ TABLES: Mapping[str, Schema] = {
     "images": Schema(
         ("photo", "point"),
         ("photo", "point", "use"),
-        ("column", "row", "x", "y", "sd", "sd_x", "sd_y", "sd_column", "sd_row", "correlation"),
-        "`photo`, `point`, `column`, `row` (or `x`, `y`); `sd`, or `sd_column`, `sd_row`; `use`; of a line"
-        " scanner sample and line",
+        ("column", "row", "x", "y", "sd", "sd_x", "sd_y", "sd_column", "sd_row", "level", "correlation"),
+        "`photo`, `point`, `column`, `row` (or `x`, `y`); `sd`, or `sd_column`, `sd_row`, or `level` l: that"
+        " of `[sd]`, or 1, times 2^l; `use`; of a line scanner sample and line",
         deviations=(1, 2),
     ),
     "points": Schema(
@@ -460,6 +460,18 @@ TABLES: Mapping[str, Schema] = {
         ("frame", "rig", "photo", "sensor"),
         (),
         "`frame`, `rig`, `photo`; `sensor`, where the photo's camera does not tell it",
+    ),
+    "boards": Schema(
+        ("board", "kind"),
+        ("board", "kind", "shape"),
+        (
+            *("columns", "rows", "spacing_x", "spacing_y", "tag_size", "tag_spacing"),
+            *("bend_x", "bend_y", "sd_bend_x", "sd_bend_y"),
+        ),
+        "`board`, `kind` (`chessboard`, `charuco`, `aprilgrid`, `circles`, `asymmetric_circles`, `points`):"
+        " what the control is the points of ([targets](targets.md)); `columns`, `rows`, `spacing_x`,"
+        " `spacing_y`, or `tag_size`, `tag_spacing`; `shape` (`held`, `bend`, `points`);"
+        " of a `bend` the deflections `bend_x`, `bend_y` (0), `sd_bend_x`, `sd_bend_y` (`inf`)",
     ),
     "bases": Schema(
         ("rig", *_ENDS, "distance"),

@@ -10,6 +10,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control
+from photogram.formats.plain.boards import ASSUMED, boards_table, levels
 from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
 from photogram.formats.plain.image_axes import to_tables
 from photogram.formats.plain.moving import line_times_table, moving_columns
@@ -108,13 +109,14 @@ def write(project: Project) -> Mapping[str, bytes]:
             camera_table(project, cameras), exposure_columns(cameras, exposures, *pictures, image_y)
         ),
         "photos": _photos(block, [cameras[row].name for row in photo_cameras], rigs),
-        "images": _images(block, names, _written_xy(project, cameras, photo_cameras, scanned, image_y)),
+        "images": _images(project, names, _written_xy(project, cameras, photo_cameras, scanned, image_y)),
         "points": _points(project),
         "control": control_table(project),
         **trajectory_tables(block),
         "smoothness": smoothness_table(block),
         "line_times": line_times_table(block),
         **observed_tables(block, cameras, rigs),
+        "boards": boards_table(project.boards, block),
         "lengths": lengths_table(project.statement.get("lengths", ())),
     }
     files = {f"{name}.csv": csv_text(columns) for name, columns in tables.items() if columns}
@@ -288,7 +290,8 @@ def _given(block: Block, what: str) -> tuple[Floats, Floats]:
     return (initial if observed is None else np.where(np.isfinite(sd), observed, initial)), sd
 
 
-def _images(block: Block, names: list[str], xy: Floats) -> dict[str, Any]:
+def _images(project: Project, names: list[str], xy: Floats) -> dict[str, Any]:
+    block = project.block
     photos, points = np.array(block.photo_ids, dtype=object), np.array(block.point_ids, dtype=object)
     columns: dict[str, Any] = {
         "photo": photos[block.image_photos],
@@ -297,7 +300,10 @@ def _images(block: Block, names: list[str], xy: Floats) -> dict[str, Any]:
         names[1]: xy[:, 1],
     }
     sd = block.image_sd
-    if (sd[:, 0] == sd[:, 1]).all():
+    level = levels(sd, assumed=bool(project.boards) and bool(project.details.get(ASSUMED)))
+    if level is not None:
+        columns["level"] = level.astype(np.int64)
+    elif (sd[:, 0] == sd[:, 1]).all():
         columns["sd"] = sd[:, 0]
     else:
         columns |= {f"sd_{name}": column for name, column in zip(names, sd.T, strict=True)}

@@ -1,0 +1,150 @@
+"""What `photogram calibrate` is asked of the uncertainty of cameras: options, computing, files, exit code."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast
+
+import typer
+
+from photogram.cli.job import Job, Reads
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
+    from photogram.targets.cross_validated import Into
+    from photogram.targets.worth import Asked
+
+__all__ = ["AS_USUAL", "Uncertainty"]
+
+NOT_GOOD_ENOUGH = 4
+"""Exit code, as of results that should not be used."""
+
+
+class DatumName(StrEnum):
+    """What holds still while a calibration is uncertain."""
+
+    CORNERS = "corners"
+    MEAN_FRAMES = "mean-frames"
+    IMAGE = "image"
+    AXES = "axes"
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What a user wants to know of the uncertainty of cameras, with the options that ask for it."""
+
+    map_distance: Annotated[
+        str | None,
+        typer.Option(
+            "--distance",
+            metavar="D,D,..",
+            help="Distances of maps of uncertainty, 1,inf. Default: infinity, and the boards' median.",
+            show_default=False,
+        ),
+    ] = None
+    map_datum: Annotated[
+        DatumName, typer.Option("--datum", help="What holds still in them (docs/targets.md).")
+    ] = DatumName.CORNERS
+    noise_only: Annotated[
+        bool, typer.Option("--noise-only", help="Errors of corners alone, not of priors, as mrcal has it.")
+    ] = False
+    need: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            metavar="PX",
+            help="End with exit code 4 where a map is above it within the area where the board was seen.",
+            show_default=False,
+        ),
+    ] = None
+    cross_validate: Annotated[
+        str,
+        typer.Option(
+            metavar="odd|halves|K|none", help="How views are split to be adjusted against each other."
+        ),
+    ] = "odd"
+    compare_with: Annotated[
+        Path | None,
+        Reads.FILE,
+        typer.Option(
+            "--compare", metavar="PATH", help="Another calibration, to be compared.", show_default=False
+        ),
+    ] = None
+    suggest: Annotated[
+        int, typer.Option(min=0, metavar="K", help="Find the K views that would help most.")
+    ] = 0
+
+    def asked(self) -> Asked:
+        """Return what is asked of a calibration."""
+        from photogram.targets.worth import Asked
+
+        return Asked(
+            distances=self._distances(),
+            datum=self.map_datum.value,
+            noise_only=self.noise_only,
+            cross_validate=self._split(),
+            suggest=self.suggest,
+        )
+
+    def _distances(self) -> list[float]:
+        try:
+            found = [float(each) for each in (self.map_distance or "").split(",") if each.strip()]
+        except ValueError:
+            found = [math.nan]
+        if not all(each > 0 for each in found):
+            raise typer.BadParameter(
+                f"is a list of distances, 1,inf, not {self.map_distance}", param_hint="--distance"
+            )
+        return found
+
+    def _split(self) -> Into | None:
+        if self.cross_validate == "none":
+            return None
+        if self.cross_validate in ("odd", "halves"):
+            return cast("Into", self.cross_validate)
+        if not (self.cross_validate.isdecimal() and int(self.cross_validate) > 1):
+            raise typer.BadParameter(
+                f"is odd, halves, none, or a number from 2, not {self.cross_validate}",
+                param_hint="--cross-validate",
+            )
+        return int(self.cross_validate)
+
+    def told(self, job: Job, found: Calibrated, calibrated: Callable[[Path], Calibrated]) -> Calibrated:
+        """Return an adjusted calibration with what it is worth.
+
+        Parameters
+        ----------
+        job, found
+            The job, and the calibration.
+        calibrated
+            Reads and adjusts another one, with the options of this.
+        """
+        from photogram.targets.differences import difference
+        from photogram.targets.worth import worth
+
+        with job.status("uncertainty") as status:
+            own = worth(found, self.asked(), None if status is None else status.update)
+        if self.compare_with is None:
+            return replace(found, worth=own)
+        other = calibrated(self.compare_with)
+        distances = self._distances() or [math.inf]
+        apart = [
+            difference(found, other, distances, camera=number)
+            for number in range(min(len(found.cameras), len(other.cameras)))
+        ]
+        return replace(found, worth=replace(own, differences=tuple(apart)))
+
+    def exit_code(self, found: Calibrated, code: int) -> int:
+        """Return the exit code: 4 where a map is above what is needed, or there is none to say so."""
+        worth = found.worth
+        if self.need is None or worth is None or code:
+            return code
+        return code if worth.largest <= self.need else NOT_GOOD_ENOUGH
+
+
+AS_USUAL = Uncertainty()
+"""Maps at infinity and where boards were, and cross-validation."""

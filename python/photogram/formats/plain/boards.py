@@ -1,0 +1,115 @@
+"""The table of boards: what the control of a calibration with targets is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, get_args
+
+import numpy as np
+
+from photogram.errors import InputError
+from photogram.formats.plain.schema import deviation_columns
+from photogram.formats.plain.tables import Tables
+from photogram.io.delimited import ColumnTable
+from photogram.network.block import Block
+from photogram.network.passages import Bend, Figure
+from photogram.targets.board import Board, BoardKind, Shape
+
+__all__ = ["ASSUMED", "boards_table", "levels", "read_bends", "read_boards"]
+
+ASSUMED = "sd of corners assumed"
+"""The detail of a project whose standard deviations of corners nobody has given: levels tell ratios."""
+BENDS = ("bend_x", "bend_y")
+_LENGTHS = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")
+
+
+def read_boards(tables: Tables) -> dict[str, Board]:
+    """Read boards of columns and rows; points of others are the control of the project.
+
+    Raises
+    ------
+    InputError
+        A kind or shape that there is not, what is no board, more than one.
+    """
+    table = tables.read("boards")
+    if table is None or not table.count:
+        return {}
+    if table.count > 1:
+        raise table.error(1, "several boards: those fixed to each other are one of the kind points")
+    return {name: _board(table, row, tables) for row, name in enumerate(table.names_once("board"))}
+
+
+def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
+    kind, shape = (table.texts(name)[row] for name in ("kind", "shape"))
+    given: dict[str, Any] = {"unit": tables.settings.length}
+    for name, word, words in (("kind", kind, get_args(BoardKind)), ("shape", shape, get_args(Shape))):
+        if word and word not in words:
+            raise table.error(row, f"column {name}: {word} is none of {', '.join(words)}")
+        given |= {name: word} if word else {}
+    if given.get("kind") == "points":
+        # Their places are those of the control, which is read later.
+        given["points"] = np.zeros((0, 3))
+        return Board(**given)
+    lengths = {name: float(table.numbers(name)[row]) for name in _LENGTHS}
+    given |= {name: int(table.numbers(name, 0.0)[row]) for name in ("columns", "rows")}
+    given |= {name: lengths[name] for name in _LENGTHS[2:] if not np.isnan(lengths[name])}
+    if "tag_size" not in given:
+        given["spacing"] = lengths["spacing_x"], lengths["spacing_y"]
+    try:
+        return Board(**given)
+    except InputError as error:
+        raise table.error(row, error.message) from None
+
+
+def read_bends(tables: Tables, boards: Mapping[str, Board], block: Block) -> Block:
+    """Return a block whose boards bend, where the table says so.
+
+    Raises
+    ------
+    InputError
+        A standard deviation that is none, points of the board that the block does not have.
+    """
+    table = tables.read("boards")
+    if table is None or all(each.shape != "bend" for each in boards.values()):
+        return block
+    values = np.nan_to_num(table.vectors(BENDS))
+    sd = table.vectors(deviation_columns(BENDS), np.inf, infinite=True)
+    bends = [
+        Figure(Bend(name, values[row], sd[row]), own.names, own.shifts())
+        for row, (name, own) in enumerate(boards.items())
+        if own.shape == "bend"
+    ]
+    return block.replace(passages=bends)
+
+
+def boards_table(boards: Mapping[str, Board], block: Block) -> dict[str, Any]:
+    """Return the columns of boards, with how a block lets them bend; none without boards."""
+    if not boards:
+        return {}
+    each = boards.values()
+    grids = [None if own.kind == "points" else own for own in each]
+    columns: dict[str, Any] = {"board": [*boards], "kind": [own.kind for own in each]}
+    for name in ("columns", "rows"):
+        columns[name] = [None if own is None else getattr(own, name) for own in grids]
+    for k, name in enumerate(_LENGTHS[:2]):
+        columns[name] = [None if own is None or own.tag_size else own.pitch[k] for own in grids]
+    for name in _LENGTHS[2:]:
+        columns[name] = [getattr(own, name) for own in each]
+    columns["shape"] = [own.shape or "" for own in each]
+    bends = {own.bend.name: own.bend for own in block.passages if isinstance(own, Figure)}
+    if bends:
+        found = [bends.get(name) for name in boards]
+        for k, name in enumerate(BENDS):
+            columns[name] = [None if own is None else own.position[k] for own in found]
+        for k, name in enumerate(deviation_columns(BENDS)):
+            columns[name] = [None if own is None else own.deviations[k] for own in found]
+    return columns
+
+
+def levels(image_sd: np.ndarray, *, assumed: bool) -> np.ndarray | None:
+    """Return (m,) levels l of images whose standard deviations are 2^l of an assumed one; else None."""
+    if not assumed:
+        return None
+    found = np.log2(image_sd[:, 0])
+    whole = np.round(found)
+    return whole if np.array_equal(2.0**whole, image_sd[:, 0]) else None

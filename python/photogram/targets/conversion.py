@@ -1,0 +1,267 @@
+"""Conversion of lenses: the camera of another model that shows what a camera shows, and what it misses.
+
+Over pixels q of the source, with its rays r(q), the new camera f and a motion T of its axes:
+
+    sum |f(T d r(q)) - q|^2 = min
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import is_covariance, number, whole_number
+from photogram.arguments.types import Bools, Floats
+from photogram.errors import InputError
+from photogram.network.cameras import Camera
+from photogram.show.brief import Brief, Rows
+from photogram.targets.compared import Difference
+from photogram.targets.difference import Fitted, points_at
+from photogram.targets.imaging import TURNED
+from photogram.targets.least_lens import HELD, Moved, Points
+from photogram.targets.lens_fit import GRID, KNOTS, fitted_in_stages, free_names, lens_of, shows, within
+from photogram.targets.maps import distance_text, image_grid
+
+__all__ = ["Conversion", "convert_lens"]
+
+FIRMEST = 1e-2
+"""Of the mean covariance of the images: what is added to each, so that no pixel weighs everything."""
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Conversion(Brief):
+    """A lens of another model in place of a camera.
+
+    Attributes
+    ----------
+    source, camera
+        What was converted, and what it has become: held, or with the covariance that the source gives it.
+    difference
+        Images by the new camera less pixels of the source, over 60 x 40 pixels, and the motion between their
+        axes; `inside` are those that took part in the fit.
+    names, covariance
+        (p,) parameters that were fitted, and (p, p) what the covariance of the source makes of them; None
+        where that has none. The misfit of the models is not in it.
+    """
+
+    source: Camera
+    camera: Camera
+    difference: Difference
+    names: tuple[str, ...]
+    covariance: Floats | None
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the differences where the lens was fitted, pixels."""
+        return self.difference.rms
+
+    @property
+    def largest(self) -> float:
+        """The largest of them, pixels."""
+        return self.difference.largest
+
+    @property
+    def where(self) -> tuple[float, float]:
+        """The pixel that it belongs to: column, row."""
+        lengths = np.nanmax(np.where(self.difference.inside, self.difference.lengths, -1.0), axis=0)
+        row, column = np.unravel_index(np.argmax(lengths), lengths.shape)
+        return float(self.difference.columns[column]), float(self.difference.rows[row])
+
+    @property
+    def unseen(self) -> float:
+        """The share of the picture that the new camera does not show."""
+        return float(np.mean(~np.isfinite(self.difference.lengths).all(axis=0)))
+
+    def within(self, tolerance: float) -> bool:
+        """Return whether no difference is larger than so many pixels."""
+        return self.largest <= tolerance
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return what came out in a few lines."""
+        at = " and ".join(distance_text(each, self.difference.unit) for each in self.difference.distances)
+        column, row = self.where
+        rows = [
+            ("difference", f"rms {self.rms:.3g} px, largest {self.largest:.3g} px {at}"),
+            ("largest at", f"column {column:.0f}, row {row:.0f}"),
+            ("motion of the axes", self._motion()),
+            *self.camera.brief()[1],
+        ]
+        if self.covariance is not None:
+            rows.append(("covariance", f"that of {self.source.title}; the misfit above is not in it"))
+        if self.unseen > 0:
+            rows.append(("not shown", f"{100 * self.unseen:.1f} percent of the picture"))
+        return f"{self.source.title}: {self.source.model} as {self.camera.model}", rows
+
+    def _motion(self) -> str:
+        found = self.difference
+        shift = ", ".join(f"{each:.3g}" for each in found.translation)
+        turn = f"{found.rotation:.3g} degrees" if np.any(found.fitted.motion != np.eye(4)) else "none"
+        return f"{turn}, {shift} {found.unit}" if found.fitted.finite else turn
+
+    def report(self) -> str:
+        """Return the same as text."""
+        title, rows = self.brief()
+        wide = max(len(name) for name, _ in rows)
+        return "\n".join([title, "", *(f"{name:<{wide}}  {said}" for name, said in rows), ""])
+
+
+def convert_lens(
+    source: Camera,
+    model: str,
+    size: tuple[int, int],
+    *,
+    radius: float = math.inf,
+    distances: Sequence[float] = (math.inf,),
+    intrinsics_only: bool = False,
+    knots: tuple[int, int] = KNOTS,
+    covariance: tuple[Sequence[str], ArrayLike] | None = None,
+) -> Conversion:
+    """Fit a lens of another model to what a camera shows.
+
+    Parameters
+    ----------
+    source
+        The camera; pixels count from 0 at the centre of the first.
+    model
+        A model of `docs/cameras.md`, or `opencv4`, `opencv5`, `opencv8`, `opencv12`.
+    size
+        Width and height of its pictures, pixels.
+    radius
+        Pixels farther from the middle of the picture do not count.
+    distances
+        At which both are compared, from the centre of the source. At infinity a rotation of the axes is
+        fitted, at finite distances a translation as well.
+    intrinsics_only
+        Whether the axes stay. So do those of a splined lens, whose knots do what a rotation does.
+    knots
+        Along columns and rows, of a splined model.
+    covariance
+        Names of parameters and knots of the source, and their (p, p) covariance. None: that which it has as
+        an observation. Images then count by the inverse of their covariance, and the new camera has one.
+
+    Raises
+    ------
+    InputError
+        A model that there is not or cannot show what the source shows; distances that are not positive, or
+        infinite beside finite ones; a radius that leaves too few pixels.
+    """
+    size = (whole_number("size", size[0]), whole_number("size", size[1]))
+    apart = _checked_distances(distances)
+    start = lens_of(model, source, size, knots)
+    columns, rows, pixels = image_grid(size, GRID)
+    known = _known(source, covariance)
+    points, places = points_at(source, pixels, apart), np.tile(pixels, (len(apart), 1))
+    near: Bools = np.tile(within(pixels, size, number("radius", radius)), len(apart))
+    near &= shows(start, points)
+    free = free_names(start)
+    if (2 * np.count_nonzero(near) < len(free) and start.knots is None) or not near.any():
+        raise InputError(f"model: {model} shows nothing of what the camera {source.title} shows")
+    finite = math.isfinite(apart[0])
+    roots = None if known is None else _roots(source, known, points[near])
+    shown = Points(points[near], places[near], finite, roots)
+    moving = HELD if intrinsics_only or start.knots is not None else slice(0 if finite else 3, 6)
+    found = fitted_in_stages(Moved(start), shown, free, moving)
+    images = Points(points, places, finite).imaged(found)[0]
+    images[~shows(start, points)] = np.nan
+    shape = (len(apart), len(rows), len(columns))
+    passed = None if known is None else _passed_on(source, known, shown, found, free, moving)
+    return Conversion(
+        source=source,
+        camera=_camera(found.camera, free, passed),
+        difference=Difference(
+            cameras=(source.title, found.camera.model),
+            size=size,
+            unit="m",
+            criterion="pixels",
+            fitted=Fitted(found.motion, finite and moving != HELD, int(np.count_nonzero(near))),
+            columns=columns,
+            rows=rows,
+            distances=apart,
+            vectors=(images - places).reshape(*shape, 2),
+            covariances=None,
+            inside=np.asarray(near.reshape(shape).all(axis=0)),
+            shared=0.0,
+            test=None,
+        ),
+        names=tuple(free),
+        covariance=passed,
+    )
+
+
+def _checked_distances(distances: Sequence[float]) -> tuple[float, ...]:
+    found = tuple(number("distance", each) for each in distances)
+    if not found or not all(each > 0 for each in found):
+        raise InputError(f"distances are positive, not {', '.join(map(str, found)) or 'none'}")
+    if len({math.isfinite(each) for each in found}) > 1:
+        raise InputError("distances: infinity does not go with finite ones: give a large one in its place")
+    return found
+
+
+def _known(source: Camera, given: tuple[Sequence[str], ArrayLike] | None) -> tuple[list[int], Floats] | None:
+    """Return which parameters and knots of a camera have a covariance, and the matrix."""
+    names = source.names + source.knot_names
+    if given is not None:
+        own, matrix = list(given[0]), np.asarray(given[1], dtype=float)
+        if unknown := [name for name in own if name not in names]:
+            raise InputError(f"covariance: {source.model} has no {', '.join(unknown)}")
+        if matrix.shape != (len(own), len(own)) or not is_covariance(matrix, singular=True):
+            raise InputError(f"covariance is no covariance matrix of {len(own)} parameters")
+        return [names.index(name) for name in own], matrix
+    weighted = [k for k, sd in enumerate(source.deviations.tolist()) if 0 < sd < math.inf]
+    if not weighted:
+        return None
+    joint = source.prior_covariance
+    return weighted, np.diag(source.deviations[weighted] ** 2) if joint is None else joint
+
+
+def _roots(source: Camera, known: tuple[list[int], Floats], points: Floats) -> Floats:
+    """Return (m, 2, 2) roots of the weights of the images of points: of the inverse of their covariance."""
+    rows, matrix = known
+    partials = source.partials(points * TURNED)[2][..., rows]
+    covariances = partials @ matrix @ partials.transpose(0, 2, 1)
+    mean = float(np.trace(covariances, axis1=1, axis2=2).mean()) / 2
+    lower = np.linalg.cholesky(covariances + (FIRMEST * mean or 1.0) * np.eye(2))
+    found: Floats = np.linalg.inv(lower)
+    return found
+
+
+def _passed_on(
+    source: Camera,
+    known: tuple[list[int], Floats],
+    shown: Points,
+    found: Moved,
+    free: Sequence[str],
+    moving: slice,
+) -> Floats:
+    """Return the covariance of fitted parameters: J S J' with J = -(A'A)^-1 A'B of the least squares.
+
+    A are the partials of images by what is fitted, B those by the parameters of the source: at a pixel that
+    stays, its ray moves by dr = -Pi^+ K ds.
+    """
+    rows, matrix = known
+    names = found.names
+    _, fitted, _ = shown.linearized(found, [names.index(name) for name in free], moving)
+    _, by_u, by_values = source.partials(shown.points * TURNED)
+    by_ray = by_u * TURNED
+    moved = -np.linalg.pinv(by_ray) @ by_values[..., rows]
+    by_source = shown.imaged(found)[1] @ found.motion[:3, :3] @ moved
+    if shown.roots is not None:
+        by_source = shown.roots @ by_source
+    scale = np.linalg.norm(fitted, axis=0)
+    scale[scale == 0] = 1.0
+    solved = np.linalg.lstsq(fitted / scale, by_source.reshape(len(fitted), -1), rcond=None)[0]
+    jacobian = (solved / scale[:, np.newaxis])[: len(free)]
+    passed: Floats = jacobian @ matrix @ jacobian.T
+    return (passed + passed.T) / 2
+
+
+def _camera(camera: Camera, free: Sequence[str], covariance: Floats | None) -> Camera:
+    """Return the fitted camera: with the covariance where it can be observed with it, held else."""
+    held = camera.replace(sd=0.0, knot_sd=None)
+    if covariance is None or camera.knots is not None or not is_covariance(covariance):
+        return held
+    return held.replace(covariance=(list(free), covariance))

@@ -1,0 +1,138 @@
+"""Residuals of corners summed up: by camera, level, point of the board, cell of the picture, radius.
+
+Of a group with ~v = v / sd and redundancy numbers r the mean residual vector has, in each coordinate, the
+test value t = sum ~v / (sigma0 sqrt(sum r)): the variance of the sum is at most sum r where a common shift
+goes into the unknowns, so that the test finds less than it might.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Literal, get_args
+
+import numpy as np
+
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import one_of
+from photogram.arguments.types import Floats, Indices
+from photogram.show.quantity import Axis, Quantity
+from photogram.targets.calibrated import Calibrated
+
+__all__ = ["CELLS", "Groups", "mean_residuals", "residual_groups"]
+
+Groups = Literal["camera", "level", "point", "cell", "radius"]
+"""What residuals are summed up by."""
+
+CELLS = (12, 8)
+"""Of the picture of a camera, across and down."""
+RINGS = 10
+"""Of equal width about the middle of the picture."""
+NOTABLE = 3.3
+"""Test values beyond are marked: one in a thousand by chance."""
+
+
+def residual_groups(calibrated: Calibrated, by: Groups, camera: int = 0) -> list[Quantity]:
+    """Return a table of residuals by groups: corners, rms, redundancy, sigma, mean vector and its test.
+
+    Parameters
+    ----------
+    calibrated
+        The adjusted calibration.
+    by
+        `camera`; `level`, the standard deviation over that of level 0; `point`, of the board; `cell`, 12 x 8
+        of the picture of a camera; `radius`, ten rings about the middle of it.
+    camera
+        Whose picture, of `cell` and `radius`.
+    """
+    one_of("by", by, get_args(Groups))
+    names, group = _grouped(calibrated, by, camera)
+    return _table(calibrated, by, names, group)
+
+
+def mean_residuals(calibrated: Calibrated, group: Indices, count: int) -> tuple[Floats, Floats]:
+    """Return (count, 2) mean residuals of groups in pixels, and their test values; group -1 is none."""
+    result = calibrated.result
+    own = group >= 0
+    weighted = result.residuals / result.image_given_sd
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = (
+            _sums(group[own], result.residuals[own], count)
+            / np.bincount(group[own], minlength=count)[:, None]
+        )
+        spread = np.sqrt(_sums(group[own], np.nan_to_num(result.redundancy[own]), count))
+        tests = _sums(group[own], np.nan_to_num(weighted[own]), count) / spread
+    return mean, tests / np.sqrt(result.covariance_scale)
+
+
+def _grouped(calibrated: Calibrated, by: Groups, camera: int) -> tuple[list[str], Indices]:
+    """Return names of groups, and (m,) the group of each image; -1 of those that are in none."""
+    corners, block = calibrated.calibration.corners, calibrated.result.block
+    use = corners.use
+    cameras = corners.cameras[corners.picture[use]]
+    if by == "camera":
+        return list(corners.camera_names), cameras
+    if by == "level":
+        values, group = np.unique(corners.sd[use], return_inverse=True)
+        return [f"{each:g}" for each in values], group.reshape(-1)
+    if by == "point":
+        return list(calibrated.calibration.board.names), corners.point[use]
+    size = np.array(corners.sizes[camera] or block.image_xy[cameras == camera].max(axis=0) + 1)
+    if by == "cell":
+        place = np.clip((block.image_xy + 0.5) / size * CELLS, 0, np.array(CELLS) - 1).astype(np.int64)
+        names = [f"{column} {row}" for row in range(CELLS[1]) for column in range(CELLS[0])]
+        return names, np.where(cameras == camera, place[:, 1] * CELLS[0] + place[:, 0], -1)
+    radius = np.hypot(*(block.image_xy - (size - 1) / 2).T)
+    edges = np.linspace(0.0, float(np.hypot(*size)) / 2, RINGS + 1)
+    ring = np.clip(np.digitize(radius, edges) - 1, 0, RINGS - 1)
+    names = [f"{low:.0f} to {high:.0f}" for low, high in pairwise(edges.tolist())]
+    return names, np.where(cameras == camera, ring, -1)
+
+
+_HEADS = {
+    "camera": "Camera",
+    "level": "sd over that of level 0",
+    "point": "Point of the board",
+    "cell": "Cell, column and row",
+    "radius": "Radius, px",
+}
+
+
+def _table(calibrated: Calibrated, by: Groups, names: list[str], group: Indices) -> list[Quantity]:
+    result, count = calibrated.result, len(names)
+    own = group >= 0
+    used = np.bincount(group[own], minlength=count)
+    weighted = (result.residuals / result.image_given_sd) ** 2
+    mean, tests = mean_residuals(calibrated, group, count)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rms = np.sqrt(_sums(group[own], result.residuals[own] ** 2, count).sum(axis=1) / (2 * used))
+        redundancy = _sums(group[own], result.redundancy[own], count).sum(axis=1)
+        sigma = np.sqrt(_sums(group[own], weighted[own], count).sum(axis=1) / redundancy)
+    kept = used > 0
+    pixels = Axis.of("px", "px")
+    axes = (Axis.of("x", "px"), Axis.of("y", "px"))
+    return [
+        Quantity(np.array(names, dtype=object)[kept], (), "name", by, by, head=_HEADS[by]),
+        Quantity(used[kept], (), "number", "corners", "corners", head="Corners"),
+        Quantity(rms[kept], (pixels,), "value", "rms", "rms_px", head="rms", figures=3),
+        Quantity(redundancy[kept], (), "number", "redundancy", "redundancy", head="Redundancy"),
+        Quantity(sigma[kept], (), "number", "sigma", "sigma", head="Sigma", figures=3),
+        Quantity(mean[kept], axes, "value", "mean_", "mean_px", head="Mean {}", figures=2),
+        Quantity(
+            tests[kept],
+            axes,
+            "number",
+            "t_",
+            "t",
+            head="t {}",
+            figures=2,
+            marked=np.abs(np.nan_to_num(tests[kept])) > NOTABLE,
+        ),
+    ]
+
+
+def _sums(group: Indices, values: Floats, count: int) -> Floats:
+    """Return (count, 2) sums of (m, 2) values."""
+    return np.stack([np.bincount(group, weights=column, minlength=count) for column in values.T], axis=1)
+
+
+check_arguments(globals(), ["residual_groups"])

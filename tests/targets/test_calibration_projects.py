@@ -1,0 +1,105 @@
+"""Calibrations as plain projects: written, read, adjusted again."""
+
+import numpy as np
+import pytest
+from given_targets import left_table, rig_small
+
+from photogram import InputError, formats
+from photogram.formats.calibrations import adjusted_project, calibration_of, project_of
+from photogram.targets import read
+
+
+def again(project, folder):
+    for name, content in formats.to_files(project, "plain").items():
+        (folder / name).write_bytes(content)
+    return formats.read(folder)
+
+
+def test_a_rig_is_the_same_after_a_plain_project(tmp_path):
+    given = rig_small()
+    found = calibration_of(again(project_of(given), tmp_path))
+    assert (found.sd0, found.sync) == (0.3, "known")
+    assert np.array_equal(found.references, given.references)
+    assert np.abs(found.sensors - given.sensors).max() < 1e-12
+    assert np.abs(found.poses - given.poses).max() < 1e-9
+    assert np.abs(found.corners.xy - given.corners.xy).max() < 1e-9
+    assert np.allclose(found.corners.sd, given.corners.sd)
+    assert np.array_equal(found.corners.views, given.corners.views)
+    first, second = given.adjust(), found.adjust()
+    assert second.result.sums_of_squares.total == pytest.approx(first.result.sums_of_squares.total, rel=1e-10)
+    names, expected = first.cofactors()
+    assert second.cofactors()[0] == names
+    scale = np.sqrt(np.diag(expected))
+    assert np.abs((second.cofactors()[1] - expected) / np.outer(scale, scale)).max() < 1e-6
+
+
+def test_frames_without_a_picture_of_their_reference_come_back(tmp_path):
+    given = rig_small()
+    keep = ~((given.corners.cameras == 0) & (given.corners.views < 5))
+    part = given.replace(corners=given.corners.of_pictures(keep))
+    found = calibration_of(again(project_of(part), tmp_path))
+    assert found.adjust().result.sums_of_squares.total == pytest.approx(
+        part.adjust().result.sums_of_squares.total, rel=1e-10
+    )
+
+
+def test_a_board_that_bends_goes_on_bending(tmp_path):
+    adjusted = rig_small("bend").adjust()
+    found = calibration_of(again(adjusted_project(adjusted), tmp_path))
+    assert found.bend == pytest.approx(adjusted.bend.position[:2].tolist(), rel=1e-12)
+    restarted = found.adjust()
+    assert len(restarted.result.iterations) <= 2
+    assert restarted.result.sums_of_squares.total == pytest.approx(
+        adjusted.result.sums_of_squares.total, rel=1e-10
+    )
+
+
+def test_levels_stand_for_standard_deviations_that_nobody_knows(tmp_path):
+    given = rig_small().replace(sd0=None)
+    project = project_of(given)
+    found = again(project, tmp_path)
+    header = (tmp_path / "images.csv").read_text().split("\n")[0]
+    assert header == "photo,point,column,row,level"
+    assert any("level 0" in each for each in found.lacks)
+    calibration = calibration_of(found)
+    assert calibration.sd0 is None
+    assert np.array_equal(calibration.corners.sd, given.corners.sd)
+
+
+def test_an_adjusted_calibration_begins_where_it_has_ended(tmp_path):
+    adjusted = read(left_table(tmp_path)).adjust()
+    (tmp_path / "after").mkdir()
+    found = calibration_of(again(adjusted_project(adjusted), tmp_path / "after"))
+    assert found.board.shape == "held"
+    assert found.board.unit == "mm"
+    restarted = found.adjust()
+    assert len(restarted.result.iterations) <= 2
+    camera = adjusted.cameras[0]
+    moved = np.abs(restarted.cameras[0].values - camera.values)[camera.estimated]
+    assert (moved < 1e-5 * camera.sd[camera.estimated]).all()
+
+
+@pytest.mark.parametrize(
+    ("table", "before", "after", "said"),
+    [
+        ("boards.csv", "chessboard", "ring", "column kind: ring is none of chessboard"),
+        ("boards.csv", "board,kind", "board,sort", "kind"),
+        ("boards.csv", ",9,7,", ",9,1,", "2 or more rows"),
+        ("boards.csv", ",9,7,", ",9,6,", "are none of the board"),
+        ("control.csv", "\n1,0.04,", "\n1,0.05,", "the point 1 lies elsewhere than that of the board"),
+    ],
+)
+def test_boards_that_are_wrong(tmp_path, table, before, after, said):
+    for name, content in formats.to_files(project_of(rig_small()), "plain").items():
+        (tmp_path / name).write_bytes(content)
+    path = tmp_path / table
+    assert before in path.read_text()
+    path.write_text(path.read_text().replace(before, after, 1))
+    with pytest.raises(InputError, match=said):
+        calibration_of(formats.read(tmp_path))
+
+
+def test_a_project_without_a_board_is_no_calibration():
+    project = project_of(rig_small())
+    with pytest.raises(InputError, match="has no board"):
+        calibration_of(project.replace(boards={}))
