@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import base64
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.files import read_text
 from photogram.network.cameras import Camera
+from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board
 from photogram.targets.calibration import Calibration
 from photogram.targets.corners import Corners
@@ -36,6 +38,7 @@ _LENSES = {
     **{f"OPENCV{terms}": (OPENCV, 4 + terms) for terms in (4, 5, 8, 12)},
 }
 """Models of mrcal by the name here, with as many of its parameters."""
+_SPLINED = re.compile(r"SPLINED_STEREOGRAPHIC_order=([23])_Nx=(\d+)_Ny=(\d+)_fov_x_deg=([0-9.eE+-]+)")
 
 
 @dataclass(frozen=True)
@@ -127,9 +130,11 @@ def _freed(arrays: Arrays) -> _Free:
 
 def _cameras(arrays: Arrays, free: _Free) -> list[Camera]:
     lens = arrays.text("lensmodel")
+    if splined := _SPLINED.fullmatch(lens.removeprefix(PREFIX)):
+        return _splined_cameras(arrays, free, *map(float, splined.groups()))
     own = _LENSES.get(lens.removeprefix(PREFIX))
     if own is None:
-        names = ", ".join(_LENSES)
+        names = ", ".join([*_LENSES, "SPLINED_STEREOGRAPHIC_order=..."])
         raise arrays.error("lensmodel", f"{lens} is none of those that are calibrated: {names}")
     model, count = own
     rows = arrays.numbers("intrinsics", None, count)
@@ -140,6 +145,27 @@ def _cameras(arrays: Arrays, free: _Free) -> list[Camera]:
         given = dict(zip(terms, values, strict=True))
         cameras.append(Camera(model, given, dict.fromkeys(freed, np.inf), name=f"camera {number}"))
     return cameras
+
+
+def _splined_cameras(
+    arrays: Arrays, free: _Free, order: float, nx: float, ny: float, fov: float
+) -> list[Camera]:
+    """Return cameras with knots: fx, fy, cx, cy, then dx, dy of each knot, row by row."""
+    core = ("fx", "fy", "cx", "cy")
+    shape = (int(ny), int(nx), 2)
+    rows = arrays.numbers("intrinsics", None, len(core) + 2 * shape[0] * shape[1])
+    constants = {"order": order, "nx": nx, "ny": ny, "fov_x_deg": fov}
+    return [
+        Camera(
+            KNOTTED,
+            dict(zip(core, values[: len(core)].tolist(), strict=True)) | constants,
+            dict.fromkeys(core if free.core else (), np.inf),
+            name=f"camera {number}",
+            knots=values[len(core) :].reshape(shape),
+            knot_sd=np.full(2, np.inf if free.lens else 0.0),
+        )
+        for number, values in enumerate(rows)
+    ]
 
 
 def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats]:
