@@ -118,6 +118,23 @@ class Seen:
             show_default=False,
         ),
     ] = None
+    knots: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CxR",
+            help="With --model splined_stereographic: knots along columns and rows. Default: 30x20.",
+            show_default=False,
+        ),
+    ] = None
+    knot_sd: Annotated[
+        str | None,
+        typer.Option(
+            metavar="R,T",
+            help="Standard deviations with which knots are 0, radial and tangential, in units of the"
+            " stereographic image. Default: 1,0.1.",
+            show_default=False,
+        ),
+    ] = None
     sd: Deviations = None
     regularise: Annotated[
         PriorName | None,
@@ -144,6 +161,8 @@ class Seen:
             board=self._board(),
             unit=self.unit,
             model=self.model,
+            knots=None if self.knots is None else _pair(self.knots, "--knots"),
+            knot_sd=None if self.knot_sd is None else _deviations(self.knot_sd),
             cameras=self.cameras or [],
             within=self.within,
             size=None if self.size is None else _pair(self.size, "--size"),
@@ -200,6 +219,15 @@ def _pair(text: str, option: str) -> tuple[int, int]:
             f"is two numbers, 10x7, or a file that is there, not {text}", param_hint=option
         )
     return int(first), int(second)
+
+
+def _deviations(text: str) -> tuple[float, float]:
+    """Return two standard deviations with a comma between them."""
+    try:
+        radial, tangential = map(float, text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"is two numbers, 1,0.1, not {text}", param_hint="--knot-sd") from None
+    return radial, tangential
 
 
 @with_job

@@ -14,7 +14,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.unknowns import Unknown
 
-__all__ = ["KNOTTED", "Knot", "checked_knot_sd", "checked_knots", "knot_names", "knot_unknowns"]
+__all__ = ["KNOTTED", "Knot", "checked_knot_sd", "checked_knots", "knot_names", "knot_unknowns", "outside"]
 
 KNOTTED = "splined_stereographic"
 """The model that has knots."""

@@ -12,6 +12,7 @@ import numpy as np
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.network.attitudes import Attitudes
+from photogram.network.cameras import Camera
 from photogram.network.passages import Bend
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
@@ -137,7 +138,8 @@ class Calibrated(Brief, Shown):
         Parameters
         ----------
         parts
-            In the order of rows: `cameras` (all parameters; held ones have zeros), `sensors` and `views` (six
+            In the order of rows: `cameras` (of each all parameters; held ones have zeros; and its unknown
+            knots), `sensors` and `views` (six
             steps each: R <- Exp(w) R, t <- t + dt in vision axes; dt, then w), `board` (x, y, z of the points
             that pictures show, or `bend_x` and `bend_y`).
 
@@ -190,15 +192,17 @@ class Calibrated(Brief, Shown):
         steps: list[Floats] = []
         for part in parts:
             one_of("part of a calibration", part, get_args(Part))
+            if part == "cameras":
+                for camera in self.cameras:
+                    names += [f"{camera.name} {name}" for name in _names_of(camera.camera)]
+                    wanted += _selected_of(camera)
+                    steps.append(np.eye(len(_names_of(camera.camera))))
+                continue
             own_names, selection, partials = getattr(self, f"_{part}")()
             names += own_names
             wanted += [selection] if selection[1] else []
             steps += partials
         return names, wanted, steps
-
-    def _cameras(self) -> tuple[list[str], tuple[str, list[str]], list[Floats]]:
-        names = [f"{each.name} {name}" for each in self.cameras for name in each.names]
-        return names, ("camera", list(self._numbers)), [np.eye(len(each.names)) for each in self.cameras]
 
     def _sensors(self) -> tuple[list[str], tuple[str, list[str]], list[Floats]]:
         rows = self.sensors_adjusted()
@@ -217,3 +221,13 @@ class Calibrated(Brief, Shown):
         photos = [self.result.block.photo_ids[row] for row in self.photos.tolist()]
         names = [f"view {view} {step}" for view in range(len(photos)) for step in STEPS]
         return names, ("step", photos), [view_steps(pose) for pose in self.poses]
+
+
+def _names_of(camera: Camera) -> tuple[str, ...]:
+    """Return the parameters of a camera, and behind them its knots where these were unknown."""
+    return camera.names + (camera.knot_names if camera.knot_unknowns else ())
+
+
+def _selected_of(camera: AdjustedCamera) -> list[tuple[str, list[str]]]:
+    knots = [each.name for each in camera.camera.knot_unknowns]
+    return [("camera", [camera.name]), *([("unknown", knots)] if knots else [])]

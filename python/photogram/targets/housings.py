@@ -9,8 +9,10 @@ import numpy as np
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.network.knots import Knot
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.housing import Housing, Seen, mean_motion
+from photogram.targets.imaging import unknown_of
 
 __all__ = ["camera_number", "housed_with", "housing_of", "size_of"]
 
@@ -123,9 +125,10 @@ def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> Seen:
 
 def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses: Floats) -> Floats:
     """Return the cofactors of common unknowns and of the mean motion of the boards."""
-    lengths = [len(each.names) for each in calibrated.cameras]
+    found = [each.camera for each in calibrated.cameras]
+    lengths = [len(each.names) + 2 * len(each.knot_unknowns) for each in found]
     starts = np.concatenate([[0], np.cumsum(lengths)])
-    kept = [starts[each] + np.flatnonzero(calibrated.cameras[each].camera.deviations > 0) for each in cameras]
+    kept = [starts[each] + np.flatnonzero(unknown_of(found[each])) for each in cameras]
     sensors, board = calibrated.sensors_adjusted(), _board_size(calibrated)
     kept += [starts[-1] + 6 * sensors.index(each) + np.arange(6) for each in cameras[1:]]
     kept.append(starts[-1] + 6 * len(sensors) + np.arange(board))
@@ -150,7 +153,7 @@ def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
         covariance = block.cameras[each].prior_covariance
         if covariance is not None:
             own[np.ix_(weighted, weighted)] = np.linalg.inv(covariance)
-        blocks.append(own)
+        blocks += [own, *map(_weight, block.cameras[each].knot_unknowns)]
     blocks += [np.zeros((6, 6))] * (len(cameras) - 1)
     points = np.diag(1 / block.point_sd[rows].ravel() ** 2)
     blocks.append(points if calibrated.bend is None else np.zeros((2, 2)))
@@ -160,3 +163,8 @@ def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
         found[start : start + len(own), start : start + len(own)] = own
         start += len(own)
     return found
+
+
+def _weight(knot: Knot) -> Floats:
+    """Return the (2, 2) inverse covariance of what was known of a knot."""
+    return np.zeros((2, 2)) if knot.covariance is None else np.asarray(np.linalg.inv(knot.covariance))
