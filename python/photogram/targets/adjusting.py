@@ -22,6 +22,9 @@ from photogram.targets.start import Start
 
 __all__ = ["adjusted_start", "snooped_start"]
 
+ROUGHLY, FINELY = 0.5, 1e-7
+"""Of a standard deviation: where the first and the last steps of a splined lens end."""
+
 
 def adjusted_start(
     start: Start,
@@ -38,7 +41,7 @@ def adjusted_start(
         how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress, "verdict": True}
         # Knots that no image touches are determined by priors alone.
         free = None if _has_knots(start) else adjust(start.block(), **how)
-        result = adjust(_weighted(start), **how) if free is None else _with_priors(start, free, threads)
+        result = _knotted(start, how) if free is None else _with_priors(start, free, threads)
         worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
         if not (worse.any() and result.converged):
             break
@@ -47,6 +50,22 @@ def adjusted_start(
     if start.sd0 is None:
         told = with_unknown_weight(told)
     return Calibrated(calibration=start, result=told, unregularised=free if start.regularise else None)
+
+
+def _knotted(start: Start, how: dict[str, Any]) -> Result:
+    """Return the adjustment of splined cameras.
+
+    An adjustment reckons with the knots near images where it begins: the last of it begins where corners stay
+    at theirs.
+    """
+    block = _weighted(start)
+    near = adjust(block, **how | {"verdict": False}, covariance=False, tolerance=ROUGHLY)
+    moved = near.block.replace(
+        photo_positions=near.photo_positions,
+        photo_attitudes=near.photo_attitudes,
+        cameras=[each.restarted() for each in near.cameras],
+    )
+    return adjust(moved, **how, tolerance=FINELY)
 
 
 def _has_knots(start: Start) -> bool:
