@@ -7,7 +7,10 @@ import pytest
 from given_targets import DATA, golden, left_table, poses_of, rig_small
 
 from photogram.targets import read
+from photogram.targets.prior_shift import prior_shift
 from photogram.targets.regularisation import regularised
+
+REGULARISED = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "cx", "cy")
 
 
 @cache
@@ -114,3 +117,87 @@ def test_left_pictures_of_opencv_from_corners_alone(tmp_path):
     rms = np.sqrt((found.result.residuals**2).sum(axis=1).mean())
     assert rms == pytest.approx(opencv["rms"], rel=1e-9)
     assert found.result.global_test is None  # nobody has said how well corners are measured
+
+
+def test_rig_with_a_board_of_two_parabolas():
+    found, expected = rig_small("bend").adjust(), golden("rig_small")["two_parabolas"]
+    assert found.result.sums_of_squares.total == pytest.approx(expected["cost"], rel=1e-10)
+    assert found.result.degrees_of_freedom == expected["dof"]
+    names, cofactors = found.cofactors(("cameras", "sensors", "board"))
+    assert names[-2:] == ["bend_x", "bend_y"]
+    wanted = np.array(expected["cofactors_camera_sensor_bend"])
+    scale = np.sqrt(np.diag(wanted))
+    assert np.abs((cofactors - wanted) / np.outer(scale, scale)).max() < 1e-6
+    assert np.abs((found.bend.position[:2] - expected["bend"]) / scale[-2:]).max() < 1e-6
+    for camera, values in zip(found.cameras, expected["cameras"], strict=True):
+        assert np.abs((camera.values - values) / camera.sd).max() < 1e-6
+    assert np.abs(found.sensors[1] - poses_of(expected["sensor1"])).max() < 1e-9
+    assert found.points[31, 2] == pytest.approx(sum(expected["bend"]), rel=1e-6)
+
+
+@cache
+def opencv8(regularise):
+    given = read(DATA / "opencv8-0.cameramodel") if DATA.exists() else pytest.skip("no shared data")
+    return given.replace(regularise=regularise).adjust()
+
+
+@pytest.mark.parametrize(
+    ("regularise", "key"), [("mrcal", "with_regularisation"), (None, "without_regularisation")]
+)
+def test_optimum_of_mrcal(regularise, key):
+    found, expected = opencv8(regularise), golden("mrcal_opencv8")[key]
+    squares = found.result.sums_of_squares
+    assert squares.total == pytest.approx(expected["cost"], rel=1e-10)
+    assert squares.plates == pytest.approx(expected["image_sum"], rel=1e-9)
+    assert found.result.degrees_of_freedom == expected["dof"]
+    names, cofactors = found.cofactors(("cameras", "board"))
+    order = [*(f"camera 0 {name}" for name in expected["intrinsics"]), "bend_x", "bend_y"]
+    rows = [names.index(name) for name in order]
+    wanted = np.array(expected["cofactors_common"])
+    scale = np.sqrt(np.diag(wanted))
+    assert np.abs((cofactors[np.ix_(rows, rows)] - wanted) / np.outer(scale, scale)).max() < 1e-6
+    assert np.sqrt(np.diag(cofactors))[rows] == pytest.approx(
+        list(expected["sd_a_priori"].values()), rel=1e-6
+    )
+    values = [found.cameras[0].value(name) for name in expected["intrinsics"]]
+    bend = found.bend.position[:2] - expected["board_bend"]
+    off = np.array([*(np.array(values) - list(expected["intrinsics"].values())), *bend])
+    assert np.abs(off / scale).max() < 1e-4
+
+
+def test_views_and_corners_at_the_optimum_of_mrcal():
+    found, expected = opencv8("mrcal"), golden("mrcal_opencv8")["with_regularisation"]
+    result = found.result
+    assert np.abs(result.redundancy[:100] - expected["redundancy_first_view"]).max() < 1e-7
+    assert np.abs(result.residuals[:100] - expected["residuals_first_view"]).max() < 1e-5
+    assert result.redundancies.plates == pytest.approx(expected["redundancy_images"], rel=1e-8)
+    camera = found.cameras[0]
+    own = [camera.redundancy[camera.names.index(name)] for name in REGULARISED]
+    assert np.abs(np.array(own) - expected["redundancy_regularisation"]).max() < 1e-6
+    weighted = result.residuals / result.image_given_sd
+    rms = np.sqrt((weighted**2).mean())
+    assert rms == pytest.approx(expected["weighted_rms_per_coordinate"], rel=1e-9)
+    assert weighted.std() == pytest.approx(expected["sigma_mrcal"], rel=1e-9)
+    names, cofactors = found.cofactors(("views",))
+    for pose in expected["poses"]:
+        view = pose["view"]
+        assert np.abs(found.poses[view][:3, :3] - pose["R"]).max() < 1e-6
+        wanted = np.array(pose["cofactors"])
+        scale = np.sqrt(np.diag(wanted))
+        rows = [names.index(f"view {view} {step}") for step in ("tx", "ty", "tz", "wx", "wy", "wz")]
+        assert np.abs((cofactors[np.ix_(rows, rows)] - wanted) / np.outer(scale, scale)).max() < 1e-6
+
+
+def test_what_the_priors_of_mrcal_have_moved():
+    """All intrinsics move by less than 0.2 of their standard deviations: the report says so."""
+    moved = {
+        name: over
+        for name, _, over in zip(*(each.values for each in prior_shift(opencv8("mrcal"))), strict=True)
+    }
+    expected = golden("mrcal_opencv8")
+    free, priors = expected["without_regularisation"], expected["with_regularisation"]
+    sigma = np.sqrt(priors["variance_of_unit_weight"])
+    for name, value in priors["intrinsics"].items():
+        wanted = (value - free["intrinsics"][name]) / (sigma * priors["sd_a_priori"][name])
+        assert moved[f"camera 0 {name}"] == pytest.approx(wanted, abs=1e-3)
+    assert "of its standard deviation" in opencv8("mrcal").report()

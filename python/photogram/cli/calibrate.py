@@ -236,7 +236,7 @@ def calibrate(
     strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
-    """Calibrate cameras and rigs with pictures of a board: corners in, cameras with their uncertainty out.
+    """Calibrate cameras and rigs with pictures of a board: cameras with their uncertainty.
 
     Needs no start values. The report, tables of views, points, corners and cameras, and the adjusted project
     go to --out.

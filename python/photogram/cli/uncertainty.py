@@ -15,7 +15,7 @@ from photogram.cli.job import Job, Reads
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
-    from photogram.targets.cross_validated import Into
+    from photogram.targets.cross_validation import Into
     from photogram.targets.worth import Asked
 
 __all__ = ["AS_USUAL", "Uncertainty"]
@@ -123,11 +123,11 @@ class Uncertainty:
         calibrated
             Reads and adjusts another one, with the options of this.
         """
+        from photogram.targets.appraisal import appraise
         from photogram.targets.differences import difference
-        from photogram.targets.worth import worth
 
         with job.status("uncertainty") as status:
-            own = worth(found, self.asked(), None if status is None else status.update)
+            own = appraise(found, self.asked(), None if status is None else status.update)
         if self.compare_with is None:
             return replace(found, worth=own)
         other = calibrated(self.compare_with)

@@ -18,6 +18,7 @@ from photogram.targets.board import Board
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.calibration import Calibration
 from photogram.targets.corners import Corners
+from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
 
 __all__ = ["TITLE", "adjusted_project", "calibration_of", "project_of"]
@@ -29,7 +30,7 @@ NEAR = 1e-6
 """Of the spacing: what control may be off the points of a board."""
 
 
-def project_of(calibration: Calibration, path: Path | None = None) -> Project:
+def project_of(calibration: Start, path: Path | None = None) -> Project:
     """Return a calibration as a project, whose pixels count from the upper-left corner of the first."""
     block, lacks = from_corner(calibration.block()), []
     if calibration.sd0 is None:

@@ -220,9 +220,15 @@ class Board(Valued, Brief):
         x, y
             The deflections in the middle along the columns and along the rows; a and b go from 0 to 1 there.
         """
-        found = self.places.copy()
-        a, b = (found[:, :2] / found[:, :2].max(axis=0)).T
-        found[:, 2] = 4 * x * a * (1 - a) + 4 * y * b * (1 - b)
+        found: Floats = self.places + np.einsum("nki,k->ni", self.shifts(), [x, y])
+        return found
+
+    def shifts(self) -> Floats:
+        """Return (n, 2, 3) how points move with a deflection of one along the columns, and along the rows."""
+        places = self.places
+        a, b = (places[:, :2] / places[:, :2].max(axis=0)).T
+        found = np.zeros((len(places), 2, 3))
+        found[:, 0, 2], found[:, 1, 2] = 4 * a * (1 - a), 4 * b * (1 - b)
         return found
 
     def shape_of(self, views: int) -> Shape:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-
-if TYPE_CHECKING:
-    from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibrated import Calibrated
 
 __all__ = ["BoardFit", "board_fit"]
 

@@ -5,25 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.network.attitudes import Attitudes
+from photogram.network.passages import Bend
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
 from photogram.results.snooped import Snooped
+from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
+from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
-
-if TYPE_CHECKING:
-    from photogram.targets.calibration import Calibration
-    from photogram.targets.worth import Worth
+from photogram.targets.worth import Worth
 
 __all__ = ["STEPS", "Calibrated", "Part", "UnknownWeight", "with_unknown_weight"]
 
@@ -67,7 +67,7 @@ class Calibrated(Brief, Shown):
         Maps of uncertainty, cross-validation and what else was asked for, which reports show.
     """
 
-    calibration: Calibration
+    calibration: Start
     result: Result
     unregularised: Result | None = None
     snooped: Snooped | None = None
@@ -116,8 +116,14 @@ class Calibrated(Brief, Shown):
     @property
     def points(self) -> Floats:
         """(n, 3) adjusted points of the board; nominal where no picture shows them."""
-        found = self.result.point_positions
-        return np.where(np.isnan(found), self.calibration.board.places, found)
+        found, board = self.result.point_positions, self.calibration.board
+        given = board.places if self.bend is None else board.bent(*self.bend.position[:2])
+        return np.where(np.isnan(found), given, found)
+
+    @property
+    def bend(self) -> AdjustedUnknown | None:
+        """The deflections of the middle of the board, where these are unknowns."""
+        return next((each for each in self.result.unknowns if each.kind == Bend.KIND), None)
 
     def sensors_adjusted(self) -> list[int]:
         """Return the cameras that have a sensor whose pose was adjusted."""
@@ -131,7 +137,7 @@ class Calibrated(Brief, Shown):
         parts
             In the order of rows: `cameras` (all parameters; held ones have zeros), `sensors` and `views` (six
             steps each: R <- Exp(w) R, t <- t + dt in vision axes; dt, then w), `board` (x, y, z of the points
-            that pictures show).
+            that pictures show, or `bend_x` and `bend_y`).
 
         Returns
         -------
@@ -199,6 +205,8 @@ class Calibrated(Brief, Shown):
         return names, ("unknown", own), [sensor_steps(self.sensors[row]) for row in rows]
 
     def _board(self) -> tuple[list[str], tuple[str, list[str]], list[Floats]]:
+        if self.bend is not None:
+            return ["bend_x", "bend_y"], ("unknown", [self.bend.name]), [np.eye(2)]
         seen = np.flatnonzero(self.result.used_points).tolist()
         own = [self.calibration.board.names[row] for row in seen]
         return [f"{name}.{axis}" for name in own for axis in "xyz"], ("point", own), [np.eye(3)] * len(own)

@@ -61,6 +61,9 @@ def _board(calibrated: Calibrated) -> dict[str, Any]:
             ]
         ),
     }
+    if (bend := calibrated.bend) is not None:
+        found["bend"] = bend.position[:2].tolist()
+        found["bend_covariance"] = bend.covariance.tolist()
     if fit is not None:
         found["plane"] = fit.plane.tolist()
         found["rms_out_of_plane"] = fit.rms_out_of_plane

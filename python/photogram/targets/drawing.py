@@ -18,7 +18,7 @@ from photogram.plots.panels import Where, handed_out, note, panels, placed
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, COLOURS, FAINT, INK, ORDERED, VERMILION
 from photogram.targets.compared import Difference
-from photogram.targets.cross_validated import CrossValidation
+from photogram.targets.cross_validation import CrossValidation
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
 
 if TYPE_CHECKING:

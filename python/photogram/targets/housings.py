@@ -91,7 +91,14 @@ def _board_rows(calibrated: Calibrated) -> list[int]:
     return np.flatnonzero(calibrated.result.used_points).tolist()
 
 
+def _board_size(calibrated: Calibrated) -> int:
+    """Return how many unknowns the board has: coordinates of its points, or the two of its bend."""
+    return 3 * len(_board_rows(calibrated)) if calibrated.bend is None else 2
+
+
 def _points_by_board(calibrated: Calibrated) -> Floats:
+    if calibrated.bend is not None:
+        return calibrated.calibration.board.shifts().transpose(0, 2, 1)
     rows = _board_rows(calibrated)
     found = np.zeros((len(calibrated.points), 3, len(rows), 3))
     found[rows, :, np.arange(len(rows))] = np.eye(3)
@@ -119,7 +126,7 @@ def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses
     lengths = [len(each.names) for each in calibrated.cameras]
     starts = np.concatenate([[0], np.cumsum(lengths)])
     kept = [starts[each] + np.flatnonzero(calibrated.cameras[each].camera.deviations > 0) for each in cameras]
-    sensors, board = calibrated.sensors_adjusted(), 3 * len(_board_rows(calibrated))
+    sensors, board = calibrated.sensors_adjusted(), _board_size(calibrated)
     kept += [starts[-1] + 6 * sensors.index(each) + np.arange(6) for each in cameras[1:]]
     kept.append(starts[-1] + 6 * len(sensors) + np.arange(board))
     columns = np.concatenate(kept)
@@ -145,7 +152,8 @@ def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
             own[np.ix_(weighted, weighted)] = np.linalg.inv(covariance)
         blocks.append(own)
     blocks += [np.zeros((6, 6))] * (len(cameras) - 1)
-    blocks.append(np.diag(1 / block.point_sd[rows].ravel() ** 2))
+    points = np.diag(1 / block.point_sd[rows].ravel() ** 2)
+    blocks.append(points if calibrated.bend is None else np.zeros((2, 2)))
     found = np.zeros((sum(map(len, blocks)),) * 2)
     start = 0
     for own in blocks:

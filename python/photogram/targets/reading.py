@@ -13,7 +13,7 @@ from photogram.io.files import read_text, reading
 from photogram.messages import counted, listed
 from photogram.targets.board import Board, Shape
 from photogram.targets.board_files import is_board, picture_size, read_board
-from photogram.targets.calibration import Calibration, Regularisation, Synchronisation
+from photogram.targets.calibration import Calibration
 from photogram.targets.corner_tables import (
     is_headless,
     is_table,
@@ -26,6 +26,7 @@ from photogram.targets.first import first_values
 from photogram.targets.measured import Grouping, Measured, ViewBy, grouped
 from photogram.targets.mrcal_model import KEY, read_model
 from photogram.targets.opencv_corners import is_npz, is_storage, read_npz, read_storage
+from photogram.targets.start import Regularisation, Synchronisation
 
 __all__ = ["holds_targets", "read"]
 

@@ -90,6 +90,9 @@ def board_facts(calibrated: Calibrated) -> list[Fact]:
     ]
     where = "cx, cy and pixels count from 0 at the centre of the first; COLMAP has 0.5 more"
     found.append(Fact("Pixels", "centre is 0", note=where))
+    if (bend := calibrated.bend) is not None:
+        for name, value, sd in zip(_BENDS, bend.position.tolist(), bend.sd.tolist(), strict=False):
+            found.append(Fact(name, significant(value, 4), unit, f"sd {significant(sd, 2)} {unit}"))
     fit = board_fit(calibrated)
     if fit is None:
         return found
@@ -100,6 +103,7 @@ def board_facts(calibrated: Calibrated) -> list[Fact]:
     return found
 
 
+_BENDS = ("Deflection along x (bend_x)", "Deflection along y (bend_y)")
 _SHAPES = {
     "held": "held: every point is taken for where it should be",
     "bend": "two parabolas, whose deflections in the middle are unknowns",

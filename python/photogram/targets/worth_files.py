@@ -10,10 +10,9 @@ import numpy as np
 
 from photogram.show.pictures import drawn
 from photogram.targets.compared import Difference
-from photogram.targets.cross_validated import CrossValidation
-from photogram.targets.cross_validation import changes_between
+from photogram.targets.cross_validation import CrossValidation, changes_between
 from photogram.targets.maps import UncertaintyMap
-from photogram.targets.suggestions import Suggestions
+from photogram.targets.new_views import Suggestions
 from photogram.targets.worth import Worth
 from photogram.targets.worth_page import drawings
 

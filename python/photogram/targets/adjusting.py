@@ -1,0 +1,70 @@
+"""Adjusting a calibration: once, again with the priors of its cameras, again without what does not fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from photogram.adjustment.adjustment import Progress, adjust, adjusted_again
+from photogram.adjustment.robust import Loss
+from photogram.adjustment.snooping import snoop
+from photogram.arguments.arrays import one_of
+from photogram.errors import InputError
+from photogram.results.result import Result
+from photogram.targets.calibrated import Calibrated, with_unknown_weight
+from photogram.targets.outliers import marked_as_mrcal
+from photogram.targets.regularisation import regularised
+from photogram.targets.start import Start
+
+__all__ = ["adjusted_start", "snooped_start"]
+
+
+def adjusted_start(
+    start: Start,
+    *,
+    loss: Loss | None = None,
+    outliers: Literal["mrcal"] | None = None,
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Calibrated:
+    """Adjust cameras, sensors, views and the board together; see :meth:`Calibration.adjust`."""
+    if outliers is not None:
+        one_of("outliers", outliers, ("mrcal",))
+    while True:
+        free = adjust(start.block(), loss=loss, threads=threads, progress=progress, verdict=True)
+        result = _with_priors(start, free, threads)
+        worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
+        if not (worse.any() and result.converged):
+            break
+        start = start.without(worse)
+    told = replace(result, messages=[*start.messages, *result.messages])
+    if start.sd0 is None:
+        told = with_unknown_weight(told)
+    return Calibrated(calibration=start, result=told, unregularised=free if start.regularise else None)
+
+
+def _with_priors(start: Start, free: Result, threads: int | None) -> Result:
+    """Return the adjustment with the priors of cameras, from where that without them has ended."""
+    if start.regularise is None:
+        return free
+    observed = 2 * len(start.board.places) * len(start.corners.pictures)
+    cameras = regularised(start.cameras, start.corners.sizes, observed)
+    found = adjusted_again(start.block(cameras), free.options, free.state, threads=threads)
+    assert isinstance(found, Result)
+    return found
+
+
+def snooped_start(start: Start, **options: Any) -> Calibrated:
+    """Take gross errors out one after the other, and adjust what is left; see :meth:`Calibration.snoop`."""
+    if start.regularise is not None:
+        raise InputError("gross errors are taken out without priors of cameras: regularise is None")
+    found = snoop(start.block(), **options)
+    result = found.judged
+    assert isinstance(result, Result)
+    own = start.with_images_of(result.block)
+    told = replace(result, messages=[*own.messages, *result.messages])
+    vars(told)["verdict"] = found.verdict
+    return Calibrated(calibration=own, result=told, snooped=found)
