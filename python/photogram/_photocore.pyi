@@ -281,8 +281,8 @@ def camera_patches(model: str, parameters: _Floats, u: _Floats) -> tuple[_Indice
 
     Returns
     -------
-    (n, s) numbers of knots, row by row, and (n, s) their weights, s = 16 of order 3, 9 of order 2: partials of
-    the image by a knot are diag(fx, fy) times its weight.
+    (n, s) numbers of knots, row by row, and (n, s) their weights, s = 16 of order 3, 9 of order 2: partials
+    of the image by a knot are diag(fx, fy) times its weight.
 
     Raises
     ------

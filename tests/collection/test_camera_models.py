@@ -116,6 +116,8 @@ def random_cameras(rng):
                 values.append(rng.uniform(0.6, 0.9))
             elif parameter in ("c", "f", "fx", "fy", "w", "h", "b", "hx", "hy"):
                 values.append(rng.uniform(900.0, 1400.0))
+            elif name == KNOTTED and power == 0:
+                values.append({"order": 3.0, "fov_x_deg": 150.0}.get(parameter, 12.0))
             elif power == 1:
                 values.append(rng.uniform(-5.0, 5.0))
             else:

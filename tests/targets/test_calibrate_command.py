@@ -114,7 +114,6 @@ def test_outliers_as_mrcal_marks_them(left):
         (["--sd", "control=1"], "images=S"),
         (["--snoop", "--loss", "huber"], "goes without --loss"),
         (["--model", "pinhole9"], "did you mean pinhole?"),
-        (["--shape", "bend"], "bend"),
     ],
 )
 def test_what_does_not_go_is_refused(left, words, said):

@@ -43,6 +43,17 @@ def test_frames_without_a_picture_of_their_reference_come_back(tmp_path):
     )
 
 
+def test_a_board_that_bends_goes_on_bending(tmp_path):
+    adjusted = rig_small("bend").adjust()
+    found = calibration_of(again(adjusted_project(adjusted), tmp_path))
+    assert found.bend == pytest.approx(adjusted.bend.position[:2].tolist(), rel=1e-12)
+    restarted = found.adjust()
+    assert len(restarted.result.iterations) <= 2
+    assert restarted.result.sums_of_squares.total == pytest.approx(
+        adjusted.result.sums_of_squares.total, rel=1e-10
+    )
+
+
 def test_levels_stand_for_standard_deviations_that_nobody_knows(tmp_path):
     given = rig_small().replace(sd0=None)
     project = project_of(given)

@@ -104,6 +104,17 @@ def test_a_lens_of_150_degrees_ends_where_it_should():
         assert abs(values[name] - value) < 1e-3 * sd[name]
 
 
+def test_knots_begin_as_the_lens_that_needs_none():
+    board, corners = wide(step=6)
+    plain, splined = (first_values(board, corners, model) for model in (None, "splined_stereographic"))
+    knotted = splined.cameras[0]
+    assert knotted.model == "splined_stereographic"
+    assert np.isinf(knotted.knot_sd).all()
+    own = knotted.project(plain.cameras[0].rays(corners.xy))
+    assert np.abs(own - corners.xy).max() < 1.0
+    np.testing.assert_allclose(splined.poses, plain.poses, atol=1e-3)
+
+
 def test_every_third_picture_of_it_is_enough():
     board, corners = wide(step=3)
     found = calibration(board, first_values(board, corners)).adjust()

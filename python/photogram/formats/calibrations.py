@@ -14,6 +14,7 @@ from photogram.messages import listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.network.passages import Figure
 from photogram.targets.board import Board
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.calibration import Calibration
@@ -82,8 +83,15 @@ def calibration_of(project: Project) -> Calibration:
         references=references,
         sd0=None if assumed else sd0,
         sync="known" if rig or len(references) == 1 else "none",
+        bend=_bend(block),
         messages=project.messages,
     )
+
+
+def _bend(block: Block) -> tuple[float, float]:
+    """Return the deflections that the board begins with."""
+    found = [each.bend.position for each in block.passages if isinstance(each, Figure)]
+    return (float(found[0][0]), float(found[0][1])) if found else (0.0, 0.0)
 
 
 def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> tuple[Corners, Indices]:
@@ -167,9 +175,14 @@ def from_corner(block: Block) -> Block:
 
 def adjusted_project(calibrated: Calibrated) -> Project:
     """Return what was adjusted as a project: free values where the adjustment has ended."""
-    result = calibrated.result
-    return project_of(calibrated.calibration).replace(
-        block=from_corner(result.restarted()), starts=calibrated.points
+    own, bend = calibrated.calibration, calibrated.bend
+    return project_of(
+        own.replace(
+            cameras=[each.restarted() for each in calibrated.cameras],
+            sensors=calibrated.sensors,
+            poses=calibrated.poses,
+            bend=own.bend if bend is None else (float(bend.position[0]), float(bend.position[1])),
+        )
     )
 
 

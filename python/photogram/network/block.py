@@ -28,6 +28,7 @@ from photogram.network.observations import (
     observation_rows,
     of_records,
 )
+from photogram.network.observations.knots import with_knots
 from photogram.network.observations.smoothness import with_smoothness
 from photogram.network.passages import Figure, Passage, checked_passages
 from photogram.network.photo_cameras import checked_cameras, photo_indices
@@ -420,6 +421,7 @@ class Block(Valued, Brief):
         self._check_motions()
         self._set("passages", checked_passages(self.passages, self.point_ids, self.photo_ids))
         self._set("observations", with_smoothness(self.observations, self.trajectories))
+        self._set("observations", with_knots(self.observations, self.cameras))
         observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
         self._check_figures()
 
@@ -501,7 +503,8 @@ class Block(Valued, Brief):
         of_times = [scalar for each in self.timed for scalar in each.scalars]
         coefficients = [each for own in self.trajectories for all_ in own.coefficients for each in all_]
         records = of_records(self.observations)
-        passed = [own for each in self.passages for own in each.unknowns]
+        passed: list[Unknown] = [own for each in self.passages for own in each.unknowns]
+        passed += [knot for camera in self.cameras for knot in camera.knot_unknowns]
         return different_unknowns([*sensors, *of_times, *coefficients, *records, *passed, *of_observations])
 
     @property

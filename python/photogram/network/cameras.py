@@ -6,7 +6,7 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
@@ -17,7 +17,7 @@ from photogram.arguments.arrays import is_covariance, number, one_of, shaped, sh
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.network.knots import checked_knot_sd, checked_knots, knot_names
+from photogram.network.knots import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
 from photogram.show.brief import Brief, Rows
 
 __all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "images_of", "rays_of_row"]
@@ -167,6 +167,11 @@ class Camera(Valued, Brief):
     def knot_names(self) -> tuple[str, ...]:
         """`dx_i_j`, `dy_i_j` of each knot, row by row, i along columns from 0; none without knots."""
         return knot_names(self.knots)
+
+    @cached_property
+    def knot_unknowns(self) -> tuple[Knot, ...]:
+        """The knots as unknowns of a block, row by row; none where they are held."""
+        return knot_unknowns(self.title, self.knots, self.knot_sd)
 
     @property
     def powers(self) -> dict[str, int]:

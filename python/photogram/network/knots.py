@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,13 +12,73 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import frozen, numbers, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.network.unknowns import Unknown
 
-__all__ = ["KNOTTED", "checked_knot_sd", "checked_knots", "knot_names"]
+__all__ = ["KNOTTED", "Knot", "checked_knot_sd", "checked_knots", "knot_names", "knot_unknowns"]
 
 KNOTTED = "splined_stereographic"
 """The model that has knots."""
 MOST = 10_000
 """Knots along columns or rows, at the most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Knot(Unknown):
+    """Displacements dx, dy at one knot of a camera, in units of the stereographic image.
+
+    Parameters
+    ----------
+    name
+        The camera and the knot.
+    value
+        (2,) where the adjustment starts from.
+    sd
+        (2,) 0 held, infinite free or weighted by `covariance`.
+    covariance
+        (2, 2) of the observation that both are 0; None without.
+    """
+
+    KIND = "knot"
+
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+    covariance: Floats | None = None
+
+    def _position(self) -> Floats:
+        return np.append(shaped(f"value of {self.title}", self.value, (2,)), 0.0)
+
+
+def knot_unknowns(camera: str, knots: Floats | None, sd: Floats | None) -> tuple[Knot, ...]:
+    """Return the knots of a camera as unknowns, row by row; none where all are held.
+
+    Parameters
+    ----------
+    camera
+        Its name.
+    knots, sd
+        (ny, nx, 2) as of :class:`photogram.Camera`; None of a model without them.
+    """
+    if knots is None or sd is None or not sd.any():
+        return ()
+    rows, columns, _ = knots.shape
+    j, i = np.mgrid[:rows, :columns]
+    away = np.stack([2 * i - columns + 1, 2 * j - rows + 1], axis=2).astype(float)
+    away[(away == 0).all(axis=2)] = (1.0, 0.0)
+    radial = away / np.linalg.norm(away, axis=2, keepdims=True)
+    across = radial[..., ::-1] * [-1.0, 1.0]
+    axes = np.stack([radial, across], axis=3)
+    with np.errstate(invalid="ignore"):
+        covariances = np.einsum("jiak,jik,jibk->jiab", axes, sd**2, axes)
+    return tuple(
+        Knot(
+            f"{camera} {column}_{row}",
+            knots[row, column],
+            np.inf if own.any() else 0.0,
+            covariances[row, column] if 0 < own[0] < np.inf else None,
+        )
+        for row in range(rows)
+        for column, own in enumerate(sd[row])
+    )
 
 
 def checked_knots(
@@ -73,6 +134,9 @@ def checked_knot_sd(title: str, knots: Floats | None, given: ArrayLike) -> Float
     found = shaped(what, found, knots.shape)
     if not (found >= 0).all():
         raise InputError(f"{what} holds what is no standard deviation: {float(found[~(found >= 0)][0])}")
+    kinds = np.sign(found) + np.isinf(found)
+    if (kinds[..., 0] != kinds[..., 1]).any():
+        raise InputError(f"{what}: a knot is held, weighted or free in both directions")
     return frozen(found)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from photogram.arguments.arrays import freeze_fields, standard_deviations
 from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.show.brief import Brief
@@ -92,7 +93,17 @@ class AdjustedCamera(Brief):
         return np.flatnonzero((sd > 0) & np.isfinite(sd)).tolist()
 
     def observed(self) -> Camera:
-        """Return the camera as an observation for other adjustments: estimated parameters and covariances."""
+        """Return the camera as an observation for other adjustments: estimated parameters and covariances.
+
+        Raises
+        ------
+        InputError
+            Its knots were estimated, too: their covariance has no place in a camera.
+        """
+        if self.given.knot_unknowns:
+            raise InputError(
+                f"the knots of {self.name} were estimated: they are no observations of another block"
+            )
         rows = self.estimated
         names = [self.names[k] for k in rows]
         covariance = (names, self.covariance[np.ix_(rows, rows)]) if names else None
@@ -101,7 +112,8 @@ class AdjustedCamera(Brief):
     def restarted(self) -> Camera:
         """Return the camera as it was given, but with adjusted values of free parameters."""
         found = np.where(np.isinf(self.given.deviations), self.values, self.given.values)
-        return self.given.replace(parameters=dict(zip(self.names, found.tolist(), strict=True)))
+        parameters = dict(zip(self.names, found.tolist(), strict=True))
+        return self.given.replace(parameters=parameters, knots=self.camera.knots)
 
     def value(self, name: str) -> float:
         """Return an adjusted parameter."""
@@ -119,6 +131,7 @@ def adjusted_cameras(
     if not block.cameras:
         return ()
     found = []
+    knots = _knots(block, solution)
     for name, given, row in zip(block.camera_names, block.cameras, solution.cameras, strict=True):
         parameters, cofactors, redundancy, information, photos, images = row
         k = len(parameters)
@@ -127,7 +140,10 @@ def adjusted_cameras(
             AdjustedCamera(
                 name=name,
                 given=given,
-                camera=given.replace(parameters=dict(zip(given.names, parameters, strict=True))),
+                camera=given.replace(
+                    parameters=dict(zip(given.names, parameters, strict=True)),
+                    knots=knots.get(id(given), given.knots),
+                ),
                 cofactors=matrix,
                 covariance=matrix * scale,
                 redundancy=np.array(redundancy),
@@ -137,6 +153,21 @@ def adjusted_cameras(
             )
         )
     return tuple(found)
+
+
+def _knots(block: Block, solution: _photocore.BlockSolution) -> dict[int, Floats]:
+    """Return (ny, nx, 2) adjusted knots of cameras that have unknown ones, by their identity."""
+    if not any(each.knot_unknowns for each in block.cameras):
+        return {}
+    rows = {id(each): row for row, each in enumerate(block.unknowns)}
+    places = [position for _, position, *_ in solution.adjusted_unknowns]
+
+    found = {}
+    for each in block.cameras:
+        if each.knots is not None and each.knot_unknowns:
+            own = np.array([places[rows[id(knot)]][:2] for knot in each.knot_unknowns])
+            found[id(each)] = own.reshape(each.knots.shape)
+    return found
 
 
 def units(camera: Camera) -> list[str]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.network.knots import Knot
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
 from photogram.results.result import Result
 from photogram.results.trajectories import corrections
@@ -147,21 +148,28 @@ def courses_table(every: Sequence[Course], linear_unit: str) -> list[Quantity]:
     ]
 
 
+_MANY = (Coefficient, Knot)
+"""Types of which a block may have thousands."""
+
+
 def notable(every: Sequence[AdjustedUnknown]) -> tuple[list[AdjustedUnknown], str]:
     """Return the common unknowns that reports list, and what they say of the others.
 
-    All but coefficients of trajectories, and these where they are few, or have large test values.
+    All but coefficients of trajectories and knots of lenses, and these where they are few, or have large test
+    values.
     """
-    own = [each for each in every if isinstance(each.given, Coefficient)]
+    own = [each for each in every if isinstance(each.given, _MANY)]
     if len(own) <= COEFFICIENTS:
         return list(every), ""
     sizes = np.array([np.nan_to_num(np.abs(each.standardized)).max(initial=0.0) for each in own])
     order = np.argsort(-sizes, kind="stable")[:LISTED]
     kept = {id(own[row]) for row in order.tolist() if sizes[row] > NOTABLE}
-    shown = [each for each in every if not isinstance(each.given, Coefficient) or id(each) in kept]
+    shown = [each for each in every if not isinstance(each.given, _MANY) or id(each) in kept]
+    both = {isinstance(each.given, Knot): None for each in own}
+    kinds = " and ".join("knots of lenses" if knot else "coefficients of trajectories" for knot in both)
     which = f"{len(kept)} of " if kept else ""
     what = f"with |test value| > {NOTABLE:g}, " if kept else ""
     return shown, (
-        f"{which}{len(own)} coefficients of trajectories {what}{'are listed' if kept else 'are not listed'}:"
+        f"{which}{len(own)} {kinds} {what}{'are listed' if kept else 'are not listed'}:"
         " the table of unknowns has all"
     )

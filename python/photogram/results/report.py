@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.network.geometry import lengths_of_units
-from photogram.network.observations import Observation, Smoothness
+from photogram.network.knots import Knot
+from photogram.network.observations import Observation, Prior, Smoothness
 from photogram.network.structuring import structure
 from photogram.results.axes import image_axes, point_axes
 from photogram.results.calibration_report import calibration_sections
@@ -298,8 +299,9 @@ def _kind(result: Result, kind: ObservedKind) -> list[str]:
 
 
 def _is_flown(observation: Observation) -> bool:
-    """Whether an observation is of a trajectory: there may be thousands in a minute."""
-    return observation.moment is not None or isinstance(observation, Smoothness)
+    """Whether an observation is of a trajectory or of a knot: there may be thousands."""
+    of_knot = isinstance(observation, Prior) and isinstance(observation.unknown, Knot)
+    return of_knot or observation.moment is not None or isinstance(observation, Smoothness)
 
 
 def _width(names: Iterable[str], least: int) -> int:

@@ -146,8 +146,8 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     own_arrays, block_arrays = saved.arrays(parts, "block")
     block = Block(**given, **block_arrays)
     members = saved.members("result", Result)
-    if block.timed:
-        # Coefficients of photos with trajectories of their own are made with their block.
+    if block.timed or any(each.knot_unknowns for each in block.cameras):
+        # Coefficients of photos with trajectories of their own, and knots, are made with their block.
         pairs = zip(members["unknowns"], block.unknowns, strict=True)
         members["unknowns"] = tuple(replace(each, given=own) for each, own in pairs)
     return Result(**members, **own_arrays, block=block, state=saved.state())

@@ -21,7 +21,7 @@ __all__ = ["AdjustedUnknown", "adjusted_unknowns"]
 _PLACED = frozenset(
     (
         *("lever arm", "shift", "drift", "instrument", "level", "sensor"),
-        *("position coefficient", "rotation coefficient", "gyro bias", "clock", "readout", "bend"),
+        *("position coefficient", "rotation coefficient", "gyro bias", "clock", "readout", "bend", "knot"),
     )
 )
 """Types with components of `position` for values."""

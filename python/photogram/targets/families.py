@@ -25,6 +25,8 @@ __all__ = ["POOR", "Trial", "adjusted_family", "misfits", "perspective", "rays_o
 
 FIELDS = np.linspace(60.0, 200.0, 15)
 """Degrees of horizontal field that are tried; then what is between them is halved."""
+ENOUGH = 24
+"""Pictures that fields are tried by, at the most."""
 FINEST = 0.5
 """Degrees of field to which the best is found."""
 RIVALS = 1.5
@@ -127,7 +129,9 @@ def wide(seen: Sightings, size: tuple[int, int], family: str) -> Trial:
 
 def trials(seen: Sightings, size: tuple[int, int]) -> list[Trial]:
     """Return the families that fit, the best first: those within a factor of it."""
-    found = [perspective(seen, size), *(wide(seen, size, family) for family in FAMILIES)]
+    some = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / ENOUGH)))
+    few = [perspective(some, size), *(wide(some, size, family) for family in FAMILIES)]
+    found = [_tried(seen, trial.camera) for trial in few]
     found.sort(key=lambda trial: trial.pixels)
     return [trial for trial in found if trial.pixels <= RIVALS * found[0].pixels]
 

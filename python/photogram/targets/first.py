@@ -74,7 +74,8 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
     model
         The lens that is wanted: a model of `docs/cameras.md`, or `opencv4`, `opencv5`, `opencv8`, `opencv12`,
         `opencv_pinhole` with so many terms. None: `opencv5` below 90 degrees of horizontal field, `opencv8`
-        above, `opencv_fisheye` where corners are seen beside the camera and behind it.
+        above, `opencv_fisheye` where corners are seen beside the camera and behind it, or hardly determine
+        that. Knots of `splined_stereographic` are fitted to what None gives.
 
     Raises
     ------
@@ -99,8 +100,8 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
         cameras.append(camera)
         remarks += told
     pictures = Pictures(seen, list(corners.pictures), corners.cameras, cameras, usable)
-    orders, of_orders = pictures.ordered()
-    made = pictures.poses(orders)
+    orders, fits, of_orders = pictures.ordered()
+    made = pictures.adjusted(orders, fits)
     rig = connected(made, corners.cameras, corners.views, len(cameras), seen.listings.turns)
     made = _turned(made, rig, seen.listings)
     remarks += [*of_orders, *_of_rig(rig, corners), *(_frontal(made, corners) if seen.is_flat else ())]

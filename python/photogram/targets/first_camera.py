@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.cameras import Camera
+from photogram.network.knots import KNOTTED
 from photogram.targets.families import POOR, Trial, adjusted_family, misfits, rays_of, trials
 from photogram.targets.homographies import poses, ray_homographies
 from photogram.targets.lens_fit import fitted, is_perspective, lens_of
@@ -22,6 +24,8 @@ MANY = 62
 """Pictures that first values of a camera are adjusted by, at the most: the others would say the same."""
 NARROW, WIDEST = math.radians(90.0), math.radians(88.0)
 """The horizontal field below which `opencv5` is usual, and how far from the axis `opencv8` may see."""
+TOLERANCE = 1e-5
+"""Of a standard deviation: where steps of an adjustment end that shows what corners determine."""
 NO_WORSE = 1.5
 """What a misfit may grow when one more view takes part."""
 MARGIN = 1.05
@@ -49,7 +53,8 @@ def first_camera(
     size, name
         Width and height of them in pixels, and what the camera is called.
     model
-        The wanted model; None for what is usual at its field of view.
+        The wanted model; None for what is usual at its field of view. The knots of a splined one are fitted
+        to the usual one: many of them are where no corner is.
 
     Raises
     ------
@@ -62,13 +67,18 @@ def first_camera(
     remarks = []
     if adjusted is None:
         remarks.append(Message(f"camera {name}: no trial lens could be adjusted; the first values are rough"))
-    wanted = _wanted(family, seen, size, model)
     reach = MARGIN * float(np.nanmax(np.linalg.norm(seen.xy - (np.array(size) - 1) / 2, axis=2)))
-    camera = fitted(family, wanted, size, radius=reach)
-    done = _adjusted(used.listed(trial.orders), trial, family, camera)
-    if done is None:
-        remarks.append(Message(f"camera {name}: {wanted} was fitted to a lens of the family {family.model}"))
-    return (camera if done is None else done.camera), remarks
+    own = used.listed(trial.orders)
+    splined = model == KNOTTED
+    for wanted in _wanted(family, seen, size, None if splined else model):
+        camera = fitted(family, wanted, size, radius=reach)
+        done = _adjusted(own, trial, family, camera)
+        if done is not None and done.is_whole:
+            break
+        why = f"its corners alone hardly determine the terms of {wanted}"
+        remarks.append(Message(f"camera {name}: {why}: priors, or another lens, would help"))
+    found = camera if done is None else done.camera
+    return (fitted(found, KNOTTED, size) if splined else found), remarks
 
 
 def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> Adjusted | None:
@@ -79,13 +89,13 @@ def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> 
     """
     start = poses(ray_homographies(seen.coordinates, rays_of(family, seen.xy)))
     fits = trial.misfits <= POOR * trial.angle
-    done = adjusted_views(camera, seen.of(fits), start[fits])
+    done = adjusted_views(camera, seen.of(fits), start[fits], TOLERANCE)
     if done is None:
         return None
     for row in np.argsort(trial.misfits)[np.count_nonzero(fits) :].tolist():
         before = float(np.median(misfits(seen.of(fits), rays_of(done.camera, seen.of(fits).xy))))
         more = fits | (np.arange(len(fits)) == row)
-        wider = adjusted_views(done.camera, seen.of(more), start[more])
+        wider = adjusted_views(done.camera, seen.of(more), start[more], TOLERANCE)
         if wider is None:
             break
         after = misfits(seen, rays_of(wider.camera, seen.xy))
@@ -95,20 +105,21 @@ def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> 
     return done
 
 
-def _wanted(family: Camera, seen: Sightings, size: tuple[int, int], model: str | None) -> str:
-    """Return the model that was asked for, if it can show all corners; else the usual one."""
+def _wanted(family: Camera, seen: Sightings, size: tuple[int, int], model: str | None) -> Sequence[str]:
+    """Return the model that was asked for, if it can show all corners; else the usual ones, in order."""
     farthest = _from_axis(family, seen.xy.reshape(-1, 2))
     if model is None:
         ends = np.array([[0.0, (size[1] - 1) / 2], [size[0] - 1.0, (size[1] - 1) / 2]])
         field = float(np.arccos(np.clip(np.prod(family.rays(ends), axis=0).sum(), -1, 1)))
-        wide = "opencv8" if farthest < WIDEST else "opencv_fisheye"
-        return "opencv5" if field < NARROW and farthest < WIDEST else wide
+        if farthest >= WIDEST:
+            return ["opencv_fisheye"]
+        return ["opencv5"] if field < NARROW else ["opencv8", "opencv_fisheye"]
     if farthest >= math.pi / 2 and is_perspective(lens_of(model, family, size)):
         raise InputError(
             f"camera {family.name}: it sees corners {math.degrees(farthest):.0f} degrees off its axis, which"
             f" {model} cannot show; opencv_fisheye can"
         )
-    return model
+    return [model]
 
 
 def _from_axis(camera: Camera, xy: Floats) -> float:

@@ -21,6 +21,8 @@ STEPS, CLOSE = 100, 1e-10
 """Steps of a fit at the most, and the relative fall of the sum of squares with which it ends."""
 WEAKEST, STRONGEST = 1e-14, 1e8
 """Damping of steps, relative to the normal equations: the least, and the one with which a fit gives up."""
+MANY = 100
+"""Unknowns beyond which equations are solved without looking for their rank."""
 HELD = slice(0, 0)
 """Of the six steps (dt, w) of a motion: none."""
 
@@ -138,5 +140,8 @@ def _damped(rows: Floats, misses: Floats, damping: float) -> Floats:
     scaled = rows / scale
     normal = scaled.T @ scaled
     normal[np.diag_indices(len(normal))] += damping
-    found: Floats = np.linalg.lstsq(normal, scaled.T @ misses, rcond=None)[0] / scale
-    return found
+    right = scaled.T @ misses
+    # Knots are many; damping keeps apart what the images of those at the edge do not.
+    many = len(normal) > MANY
+    found: Floats = np.linalg.solve(normal, right) if many else np.linalg.lstsq(normal, right, rcond=None)[0]
+    return found / scale

@@ -95,31 +95,37 @@ def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int,
     if own not in models:
         raise InputError(f"model: there is no lens {shown(model)}{nearest(model, [*LENS_TERMS, *models])}")
     names = [name for name, _ in models[own][1]]
-    constants = {*names[len(names) - models[own][2] :]} - {"w", "h"}
+    splined = own == KNOTTED
+    constants = {*()} if splined else {*names[len(names) - models[own][2] :]} - {"w", "h"}
     if not ({"f", "fx"} & {*names} and "cx" in names) or constants:
         raise InputError(
             f"model: {model} has no focal length and principal point in pixels to begin with"
             + "".join(f", and a constant {each} that nothing says" for each in sorted(constants))
         )
-    given = source.parameters
-    fx, fy = given.get("fx", given.get("f")), given.get("fy", given.get("f"))
-    start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1]} | dict(_STARTS)
-    start |= _principal_point(source, "w" in names, size)
-    splined = own == KNOTTED
+    start = _start(source, size, "w" in names)
     if splined:
-        start |= {"order": ORDER, "nx": knots[0], "ny": knots[1]}
-        start["fov_x_deg"] = _field(source, size, knots)
-    free = {*()} if splined else {*names} - {"w", "h"}
-    if count is not None:
-        free = {*names[: 4 + count]}
+        start |= {"order": ORDER, "nx": knots[0], "ny": knots[1], "fov_x_deg": _field(source, size, knots)}
+    free = {*()} if splined else {*names} - {"w", "h"} if count is None else {*names[: 4 + count]}
     return Camera(
         own,
-        {name: value for name, value in start.items() if name in names and value is not None},
+        {name: value for name, value in start.items() if name in names},
         {name: math.inf for name in names if name in free},
         name=source.name,
         unit="px",
         knot_sd=math.inf if splined else None,
     )
+
+
+def _start(source: Camera, size: tuple[int, int], from_middle: bool) -> dict[str, float]:
+    """Return where parameters begin: what the source says, and terms that say nothing."""
+    given = source.parameters
+    if "cx" not in given or not ({"f", "fx"} & {*given}):
+        raise InputError(
+            f"the camera {source.title}, {source.model}, has no focal length and principal point in pixels"
+        )
+    fx, fy = given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0))
+    start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1], **dict(_STARTS)}
+    return start | _principal_point(source, from_middle, size)
 
 
 def _field(source: Camera, size: tuple[int, int], knots: tuple[int, int]) -> float:

@@ -9,9 +9,10 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
-from photogram.targets.families import POOR, misfits, rays_of
-from photogram.targets.homographies import centres, poses, ray_homographies
+from photogram.targets.families import POOR, rays_of
+from photogram.targets.homographies import angles_apart, centres, poses, ray_homographies
 from photogram.targets.sightings import LISTED, Sightings
+from photogram.targets.small_block import adjusted_views
 
 __all__ = ["Pictures"]
 
@@ -47,13 +48,25 @@ class Pictures:
 
     def poses(self, orders: Indices) -> Floats:
         """Return (P, 4, 4) poses board -> camera with corners listed in (P,) orders; NaN where unknown."""
-        own = self.seen.listed(orders)
+        rows = np.flatnonzero(self.usable)
+        seen = self.seen.of(rows).listed(orders[rows])
         found = np.full((len(orders), 4, 4), np.nan)
-        found[self.usable] = poses(ray_homographies(own.coordinates, self._rays(own)[self.usable]))
+        found[rows] = poses(ray_homographies(seen.coordinates, self._rays(seen, rows)))
         return found
 
-    def ordered(self) -> tuple[Indices, list[Message]]:
-        """Return (P,) in which order the corners of each picture are listed, and what is to be said of it.
+    def adjusted(self, orders: Indices, fits: Bools) -> Floats:
+        """Return these poses adjusted with the cameras held, of (P,) pictures that fit."""
+        found, seen = self.poses(orders), self.seen.listed(orders)
+        for k, camera in enumerate(self.cameras):
+            own = (self.of_cameras == k) & fits
+            held = camera.replace(sd=0.0, knot_sd=None)
+            done = adjusted_views(held, seen.of(own), found[own]) if own.any() else None
+            if done is not None:
+                found[own] = done.poses
+        return found
+
+    def ordered(self) -> tuple[Indices, Bools, list[Message]]:
+        """Return (P,) in which order the corners of each picture are listed, whether they fit, and remarks.
 
         That of their numbers is kept where a picture fits as well as most do, and sees the board from the
         side that most see: the front, x to the right and y down, where none says it. Else the first order
@@ -61,35 +74,56 @@ class Pictures:
         """
         misfit, front = self._tried()
         best = misfit.min(axis=1, keepdims=True)
-        limit = max(POOR * float(np.median(best)), ROUNDING)
+        limit = self._limit(misfit)
         fits = (misfit <= limit) & (misfit <= np.maximum(CLEAR * best, ROUNDING))
         fits[:, 0] |= misfit[:, 0] <= limit
         side = 1.0 if front[fits[:, 0], 0].sum() > 0 else -1.0
         right = fits & (front == side)
         orders = np.zeros(len(self.usable), dtype=np.int64)
         orders[self.usable] = np.argmax(right, axis=1)
-        return orders, self._told(orders, fits, right)
+        fit = np.zeros(len(self.usable), dtype=bool)
+        fit[self.usable] = fits.any(axis=1)
+        return orders, fit, self._told(orders, fits, right)
 
-    def _rays(self, seen: Sightings) -> Floats:
-        """Return (P, n, 3) rays, those of each picture by its camera."""
+    def _rays(self, seen: Sightings, rows: Indices) -> Floats:
+        """Return (k, n, 3) rays of pictures that are `rows`, those of each by its camera."""
         found = np.full((*seen.xy.shape[:2], 3), np.nan)
         for k, camera in enumerate(self.cameras):
-            own = (self.of_cameras == k) & self.usable
+            own = self.of_cameras[rows] == k
             found[own] = rays_of(camera, seen.xy[own])
         return found
 
     def _tried(self) -> tuple[Floats, Floats]:
-        """Return how usable pictures fit in each order, radians, and then the sign of z of its camera."""
-        count = len(self.seen.listings.points)
-        misfit, front = (np.full((int(self.usable.sum()), count), -1.0) for _ in range(2))
-        for order in range(count):
-            own = self.seen.listed(np.full(len(self.usable), order))
-            rays = self._rays(own)[self.usable]
-            misfit[:, order] = misfits(own, rays)
-            if self.seen.listings.one_sided:
-                made = poses(ray_homographies(own.coordinates, rays))
-                front[:, order] = np.sign(centres(made)[:, 2])
+        """Return how usable pictures fit in each order, radians, and then the sign of z of its camera.
+
+        Pictures that are as most are in the order of their numbers are not tried in others.
+        """
+        rows, listings = np.flatnonzero(self.usable), self.seen.listings
+        misfit = np.full((len(rows), len(listings.points)), np.inf)
+        front = np.full(misfit.shape, -1.0)
+        for order in listings.shapes:
+            misfit[:, order], front[:, order] = self._in_order(order, rows)
+        odd = misfit[:, 0] > self._limit(misfit)
+        odd |= front[:, 0] != (1.0 if front[~odd, 0].sum() > 0 else -1.0)
+        others = {*range(len(listings.points))} - {*listings.shapes} if odd.any() else ()
+        for order in others:
+            misfit[odd, order], front[odd, order] = self._in_order(order, rows[odd])
         return misfit, front
+
+    def _in_order(self, order: int, rows: Indices) -> tuple[Floats, Floats]:
+        """Return the same of some pictures in one order."""
+        seen = self.seen.of(rows).listed(np.full(len(rows), order))
+        rays = self._rays(seen, rows)
+        found = ray_homographies(seen.coordinates, rays)
+        misfit = np.nanmedian(angles_apart(seen.coordinates, rays, found), axis=1)
+        if not seen.listings.one_sided:
+            return misfit, np.full(len(rows), -1.0)
+        return misfit, np.sign(centres(poses(found))[:, 2])
+
+    @staticmethod
+    def _limit(misfit: Floats) -> float:
+        """Return the misfit beyond which a picture does not fit."""
+        return max(POOR * float(np.median(misfit.min(axis=1))), ROUNDING)
 
     def _told(self, orders: Indices, fits: Bools, right: Bools) -> list[Message]:
         """Return what is to be said of pictures whose corners are not listed as the board's are."""

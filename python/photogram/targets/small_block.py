@@ -11,6 +11,7 @@ import numpy as np
 from photogram.adjustment.adjustment import adjust
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError
+from photogram.messages import Undetermined
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -19,8 +20,8 @@ from photogram.targets.vision import photo_poses, vision_poses
 
 __all__ = ["Adjusted", "adjusted_views"]
 
-TOLERANCE = 1e-3
-"""Of a standard deviation: where steps of first values end."""
+ROUGHLY = 1e-3
+"""Of a standard deviation: where steps end of what is only to be begun with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,24 +36,31 @@ class Adjusted:
         (P, 4, 4) board -> camera.
     variance
         The variance of unit weight, px^2.
+    is_whole
+        Whether all that was free was adjusted, converged, and is more than hardly determined.
     """
 
     camera: Camera
     poses: Floats
     variance: float
+    is_whole: bool
 
 
-def adjusted_views(camera: Camera, seen: Sightings, poses: Floats) -> Adjusted | None:
+def adjusted_views(
+    camera: Camera, seen: Sightings, poses: Floats, tolerance: float = ROUGHLY
+) -> Adjusted | None:
     """Adjust a camera and the poses of views; with less of it free where they do not determine all.
 
     Parameters
     ----------
     camera
-        The camera, what is unknown of it free.
+        The camera, what is unknown of it free; nothing is where the poses alone are adjusted.
     seen
         The views, their corners in the order of their numbers.
     poses
         (P, 4, 4) board -> camera, to begin with.
+    tolerance
+        As of :func:`photogram.adjust`.
 
     Returns
     -------
@@ -72,10 +80,11 @@ def adjusted_views(camera: Camera, seen: Sightings, poses: Floats) -> Adjusted |
         cameras=[camera],
         photo_cameras=0,
     )
-    for free in _less_and_less(camera):
+    attempts = _less_and_less(camera)
+    for free in attempts:
         own = camera.replace(sd=dict.fromkeys(free, math.inf))
         try:
-            result = adjust(block.replace(cameras=[own]), covariance=False, tolerance=TOLERANCE)
+            result = adjust(block.replace(cameras=[own]), covariance=False, tolerance=tolerance)
         except AdjustmentError:
             continue
         if result.status == "diverged":
@@ -84,7 +93,9 @@ def adjusted_views(camera: Camera, seen: Sightings, poses: Floats) -> Adjusted |
         found = vision_poses(result.photo_positions, turned)
         adjusted = result.cameras[0].camera.replace(sd=camera.sd)
         squares, freedom = result.sum_and_freedom
-        return Adjusted(adjusted, found, squares / max(freedom, 1.0))
+        weak = any(isinstance(each, Undetermined) for each in result.messages)
+        whole = free == attempts[0] and result.converged and not weak
+        return Adjusted(adjusted, found, squares / max(freedom, 1.0), whole)
     return None
 
 
@@ -94,6 +105,6 @@ def _less_and_less(camera: Camera) -> Sequence[list[str]]:
     attempts: list[list[str]] = []
     for kept in ({*free}, {"f", "fx", "fy", "cx", "cy"}, {"f", "fx", "fy"}):
         own = [name for name in free if name in kept]
-        if own and own not in attempts:
+        if own not in attempts and (own or not free):
             attempts.append(own)
     return attempts

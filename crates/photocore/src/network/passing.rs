@@ -143,7 +143,8 @@ impl Bundle {
         let mut inner = GroupRows { constant, local: point, retained, shared: &mut shared };
         let timed = self.compose_timed((stations, bent), group, own);
         bent.write(self.space, stations, timed.then_some(&*own), &self.images[group], local, &mut inner);
-        for (to, from) in rows.shared.chunks_exact_mut(all).zip(shared.chunks(plain.max(1))) {
+        for (row, to) in rows.shared.chunks_exact_mut(all.max(1)).enumerate() {
+            let from = &shared[plain * row..][..plain];
             to[..poses].copy_from_slice(&from[..poses]);
             to[poses..passed].fill(0.0);
             to[passed..].copy_from_slice(&from[poses..]);

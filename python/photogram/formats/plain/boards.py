@@ -8,14 +8,18 @@ from typing import Any, get_args
 import numpy as np
 
 from photogram.errors import InputError
+from photogram.formats.plain.schema import deviation_columns
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable
+from photogram.network.block import Block
+from photogram.network.passages import Bend, Figure
 from photogram.targets.board import Board, BoardKind, Shape
 
-__all__ = ["ASSUMED", "boards_table", "levels", "read_boards"]
+__all__ = ["ASSUMED", "boards_table", "levels", "read_bends", "read_boards"]
 
 ASSUMED = "sd of corners assumed"
 """The detail of a project whose standard deviations of corners nobody has given: levels tell ratios."""
+BENDS = ("bend_x", "bend_y")
 _LENGTHS = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")
 
 
@@ -57,8 +61,29 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
         raise table.error(row, error.message) from None
 
 
-def boards_table(boards: Mapping[str, Board]) -> dict[str, Any]:
-    """Return the columns of boards; none without."""
+def read_bends(tables: Tables, boards: Mapping[str, Board], block: Block) -> Block:
+    """Return a block whose boards bend, where the table says so.
+
+    Raises
+    ------
+    InputError
+        A standard deviation that is none, points of the board that the block does not have.
+    """
+    table = tables.read("boards")
+    if table is None or all(each.shape != "bend" for each in boards.values()):
+        return block
+    values = np.nan_to_num(table.vectors(BENDS))
+    sd = table.vectors(deviation_columns(BENDS), np.inf, infinite=True)
+    bends = [
+        Figure(Bend(name, values[row], sd[row]), own.names, own.shifts())
+        for row, (name, own) in enumerate(boards.items())
+        if own.shape == "bend"
+    ]
+    return block.replace(passages=bends)
+
+
+def boards_table(boards: Mapping[str, Board], block: Block) -> dict[str, Any]:
+    """Return the columns of boards, with how a block lets them bend; none without boards."""
     if not boards:
         return {}
     each = boards.values()
@@ -70,7 +95,15 @@ def boards_table(boards: Mapping[str, Board]) -> dict[str, Any]:
         columns[name] = [None if own is None or own.tag_size else own.pitch[k] for own in grids]
     for name in _LENGTHS[2:]:
         columns[name] = [getattr(own, name) for own in each]
-    return columns | {"shape": [own.shape or "" for own in each]}
+    columns["shape"] = [own.shape or "" for own in each]
+    bends = {own.bend.name: own.bend for own in block.passages if isinstance(own, Figure)}
+    if bends:
+        found = [bends.get(name) for name in boards]
+        for k, name in enumerate(BENDS):
+            columns[name] = [None if own is None else own.position[k] for own in found]
+        for k, name in enumerate(deviation_columns(BENDS)):
+            columns[name] = [None if own is None else own.deviations[k] for own in found]
+    return columns
 
 
 def levels(image_sd: np.ndarray, *, assumed: bool) -> np.ndarray | None:

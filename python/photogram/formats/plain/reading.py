@@ -15,7 +15,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN
 from photogram.formats.format import Wishes
-from photogram.formats.plain.boards import ASSUMED, read_boards
+from photogram.formats.plain.boards import ASSUMED, read_bends, read_boards
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.images import Images, image_coordinates, read_images, sd_is_given
@@ -108,6 +108,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
             f" origin, and tables with a crs go into one that is {transform.frame}",
             file=settings.path,
         )
+    boards = read_boards(tables)
     assumed = not sd_is_given(tables, images.table)
     project = assembled(
         path=settings.path,
@@ -139,10 +140,11 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         details={"settings": settings, ASSUMED: assumed},
     ).replace(
         sd_taken=True,
-        boards=read_boards(tables),
+        boards=boards,
         features=settings.features,
         statement=asked_of(tables, places, frozenset() if given is None else given.vegetated),
     )
+    project = project.replace(block=read_bends(tables, boards, project.block))
     _check_features(settings, points.names)
     if control is not None and given is not None:
         from photogram.formats.exchanged import check_systems

@@ -416,10 +416,14 @@ TABLES: Mapping[str, Schema] = {
     "boards": Schema(
         ("board", "kind"),
         ("board", "kind", "shape"),
-        ("columns", "rows", "spacing_x", "spacing_y", "tag_size", "tag_spacing"),
+        (
+            *("columns", "rows", "spacing_x", "spacing_y", "tag_size", "tag_spacing"),
+            *("bend_x", "bend_y", "sd_bend_x", "sd_bend_y"),
+        ),
         "`board`, `kind` (`chessboard`, `charuco`, `aprilgrid`, `circles`, `asymmetric_circles`, `points`):"
         " what the control is the points of ([targets](targets.md)); `columns`, `rows`, `spacing_x`,"
-        " `spacing_y`, or `tag_size`, `tag_spacing`; `shape` (`held`, `bend`, `points`)",
+        " `spacing_y`, or `tag_size`, `tag_spacing`; `shape` (`held`, `bend`, `points`);"
+        " of a `bend` the deflections `bend_x`, `bend_y` (0), `sd_bend_x`, `sd_bend_y` (`inf`)",
     ),
     "bases": Schema(
         ("rig", *_ENDS, "distance"),

@@ -116,7 +116,7 @@ def write(project: Project) -> Mapping[str, bytes]:
         "smoothness": smoothness_table(block),
         "line_times": line_times_table(block),
         **observed_tables(block, cameras, rigs),
-        "boards": boards_table(project.boards),
+        "boards": boards_table(project.boards, block),
         "lengths": lengths_table(project.statement.get("lengths", ())),
     }
     files = {f"{name}.csv": csv_text(columns) for name, columns in tables.items() if columns}

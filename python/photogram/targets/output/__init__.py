@@ -1,0 +1,1 @@
+"""Cameras and rigs as others take them: files of OpenCV, ROS, Kalibr and mrcal."""

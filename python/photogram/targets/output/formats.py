@@ -1,0 +1,51 @@
+"""The formats of cameras by their names, and files of a calibration in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from photogram.arguments.arrays import one_of
+from photogram.targets.calibrated import Calibrated
+from photogram.targets.output.kalibr import kalibr_camchain
+from photogram.targets.output.mrcal import mrcal_models
+from photogram.targets.output.opencv import opencv_yaml
+from photogram.targets.output.rig import Rig, rig_of
+from photogram.targets.output.ros import ros_camera_info
+
+__all__ = ["CAMERA_FORMATS", "camera_files"]
+
+CAMERA_FORMATS: Mapping[str, Callable[[Rig], dict[str, bytes]]] = MappingProxyType(
+    {
+        "opencv_yaml": opencv_yaml,
+        "ros_camera_info": ros_camera_info,
+        "kalibr_camchain": kalibr_camchain,
+        "mrcal": mrcal_models,
+    }
+)
+"""What makes the files of each, by their names."""
+
+
+def camera_files(calibrated: Calibrated, to: str) -> dict[str, bytes]:
+    """Return the cameras of an adjusted calibration in the format of another program.
+
+    Parameters
+    ----------
+    calibrated
+        The adjusted calibration; pixels count from 0 at the centre of the first.
+    to
+        `opencv_yaml`, `ros_camera_info` (a file a camera), `kalibr_camchain` (one file), `mrcal` (a
+        `.cameramodel` a camera, with the calibration where mrcal could have made it).
+
+    Returns
+    -------
+    Contents by the names of files.
+
+    Raises
+    ------
+    InputError
+        A format that there is not, a lens that it cannot hold: the message has the command that fits one that
+        it can.
+    """
+    one_of("format of cameras", to, list(CAMERA_FORMATS))
+    return CAMERA_FORMATS[to](rig_of(calibrated))

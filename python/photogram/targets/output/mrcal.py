@@ -1,0 +1,152 @@
+"""`.cameramodel` of mrcal: a camera, its pose, and the calibration that it comes from, for its tools."""
+
+from __future__ import annotations
+
+import base64
+import io
+from typing import Any
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.network.knots import KNOTTED
+from photogram.targets.calibrated import Calibrated
+from photogram.targets.mrcal_model import INDICES, KEY, PREFIX
+from photogram.targets.output.rig import Rig
+from photogram.targets.output.terms import TERMS, terms_of
+
+__all__ = ["mrcal_models"]
+
+TITLE = "a .cameramodel of mrcal"
+CORE = frozenset({"f", "fx", "fy", "cx", "cy"})
+COUNTS = (0, 4, 5, 8, 12)
+"""Terms of the models PINHOLE, OPENCV4, OPENCV5 ..."""
+LATTICES = ("chessboard", "charuco")
+"""Boards whose corners lie on a grid of rows and columns, one spacing apart."""
+ABSENT = -1.0
+"""The weight of a corner that is not there."""
+
+
+def mrcal_models(rig: Rig, valid: dict[int, Floats] | None = None) -> dict[str, bytes]:
+    """Return a file a camera.
+
+    Parameters
+    ----------
+    rig
+        The cameras; `optimization_inputs` go with them where the calibration is at hand and mrcal could have
+        made it: a board on a grid, its shape held or two parabolas, cameras of one model.
+    valid
+        (n, 2) by the numbers of cameras: the closed outline of what is known well enough.
+
+    Raises
+    ------
+    InputError
+        A lens that mrcal has not, pictures of unknown size.
+    """
+    lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
+    inputs = None if rig.calibrated is None else _inputs(rig, rig.calibrated, lenses)
+    found = {}
+    for row, name in enumerate(rig.files):
+        model, values = lenses[row]
+        pose = rig.sensors[row] if rig.tied(row) else np.eye(4)
+        members: dict[str, Any] = {
+            "lensmodel": PREFIX + model,
+            "intrinsics": values.tolist(),
+            "extrinsics": _vectors(pose[np.newaxis])[0].tolist(),
+            "imagersize": list(rig.size(row)),
+        }
+        if valid is not None and row in valid:
+            members["valid_intrinsics_region"] = np.asarray(valid[row]).tolist()
+        if inputs is not None:
+            members |= {"icam_intrinsics": row, KEY: inputs}
+        lines = [f"    {name!r}: {value!r}," for name, value in members.items()]
+        found[f"{name}.cameramodel"] = "\n".join(["{", *lines, "}", ""]).encode()
+    return found
+
+
+def _lens(rig: Rig, row: int) -> tuple[str, Floats]:
+    """Return the name of a model without its beginning, and its parameters in the order of mrcal."""
+    camera = rig.cameras[row]
+    if camera.model == KNOTTED and camera.knots is not None:
+        order, nx, ny, fov = (camera.parameters[name] for name in ("order", "nx", "ny", "fov_x_deg"))
+        name = f"SPLINED_STEREOGRAPHIC_order={order:.0f}_Nx={nx:.0f}_Ny={ny:.0f}_fov_x_deg={fov!r}"
+        return name, np.append(camera.values[:4], camera.knots)
+    if camera.model == "stereographic" and not camera.values[4:].any():
+        return "STEREOGRAPHIC", camera.values[:4]
+    lens = terms_of(camera)
+    if lens is None or lens.fisheye:
+        raise rig.refusal(row, TITLE, ["opencv8", "opencv5", "opencv12", KNOTTED])
+    free = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
+    # Terms that were free are there, be they 0.
+    count = next(each for each in COUNTS if not any(lens.terms.get(k) or free.get(k) for k in TERMS[each:]))
+    values = [*lens.focal, *lens.centre, *(lens.first(count) or ())]
+    return f"OPENCV{count}" if count else "PINHOLE", np.array(values)
+
+
+def _vectors(poses: Floats) -> Floats:
+    """Return (n, 6) rotation vectors and translations of (n, 4, 4) poses."""
+    return np.column_stack([_photocore.rotation_vectors(poses[:, :3, :3]), poses[:, :3, 3]])
+
+
+def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) -> bytes | None:
+    """Return the archive of a calibration between letters; None where mrcal could not have made it."""
+    calibration, count = calibrated.calibration, len(rig.cameras)
+    board = calibration.board
+    fits = (
+        board.kind in LATTICES
+        and calibration.shape in ("held", "bend")
+        and board.pitch[0] == board.pitch[1]
+        and len({name for name, _ in lenses}) == 1
+        and (count == 1 or all(rig.tied(row) for row in range(1, count)))
+    )
+    if not fits:
+        return None
+    variance = calibrated.result.variance_of_unit_weight or 1.0
+    observed, indices = _observations(calibrated)
+    core, terms = _freed(calibrated)
+    arrays: dict[str, Any] = {
+        "intrinsics": np.array([values for _, values in lenses]),
+        "extrinsics_rt_fromref": _vectors(rig.sensors[1:]) if count > 1 else np.zeros((0, 6)),
+        "frames_rt_toref": _vectors(calibrated.poses),
+        "points": "",
+        "observations_board": observed,
+        INDICES: indices,
+        "observations_point": "",
+        "indices_point_camintrinsics_camextrinsics": "",
+        "lensmodel": PREFIX + lenses[0][0],
+        "imagersizes": np.array([rig.size(row) for row in range(count)], dtype=np.int32),
+        "calobject_warp": np.array(calibration.bend),
+        "do_optimize_intrinsics_core": core,
+        "do_optimize_intrinsics_distortions": terms,
+        "do_optimize_extrinsics": True,
+        "do_optimize_frames": True,
+        "do_optimize_calobject_warp": calibration.shape == "bend",
+        "calibration_object_spacing": float(board.pitch[0]),
+        "do_apply_outlier_rejection": False,
+        "observed_pixel_uncertainty": float(np.sqrt(variance)) * (calibration.sd0 or 1.0),
+        "do_apply_regularization": calibration.regularise == "mrcal",
+        "verbose": False,
+    }
+    file = io.BytesIO()
+    np.savez_compressed(file, **arrays)
+    return base64.b85encode(file.getvalue())
+
+
+def _observations(calibrated: Calibrated) -> tuple[Floats, Any]:
+    """Return (P, rows, columns, 3) x, y, weight of corners, (P, 3) view, camera, sensor of pictures."""
+    corners, board = calibrated.calibration.corners, calibrated.calibration.board
+    found = np.zeros((len(corners.pictures), board.rows * board.columns, 3))
+    found[..., 2] = ABSENT
+    found[corners.picture, corners.point, :2] = corners.xy
+    # What does not count has a weight below 0.
+    found[corners.picture, corners.point, 2] = np.where(corners.use, 1.0, -1.0) / corners.sd
+    order = np.lexsort([corners.cameras, corners.views])
+    indices = np.column_stack([corners.views, corners.cameras, corners.cameras - 1]).astype(np.int32)
+    return found.reshape(-1, board.rows, board.columns, 3)[order], indices[order]
+
+
+def _freed(calibrated: Calibrated) -> tuple[bool, bool]:
+    """Return whether focal lengths and centres, and whether lens terms were free."""
+    free = {each.names[k] for each in calibrated.cameras for k in each.estimated}
+    return bool(free & CORE), bool(free - CORE)

@@ -1,0 +1,95 @@
+"""YAML of OpenCV: camera matrix, distortion, errors; of further cameras of a rig R, T, E and F as well."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.results.cameras import AdjustedCamera
+from photogram.targets.calibrated import Calibrated
+from photogram.targets.output.rig import Rig
+from photogram.targets.output.terms import TERMS, Terms, terms_of
+from photogram.targets.output.yaml import matrix
+from photogram.targets.vision import crossing
+
+__all__ = ["opencv_yaml"]
+
+TITLE = "YAML of OpenCV"
+COUNTS = (4, 5, 8, 12)
+FEWEST = 5
+"""Terms that OpenCV writes at the least, where they are not those of a fisheye."""
+DEVIATIONS = ("fx", "fy", "cx", "cy", *TERMS, "tx", "ty")
+"""The order of `std_deviations_intrinsics`."""
+
+
+def opencv_yaml(rig: Rig) -> dict[str, bytes]:
+    """Return a file a camera.
+
+    Pixels count from 0 at the centre of the first. `avg_reprojection_error` is as OpenCV has it: the root of
+    the mean of dx^2 + dy^2 over points.
+
+    Raises
+    ------
+    InputError
+        A lens that OpenCV has not, pictures of unknown size.
+    """
+    lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
+    return {
+        f"{name}.yaml": "\n".join(["%YAML:1.0", "---", *_camera(rig, row, lenses), ""]).encode()
+        for row, name in enumerate(rig.files)
+    }
+
+
+def _lens(rig: Rig, row: int) -> Terms:
+    found = terms_of(rig.cameras[row])
+    if found is None or found.fewest((4,) if found.fisheye else COUNTS) is None:
+        raise rig.refusal(row, TITLE, ["opencv5", "opencv8", "opencv12", "opencv_fisheye"])
+    return found
+
+
+def _camera(rig: Rig, row: int, lenses: list[Terms]) -> list[str]:
+    lens, (width, height) = lenses[row], rig.size(row)
+    terms = lens.first(4) if lens.fisheye else lens.fewest(COUNTS[COUNTS.index(FEWEST) :])
+    lines = [f"image_width: {width}", f"image_height: {height}"]
+    lines += ["fisheye_model: 1"] if lens.fisheye else []
+    lines += matrix("camera_matrix", lens.matrix)
+    lines += matrix("distortion_coefficients", np.reshape(terms or [], (-1, 1)))
+    if rig.calibrated is not None:
+        lines += _errors(rig.calibrated, row)
+        lines += matrix("std_deviations_intrinsics", _deviations(rig.calibrated.cameras[row]))
+    if row and rig.tied(row):
+        lines += _stereo(rig.sensors[row], lenses[0].matrix, lens.matrix)
+    return lines
+
+
+def _errors(calibrated: Calibrated, row: int) -> list[str]:
+    """Return the errors of a camera, of all its corners that were used and of each of its pictures."""
+    corners = calibrated.calibration.corners
+    squares = (calibrated.result.residuals**2).sum(axis=1)
+    pictures = corners.picture[corners.use]
+    own = np.flatnonzero(corners.cameras == row)
+    mean = [squares[pictures == picture].mean() for picture in own if (pictures == picture).any()]
+    average = squares[corners.cameras[pictures] == row].mean()
+    return [
+        f"avg_reprojection_error: {float(np.sqrt(average))!r}",
+        *matrix("per_view_reprojection_errors", np.sqrt(mean).reshape(-1, 1)),
+    ]
+
+
+def _deviations(camera: AdjustedCamera) -> Floats:
+    """Return (18, 1) standard deviations a posteriori, 0 of what was held."""
+    found = dict(zip(camera.names, camera.sd.tolist(), strict=True))
+    found |= {"fx": found["f"], "fy": found["f"]} if "f" in found else {}
+    found |= {"k1": found["k"]} if "k" in found else {}
+    return np.array([[found.get(name, 0.0)] for name in DEVIATIONS])
+
+
+def _stereo(sensor: Floats, before: Floats, own: Floats) -> list[str]:
+    """Return R, T of camera 0 -> this one, E = [T]x R and F = K^-T E K0^-1, its last element 1."""
+    rotation, shift = sensor[:3, :3], sensor[:3, 3]
+    essential = crossing(shift) @ rotation
+    fundamental = np.linalg.inv(own).T @ essential @ np.linalg.inv(before)
+    if fundamental[2, 2]:
+        fundamental = fundamental / fundamental[2, 2]
+    named = (("R", rotation), ("T", shift.reshape(3, 1)), ("E", essential), ("F", fundamental))
+    return [line for name, values in named for line in matrix(name, values)]

@@ -1,0 +1,94 @@
+"""YAML of ROS (`sensor_msgs/CameraInfo`): a file a camera; a pair is rectified so that rows are equal."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.targets.output.rig import Rig
+from photogram.targets.output.terms import Terms, terms_of
+from photogram.targets.output.yaml import quoted, ros_matrix
+
+__all__ = ["ros_camera_info"]
+
+TITLE = "camera_info of ROS"
+PLUMB_BOB, RATIONAL, EQUIDISTANT = 5, 8, 4
+"""Terms of the models `plumb_bob`, `rational_polynomial` and `equidistant`."""
+
+
+def ros_camera_info(rig: Rig) -> dict[str, bytes]:
+    """Return a file a camera.
+
+    Of two cameras that are tied the rectification turns both so that a point has one row in both; the
+    projection of the second has -fx b, b the base. All others are not rectified.
+
+    Raises
+    ------
+    InputError
+        A lens that ROS has not, pictures of unknown size.
+    """
+    lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
+    rectified = [(np.eye(3), np.column_stack([each.matrix, np.zeros(3)])) for each in lenses]
+    if len(lenses) == 2 and rig.tied(1):
+        rectified = _rectified(rig.sensors[1], lenses)
+    found = {}
+    for row, (lens, (turn, projection)) in enumerate(zip(lenses, rectified, strict=True)):
+        width, height = rig.size(row)
+        model, terms = _distortion(lens)
+        lines = [
+            f"image_width: {width}",
+            f"image_height: {height}",
+            f"camera_name: {quoted(rig.names[row])}",
+            *ros_matrix("camera_matrix", lens.matrix),
+            f"distortion_model: {model}",
+            *ros_matrix("distortion_coefficients", [terms]),
+            *ros_matrix("rectification_matrix", turn),
+            *ros_matrix("projection_matrix", projection),
+        ]
+        found[f"{rig.files[row]}.yaml"] = "\n".join([*lines, ""]).encode()
+    return found
+
+
+def _lens(rig: Rig, row: int) -> Terms:
+    found = terms_of(rig.cameras[row])
+    if found is None or not _distortion(found)[1]:
+        raise rig.refusal(row, TITLE, ["opencv5", "opencv8", "opencv_fisheye"])
+    return found
+
+
+def _distortion(lens: Terms) -> tuple[str, list[float]]:
+    """Return the model and its terms; none where no model has them."""
+    if lens.fisheye:
+        return "equidistant", lens.first(EQUIDISTANT) or []
+    if (terms := lens.first(PLUMB_BOB)) is not None:
+        return "plumb_bob", terms
+    return "rational_polynomial", lens.first(RATIONAL) or []
+
+
+def _rectified(sensor: Floats, lenses: list[Terms]) -> list[tuple[Floats, Floats]]:
+    """Return rotation and (3, 4) projection of both cameras.
+
+    Each is turned by half of the rotation between them, then both so that the base is the x axis. One
+    focal length, the shorter, and one centre, the mean of those where the old axes lie then, serve both.
+    """
+    half = _photocore.rotation_vectors(sensor[np.newaxis, :3, :3]) / 2
+    turns = _photocore.vector_rotations(np.concatenate([half, -half]))
+    base = turns[1] @ sensor[:3, 3]
+    along = np.array([np.sign(base[0]) or 1.0, 0.0, 0.0])
+    across = np.cross(base, along)
+    angle = np.arctan2(np.linalg.norm(across), base @ along)
+    axis = across / (np.linalg.norm(across) or 1.0)
+    common = _photocore.vector_rotations(angle * axis[np.newaxis])[0]
+    turned = [common @ each for each in turns]
+    focal = min(value for each in lenses for value in each.focal)
+    # Where the middle of a picture comes to lie: K^-1 c is the old axis.
+    axes = [each[:2, 2] / each[2, 2] for each in turned]
+    centre = np.mean(
+        [np.array(each.centre) - focal * own for each, own in zip(lenses, axes, strict=True)], axis=0
+    )
+    shifts = (0.0, focal * float((common @ base)[0]))
+    return [
+        (turn, np.array([[focal, 0, centre[0], shift], [0, focal, centre[1], 0], [0, 0, 1, 0]]))
+        for turn, shift in zip(turned, shifts, strict=True)
+    ]
