@@ -30,6 +30,7 @@ from functools import cache
 from pathlib import Path
 
 import calibration_numbers
+import certificate_numbers
 import comparator_numbers
 import redundancy_figure
 import statement_numbers
@@ -38,6 +39,7 @@ import tests_numbers
 
 DOCS = Path(__file__).parent
 BLOCKS: dict[str, Mapping[str, Callable[[], list[str] | None]]] = {
+    "certificates.md": certificate_numbers.BLOCKS,
     "comparator.md": comparator_numbers.BLOCKS,
     "redundancy.md": redundancy_figure.BLOCKS,
     "self-calibration.md": calibration_numbers.BLOCKS,
@@ -64,7 +66,7 @@ SHOWN = re.compile(
     r"<!-- (?:numbers|printed|measured): .*?<!-- end -->|^```console\n.*?^```$", re.DOTALL | re.MULTILINE
 )
 """Blocks whose figures are checked, those of docs/walk.py among them."""
-LANGUAGES = {".rs": "rust", ".py": "python"}
+LANGUAGES = {".rs": "rust", ".py": "python", ".toml": "toml"}
 
 
 def quoted(path: Path, first: str | None) -> list[str]:

@@ -103,6 +103,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "Check a camera's certificate: typing errors, marks from distances, lens from its table.",
         "certificate.certificate",
     ),
+    "camera": (
+        "Compare calibrations of cameras over years.",
+        {"compare": "camera.compare"},
+    ),
     "stellar-camera": (
         "Calibrate a camera by a plate with stars, or by exposures of the sky.",
         {

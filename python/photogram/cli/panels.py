@@ -9,7 +9,7 @@ from typer.core import TyperCommand
 __all__ = ["Command"]
 
 PANELS = {
-    "Input": "example packaged file_format control control_crs columns roles images names camera sd"
+    "Input": "example day name packaged file_format control control_crs columns roles images names camera sd"
     " cubes jigsaw photos_dir photos_crs mrk_antenna pixel_origin model angles grid hand against"
     " against_spacing against_position_sd catalogue utc epoch faintest points point_sd decimals"
     " format zero_missing ground_unit model_unit restart start reject photos kind board spacing unit"
@@ -18,7 +18,7 @@ PANELS = {
     " pdf to trace points_out part_two restart_out ident date",
     "Adjustment": "datum datum_points hold loss scale tolerance max_iterations covariance unit_variance"
     " self_calibrate keep_all keep_repeated as_published weights method polynomial"
-    " estimate_grid each_case lens common_scale without any_roll blind air_refraction"
+    " estimate_grid each_case angle lens common_scale without any_roll blind air_refraction"
     " water_refraction water_level water_index limits invert extrapolate components regularise"
     " together calibrate",
     "Gross errors": "snoop level fdr unit_weight outliers",

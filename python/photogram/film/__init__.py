@@ -6,13 +6,16 @@ from photogram.film.certificate_check import DistanceDifference, Explanation
 from photogram.film.decentring import Tangential
 from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
 from photogram.film.lens_table import Curve, LensParameters, RadialTable
+from photogram.film.years import CameraComparison, DatedCamera, compare_cameras
 
 __all__ = [
     "AdjustedMarks",
     "CalibratedMarks",
+    "CameraComparison",
     "Certificate",
     "Crossing",
     "Curve",
+    "DatedCamera",
     "DistanceDifference",
     "Explanation",
     "LensParameters",
@@ -21,9 +24,10 @@ __all__ = [
     "RightAngle",
     "Tangential",
     "adjust_distances",
+    "compare_cameras",
 ]
 
-check_arguments(globals(), ["adjust_distances"])
+check_arguments(globals(), ["adjust_distances", "compare_cameras"])
 
 WAYS = {
     "document_of": ("certificate_document",),

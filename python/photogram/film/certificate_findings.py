@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from photogram.film.certificate import Certificate
@@ -30,7 +32,6 @@ def certificate_findings(certificate: Certificate) -> Findings:
         if compared
         else "nothing is redundant",
         spoiled="; ".join(map(str, beyond)),
-        computed=bool(tested) or not compared,
         remarks=[*_agreement(certificate), *certificate.told()],
         scaled=False,
         check="look at the report: the figures as printed, names of marks, units",
@@ -43,6 +44,8 @@ def certificate_findings(certificate: Certificate) -> Findings:
 
 def _tests(certificate: Certificate) -> tuple[list[Tested], list[GlobalTest]]:
     found: list[tuple[Tested, GlobalTest | None]] = []
+    if certificate.check():
+        found.append((_compared(certificate), None))
     if not certificate.places and (certificate.distances or certificate.lines):
         adjusted = certificate.fiducials().adjusted
         assert adjusted is not None
@@ -59,6 +62,22 @@ def _tests(certificate: Certificate) -> tuple[list[Tested], list[GlobalTest]]:
         )
         found.append((w, own.test))
     return [tested for tested, _ in found], [test for _, test in found if test is not None]
+
+
+def _compared(certificate: Certificate) -> Tested:
+    """Return distances less those from coordinates, over the standard deviations of both."""
+    marks, compared = certificate.fiducials(), certificate.check()
+    of = {name: row for row, name in enumerate(marks.names)}
+    cofactors = marks.covariance.reshape(len(of), 2, len(of), 2)
+    w: list[float] = []
+    for each in certificate.distances:
+        if not {each.first, each.second} <= of.keys():
+            continue
+        i, j = of[each.first], of[each.second]
+        along = (marks.xy[j] - marks.xy[i]) / np.hypot(*(marks.xy[j] - marks.xy[i]))
+        both = cofactors[i, :, i] + cofactors[j, :, j] - cofactors[i, :, j] - cofactors[j, :, i]
+        w.append(compared[len(w)].difference / math.sqrt(each.sd**2 + along @ both @ along))
+    return Tested("distances beside coordinates", np.array(w), lambda at: compared[at[0]].name, "w")
 
 
 def _agreement(certificate: Certificate) -> list[str]:

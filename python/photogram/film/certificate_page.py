@@ -20,7 +20,7 @@ from photogram.film.certificate_tables import (
     terms,
 )
 from photogram.show.cells import page_table
-from photogram.show.judgement import judged, remarks_section, tests_section
+from photogram.show.judgement import judged, tests_section
 from photogram.show.page import Drawing, Facts, Page, Part, Section
 from photogram.show.pictures import new_figure
 from photogram.show.style import FAINT, INK, MARKED, in_style
@@ -45,7 +45,6 @@ def certificate_page(certificate: Certificate) -> Page:
         ),
         tests_section(certificate.verdict),
         Section("certificate", "Certificate", [Facts("Certificate", named)]),
-        remarks_section(certificate.told()),
     ]
     return Page(
         what="Certificate of a camera",

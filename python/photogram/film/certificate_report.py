@@ -57,7 +57,7 @@ def _explained(certificate: Certificate) -> list[str]:
     for each in certificate.check():
         for one in each.explanations:
             far = "" if one.from_usual is None else f", {one.from_usual:+.3f} mm from its usual place"
-            lines.append(f"{each.name:<14}{one}: leaves {1e3 * one.remaining:+.1f} um{far}")
+            lines.append(f"{each.name:<14}{one}: leaves {round(1e3 * one.remaining, 1) + 0.0:+.1f} um{far}")
         if each.beyond and not each.explanations:
             lines.append(f"{each.name:<14}no single change of a figure")
     return lines

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.show.cells import page_table, unit_written
-from photogram.show.page import Table
+from photogram.show.lines import field, table_lines
+from photogram.show.page import Drawing, Part, Section, Table, decimals_of
 from photogram.show.pictures import new_figure
 from photogram.show.quantity import Axis, Quantity, component, of_each, records
 from photogram.show.style import FAINT, INK, MARKED, in_style
@@ -18,7 +20,15 @@ if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.statistics.history import History
 
-__all__ = ["control_charts", "history_document", "series", "series_table", "values_table"]
+__all__ = [
+    "charts_section",
+    "control_charts",
+    "history_document",
+    "series",
+    "series_lines",
+    "series_table",
+    "values_table",
+]
 
 ACROSS = 3
 """Charts beside each other."""
@@ -51,6 +61,43 @@ def series_table(history: History, whose: str) -> Table:
         f" |t| beyond {history.limit:.3g} is accepted. Drift and steps as if nothing else changed."
     )
     return page_table(f"What changed in {whose}", series(history), note, _deviations(history))
+
+
+def series_lines(history: History) -> list[str]:
+    """Return the same as lines of text; times are years."""
+    components, mean, mean_sd, drift, drift_sd, steps, _, found = series(history)
+    forms = [f".{decimals_of(each.sd)}f" for each in history.series]
+    return table_lines(
+        [
+            *field(components, 36, gap="  "),
+            *field(mean, 9, forms, "mean"),
+            *field(mean_sd, 9, forms, "sd"),
+            *field(drift, 14, forms, "drift a year"),
+            *field(drift_sd, 9, forms, "sd"),
+            *field(steps, 8, ".2f", "step t"),
+            *field(found, 0, head="found", gap="  "),
+        ]
+    )
+
+
+def charts_section(histories: Mapping[str, History]) -> Section:
+    """Return the control charts of some things, by their names, as a section of a page."""
+    charts: list[Part] = [
+        Drawing(
+            f"charts-{k}",
+            name,
+            "",
+            lambda own=own, name=name: control_charts(own, name[:1].upper() + name[1:]),  # type: ignore[misc]
+        )
+        for k, (name, own) in enumerate(histories.items())
+    ]
+    return Section("charts", "Control charts", charts, _CHARTS)
+
+
+_CHARTS = (
+    "Each value with its standard deviation; the line is the mean of all. Dashed: beyond, a value differs"
+    " from all others, whose common errors are taken into account. Coloured: what was accepted as a change."
+)
 
 
 def values_table(history: History, whose: str) -> Table:

@@ -21,12 +21,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.messages import counted
 from photogram.statistics.distributions import (
     LEVEL,
     bonferroni,
@@ -38,8 +40,10 @@ from photogram.statistics.findings import Systematic
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
 
-__all__ = ["Change", "History", "Series", "history"]
+__all__ = ["Change", "Dates", "History", "Series", "changed_of", "dates_of", "history", "unchanged_of"]
 
+YEAR = 365.2425
+"""Days."""
 MOST = 3
 """Changes of one quantity that are told apart."""
 
@@ -164,6 +168,39 @@ class History:
             level=self.level,
             large=False,
         )
+
+
+@dataclass(frozen=True)
+class Dates:
+    """When k occasions were, in years, and what they are called."""
+
+    years: list[float]
+    names: list[str]
+
+
+def dates_of(days: Sequence[date], names: Sequence[str]) -> Dates:
+    """Return the dates of occasions: days, with the names of their files where two are of one day."""
+    written = [day.isoformat() for day in days]
+    called = [
+        day if written.count(day) == 1 else f"{day} ({name})"
+        for day, name in zip(written, names, strict=True)
+    ]
+    return Dates([day.year + (day - date(day.year, 1, 1)).days / YEAR for day in days], called)
+
+
+def changed_of(histories: Mapping[str, History]) -> list[str]:
+    """Return what a verdict says of what changed, each thing by its name."""
+    return [f"{whose}: {text}" for whose, own in histories.items() for text in own.changed]
+
+
+def unchanged_of(histories: Mapping[str, History]) -> list[str]:
+    """Return the sentences on things of which nothing changed."""
+    return [
+        f"{whose}: nothing changed between {own.occasions[0]} and {own.occasions[-1]}"
+        f" ({counted(len(own.occasions), 'calibration')}, {len(own.series)} quantities)"
+        for whose, own in histories.items()
+        if not own.changed
+    ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -144,7 +144,7 @@ def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses
 
 def _weight_of(knot: Knot) -> Floats:
     """Return (2, 2) of the observation that a knot is 0."""
-    return np.zeros((2, 2)) if knot.covariance is None else np.linalg.inv(knot.covariance)
+    return np.zeros((2, 2)) if knot.covariance is None else np.asarray(np.linalg.inv(knot.covariance))
 
 
 def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:

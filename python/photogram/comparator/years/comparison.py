@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +22,9 @@ from photogram.errors import InputError
 from photogram.show.brief import Brief
 from photogram.show.ways import Shown
 from photogram.statistics.distributions import LEVEL
-from photogram.statistics.history import History, history
+from photogram.statistics.history import History, dates_of, history
 
 __all__ = ["Comparison", "compare"]
-
-YEAR = 365.2425
-"""Days."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -158,11 +154,12 @@ def _history(
     known: dict[str, tuple[Floats, str]] = {}
     if None not in temperatures:
         known["temperature"] = (np.array(temperatures, dtype=float), "kelvin")
+    dates = dates_of([each.day for each in mine], [each.name for each in mine])
     return history(
         found.values,
         found.covariance,
-        times=[_year(each.day) for each in mine],
-        occasions=_occasions(mine),
+        times=dates.years,
+        occasions=dates.names,
         names=found.names,
         units=found.units,
         unit_of_time="year",
@@ -170,19 +167,6 @@ def _history(
         freedom=sum(each.freedom for each in records),
         level=level,
     )
-
-
-def _occasions(records: Sequence[RecordedCalibration]) -> list[str]:
-    """Return the days, with the names of the files where two are of one day."""
-    days = [each.day.isoformat() for each in records]
-    return [
-        day if days.count(day) == 1 else f"{day} ({each.name})"
-        for day, each in zip(days, records, strict=True)
-    ]
-
-
-def _year(day: date) -> float:
-    return day.year + (day - date(day.year, 1, 1)).days / YEAR
 
 
 def _certified(records: Sequence[RecordedCalibration], together: Together, plate: int) -> Grid:

@@ -6,9 +6,8 @@ from photogram import _photocore
 from photogram.comparator.years.comparison import Comparison
 from photogram.comparator.years.tables import calibrations, operators
 from photogram.io import json
-from photogram.show.history import history_document, series
+from photogram.show.history import history_document, series_lines
 from photogram.show.lines import field, table_lines
-from photogram.show.page import decimals_of
 from photogram.show.quantity import Quantity, records
 from photogram.show.ways import document_of, report_of
 
@@ -68,23 +67,7 @@ def comparison_text(comparison: Comparison) -> str:
         ]
     )
     for name, own in comparison.histories.items():
-        components, mean, mean_sd, drift, drift_sd, steps, _, found = series(own)
-        forms = [f".{decimals_of(each.sd)}f" for each in own.series]
-        lines += [
-            "",
-            name,
-            *table_lines(
-                [
-                    *field(components, 36, gap="  "),
-                    *field(mean, 9, forms, "mean"),
-                    *field(mean_sd, 9, forms, "sd"),
-                    *field(drift, 14, forms, "drift a year"),
-                    *field(drift_sd, 9, forms, "sd"),
-                    *field(steps, 8, ".2f", "step t"),
-                    *field(found, 0, head="found", gap="  "),
-                ]
-            ),
-        ]
+        lines += ["", name, *series_lines(own)]
     lines.append("")
     for plate, grid in comparison.grids.items():
         given = comparison.together.grids[plate].sigma_um or 0.0

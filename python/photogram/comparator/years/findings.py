@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.comparator.years.comparison import Comparison
-from photogram.messages import counted
 from photogram.show.ways import findings_of
 from photogram.statistics.findings import Findings, Tested
+from photogram.statistics.history import changed_of, unchanged_of
 
 __all__ = ["comparison_findings"]
 
@@ -36,14 +36,9 @@ def comparison_findings(comparison: Comparison) -> Findings:
         degrees_of_freedom=test.degrees_of_freedom,
         global_test=test,
         spoiled="" if test.problem() is None else "readings do not agree with the grids and with each other",
-        changed=[f"{whose}: {text}" for whose, own in comparison.histories.items() for text in own.changed],
+        changed=changed_of(comparison.histories),
         systematic=[own.systematic(whose) for whose, own in comparison.histories.items()],
-        remarks=[
-            f"{whose}: nothing changed between {own.occasions[0]} and {own.occasions[-1]}"
-            f" ({counted(len(own.occasions), 'calibration')}, {len(own.series)} quantities)"
-            for whose, own in comparison.histories.items()
-            if not own.changed
-        ],
+        remarks=unchanged_of(comparison.histories),
         if_usable=[grid],
         if_withheld=[
             "The grids are withheld: readings do not agree with them and with each other."

@@ -5,9 +5,9 @@ from __future__ import annotations
 from photogram.comparator.years.comparison import Comparison
 from photogram.comparator.years.tables import calibrations, operators, points
 from photogram.show.cells import page_table
-from photogram.show.history import control_charts, series_table, values_table
+from photogram.show.history import charts_section, series_table, values_table
 from photogram.show.judgement import judged, tests_section
-from photogram.show.page import Drawing, Fact, Page, Part, Section, significant
+from photogram.show.page import Fact, Page, Part, Section, significant
 from photogram.show.ways import page_of
 
 __all__ = ["comparison_page"]
@@ -21,7 +21,7 @@ def comparison_page(comparison: Comparison) -> Page:
     histories = comparison.histories
     first, last = comparison.calibrations[0].day, comparison.calibrations[-1].day
     sections = [
-        Section("charts", "Control charts", _charts(comparison), _CHARTS),
+        charts_section(histories),
         Section("changes", "What changed", [series_table(own, name) for name, own in histories.items()]),
         Section("calibrations", "Calibrations", [page_table("Calibrations", calibrations(comparison))]),
         Section("grids", "Grids", _grids(comparison), _GRIDS),
@@ -47,27 +47,11 @@ def comparison_page(comparison: Comparison) -> Page:
     )
 
 
-_CHARTS = (
-    "Each value with its standard deviation; the line is the mean of all. Dashed: beyond, a value differs"
-    " from all others, whose common errors are taken into account. Coloured: what was accepted as a change."
-)
 _GRIDS = (
     "Given coordinates and all readings of all calibrations in one adjustment, each calibration with a"
     " comparator of its own. Absolute scale and odd shapes that look alike in grid and comparator come from"
     " the given coordinates."
 )
-
-
-def _charts(comparison: Comparison) -> list[Part]:
-    return [
-        Drawing(
-            f"charts-{k}",
-            name,
-            "",
-            lambda own=own, name=name: control_charts(own, name[:1].upper() + name[1:]),  # type: ignore[misc]
-        )
-        for k, (name, own) in enumerate(comparison.histories.items())
-    ]
 
 
 def _grids(comparison: Comparison) -> list[Part]:

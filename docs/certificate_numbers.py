@@ -1,0 +1,32 @@
+"""The numbers of docs/certificates.md: `python docs/regenerate.py certificates.md`."""
+
+from __future__ import annotations
+
+import tempfile
+from importlib.resources import files
+from pathlib import Path
+from textwrap import wrap
+
+from photogram.film import Certificate, compare_cameras
+from photogram.film.years.example import simulated_certificates
+
+EXAMPLE = files("photogram") / "examples" / "certificate" / "rc10.toml"
+
+
+def slip_lines() -> list[str]:
+    """Exchange two digits of a distance of the example, and say what the report says of it."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "rc10.toml"
+        path.write_text(EXAMPLE.read_text(encoding="utf-8").replace("220.018", "220.108"), encoding="utf-8")
+        report = Certificate.read(path).report()
+    first, last = report.index("Distances beside"), report.index("Marks\n")
+    return report[first:last].rstrip().splitlines()
+
+
+def years_lines() -> list[str]:
+    """Compare the simulated certificates of the example of `camera compare`."""
+    found = compare_cameras(simulated_certificates())
+    return [*wrap(found.verdict.headline, 118), "", *found.report().splitlines()]
+
+
+BLOCKS = {"slip": slip_lines, "years": years_lines}
