@@ -9,8 +9,8 @@ from golden_calibrations import stored
 
 from photogram import Camera
 from photogram.targets import Board, Calibration, Corners
-from photogram.targets.difference import differences_at, fitted_motion
 from photogram.targets.maps import image_grid
+from photogram.targets.motion_fit import differences_at, fitted_motion
 from photogram.targets.uncertainty import projection_uncertainty
 from photogram.targets.vision import composed
 

@@ -16,7 +16,7 @@ from photogram.cli.job import Job, Reads
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
     from photogram.targets.cross_validation import Into
-    from photogram.targets.worth import Asked
+    from photogram.targets.worth import WorthOptions
 
 __all__ = ["AS_USUAL", "Uncertainty"]
 
@@ -78,11 +78,11 @@ class Uncertainty:
         int, typer.Option(min=0, metavar="K", help="Find the K views that would help most.")
     ] = 0
 
-    def asked(self) -> Asked:
+    def asked(self) -> WorthOptions:
         """Return what is asked of a calibration."""
-        from photogram.targets.worth import Asked
+        from photogram.targets.worth import WorthOptions
 
-        return Asked(
+        return WorthOptions(
             distances=self._distances(),
             datum=self.map_datum.value,
             noise_only=self.noise_only,

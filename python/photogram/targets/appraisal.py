@@ -15,7 +15,7 @@ from photogram.targets.housings import housed_with, housing_of
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.suggestions import suggest_views
 from photogram.targets.uncertainty import uncertainty_map
-from photogram.targets.worth import Asked, Worth
+from photogram.targets.worth import Worth, WorthOptions
 
 __all__ = ["appraise", "median_distance", "model_verdict"]
 
@@ -24,7 +24,7 @@ FIGURES = 2
 
 
 def appraise(
-    calibrated: Calibrated, asked: Asked | None = None, progress: Callable[[str], None] | None = None
+    calibrated: Calibrated, asked: WorthOptions | None = None, progress: Callable[[str], None] | None = None
 ) -> Worth:
     """Return what a calibration is worth.
 
@@ -44,7 +44,7 @@ def appraise(
     OutOfMemoryError, KeyboardInterrupt
         As of the adjustment.
     """
-    asked = asked or Asked()
+    asked = asked or WorthOptions()
     told = progress or (lambda _: None)
     remarks: list[str] = []
     cross = _cross_validated(calibrated, asked, told, remarks)
@@ -76,7 +76,7 @@ def appraise(
 
 
 def _cross_validated(
-    calibrated: Calibrated, asked: Asked, told: Callable[[str], None], remarks: list[str]
+    calibrated: Calibrated, asked: WorthOptions, told: Callable[[str], None], remarks: list[str]
 ) -> list[CrossValidation]:
     """Return the cross-validation of each housing; what cannot be is told."""
     if asked.cross_validate is None:

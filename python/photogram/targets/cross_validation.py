@@ -21,8 +21,8 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.show.brief import Brief, Rows
-from photogram.targets.agreement import EXPLAINED, Agreement
 from photogram.targets.datums import datum_rows
+from photogram.targets.difference_test import EXPLAINED, DifferenceTest
 from photogram.targets.housing import Housing
 from photogram.targets.imaging import unknown_of, values_of
 from photogram.targets.projection import common_partials
@@ -85,7 +85,7 @@ def changes_between(a: Housing, b: Housing) -> tuple[Floats, Floats]:
 
 def parts_agree(
     a: Housing, b: Housing, names: Sequence[str], unit: tuple[float, float] = (1.0, math.inf)
-) -> list[Agreement]:
+) -> list[DifferenceTest]:
     """Test the differences of two parts, of each camera, and of all cameras and sensors together.
 
     Parameters
@@ -105,7 +105,7 @@ def parts_agree(
     found = []
     for name, own in groups.items():
         chi2 = float(change[own] @ np.linalg.solve(cofactors[own, own], change[own])) / variance
-        found.append(Agreement.of(name, chi2, len(change[own]), freedom))
+        found.append(DifferenceTest.of(name, chi2, len(change[own]), freedom))
     return found
 
 
@@ -140,7 +140,7 @@ class CrossValidation(Brief):
     into: str
     cameras: tuple[str, ...]
     parts: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
-    tests: tuple[tuple[Agreement, ...], ...]
+    tests: tuple[tuple[DifferenceTest, ...], ...]
     whole: Housing
     housings: tuple[tuple[Housing, Housing], ...]
 

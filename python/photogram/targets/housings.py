@@ -11,7 +11,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.knots import Knot
 from photogram.targets.calibrated import Calibrated
-from photogram.targets.housing import Housing, Seen, mean_motion
+from photogram.targets.housing import Housing, SeenCorners, mean_motion
 from photogram.targets.imaging import unknown_of
 
 __all__ = ["camera_number", "housed_with", "housing_of", "size_of"]
@@ -107,14 +107,14 @@ def _points_by_board(calibrated: Calibrated) -> Floats:
     return found.reshape(len(found), 3, -1)
 
 
-def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> Seen:
+def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> SeenCorners:
     """Return the corners that took part; views and cameras are numbered within the housing."""
     result, corners = calibrated.result, calibrated.calibration.corners
     block = result.block
     used = result.used_images & np.isin(corners.cameras[block.image_photos], cameras)
     used &= result.image_weights > 0
     photos = block.image_photos[used]
-    return Seen(
+    return SeenCorners(
         cameras=np.array([cameras.index(each) for each in corners.cameras[photos].tolist()], dtype=np.int64),
         views=np.searchsorted(views, corners.views[photos]),
         points=block.image_points[used],

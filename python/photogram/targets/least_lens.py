@@ -144,4 +144,4 @@ def _damped(rows: Floats, misses: Floats, damping: float) -> Floats:
     # Knots are many; damping keeps apart what the images of those at the edge do not.
     many = len(normal) > MANY
     found: Floats = np.linalg.solve(normal, right) if many else np.linalg.lstsq(normal, right, rcond=None)[0]
-    return found / scale
+    return np.asarray(found / scale)

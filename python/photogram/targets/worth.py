@@ -6,17 +6,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from photogram.targets.compared import Difference
+from photogram.targets.compared import CameraDifference
 from photogram.targets.cross_validation import CrossValidation, Into
 from photogram.targets.datums import DatumName
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.new_views import Suggestions
 
-__all__ = ["Asked", "Worth"]
+__all__ = ["Worth", "WorthOptions"]
 
 
 @dataclass(frozen=True)
-class Asked:
+class WorthOptions:
     """What is asked of a calibration.
 
     Attributes
@@ -62,7 +62,7 @@ class Worth:
     maps: tuple[UncertaintyMap, ...] = ()
     cross: tuple[CrossValidation, ...] = ()
     suggestions: tuple[Suggestions, ...] = ()
-    differences: tuple[Difference, ...] = ()
+    differences: tuple[CameraDifference, ...] = ()
     remarks: tuple[str, ...] = field(default=())
 
     @property

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from photogram.show.pictures import drawn
-from photogram.targets.compared import Difference
+from photogram.targets.compared import CameraDifference
 from photogram.targets.cross_validation import CrossValidation, changes_between
 from photogram.targets.maps import UncertaintyMap
 from photogram.targets.new_views import Suggestions
@@ -87,7 +87,7 @@ def _cross(found: CrossValidation) -> dict[str, Any]:
     }
 
 
-def _difference(found: Difference) -> dict[str, Any]:
+def _difference(found: CameraDifference) -> dict[str, Any]:
     test = found.test
     return {
         "cameras": list(found.cameras),
