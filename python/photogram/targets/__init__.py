@@ -6,6 +6,7 @@ from photogram.targets.board import Board
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.calibration import Calibration
 from photogram.targets.compared import CameraDifference
+from photogram.targets.conversion import Conversion, convert_lens
 from photogram.targets.corners import Corners
 from photogram.targets.cross_validated import cross_validate
 from photogram.targets.cross_validation import CrossValidation
@@ -13,6 +14,7 @@ from photogram.targets.differences import difference
 from photogram.targets.first import FirstCalibration, first_values
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap
 from photogram.targets.new_views import Candidate, NewView, Suggestions
+from photogram.targets.output.formats import camera_files
 from photogram.targets.reading import read
 from photogram.targets.residual_groups import residual_groups
 from photogram.targets.simulation import simulate_corners
@@ -32,6 +34,7 @@ __all__ = [
     "Calibration",
     "CameraDifference",
     "Candidate",
+    "Conversion",
     "Corners",
     "CrossValidation",
     "FirstCalibration",
@@ -43,6 +46,8 @@ __all__ = [
     "Worth",
     "WorthOptions",
     "appraise",
+    "camera_files",
+    "convert_lens",
     "cross_validate",
     "difference",
     "distance_uncertainty",
@@ -60,6 +65,7 @@ __all__ = [
 _MADE = {
     "Calibrated",
     "CameraDifference",
+    "Conversion",
     "CrossValidation",
     "FirstCalibration",
     "NewView",

@@ -261,7 +261,6 @@ def _passed_on(
 
 def _camera(camera: Camera, free: Sequence[str], covariance: Floats | None) -> Camera:
     """Return the fitted camera: with the covariance where it can be observed with it, held else."""
-    held = camera.replace(sd=0.0, knot_sd=None)
-    if covariance is None or camera.knots is not None or not is_covariance(covariance):
-        return held
-    return held.replace(covariance=(list(free), covariance))
+    can = covariance is not None and camera.knots is None and is_covariance(covariance)
+    observed = (list(free), covariance) if can else None
+    return camera.replace(sd=0.0, knot_sd=None, covariance=observed)

@@ -102,6 +102,7 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
     )
     if not fits:
         return None
+    bend = calibrated.bend
     variance = calibrated.result.variance_of_unit_weight or 1.0
     observed, indices = _observations(calibrated)
     core, terms = _freed(calibrated)
@@ -116,7 +117,7 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
         "indices_point_camintrinsics_camextrinsics": "",
         "lensmodel": PREFIX + lenses[0][0],
         "imagersizes": np.array([rig.size(row) for row in range(count)], dtype=np.int32),
-        "calobject_warp": np.array(calibration.bend),
+        "calobject_warp": np.array(calibration.bend if bend is None else bend.position[:2]),
         "do_optimize_intrinsics_core": core,
         "do_optimize_intrinsics_distortions": terms,
         "do_optimize_extrinsics": True,
