@@ -9,7 +9,7 @@ from moving_blocks import rolling
 from photogram.adjustment.snooping import options_of
 from photogram.errors import PhotogramError
 from photogram.network.core import block_network
-from photogram.network.observations import Attitude, Position, Rate, Smoothness, Velocity
+from photogram.network.observations import Attitude, Position, Range, Rate, Smoothness, Velocity
 from photogram.network.timed import Lines, LineSensor, Shutter, Timed
 from photogram.network.trajectories import Clock, GyroBias, Polynomial, Readout, Spline, Table, Trajectory
 from test_arguments import HOSTILE
@@ -45,6 +45,7 @@ GOOD = {
     Attitude: RECORD | {"attitude": np.eye(3)},
     Velocity: RECORD | {"velocity": [0, 0, 0]},
     Rate: RECORD | {"rate": [0, 0, 0]},
+    Range: RECORD | {"point": BLOCK.point_ids[0], "length": 1.0},
     Smoothness: {"coefficients": PASS.coefficients[0], "factors": [1.0, -1.0], "sd": 1.0},
 }
 CASES = [

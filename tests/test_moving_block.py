@@ -9,7 +9,7 @@ from moving_blocks import rolling, scanned
 from photogram import Camera, InputError
 from photogram.network.chosen import of_photos
 from photogram.network.motion import at_rest, flown_by, focal_images, of_pictures, scanners, timed_photos
-from photogram.network.observations import Attitude, Position, Rate, Smoothness, Velocity
+from photogram.network.observations import Attitude, Position, Range, Rate, Smoothness, Velocity
 from photogram.network.timed import Timed
 from photogram.network.trajectories import Clock, Polynomial, Table, Trajectory
 from photogram.network.unknowns import Sensor
@@ -29,7 +29,19 @@ RECORDS = {
     Attitude: {"attitude": np.eye(3)},
     Velocity: {"velocity": [0.0, 0.0, 0.0]},
     Rate: {"rate": [0.0, 0.0, 0.0]},
+    Range: {"point": "P", "length": 1.0},
 }
+
+
+def test_weights_of_samples_and_lines_are_refused():
+    """They were taken for those of places before the lens, in mm."""
+    block = scanned(photos=True)
+    lens = Camera("brown", {"c": -60.0, "K1": 1e-6}, name="lens")
+    measured = lens.replace(weights="measured", name="measured")
+    with pytest.raises(InputError, match="measured is a scanner's: standard deviations of its images are"):
+        block.replace(cameras=[measured, lens])
+    # Of a frame they are what they say.
+    block.replace(cameras=[lens, measured])
 
 
 @pytest.mark.parametrize("kind", RECORDS)

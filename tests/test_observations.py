@@ -17,6 +17,7 @@ from photogram.network.observations import (
     Distance,
     EqualHeight,
     Position,
+    Range,
     Relative,
 )
 
@@ -27,6 +28,7 @@ KINDS = {
     "control": 3,
     "position": 3,
     "attitude": 3,
+    "range": 1,
     "relative": 6,
 }
 
@@ -55,12 +57,15 @@ def exact(spheroid):
     boresight = rotation_matrix([[0.01, -0.02, 1.5]])[0]
     shift = turned[0].T @ (centres[1] - centres[0])
     covariance = 0.01**2 * (np.eye(3) + 0.3)
+    arm = np.array([0.5, -1.0, 2.0])
+    ray = xyz[q] - centres[2] - turned[2] @ arm
     control = [point for point, sd in enumerate(truth.point_sd) if np.isfinite(sd).all()]
     observations = [
         Distance(points[p], points[q], float(np.linalg.norm(xyz[q] - xyz[p])), sd=0.01),
         EqualHeight(points[p], points[q], sd=0.01, difference=float(plane[q, 2] - plane[p, 2])),
         Difference(points[q], points[p], np.where([True, False, True], xyz[p] - xyz[q], np.nan), sd=0.01),
         *(Control(points[point], plane[point], covariance=covariance) for point in control),
+        Range(photos[2], points[q], float(np.linalg.norm(ray)), sd=0.01, lever_arm=arm),
         Position(photos[0], stations[0], sd=[0.01, 0.01, 0.02]),
         Attitude(photos[1], local[1] @ boresight, sd=1e-4, boresight=boresight),
         Relative(photos[0], photos[1], shift, turned[0].T @ turned[1], sd=[0.01] * 3 + [1e-4] * 3),

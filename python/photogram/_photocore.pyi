@@ -25,7 +25,7 @@ CombinationRow = tuple[list[int], list[int], list[int], list[tuple[int, int]], l
 """Photos; cameras that several of them share; common unknowns; cameras with parameters that take a notable
 part; parts of poses that do: positions `along` and `across` the view, `tilt`, `swing` about the view."""
 
-FailureRow = tuple[str, str, list[CombinationRow], list[int]]
+FailureRow = tuple[str, str, list[CombinationRow], list[int], list[float]]
 """Why a network cannot be adjusted, as in :class:`BlockError`."""
 
 CameraRow = tuple[list[float], list[float], list[float], list[float], int, int]
@@ -575,10 +575,12 @@ def refraction_shift(
 class BlockError(Exception):
     """A block that cannot be adjusted.
 
-    `args` is (kind, message, combinations, points): kind is `undetermined points`, `undetermined photos`,
-    `no intersection`, `coarse` (too large for double precision), `not finite`, `memory`, `empty` or `input`;
-    combinations are what undetermined combinations of unknowns move (of `coarse`, the photos concerned, in
-    one), points a list of point indices.
+    `args` is (kind, message, combinations, points, seconds): kind is `undetermined points`, `undetermined
+    photos`, `no intersection`, `coarse` (too large for double precision), `outside` (a time that a trajectory
+    does not reach), `not finite`, `memory`, `empty` or `input`; combinations are what undetermined
+    combinations of unknowns move (of `coarse` and `outside`, the photos concerned, in one), points a list of
+    point indices: of `outside` the point of the image that is, none where it is the photo itself. Seconds
+    are, of `outside`, the time and the first and the last that the trajectory reaches, counted as its own.
     """
 
 def find_first_values(
@@ -626,6 +628,9 @@ def find_first_values(
     ValueError
         An argument of another shape or length, an index out of range; the message names it.
     """
+
+def trajectory_span(trajectory: TrajectoryRow) -> tuple[float, float]:
+    """Return the first and the last time that a trajectory may be asked for, counted as its own."""
 
 def flown(trajectory: TrajectoryRow, position: _Floats, rotation: _Floats, times: list[float]) -> FlownRow:
     """Return a trajectory at n times (docs/moving.md).

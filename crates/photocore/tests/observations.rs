@@ -15,7 +15,7 @@ use photocore::geometry::{
 use photocore::network::mounts::OnFrame;
 use photocore::network::observations::{
     Attitude, Base, Control, Difference, Distance, EqualHeight, Fault, OnLevel, OnLine, OnPlane, OnPlumbLine,
-    Position, Prior, Quantity, Relative,
+    Position, Prior, Quantity, Range, Relative,
 };
 use photocore::network::{
     Camera, Common, CommonKind, Dropped, Image, Mount, Network, NetworkError, Observation, Options, Photo,
@@ -153,6 +153,11 @@ fn network() -> Network {
         let precision = covariance(&[0.002, 0.003, 0.002, 5e-4, 4e-4, 6e-4]);
         Relative { photos: [i, j], pose, precision }.into()
     };
+    let range = |photo: usize, point: usize| {
+        let from = position(&pose(photo)) + attitude(&pose(photo)) * lever_arm;
+        let length = (Vector3::from(place(point)) - from).norm() + 1e-3 * noise(150 + photo);
+        Range { photo, point, length, sd: 1e-3, lever_arm, instrument: None }
+    };
     let components = |a, b, seen: [bool; 3]| {
         std::array::from_fn(|k| seen[k].then(|| difference(a, b)[k] + 1e-3 * noise(130 + k)))
     };
@@ -182,6 +187,8 @@ fn network() -> Network {
         }
         .into(),
         gnss(4, sd(&[0.01, 0.02, 0.01])),
+        range(2, 9).into(),
+        Range { instrument: Some(INSTRUMENT), ..range(3, 2) }.into(),
         imu(3, covariance(&[1e-3, 1e-3, 2e-3])),
         level(7, 8),
     ];
@@ -538,6 +545,13 @@ mod dense {
             let point = |i: usize| -> V { std::array::from_fn(|k| x[3 * i + k]) };
             let photo = |i: usize| self.photo(x, i);
             let place = |i: usize| -> V { self.network.commons[i].position.map(C::from) };
+            let told = |d: V, instrument: Option<usize>| {
+                let s = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+                instrument.map_or(s, |instrument| {
+                    let (_, [m, k, _], _) = self.common(x, instrument);
+                    m * s + k
+                })
+            };
             let mut all = vec![];
             for image in &self.network.images {
                 let (centre, a) = photo(image.photo);
@@ -550,14 +564,13 @@ mod dense {
                 match observation {
                     Observation::Distance(own) => {
                         let d = minus(&point(own.points[1]), &point(own.points[0]));
-                        let s = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-                        all.push(
-                            own.length
-                                - own.instrument.map_or(s, |instrument| {
-                                    let (_, [m, k, _], _) = self.common(x, instrument);
-                                    m * s + k
-                                }),
-                        );
+                        all.push(own.length - told(d, own.instrument));
+                    }
+                    Observation::Range(own) => {
+                        let (centre, a) = photo(own.photo);
+                        let arm = times(&a, &vector(&own.lever_arm));
+                        let d = minus(&minus(&point(own.point), &centre), &arm);
+                        all.push(own.length - told(d, own.instrument));
                     }
                     Observation::Difference(own) => {
                         let d = minus(&point(own.points[1]), &point(own.points[0]));

@@ -80,6 +80,7 @@ pub fn trajectory(row: TrajectoryRow<'_>) -> PyResult<Trajectory> {
 
 /// Adds the function to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(trajectory_span, module)?)?;
     module.add_function(wrap_pyfunction!(flown, module)?)
 }
 
@@ -95,6 +96,11 @@ type FlownRow<'py> = (
     Active,
     Active,
 );
+
+#[pyfunction]
+fn trajectory_span(trajectory: TrajectoryRow<'_>) -> PyResult<(f64, f64)> {
+    Ok(self::trajectory(trajectory)?.course.span())
+}
 
 #[pyfunction]
 fn flown<'py>(

@@ -407,6 +407,7 @@ def named(
     message: str,
     combinations: list[_photocore.CombinationRow],
     points: list[int],
+    seconds: list[float],
     *,
     unknowns: Sequence[Unknown] | None = None,
 ) -> AdjustmentError:
@@ -426,5 +427,6 @@ def named(
         return too_coarse([block.photo_ids[i] for i in combinations[0][0]], point_names)
     if kind == "memory":
         return OutOfMemoryError(message)
-    # The core counts photos, trajectories and seconds from where these begin.
-    return AdjustmentError(outside(block) or message if kind == "input" else message)
+    if kind == "outside":
+        return AdjustmentError(outside(block, combinations[0][0][0], points, seconds))
+    return AdjustmentError(message)

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.messages import counted, listed
+from photogram.messages import listed
 from photogram.network.block import Block
-from photogram.network.flown import timed_images
 from photogram.network.observations import moments
 from photogram.network.trajectories import Coefficient, Spline, Trajectory
 from photogram.network.unknowns import Unknown
-from photogram.network.whereabouts import reach
 
 __all__ = ["named_unknowns", "of_motion", "outside"]
 
@@ -54,33 +52,35 @@ def _named(trajectory: Trajectory, part: int, wanted: set[int]) -> str:
     return f"{trajectory.name} between {begin:.10g} and {end:.10g} s"
 
 
-def outside(block: Block) -> str:
-    """Say which photo, or record, is at a time that its trajectory does not reach; nothing where none is."""
-    for own, trajectory, _, rows in timed_images(block):
-        times = own.times(block.image_xy[rows])
-        begin = own.images(block.image_xy[rows])[0] + own.delay
-        first, last = reach(trajectory)
-        bad = np.flatnonzero((times < first) | (times > last))
-        if bad.size or not first <= begin <= last:
-            at = float(times[bad[0]]) if bad.size else begin
-            what = f"the photo {own.photo}"
-            if bad.size:
-                what = f"the image of point {block.point_ids[block.image_points[rows[bad[0]]]]} on {what}"
-            return f"{what} is at {at:.12g} s, {_beyond(trajectory, first, last)}"
-    for each in moments(block.observations):
-        first, last = reach(each.trajectory)
-        at = each.time + (0.0 if each.clock is None else float(each.clock.position[0]))
-        if not first <= at <= last:
-            count = sum(one.moment is not None and one.moment.name == each.name for one in block.observations)
-            what = f"{counted(count, 'observation')} of {each.name}"
-            return f"{what}: it is {_beyond(each.trajectory, first, last)}"
-    return ""
+def outside(block: Block, photo: int, points: Sequence[int], seconds: Sequence[float]) -> str:
+    """Say what is at a time that its trajectory does not reach.
 
-
-def _beyond(trajectory: Trajectory, first: float, last: float) -> str:
+    Parameters
+    ----------
+    block
+        The block.
+    photo
+        Its index; records on trajectories stand behind the photos.
+    points
+        The point of its image at that time; none where it is the photo itself, or a record.
+    seconds
+        That time, and the first and the last that the trajectory reaches, from its origin.
+    """
+    count = len(block.photo_ids)
+    if photo < count:
+        what = f"the photo {block.photo_ids[photo]}"
+        if points:
+            what = f"the image of point {block.point_ids[points[0]]} on {what}"
+        trajectories = zip(block.timed, block.trajectories, strict=True)
+        trajectory = next(on for own, on in trajectories if own.photo == block.photo_ids[photo])
+    else:
+        record = moments(block.observations)[photo - count]
+        trajectory = record.trajectory
+        what = f"what was observed of {record.name}"
+    time, first, last = (trajectory.origin + each for each in seconds)
     return (
-        f"beyond the trajectory {trajectory.name}, which reaches from {first!r} to {last!r} s: half a record"
-        " beyond its table, within its knots"
+        f"{what} is at {time:.12g} s, beyond the trajectory {trajectory.name}, which reaches from {first!r}"
+        f" to {last!r} s: half a record beyond its table, within its knots"
     )
 
 

@@ -317,6 +317,11 @@ def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValu
 
 def _check_snooping(project: Project, choices: Choices, division: Division | None) -> None:
     """Refuse what does not go with taking gross errors out."""
+    from photogram import adjust
+    from photogram.formats import adjusting
+
+    if adjusting(project, adjust) is not adjust:
+        raise typer.BadParameter("goes without OUTLIER_REJECTION", param_hint="--snoop")
     if division is not None:
         raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--snoop")
     chosen = choices.datum is not None or choices.loss is not None
@@ -368,6 +373,7 @@ def adjusted_block(
     """Adjust a block as its project says, but for what a user chooses, with its features."""
     from photogram import FirstValues, InputError, adjust_started
     from photogram.diagnosis.adjusted import diagnosed, errors_explained
+    from photogram.formats import adjusting
     from photogram.formats.additions import repeated_remarks
     from photogram.results.fitting import with_features
 
@@ -380,7 +386,7 @@ def adjusted_block(
             "progress": shown(status, "weighted sum of squares", 1.0) if status is not None else None,
         }
         with errors_explained(block):
-            call = _call(chosen, choices.loss_of(project), division)
+            call = adjusting(project, _call(chosen, choices.loss_of(project), division))
             if isinstance(block, FirstValues):
                 result = adjust_started(block, by=call, **how)
             else:
@@ -417,12 +423,14 @@ def _files(
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.formats import FORMATS, to_files
     from photogram.formats.adjusted import adjusted, table_files
+    from photogram.network.refined import is_scanned
 
     read = "\n".join(line for title, lines in sections for line in (title, *(f"  {each}" for each in lines)))
     files = {"report.txt": f"{report}\n{read}\n".encode(), **table_files(result)}
     after = adjusted(project, result)
     own = next((name for name, each in FORMATS.items() if each.title == project.title), None)
-    plain = to_files(after, "plain") if own in (None, "plain") else _in_format(after, "plain")
+    whole = own in (None, "plain") and not is_scanned(after.block)
+    plain = to_files(after, "plain") if whole else _in_format(after, "plain")
     files |= {f"adjusted/{name}": content for name, content in plain.items()}
     if own not in (None, "plain"):
         files |= {f"adjusted-{own}/{name}": content for name, content in _in_format(after, str(own)).items()}

@@ -11,7 +11,11 @@ __all__ = ["named"]
 
 
 def named(
-    kind: str, message: str, combinations: list[_photocore.CombinationRow], points: list[int]
+    kind: str,
+    message: str,
+    combinations: list[_photocore.CombinationRow],
+    points: list[int],
+    _seconds: list[float],
 ) -> AdjustmentError | InputError:
     """Put a failure of the core into words; photos and points have no names but their numbers, from 0."""
     if kind == "undetermined points":

@@ -22,7 +22,6 @@ from photogram.network.block import Block
 from photogram.network.observations import Position
 from photogram.network.timed import Moment
 from photogram.network.unknowns import LeverArm
-from photogram.network.whereabouts import reach
 
 __all__ = ["flown_hints"]
 
@@ -74,7 +73,7 @@ def _records_misfit(block: Block) -> Floats:
         trajectory = own[0][0].trajectory
         clocks = [0.0 if at.clock is None else float(at.clock.position[0]) for at, _ in own]
         times = np.array([at.time for at, _ in own]) + clocks
-        ends = reach(trajectory)
+        ends = trajectory.reach
         inside += int(np.count_nonzero((times >= ends[0]) & (times <= ends[1])))
         given = (np.array([each.position for each in part]) for part in trajectory.coefficients)
         centres, turned, *_ = trajectory.flown(np.clip(times, *ends), *given)

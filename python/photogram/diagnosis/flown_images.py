@@ -21,7 +21,7 @@ from photogram.network.geometry import geographic_to_geocentric
 from photogram.network.motion import timed_photos
 from photogram.network.projecting import camera_of, projected
 from photogram.network.rays import meet
-from photogram.network.whereabouts import given_poses, reach
+from photogram.network.whereabouts import given_poses
 
 __all__ = ["flown_misfits", "flown_predictions", "flown_view"]
 
@@ -117,7 +117,7 @@ def _rays(block: Block) -> tuple[Floats, Floats]:
     seen = image_directions(block)
     centres, directions = np.full(seen.shape, np.nan), np.full(seen.shape, np.nan)
     for own, trajectory, _, images in timed_images(block):
-        times = np.clip(own.times(block.image_xy[images]), *reach(trajectory))
+        times = np.clip(own.times(block.image_xy[images]), *trajectory.reach)
         at, turned = given_poses(trajectory, times)
         if own.sensor is not None:
             at, turned = at + turned @ own.sensor.position, turned @ own.sensor.attitude

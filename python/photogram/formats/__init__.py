@@ -11,7 +11,15 @@ if TYPE_CHECKING:
     from photogram.formats.metadata.said import Said
     from photogram.formats.placing import Placed, placed
     from photogram.formats.project import Frame, Options, Project
-    from photogram.formats.registry import FORMATS, cannot_hold, read, recognised, target, to_files
+    from photogram.formats.registry import (
+        FORMATS,
+        adjusting,
+        cannot_hold,
+        read,
+        recognised,
+        target,
+        to_files,
+    )
 
 __all__ = [
     "FORMATS",
@@ -25,6 +33,7 @@ __all__ = [
     "Project",
     "Said",
     "Wishes",
+    "adjusting",
     "cannot_hold",
     "placed",
     "read",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -20,8 +20,9 @@ from photogram.formats.topocentric import in_topocentric, topocentric_remarks
 from photogram.io.files import reading
 from photogram.memory import turned
 from photogram.messages import counted, listed
+from photogram.results.result import Result
 
-__all__ = ["FORMATS", "cannot_hold", "read", "recognised", "target", "to_files"]
+__all__ = ["FORMATS", "adjusting", "cannot_hold", "read", "recognised", "target", "to_files"]
 
 FORMATS: dict[str, Format] = {
     name: import_module(f"photogram.formats.{name}").FORMAT
@@ -259,6 +260,24 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
         *([] if chosen.name == "plain" else beside),
         *(nominal_pixels(project) if chosen.pixels else []),
     ]
+
+
+def adjusting(project: Project, adjust: Callable[..., Result]) -> Callable[..., Result]:
+    """Return a call that adjusts the block of a project as its files ask for, in several rounds if need be.
+
+    Parameters
+    ----------
+    project
+        The project.
+    adjust
+        A call that adjusts a block once, with options by name: :func:`photogram.adjust`.
+
+    Returns
+    -------
+    That call itself where its files ask for nothing more.
+    """
+    own = next((each for each in FORMATS.values() if each.title == project.title), None)
+    return adjust if own is None or own.adjusting is None else own.adjusting(project, adjust)
 
 
 def _named(file_format: str) -> Format:

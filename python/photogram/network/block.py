@@ -18,7 +18,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.network.cameras import Camera, CameraRow, camera_rows
-from photogram.network.films import check_scans
+from photogram.network.films import check_scans, reads_pixels
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import (
@@ -369,6 +369,13 @@ class Block(Valued, Brief):
             raise InputError(
                 f"the photo {scanned[0]} is a scanner's: its camera is in mm, not {self.image_unit}"
             )
+        of_scanners = np.isin(self.photo_ids, scanned)
+        own = [] if self.photo_cameras is None else np.unique(self.photo_cameras[of_scanners]).tolist()
+        if measured := [self.cameras[row].title for row in own if self.cameras[row].weights == "measured"]:
+            raise InputError(
+                f"the camera {measured[0]} is a scanner's: standard deviations of its images are of the"
+                " corrected place in the focal plane, not of what was measured (docs/moving.md#images)"
+            )
         named = Counter(each.name for each in self.all_trajectories)
         twice = [name for name, count in named.items() if count > 1]
         if twice:
@@ -426,7 +433,7 @@ class Block(Valued, Brief):
         observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
         self._check_figures()
         of_photos = self.photo_cameras if self.cameras else None
-        check_scans(self.passages, self.photo_ids, self.cameras, of_photos)
+        check_scans(self.passages, self.photo_ids, self.cameras, of_photos, self.image_photos)
 
     def _check_figures(self) -> None:
         named = {
@@ -512,7 +519,9 @@ class Block(Valued, Brief):
 
     @property
     def image_unit(self) -> str:
-        """What image coordinates are measured in, `mm` or `px`."""
+        """What image coordinates are measured in, `mm` or `px`; of scanned films what readings are."""
+        if self.passages and reads_pixels(self.passages):
+            return "px"
         return str(self.cameras[0].unit) if self.cameras else "mm"
 
     @property

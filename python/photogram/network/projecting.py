@@ -18,7 +18,6 @@ from photogram.network.geometry import geographic_to_geocentric
 from photogram.network.timed import Timed
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown
-from photogram.network.whereabouts import reach
 
 __all__ = ["camera_of", "projected", "projected_images", "standing"]
 
@@ -75,7 +74,7 @@ def projected(
             f"the scanner {own.photo} has a factor of line rates, which needs a time to count from"
         )
     if own.lines is not None:
-        times, samples = _crossed(own, reach(trajectory), seen, len(places))
+        times, samples = _crossed(own, trajectory.reach, seen, len(places))
         # By the clock and the rates of the scanner itself.
         start = float(own.time or 0.0)
         return np.column_stack([samples, own.lines.at(start + (times - offset - start) / rate)])

@@ -481,10 +481,22 @@ class Trajectory:
 
     def flown(self, times: Floats, position: Floats, rotation: Floats) -> _photocore.FlownRow:
         """Return what the core makes of (n,) times, (K, 3) coefficients of positions and of rotations."""
-        # Which unknowns these are does not matter here.
-        row = self.row({id(each): 0 for own in self.coefficients for each in own})
         c, r = np.reshape(position, (-1, 3)), np.reshape(rotation, (-1, 3))
-        return _photocore.flown(row, c, r, (times - self.origin).tolist())
+        return _photocore.flown(self._row, c, r, (times - self.origin).tolist())
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """The first and the last time that it may be asked for, in seconds.
+
+        They lie half a record beyond its table, and within the knots of its splines.
+        """
+        first, last = _photocore.trajectory_span(self._row)
+        return self.origin + first, self.origin + last
+
+    @property
+    def _row(self) -> _photocore.TrajectoryRow:
+        """What the core takes where it does not matter which unknowns its coefficients are."""
+        return self.row({id(each): 0 for own in self.coefficients for each in own})
 
 
 def _of_each(name: str, given: ArrayLike, count: int) -> Floats:

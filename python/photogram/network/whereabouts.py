@@ -1,37 +1,13 @@
-"""Where a trajectory is before anything is adjusted, and which times it has."""
+"""Where a trajectory is before anything is adjusted."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.network.trajectories import Spline, Trajectory
+from photogram.network.trajectories import Trajectory
 
-__all__ = ["about", "given_poses", "reach"]
-
-
-def reach(trajectory: Trajectory) -> tuple[float, float]:
-    """Return the first and the last time that a trajectory may be asked for, in seconds.
-
-    They lie half a record beyond its table, and within the knots of its splines, as the core has it.
-    """
-    table = trajectory.table
-    spans = [_reaching(each) for each in (table.times, table.attitude_times)]
-    if trajectory.body is not None:
-        spans.append(_reaching(np.asarray(trajectory.body[0])))
-    for basis in (trajectory.position, trajectory.rotation):
-        if isinstance(basis, Spline):
-            knots = np.asarray(basis.knots, dtype=float)
-            spans.append((float(knots[basis.degree]), float(knots[-basis.degree - 1])))
-    return max(first for first, _ in spans), min(last for _, last in spans)
-
-
-def _reaching(times: Floats) -> tuple[float, float]:
-    """Return the times of records, and half an interval beyond; all times where there is one alone."""
-    if len(times) == 1:
-        return -np.inf, np.inf
-    first, last = times[1] - times[0], times[-1] - times[-2]
-    return float(times[0] - first / 2), float(times[-1] + last / 2)
+__all__ = ["about", "given_poses"]
 
 
 def about(trajectory: Trajectory, time: float) -> tuple[Floats, Floats]:
@@ -48,7 +24,7 @@ def about(trajectory: Trajectory, time: float) -> tuple[Floats, Floats]:
     -------
     (3,) X, Y, Z, geocentric where the object space is geographic, and (3, 3) the axes of the photo in these.
     """
-    places, matrices = given_poses(trajectory, np.clip([time], *reach(trajectory)))
+    places, matrices = given_poses(trajectory, np.clip([time], *trajectory.reach))
     return places[0], matrices[0]
 
 

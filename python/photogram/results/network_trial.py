@@ -114,7 +114,7 @@ class NetworkTrial:
         try:
             return ask(*arguments, **options)
         except (_photocore.BlockError, _photocore.CollectionError) as error:
-            kind, _, combinations, points = error.args
+            kind, _, combinations, points, _ = error.args
             if kind == "undetermined points":
                 raise LostSupportError(points, []) from error
             if kind == "not finite":

@@ -16,7 +16,6 @@ from photogram.network.block import Block
 from photogram.network.geometry import geographic_to_geocentric
 from photogram.network.projecting import camera_of, projected
 from photogram.network.trajectories import Trajectory
-from photogram.network.whereabouts import reach
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances
 from photogram.results.unknowns import AdjustedUnknown
@@ -155,7 +154,7 @@ class AdjustedTrajectory:
 
     def _inside(self, times: ArrayLike) -> Floats:
         own = np.atleast_1d(np.asarray(times, dtype=float))
-        first, last = reach(self.given)
+        first, last = self.given.reach
         outside = ~((own >= first) & (own <= last))
         if own.ndim != 1 or outside.any():
             bad = own.ravel()[np.argmax(outside)] if outside.any() else times

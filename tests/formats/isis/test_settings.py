@@ -23,6 +23,7 @@ def test_defaults_are_those_of_jigsaw():
 @pytest.mark.parametrize("name", PARAMETERS)
 def test_every_setting_changes_its_field(name):
     words = {"ck_degree": "5", "ck_solve_degree": "4", "spk_degree": "3", "spk_solve_degree": "6"}
+    words |= {"multiplier": "7.5"}
     words |= {"angles": "all", "positions": "all", "twist": "no", "axes": "rectangular", "held": "held.lis"}
     own = PARAMETERS[name]
     value = words.get(own.field, "7.5" if own.place is not None else "yes")
@@ -78,8 +79,7 @@ def test_a_file_of_settings(tmp_path):
         ("TWIST=perhaps", "neither yes nor no"),
         ("POINT_RADIUS_SIGMA=-3", "no positive number"),
         ("SPACECRAFT_POSITION_SIGMA=far", "no positive number"),
-        ("OBSERVATIONS=yes", "is not done: which images share"),
-        ("OUTLIER_REJECTION=yes", "--snoop"),
+        ("REJECTION_MULTIPLIER=0", "no positive number"),
         ("SOLVETARGETBODY=yes", "how the body turns"),
         ("CAMSOLVE=all TWIST", "NAME=value, not TWIST"),
         ('TWIST="yes', "No closing quotation"),

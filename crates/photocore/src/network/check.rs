@@ -139,18 +139,18 @@ impl Network {
         }
         let known = self.placed_mounts([0.0; 3]);
         let spans: Vec<(f64, f64)> = self.trajectories.iter().map(|own| own.course.span()).collect();
-        let reach = |photo: usize, at: f64| {
+        let reach = |photo: usize, point: Option<usize>, at: f64| {
             let flight = known.of(known.carrier(photo)).first().and_then(|mount| mount.flight(at, &known));
             let Some((trajectory, time)) = flight else { return Ok(()) };
             let (first, last) = spans[trajectory];
             if first <= time && time <= last {
                 return Ok(());
             }
-            Err(NetworkError::OutsideTrajectory { photo, trajectory, time, first, last })
+            Err(NetworkError::OutsideTrajectory { photo, point, trajectory, time, first, last })
         };
-        (0..self.photos.len()).try_for_each(|photo| reach(photo, AT_PHOTO))?;
-        let images = self.images.iter().zip(&self.image_times);
-        images.into_iter().try_for_each(|(image, &at)| reach(image.photo, at))
+        let mut images = self.images.iter().zip(&self.image_times);
+        images.try_for_each(|(image, &at)| reach(image.photo, Some(image.point), at))?;
+        (0..self.photos.len()).try_for_each(|photo| reach(photo, None, AT_PHOTO))
     }
 
     /// Refuses names of blocks that are not there.

@@ -75,6 +75,8 @@ pub enum NetworkError {
     OutsideTrajectory {
         /// The photo.
         photo: usize,
+        /// The point of its image; None where it is the photo itself.
+        point: Option<usize>,
         /// The trajectory.
         trajectory: usize,
         /// The time of the photo or of one of its images.

@@ -25,13 +25,13 @@ create_exception!(
     _photocore,
     BlockError,
     PyException,
-    "The block cannot be adjusted: (kind, message, combinations, points)."
+    "The block cannot be adjusted: (kind, message, combinations, points, seconds)."
 );
 create_exception!(
     _photocore,
     CollectionError,
     PyException,
-    "The collection cannot be adjusted: (kind, message, combinations, points)."
+    "The collection cannot be adjusted: (kind, message, combinations, points, seconds)."
 );
 
 /// Adds the functions and classes to the extension module.
@@ -79,20 +79,26 @@ fn images(
 /// What an undetermined combination moves: photos, cameras, common unknowns, parameters of cameras, parts of poses.
 type CombinationRow = (Vec<usize>, Vec<usize>, Vec<usize>, Vec<(usize, usize)>, Vec<&'static str>);
 
-/// Kind, message, and what is concerned: combinations or, where there are none, photos in one; points.
-type FailureRow = (&'static str, String, Vec<CombinationRow>, Vec<usize>);
+/// Kind, message, and what is concerned: combinations or, where there are none, photos in one; points; seconds of a trajectory: a time,
+/// the first that it reaches, the last.
+type FailureRow = (&'static str, String, Vec<CombinationRow>, Vec<usize>, Vec<f64>);
 
 /// A failure as Python sees it.
 fn failure(error: &Failure, what: &str) -> FailureRow {
+    let photos_alone = |photos: &[usize]| {
+        vec![combination_row(&Combination { photos: photos.to_vec(), ..Combination::default() })]
+    };
+    let mut seconds = vec![];
     let (kind, combinations, points) = match error {
         Failure::NoIntersection(point) => ("no intersection", vec![], vec![*point]),
         Failure::UndeterminedPoints(points) => ("undetermined points", vec![], points.clone()),
         Failure::Undetermined(combinations) => {
             ("undetermined photos", combinations.iter().map(combination_row).collect(), vec![])
         }
-        Failure::Coarse(Coarse { photos, points }) => {
-            let photos = Combination { photos: photos.clone(), ..Combination::default() };
-            ("coarse", vec![combination_row(&photos)], points.clone())
+        Failure::Coarse(Coarse { photos, points }) => ("coarse", photos_alone(photos), points.clone()),
+        Failure::OutsideTrajectory { photo, point, time, first, last, .. } => {
+            seconds = vec![*time, *first, *last];
+            ("outside", photos_alone(&[*photo]), point.iter().copied().collect())
         }
         Failure::Empty => ("empty", vec![], vec![]),
         error if block_network::has_datum(error) => ("not free", vec![], vec![]),
@@ -117,7 +123,6 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::Trajectory(_)
         | Failure::Passage(_)
         | Failure::ImageTimes(_)
-        | Failure::OutsideTrajectory { .. }
         | Failure::CameraConstant { .. }
         | Failure::Observation { .. }
         | Failure::Vectors
@@ -127,7 +132,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::Layout(_)
         | Failure::Stopped(_) => ("input", vec![], vec![]),
     };
-    (kind, said(error, what), combinations, points)
+    (kind, said(error, what), combinations, points, seconds)
 }
 
 fn combination_row(combination: &Combination) -> CombinationRow {

@@ -18,7 +18,6 @@ from photogram.network.cameras import Camera
 from photogram.network.projecting import projected
 from photogram.network.timed import LineSensor, Timed
 from photogram.network.trajectories import Basis, Interpolation, Table, Trajectory
-from photogram.network.whereabouts import reach
 
 __all__ = ["SupportedImage", "camera_of", "to_camera", "trajectory_of", "with_polynomial_pointing"]
 
@@ -266,7 +265,7 @@ class SupportedImage:
 
     def _check_reached(self, times: Floats, lines: Floats) -> None:
         """Refuse times at which nothing is known of the pose."""
-        first, last = reach(self.flown)
+        first, last = self.flown.reach
         beyond = (times < first) | (times > last)
         if beyond.any():
             row = int(np.argmax(beyond))

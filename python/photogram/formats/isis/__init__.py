@@ -7,6 +7,7 @@ from pathlib import Path
 from photogram.formats.format import Format
 from photogram.formats.isis.assembling import TITLE, read
 from photogram.formats.isis.reading import is_network
+from photogram.formats.isis.rejection import rejecting
 from photogram.formats.isis.writing_results import results
 from photogram.io.files import reading
 
@@ -23,4 +24,6 @@ def _recognises(path: Path) -> bool:
         return is_network(file.read(HEAD))
 
 
-FORMAT = Format(name="isis", title=TITLE, recognises=_recognises, read=read, results=results)
+FORMAT = Format(
+    name="isis", title=TITLE, recognises=_recognises, read=read, results=results, adjusting=rejecting
+)

@@ -15,6 +15,7 @@ from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.format import Wishes
 from photogram.formats.isis.contents import DETAILS, PITCHES, Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.network import ControlNetwork
+from photogram.formats.isis.observations import observations_of, one_flight
 from photogram.formats.isis.points import given_starts, known_points
 from photogram.formats.isis.reading import read_network
 from photogram.formats.isis.settings import Settings, read_settings
@@ -62,17 +63,24 @@ def read(path: Path, wishes: Wishes) -> Project:
 
 def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings, cubes: Path) -> list[Image]:
     """Return the images that have measures, in the order of the network."""
-    held, found = _held(settings, files), []
-    for row in np.unique(network.measures.serial[_counting(network)]).tolist():
-        serial = network.measures.serials[row]
+    rows = np.unique(network.measures.serial[_counting(network)]).tolist()
+    seen = [network.measures.serials[row] for row in rows]
+    for serial in seen:
         if serial not in files:
             raise InputError(f"names no image {serial}, which has measures", file=cubes)
-        isd = read_support(files[serial])
-        own = solving(isd, serial, settings, held=serial in held)
-        found.append(
-            Image(serial, files[serial], SupportedImage(isd, serial, "isis", "isis", own.trajectory), own)
-        )
-    return found
+    held, there, found = _held(settings, files), set(seen), {}
+    # The first image of an observation is that of the list.
+    observations = observations_of([each for each in files if each in there], shared=settings.observations)
+    for number, serials in observations.items():
+        known = {serial in held for serial in serials}
+        if len(known) > 1:
+            raise InputError(f"names some images of the observation {number}, not all", file=settings.held)
+        isds = [read_support(files[serial]) for serial in serials]
+        own = solving(one_flight(isds), number, settings, held=True in known, first=isds[0])
+        for serial, isd in zip(serials, isds, strict=True):
+            supported = SupportedImage(isd, serial, "isis", "isis", own.trajectory)
+            found[serial] = Image(serial, files[serial], supported, own)
+    return [found[serial] for serial in seen]
 
 
 def _held(settings: Settings, files: dict[str, Path]) -> set[str]:
@@ -200,9 +208,15 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
         timed=timed,
         spheroid=spheroid,
         lacks=[f"no standard deviations of image coordinates: {PITCHES:g} px is assumed (--sd images=...)"],
-        messages=[*messages, *known.messages, *map(Message, contents.settings.told)],
+        messages=[*messages, *known.messages, *map(Message, _told(contents.settings))],
         details={DETAILS: contents, "further inputs": [each.path for each in contents.different]},
     )
+
+
+def _told(settings: Settings) -> list[str]:
+    """Return what becomes of settings, in sentences."""
+    by = "OUTLIER_REJECTION: done by `photogram adjust`, in Python by `formats.adjusting(project, adjust)`"
+    return [*settings.told, *([by] if settings.rejects else [])]
 
 
 def _poses(contents: PlanetaryContents, spheroid: Spheroid | None) -> tuple[Floats, Floats]:

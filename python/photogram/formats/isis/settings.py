@@ -50,8 +50,12 @@ class Settings:
         What point coordinates are adjusted.
     latitude_sigmas, rectangular_sigmas
         Metres: of latitude, longitude, radius of all points, and of X, Y, Z.
+    observations
+        Whether images of one observation share their coefficients.
     held
         The list of images whose poses are known; None: no image is.
+    rejects, multiplier
+        Whether measures with long residuals are rejected, and how many of their deviations these are long.
     told
         What was said and has another form here, in sentences.
     """
@@ -71,7 +75,10 @@ class Settings:
     axes: Axes = "latitudinal"
     latitude_sigmas: Sigmas = (None, None, None)
     rectangular_sigmas: Sigmas = (None, None, None)
+    observations: bool = False
     held: Path | None = None
+    rejects: bool = False
+    multiplier: float = 3.0
     told: tuple[str, ...] = field(default=())
 
     @property
@@ -108,16 +115,18 @@ def _degree(text: str) -> int:
     return int(text)
 
 
-def _sigma(text: str) -> float | None:
+def _positive(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if text.lower() in ("none", "null", ""):
-        return None
     if not 0 < value < math.inf:
         raise InputError("is no positive number")
     return value
+
+
+def _sigma(text: str) -> float | None:
+    return None if text.lower() in ("none", "null", "") else _positive(text)
 
 
 def _word(**words: str) -> Callable[[str], str]:
@@ -165,7 +174,10 @@ PARAMETERS: Mapping[str, _Parameter] = {
     "POINT_X_SIGMA": _Parameter("rectangular_sigmas", _sigma, 0),
     "POINT_Y_SIGMA": _Parameter("rectangular_sigmas", _sigma, 1),
     "POINT_Z_SIGMA": _Parameter("rectangular_sigmas", _sigma, 2),
+    "OBSERVATIONS": _Parameter("observations", _yes),
     "HELDLIST": _Parameter("held", Path),
+    "OUTLIER_REJECTION": _Parameter("rejects", _yes),
+    "REJECTION_MULTIPLIER": _Parameter("multiplier", _positive),
 }
 """What each name of jigsaw is here."""
 
@@ -174,18 +186,13 @@ OTHERWISE: Mapping[str, str] = {
     "MAXITS": "the adjustment ends by itself, after 50 iterations at the latest",
     "SIGMA0": "the adjustment ends where no unknown changes by 1e-5 of its standard deviation",
     "ERRORPROPAGATION": "the covariance of everything is always computed",
-    "REJECTION_MULTIPLIER": "--snoop tests each measure by its own redundancy, --level says how strictly",
     "CONTROL_POINT_COORDINATE_TYPE_REPORTS": "points.csv has latitude, longitude, radius and X, Y, Z",
     "UPDATE": "the labels of cubes are left as they are; adjusted support data are written beside",
     **dict.fromkeys(("BUNDLEOUT_TXT", "IMAGESCSV", "OUTPUT_CSV", "RESIDUALS_CSV"), "it is always written"),
     **dict.fromkeys(("FROMLIST", "CNET", "ONET", "FILE_PREFIX"), _FILES),
 }
 """What has another form here."""
-REFUSED = {
-    "OBSERVATIONS": "which images share coefficients is a rule of each mission, which is not known here",
-    "SOLVETARGETBODY": "how the body turns is taken as known",
-    "OUTLIER_REJECTION": "--snoop takes measures out one by one instead",
-}
+REFUSED = {"SOLVETARGETBODY": "how the body turns is taken as known"}
 """What cannot be asked for."""
 
 

@@ -38,19 +38,22 @@ class Solving:
     over: tuple[bool, bool]
 
 
-def solving(isd: Isd, name: str, settings: Settings, *, held: bool) -> Solving:
-    """Return what is adjusted of an image.
+def solving(isd: Isd, name: str, settings: Settings, *, held: bool, first: Isd) -> Solving:
+    """Return what is adjusted of an image, or of all images of an observation.
 
     Parameters
     ----------
     isd
-        Its support data.
+        Its support data; of several images with the tables of all.
     name
         Of the trajectory.
     settings
         Which coefficients are unknown.
     held
         Whether none is.
+    first
+        The support data of the first of several images: its tables say from when time counts, and which
+        polynomials all begin with, as in jigsaw.
 
     Raises
     ------
@@ -58,8 +61,8 @@ def solving(isd: Isd, name: str, settings: Settings, *, held: bool) -> Solving:
         Records that ask for velocities and have none.
     """
     counts = (0, 0) if held else (settings.position_coefficients, settings.angle_coefficients)
-    position, isd, places = _positions(isd, settings, counts[0])
-    rotation, isd, angles = _angles(isd, settings, counts[1])
+    position, isd, places = _positions(isd, first.position, settings, counts[0])
+    rotation, isd, angles = _angles(isd, first.pointing, settings, counts[1])
     own = trajectory_of(isd, name, interpolation="isis", position=position)
     return Solving(replace(own, rotation=rotation, angles="zxz"), places, angles, _over(settings))
 
@@ -73,11 +76,15 @@ def _scaled(times: Floats) -> tuple[float, float]:
     return float(times[0] + times[-1]) / 2, float(times[-1] - times[0]) / 2 or 1.0
 
 
-def _positions(isd: Isd, settings: Settings, count: int) -> tuple[Polynomial | None, Isd, Floats]:
-    """Return corrections of positions, support data with what they are added to, and its coefficients."""
-    own, none = isd.position, np.zeros((3, 0))
+def _positions(
+    isd: Isd, own: Positions, settings: Settings, count: int
+) -> tuple[Polynomial | None, Isd, Floats]:
+    """Return corrections of positions, support data with what they are added to, and its coefficients.
+
+    They begin with records of their own, which those of the support data may go beyond.
+    """
     if not count:
-        return None, isd, none
+        return None, isd, np.zeros((3, 0))
     reference, scale = _scaled(own.times)
     sd = deviations(settings.position_sigmas, count, count - 1)
     basis = Polynomial(count - 1, reference, scale, sd=sd)
@@ -86,20 +93,19 @@ def _positions(isd: Isd, settings: Settings, count: int) -> tuple[Polynomial | N
     fit = fitted(own.times, own.places, min(settings.spk_degree, len(own.times) - 1))
     fit = _of_degree(fit, max(settings.spk_solve_degree, count - 1))
     if len(own.times) > 1:
-        times, places = fit.sampled(float(own.times[0]), float(own.times[-1]))
+        times, places = fit.sampled(float(isd.position.times[0]), float(isd.position.times[-1]))
         isd = replace(isd, position=Positions(times, places, None, "lagrange"))
     return basis, isd, fit.coefficients
 
 
-def _angles(isd: Isd, settings: Settings, count: int) -> tuple[Polynomial | None, Isd, Floats]:
+def _angles(isd: Isd, own: Turns, settings: Settings, count: int) -> tuple[Polynomial | None, Isd, Floats]:
     """Return corrections of angles, support data with what they are added to, and its coefficients.
 
     Angles that are polynomials are added to a table of one record, their value in the middle: they have no
     other attitude.
     """
-    own, none = isd.pointing, np.zeros((3, 0))
     if not count:
-        return None, isd, none
+        return None, isd, np.zeros((3, 0))
     degree = count - 1 if settings.over_existing else max(settings.ck_solve_degree, count - 1)
     reference, scale = _scaled(own.times)
     sigmas = [None if each is None else float(np.deg2rad(each)) for each in settings.angle_sigmas]

@@ -75,9 +75,25 @@ def _grid(isd: Isd) -> tuple[Floats, Floats]:
 
 
 def _adjusted_image(image: Image, adjusted: AdjustedTrajectory) -> SupportedImage:
-    """Return an image on its trajectory as adjusted."""
-    own = adjusted.given
-    changes: dict[str, Any] = {}
+    """Return an image on its trajectory as adjusted; what of its tables stays is that of the image alone."""
+    own, over = adjusted.given, image.solving.over
+    table = trajectory_of(image.supported.isd, own.name, interpolation="isis").table
+    if own.position is not None and not over[0]:
+        table = replace(
+            table,
+            times=own.table.times,
+            positions=own.table.positions,
+            velocities=own.table.velocities,
+            interpolation=own.table.interpolation,
+        )
+    if own.rotation is not None and not over[1]:
+        table = replace(
+            table,
+            attitude_times=own.table.attitude_times,
+            attitudes=own.table.attitudes,
+            attitude_interpolation=own.table.attitude_interpolation,
+        )
+    changes: dict[str, Any] = {"table": table}
     for name, value in (("position", adjusted.position), ("rotation", adjusted.rotation)):
         if (basis := getattr(own, name)) is not None:
             changes[name] = replace(basis, value=value, sd=0.0)

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.schema import AXES, TABLES, deviation_columns
 from photogram.formats.plain.shared import made
+from photogram.formats.plain.subjects import Subjects, clocked, subject_columns
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,
@@ -35,6 +37,7 @@ from photogram.network.observations import (
     OnLine,
     OnPlane,
     OnPlumbLine,
+    Range,
 )
 from photogram.network.unknowns import Instrument, Level, Line, Plane, PlumbLine, Unknown
 
@@ -87,6 +90,8 @@ class _Kind:
         Components with standard deviations `sd_..` and covariances; none: there is one, `sd`.
     unknown, common
         The field of what observations have in common, and what that is.
+    of_photos
+        Whether it is of a photo, or of a trajectory at a time, and has a lever arm there.
     """
 
     made: type[Observation]
@@ -96,6 +101,7 @@ class _Kind:
     sd: tuple[str, ...] = ()
     unknown: str = ""
     common: _Common | None = None
+    of_photos: bool = False
 
     @property
     def sd_columns(self) -> tuple[str, ...]:
@@ -106,6 +112,7 @@ class _Kind:
 _TILTS = ("sd_rotation_x", "sd_rotation_y")
 _DIFFERENCE = ("dx", "dy", "dz")
 _ENDS, _POINT = {"first": "from", "second": "to"}, {"point": "point"}
+_LEVER = ("lever_x", "lever_y", "lever_z")
 _INSTRUMENTS = _Common(
     Instrument, "instrument", {"scale": ("scale",), "constant": ("constant",)}, ("sd_scale", "sd_constant")
 )
@@ -115,6 +122,15 @@ _LINES = _Common(Line, "line", {_THROUGH: AXES, "direction": _DIFFERENCE}, ("sd_
 _PLUMB_LINES = _Common(PlumbLine, "plumb_line", {_THROUGH: AXES}, ("sd_x", "sd_y"))
 _KINDS = (
     _Kind(Distance, "distances", _ENDS, {"length": ("distance",)}, unknown="instrument", common=_INSTRUMENTS),
+    _Kind(
+        Range,
+        "ranges",
+        _POINT,
+        {"length": ("range",)},
+        unknown="instrument",
+        common=_INSTRUMENTS,
+        of_photos=True,
+    ),
     _Kind(EqualHeight, "height_differences", _ENDS, {"difference": ("dz",)}),
     _Kind(Difference, "coordinate_differences", _ENDS, {"vector": _DIFFERENCE}, _DIFFERENCE),
     _Kind(OnLevel, "level_points", _POINT, {"difference": ("dz",)}, unknown="level", common=_LEVELS),
@@ -124,7 +140,9 @@ _KINDS = (
 )
 
 
-def read_kinds(tables: Tables, transform: Transform, points: Mapping[str, int]) -> list[Observation]:
+def read_kinds(
+    tables: Tables, transform: Transform, points: Mapping[str, int], subjects: Subjects
+) -> list[Observation]:
     """Read the tables of all kinds.
 
     Raises
@@ -132,14 +150,42 @@ def read_kinds(tables: Tables, transform: Transform, points: Mapping[str, int]) 
     InputError
         Names that are not there, surfaces that are given by halves, standard deviations that give no weight.
     """
-    return [each for kind in _KINDS for each in _read(tables, transform, points, kind)]
+    # What several kinds may have is read once, and is the same for all of them.
+    commons = {kind.common.table: kind.common for kind in _KINDS if kind.common is not None}
+    known = {name: _commons(tables, transform, each) for name, each in commons.items()}
+    found: list[Observation] = []
+    for kind in _KINDS:
+        table = tables.read(kind.table)
+        if table is None:
+            continue
+        given = _given(tables, table, points, kind)
+        if kind.common is not None:
+            given[kind.unknown] = _named(table, kind.common, known[kind.common.table])
+        of = _of_photos(tables, table, kind, subjects, given) if kind.of_photos else [{}] * table.count
+        found += [
+            made(table, row, partial(kind.made, **own, **{name: each[row] for name, each in given.items()}))
+            for row, own in enumerate(of)
+            if own is not None
+        ]
+    return found
 
 
-def _read(tables: Tables, transform: Transform, points: Mapping[str, int], kind: _Kind) -> list[Observation]:
-    known = {} if kind.common is None else _commons(tables, transform, kind.common)
-    table = tables.read(kind.table)
-    if table is None:
-        return []
+def _of_photos(
+    tables: Tables, table: ColumnTable, kind: _Kind, subjects: Subjects, given: dict[str, list[Any]]
+) -> list[dict[str, Any] | None]:
+    """Return what each row is of, with its clock, None of those that are left out; adds lever arms."""
+    given["lever_arm"] = list(tables.vectors(table, _LEVER, 0.0))
+    own_clocks = clocks(tables, table, [kind.table] * table.count)
+    return [
+        None if own is None else clocked(table, row, own, own_clocks[row])
+        for row, own in enumerate(subjects.of(tables, table))
+    ]
+
+
+def _given(
+    tables: Tables, table: ColumnTable, points: Mapping[str, int], kind: _Kind
+) -> dict[str, list[Any]]:
+    """Return the fields of all rows but for what observations have in common."""
     required, names = TABLES[kind.table].required, list(points)
     if kind.common is not None and kind.common.column in required:
         table.names(kind.common.column)
@@ -162,12 +208,7 @@ def _read(tables: Tables, transform: Transform, points: Mapping[str, int], kind:
         given["covariance"] = list(covariances_of(sd, table, kind.sd))
     else:
         given["sd"] = sd[:, 0].tolist()
-    if kind.common is not None:
-        given[kind.unknown] = _named(table, kind.common, known)
-    return [
-        made(table, row, partial(kind.made, **{name: own[row] for name, own in given.items()}))
-        for row in range(table.count)
-    ]
+    return given
 
 
 def _named(table: ColumnTable, common: _Common, known: dict[str, Unknown]) -> list[Unknown | None]:
@@ -216,12 +257,12 @@ def kind_tables(block: Block) -> dict[str, dict[str, Any]]:
         own = [each for each in block.observations if isinstance(each, kind.made)]
         if not own:
             continue
-        first, last = dict[str, Any](), dict[str, Any]()
+        first, last = _photo_columns(own, block) if kind.of_photos else ({}, dict[str, Any]())
         common: dict[str, dict[str, Any]] = {}
         if kind.common is not None:
             commons = [getattr(each, kind.unknown) for each in own]
-            if there := different(commons):
-                common = {kind.common.table: _common_columns(block, kind.common, there)}
+            if different(commons):
+                common = {kind.common.table: _common_columns(block, kind.common)}
                 needed = kind.common.column in TABLES[kind.table].required
                 (first if needed else last)[kind.common.column] = [
                     each.name if each else "" for each in commons
@@ -233,6 +274,15 @@ def kind_tables(block: Block) -> dict[str, dict[str, Any]]:
         table = {kind.table: first | _deviations(own, kind) | last}
         found |= table | common if last else common | table
     return found
+
+
+def _photo_columns(own: list[Any], block: Block) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the columns that say what observations are of; those of their lever arms and clocks."""
+    last = clock_columns([None if each.moment is None else each.clock for each in own])
+    levers = np.array([each.observed[1:4] for each in own])
+    if levers.any():
+        last = dict(zip(_LEVER, levers.T, strict=True)) | last
+    return subject_columns(own, block), last
 
 
 def _deviations(own: list[Observation], kind: _Kind) -> dict[str, Any]:
@@ -247,7 +297,11 @@ def _deviations(own: list[Observation], kind: _Kind) -> dict[str, Any]:
     return dict(zip(kind.sd_columns, sd.T, strict=True)) | correlations(covariances, kind.sd)
 
 
-def _common_columns(block: Block, common: _Common, there: list[Any]) -> dict[str, Any]:
+def _common_columns(block: Block, common: _Common) -> dict[str, Any]:
+    """Return the table of what observations of all kinds have in common of one sort."""
+    kinds = {kind.made: kind.unknown for kind in _KINDS if kind.common is common}
+    named = (each for kind in kinds for each in block.observations if isinstance(each, kind))
+    there = different([getattr(each, kinds[type(each)]) for each in named])
     columns: dict[str, Any] = {common.column: [each.name for each in there]}
     for name, names in common.values.items():
         nothing = (math.nan,) * len(names)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
@@ -36,6 +35,7 @@ from photogram.formats.plain.schema import (
 )
 from photogram.formats.plain.shared import made
 from photogram.formats.plain.smoothness import read_smoothness
+from photogram.formats.plain.subjects import Subjects, clocked, subject_columns
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,
@@ -48,86 +48,16 @@ from photogram.formats.plain.tables import (
 from photogram.formats.plain.transform import Transform
 from photogram.formats.rigging import Rig
 from photogram.io.delimited import ColumnTable
-from photogram.messages import Message, counted, quoted
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Attitude, Observation, Position, Rate, Relative, Velocity
-from photogram.network.trajectories import Trajectory
-from photogram.network.whereabouts import reach
 
-__all__ = ["Subjects", "observed_tables", "read_observations"]
+__all__ = ["observed_tables", "read_observations"]
 
 _ROTATIONS = deviation_columns(ROTATIONS)
 _ANGLES = ANGLES["omega_phi_kappa"]
 _Columns = dict[str, dict[str, Any]]
 _Kind = TypeVar("_Kind", bound=Observation)
-
-
-@dataclass(frozen=True)
-class Subjects:
-    """What observations may be of.
-
-    Attributes
-    ----------
-    photos, times
-        Photos by their names, and the times of each in seconds; NaN without.
-    trajectories
-        By their names.
-    """
-
-    photos: Mapping[str, int]
-    times: Sequence[float]
-    trajectories: Mapping[str, Trajectory]
-
-    def of(self, tables: Tables, table: ColumnTable) -> list[dict[str, Any] | None]:
-        """Return what each row is of, as arguments of its observation; None of those that are left out.
-
-        These are at times that their trajectory does not reach; a remark has their number.
-
-        Raises
-        ------
-        InputError
-            Names that are not there, both or none of a photo and a trajectory, a trajectory without a time.
-        """
-        if "trajectory" not in table:
-            names, rows = list(self.photos), indices_of(table, "photo", self.photos, "photo").tolist()
-            return [{"photo": names[row]} for row in rows]
-        times = table.numbers("time")
-        spans = {name: reach(each) for name, each in self.trajectories.items()}
-        found: list[dict[str, Any] | None] = []
-        words = table.texts("photo"), table.texts("trajectory")
-        for row, (photo, name, time) in enumerate(zip(*words, times.tolist(), strict=True)):
-            if bool(photo) == bool(name):
-                raise table.error(row, "columns photo, trajectory: one of both says what the row is of")
-            for word, what, known in ((photo, "photo", self.photos), (name, "trajectory", self.trajectories)):
-                if word and word not in known:
-                    raise table.error(row, f"column {what}: there is no {what} {quoted(word)}")
-            if photo:
-                found.append({"photo": photo})
-                continue
-            if math.isnan(time):
-                raise table.error(row, "column time: is empty, and the row is of a trajectory")
-            first, last = spans[name]
-            inside = first <= time <= last
-            own = {"photo": None, "trajectory": self.trajectories[name], "time": time}
-            found.append(own if inside else None)
-        if out := sum(each is None for each in found):
-            text = f"{counted(out, 'record')} at times that their trajectory does not reach are left out"
-            tables.messages.append(Message(text, table.path))
-        return found
-
-
-def _clocked(
-    table: ColumnTable, row: int, of: Mapping[str, Any], group: Antenna | Inertial | None
-) -> dict[str, Any]:
-    """Return what an observation is of, with the clock of its group."""
-    if group is None or group.clock is None:
-        return dict(of)
-    if "trajectory" not in of:
-        raise table.error(
-            row, "its group has a clock, which dates records of trajectories, and it is of a photo"
-        )
-    return {**of, "clock": group.clock}
 
 
 def read_observations(
@@ -150,7 +80,7 @@ def read_observations(
         *_attitudes(tables, subjects),
         *_rates(tables, subjects),
         *read_smoothness(tables, subjects.trajectories),
-        *read_kinds(tables, transform, points),
+        *read_kinds(tables, transform, points, subjects),
         *_relative_poses(tables, subjects.photos),
         *read_bases(tables, rigs),
     ]
@@ -172,7 +102,7 @@ def _gnss(tables: Tables, transform: Transform, subjects: Subjects) -> list[Obse
         if own is None:
             continue
         group = group or Antenna()
-        given = _clocked(table, row, own, group)
+        given = clocked(table, row, own, group.clock)
         if own["photo"] is not None:
             time = times[row] if not math.isnan(times[row]) else subjects.times[subjects.photos[own["photo"]]]
             if group.drift is not None and math.isnan(time):
@@ -194,9 +124,9 @@ def _velocities(tables: Tables, subjects: Subjects) -> list[Observation]:
     found: list[Observation] = []
     for row, (own, group) in enumerate(zip(of, groups, strict=True)):
         if own is not None:
-            given = _clocked(table, row, own, group)
-            given |= {"velocity": values[row], "covariance": covariances[row]}
-            given |= {"lever_arm": 0.0 if group is None else group.lever}
+            group = group or Antenna()
+            given = clocked(table, row, own, group.clock)
+            given |= {"velocity": values[row], "covariance": covariances[row], "lever_arm": group.lever}
             found.append(made(table, row, partial(Velocity, **given)))
     return found
 
@@ -223,10 +153,10 @@ def _rates(tables: Tables, subjects: Subjects) -> list[Observation]:
     found: list[Observation] = []
     for row, (own, group) in enumerate(zip(of, groups, strict=True)):
         if own is not None:
-            given = _clocked(table, row, own, group)
+            group = group or Inertial()
+            given = clocked(table, row, own, group.clock)
             given |= {"rate": values[row], "covariance": covariances[row]}
-            if group is not None:
-                given |= {"boresight": group.boresight, "bias": group.bias}
+            given |= {"boresight": group.boresight, "bias": group.bias}
             found.append(made(table, row, partial(Rate, **given)))
     return found
 
@@ -251,9 +181,10 @@ def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
     found: list[Observation] = []
     for row, (own, group) in enumerate(zip(of, groups, strict=True)):
         if own is not None:
-            given = _clocked(table, row, own, group)
+            group = group or Inertial()
+            given = clocked(table, row, own, group.clock)
             given |= {"attitude": matrices[row], "covariance": covariances[row]}
-            given |= {"boresight": None if group is None else group.boresight}
+            given |= {"boresight": group.boresight}
             found.append(made(table, row, partial(Attitude, **given)))
     return found
 
@@ -316,25 +247,6 @@ def _deviations(observations: Sequence[Observation]) -> Floats:
     return found
 
 
-def _of(observations: Sequence[Position | Velocity | Attitude | Rate], block: Block) -> dict[str, Any]:
-    """Return the columns that say what observations are of."""
-    moments = [each.moment for each in observations]
-    if not any(moments):
-        # Where photos have times of their own, those of drifts are said beside.
-        times = [each.time for each in observations] if block.timed else []
-        dated = any(isinstance(each, Position) for each in observations)
-        return {
-            "photo": [each.photo for each in observations],
-            **({"time": times} if times and dated else {}),
-        }
-    photos = [each.photo for each in observations]
-    return {
-        **({"photo": photos} if any(photos) else {}),
-        "trajectory": [None if each is None else each.trajectory.name for each in moments],
-        "time": [each.time for each in observations],
-    }
-
-
 def _measured(observations: Sequence[Observation], columns: Sequence[str], values: Floats) -> dict[str, Any]:
     """Return the columns of what was observed, with deviations and covariances of components."""
     precisions = np.array([each.precision for each in observations])
@@ -355,10 +267,10 @@ def _antenna_tables(block: Block) -> _Columns:
     found: _Columns = {}
     if positions:
         places = places_written(block, np.array([each.observed[:3] for each in positions]))
-        found["gnss"] = _of(positions, block) | _measured(positions, AXES, places)
+        found["gnss"] = subject_columns(positions, block) | _measured(positions, AXES, places)
     if velocities:
         values = np.array([each.observed[:3] for each in velocities])
-        found["velocities"] = _of(velocities, block) | _measured(velocities, VELOCITY, values)
+        found["velocities"] = subject_columns(velocities, block) | _measured(velocities, VELOCITY, values)
     if list(groups) == [Antenna()]:
         return found
     names = [groups[key] for key in keys]
@@ -377,14 +289,14 @@ def _inertial_tables(block: Block) -> _Columns:
         angles = angles_of(np.array([np.asarray(each.attitude) for each in attitudes]), block)
         covariances = np.array([each.precision for each in attitudes])
         found["attitudes"] = {
-            **_of(attitudes, block),
+            **subject_columns(attitudes, block),
             **_columns(_ANGLES, angles),
             **_columns(_ROTATIONS, np.degrees(_deviations(attitudes))),
             **correlations(covariances, ROTATIONS, (DEGREE,) * 3),
         }
     if rates:
         values = np.array([each.observed[:3] for each in rates])
-        found["rates"] = _of(rates, block) | _measured(rates, RATE, values)
+        found["rates"] = subject_columns(rates, block) | _measured(rates, RATE, values)
     if not groups:
         return found
     for table, own in (("attitudes", names[: len(attitudes)]), ("rates", names[len(attitudes) :])):

@@ -21,12 +21,13 @@ from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.films import on_film, read_scanned
 from photogram.formats.plain.images import Images, image_coordinates, read_images, sd_is_given
 from photogram.formats.plain.moving import placed, read_timed
-from photogram.formats.plain.observed import Subjects, read_observations
+from photogram.formats.plain.observed import read_observations
 from photogram.formats.plain.photos import Photos, read_photos
 from photogram.formats.plain.rigs import read_frames, read_rigs
 from photogram.formats.plain.schema import AXES
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
+from photogram.formats.plain.subjects import Subjects
 from photogram.formats.plain.tables import Tables, covariances_of
 from photogram.formats.plain.trajectories import read_trajectories
 from photogram.formats.plain.transform import Transform

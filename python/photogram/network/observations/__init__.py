@@ -24,6 +24,7 @@ from photogram.network.observations.on_line import OnLine, OnPlumbLine
 from photogram.network.observations.on_plane import OnPlane
 from photogram.network.observations.position import Position
 from photogram.network.observations.prior import Prior
+from photogram.network.observations.range import Range
 from photogram.network.observations.rate import Rate
 from photogram.network.observations.relative import Relative
 from photogram.network.observations.smoothness import Smoothness
@@ -47,6 +48,7 @@ __all__ = [
     "OnPlumbLine",
     "Position",
     "Prior",
+    "Range",
     "Rate",
     "Relative",
     "Smoothness",

@@ -129,6 +129,7 @@ kinds! {
     on_plane::OnPlane;
     on_plumb_line::OnPlumbLine;
     on_line::OnLine;
+    range::Range;
     position::Position;
     attitude::Attitude;
     relative::Relative;

@@ -1,0 +1,107 @@
+"""What rows of observations are of: photos, or trajectories at times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from photogram.formats.plain.tables import Tables, indices_of
+from photogram.io.delimited import ColumnTable
+from photogram.messages import Message, counted, quoted
+from photogram.network.block import Block
+from photogram.network.observations import Attitude, Position, Range, Rate, Velocity
+from photogram.network.trajectories import Clock, Trajectory
+
+__all__ = ["Subjects", "clocked", "subject_columns"]
+
+
+@dataclass(frozen=True)
+class Subjects:
+    """What observations may be of.
+
+    Attributes
+    ----------
+    photos, times
+        Photos by their names, and the times of each in seconds; NaN without.
+    trajectories
+        By their names.
+    """
+
+    photos: Mapping[str, int]
+    times: Sequence[float]
+    trajectories: Mapping[str, Trajectory]
+
+    def of(self, tables: Tables, table: ColumnTable) -> list[dict[str, Any] | None]:
+        """Return what each row is of, as arguments of its observation; None of those that are left out.
+
+        These are at times that their trajectory does not reach; a remark has their number.
+
+        Raises
+        ------
+        InputError
+            Names that are not there, both or none of a photo and a trajectory, a trajectory without a time.
+        """
+        if "trajectory" not in table:
+            names, rows = list(self.photos), indices_of(table, "photo", self.photos, "photo").tolist()
+            return [{"photo": names[row]} for row in rows]
+        times = table.numbers("time")
+        spans = {name: each.reach for name, each in self.trajectories.items()}
+        found: list[dict[str, Any] | None] = []
+        words = table.texts("photo"), table.texts("trajectory")
+        for row, (photo, name, time) in enumerate(zip(*words, times.tolist(), strict=True)):
+            if bool(photo) == bool(name):
+                raise table.error(row, "columns photo, trajectory: one of both says what the row is of")
+            for word, what, known in ((photo, "photo", self.photos), (name, "trajectory", self.trajectories)):
+                if word and word not in known:
+                    raise table.error(row, f"column {what}: there is no {what} {quoted(word)}")
+            if photo:
+                found.append({"photo": photo})
+                continue
+            if math.isnan(time):
+                raise table.error(row, "column time: is empty, and the row is of a trajectory")
+            first, last = spans[name]
+            inside = first <= time <= last
+            own = {"photo": None, "trajectory": self.trajectories[name], "time": time}
+            found.append(own if inside else None)
+        if out := sum(each is None for each in found):
+            text = f"{counted(out, 'record')} at times that their trajectory does not reach are left out"
+            tables.messages.append(Message(text, table.path))
+        return found
+
+
+def clocked(table: ColumnTable, row: int, of: Mapping[str, Any], clock: Clock | None) -> dict[str, Any]:
+    """Return what an observation is of, with its clock.
+
+    Raises
+    ------
+    InputError
+        A clock of what is of a photo.
+    """
+    if clock is None:
+        return dict(of)
+    if "trajectory" not in of:
+        raise table.error(row, "it has a clock, which dates records of trajectories, and is of a photo")
+    return {**of, "clock": clock}
+
+
+def subject_columns(
+    observations: Sequence[Position | Velocity | Attitude | Rate | Range], block: Block
+) -> dict[str, Any]:
+    """Return the columns that say what observations are of."""
+    moments = [each.moment for each in observations]
+    if not any(moments):
+        # Where photos have times of their own, those of drifts are said beside.
+        times = [each.time for each in observations] if block.timed else []
+        dated = any(isinstance(each, Position) for each in observations)
+        return {
+            "photo": [each.photo for each in observations],
+            **({"time": times} if times and dated else {}),
+        }
+    photos = [each.photo for each in observations]
+    return {
+        **({"photo": photos} if any(photos) else {}),
+        "trajectory": [None if each is None else each.trajectory.name for each in moments],
+        "time": [each.time for each in observations],
+    }
