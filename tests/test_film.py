@@ -12,7 +12,7 @@ import pytest
 
 from photogram import Camera, InputError, Result, adjust, diagnose, first_values, read_result, simulate
 from photogram.film import interior_orientation, which_mark
-from photogram.formats import read, to_files
+from photogram.formats import read
 from photogram.formats.project import Project
 from photogram.network.films import Film, FilmPlacement, FilmSize, Readings, Scan, Scanner
 from shared_data import SHARED
@@ -274,8 +274,6 @@ def test_cameras_that_films_cannot_have_are_refused(tmp_path: Path) -> None:
             block.replace(cameras=[camera])
     with pytest.raises(InputError, match=r"scanned twice"):
         block.replace(passages=[*block.passages, block.passages[0]])
-    with pytest.raises(InputError, match=r"readings of a scanned film, which are not written"):
-        to_files(project(tmp_path), "plain")
 
 
 def test_a_bilinear_film_and_a_grid_are_adjusted(tmp_path: Path) -> None:

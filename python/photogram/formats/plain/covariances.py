@@ -188,8 +188,16 @@ def read_covariances(tables: Tables) -> Covariances:
     return Covariances(tables, table, matrices)
 
 
-def covariance_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs) -> dict[str, dict[str, Any]]:
-    """Return the table of what was determined together of cameras and of unknowns."""
+def covariance_tables(
+    block: Block,
+    cameras: Sequence[Camera],
+    rigs: Rigs,
+    more: Iterable[tuple[str, str, Sequence[str], Floats]],
+) -> dict[str, dict[str, Any]]:
+    """Return the table of what was determined together of cameras, of unknowns, and of `more`.
+
+    That is by kind, name, components and covariance matrix.
+    """
     rows: list[tuple[str, str, str, str, float]] = []
     for each in cameras:
         if each.covariance is not None:
@@ -202,6 +210,8 @@ def covariance_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs) -> di
         units = np.array(list(_units(unknown, DEGREE).values()))
         matrix = prior.precision * units * units[:, np.newaxis]
         rows += _pairs(unknown.KIND, _name(unknown, rigs), unknown.components, matrix)
+    for kind, name, components, matrix in more:
+        rows += _pairs(kind, name, components, matrix)
     if not rows:
         return {}
     columns = ("kind", "name", "first", "second", "covariance")

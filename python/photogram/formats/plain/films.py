@@ -22,6 +22,7 @@ from photogram.film.interior import (
 from photogram.film.which import which_mark
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.covariances import Covariances
+from photogram.formats.plain.films_written import INSIDE
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine, read_films, read_scanners
 from photogram.formats.plain.shared import made
@@ -43,11 +44,26 @@ _START = ("start_t1", "start_t2", "start_theta")
 
 @dataclass(frozen=True)
 class Scanned:
-    """Photos whose images are readings: which they are, what images pass, and what was observed."""
+    """Photos whose images are readings: which they are, what images pass, and what was observed.
+
+    Attributes
+    ----------
+    photos
+        (P,) which they are.
+    scans, observations
+        What images pass, and what was observed.
+    inside
+        The same where films are fitted before, with all that was read of them: tables are written of it.
+    """
 
     photos: Bools
     scans: list[Scan] = field(default_factory=list)
     observations: list[Observation] = field(default_factory=list)
+    inside: list[tuple[list[Scan], list[Observation]]] = field(default_factory=list)
+
+    def details(self) -> dict[str, object]:
+        """Return what writing tables needs beside the block, for the details of a project."""
+        return {INSIDE: self.inside[0]} if self.inside else {}
 
 
 @dataclass
@@ -83,7 +99,13 @@ def read_scanned(tables: Tables, photos: Photos, covariances: Covariances) -> Sc
             )
     found = Scanned(scanned)
     if scanned.any():
-        _Reader(tables, photos, covariances, films).read(found)
+        before = tables.settings.interior == "before"
+        _Reader(tables, photos, covariances, films, before=before).read(found)
+        if before:
+            inside = Scanned(scanned)
+            silent = replace(tables, messages=[])
+            _Reader(silent, photos, covariances, films, before=False).read(inside)
+            found.inside.append((inside.scans, inside.observations))
     return found
 
 
@@ -91,10 +113,16 @@ class _Reader:
     """Reads the films of photos."""
 
     def __init__(
-        self, tables: Tables, photos: Photos, covariances: Covariances, films: Sequence[str]
+        self,
+        tables: Tables,
+        photos: Photos,
+        covariances: Covariances,
+        films: Sequence[str],
+        *,
+        before: bool,
     ) -> None:
         self.tables, self.table, self.covariances = tables, photos.table, covariances
-        self.before = tables.settings.interior == "before"
+        self.before = before
         machines = read_scanners(tables, covariances)
         self.kinds = read_films(tables, list(dict.fromkeys(filter(None, films))), tables.settings.film)
         self.places, self.place_sd, self.certificates = self._certificates(photos)
@@ -215,7 +243,7 @@ class _Reader:
             found.scans.append(Scan(photo.name, film))
             if self.before:
                 continue
-            found.observations.append(self._known(photo, film))
+            found.observations.extend(self._known(photo, film))
             found.observations.extend(
                 Fiducial(photo.name, marks[photo.camera][name], film, reading, sd=sd)
                 for name, reading, sd in zip(photo.marks, photo.readings, photo.sd, strict=True)
@@ -345,8 +373,8 @@ class _Reader:
         )
         return partial(FilmPlacement, photo.name, fit.film[:3], 0.0), fit.film[3:].tolist(), fit.bend
 
-    def _known(self, photo: _Photo, film: Film) -> Observation:
-        """Return what is known of a film beforehand."""
+    def _known(self, photo: _Photo, film: Film) -> list[Observation]:
+        """Return what is known of a film beforehand; nothing of one that is free."""
         kind = self.kinds[photo.film]
         roll = None if film.roll is not None else kind.roll
         names = [
@@ -359,23 +387,19 @@ class _Reader:
         covariance = self.covariances.over("film", photo.name, FILM)
         if covariance is not None:
             full = [*film.placement.position.tolist(), *(values[name] for name in FILM[3:])]
-            return KnownFilm(photo.name, film.placement, film.size, roll, FILM, full, covariance=covariance)
-        return KnownFilm(
-            photo.name,
-            film.placement,
-            film.size,
-            roll,
-            names,
-            [values[n] for n in names],
-            sd=[sd[n] for n in names],
-        )
+            own = photo.name, film.placement, film.size, roll
+            return [KnownFilm(*own, FILM, full, covariance=covariance)]
+        if not names:
+            return []
+        own = photo.name, film.placement, film.size, roll
+        return [KnownFilm(*own, names, [values[n] for n in names], sd=[sd[n] for n in names])]
 
     def _known_marks(self, marks: Mapping[str, Mapping[str, Mark]]) -> list[Observation]:
         """Return certificates: a covariance of all marks of a camera, or each mark by itself."""
         found: list[Observation] = []
         read = {(photo.camera, name) for photo in self.photos for name in photo.marks}
         for camera, own in marks.items():
-            words = [f"{name}.{axis}".lower() for name in own for axis in "xy"]
+            words = [f"{name}.{axis}".lower().replace("_", " ") for name in own for axis in "xy"]
             covariance = self.covariances.over("fiducials", camera, words)
             if covariance is not None:
                 found.append(KnownTogether("certificate", list(own.values()), covariance=covariance))

@@ -142,7 +142,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         linear_unit=settings.length,
         spheroid=spheroid,
         photo_to_ground=settings.attitude == "omega_phi_kappa" and settings.rotation == "photo_to_object",
-        details={"settings": settings, ASSUMED: assumed},
+        details={"settings": settings, ASSUMED: assumed, **scanned.details()},
     ).replace(
         sd_taken=True,
         boards=boards,

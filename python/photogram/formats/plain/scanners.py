@@ -18,7 +18,7 @@ from photogram.network.films import PATTERNS, Pattern, Readings, Roll, Scanner, 
 from photogram.network.observations import KnownTogether, Observation
 from photogram.network.unknowns import Unknown
 
-__all__ = ["BENDS", "CURVES", "DEVICE", "FilmKind", "Machine", "read_films", "read_scanners"]
+__all__ = ["BENDS", "CURVES", "DEVICE", "GRID", "FilmKind", "Machine", "read_films", "read_scanners"]
 
 DEVICE = ("sx", "sy", "alpha_rad")
 """Columns of scales and obliqueness of a scanner."""
@@ -28,7 +28,8 @@ BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}
 """What is not affine in films, by their model."""
 _BEND_SD = {"bilinear": 5e-7, "projective": 2e-7}
 _WEIGHTS = tuple(f"w{k}" for k in range(1, 11))
-_GRID = ("grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows")
+GRID = ("grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows")
+"""Numbers of a pattern of shifts of nodes."""
 MODELS = ("affine", "conformal", "bilinear", "projective")
 
 
@@ -181,7 +182,7 @@ def _pattern(table: ColumnTable, row: int, film: str) -> Pattern | None:
         raise table.error(row, f"column pattern: there is no {quoted(kind)}{nearest(kind, PATTERNS)}")
     if kind == "none":
         return None
-    columns = _GRID if kind == "grid" else ("half_format_mm",)
+    columns = GRID if kind == "grid" else ("half_format_mm",)
     values = table.vectors(columns)[row]
     missing = [name for name, value in zip(columns, values, strict=True) if math.isnan(value)]
     if missing:
