@@ -100,8 +100,12 @@ class Covariances:
         own = self.matrices.get((kind, name), _Matrix())
         return {word for pair in own.values for word in pair}
 
-    def over(self, kind: str, name: str, components: Sequence[str]) -> Floats | None:
+    def over(
+        self, kind: str, name: str, components: Sequence[str], *, singular: bool = False
+    ) -> Floats | None:
         """Return the matrix of components of films, scanners or marks; None where it is not there.
+
+        It may be singular where it is said so.
 
         Raises
         ------
@@ -120,7 +124,7 @@ class Covariances:
         if missing := [word for word in components if (word, word) not in own.values]:
             raise self.table.error(own.rows[0], f"{kind} {name}: the covariance of {missing[0]} is missing")
         found = own.over(components, dict.fromkeys(components, 1.0))
-        if not is_covariance(found):
+        if not is_covariance(found, singular=singular):
             raise self.table.error(own.rows[0], f"the covariances of {kind} {name} are no covariance matrix")
         return found
 

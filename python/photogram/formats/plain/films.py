@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from photogram.film.interior import (
 )
 from photogram.film.which import which_mark
 from photogram.formats.plain.cameras import Cameras
+from photogram.formats.plain.certificates import certificate_marks, definite
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.films_written import INSIDE
 from photogram.formats.plain.photos import Photos
@@ -32,6 +34,9 @@ from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera
 from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Mark, Readings, Scan, Scanner
 from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
+
+if TYPE_CHECKING:
+    from photogram.film import Certificate
 
 __all__ = ["Scanned", "on_film", "read_scanned"]
 
@@ -80,8 +85,12 @@ class _Photo:
     sd: list[Floats] = field(default_factory=list)
 
 
-def read_scanned(tables: Tables, photos: Photos, covariances: Covariances) -> Scanned:
+def read_scanned(
+    tables: Tables, photos: Photos, covariances: Covariances, certificates: Mapping[str, Certificate]
+) -> Scanned:
     """Read which photos are scanned films or plates, and all that belongs to these.
+
+    Certificates are by the names of cameras.
 
     Raises
     ------
@@ -100,11 +109,11 @@ def read_scanned(tables: Tables, photos: Photos, covariances: Covariances) -> Sc
     found = Scanned(scanned)
     if scanned.any():
         before = tables.settings.interior == "before"
-        _Reader(tables, photos, covariances, films, before=before).read(found)
+        _Reader(tables, photos, covariances, films, certificates, before=before).read(found)
         if before:
             inside = Scanned(scanned)
             silent = replace(tables, messages=[])
-            _Reader(silent, photos, covariances, films, before=False).read(inside)
+            _Reader(silent, photos, covariances, films, certificates, before=False).read(inside)
             found.inside.append((inside.scans, inside.observations))
     return found
 
@@ -118,6 +127,7 @@ class _Reader:
         photos: Photos,
         covariances: Covariances,
         films: Sequence[str],
+        certificates: Mapping[str, Certificate],
         *,
         before: bool,
     ) -> None:
@@ -125,7 +135,8 @@ class _Reader:
         self.before = before
         machines = read_scanners(tables, covariances)
         self.kinds = read_films(tables, list(dict.fromkeys(filter(None, films))), tables.settings.film)
-        self.places, self.place_sd, self.certificates = self._certificates(photos)
+        self.places, self.place_sd = self._certificates(photos)
+        self.place_covariances = self._of_certificates(certificates)
         names = self.table.texts("scanner")
         self.photos = [
             _Photo(name, row, camera, film, self._machine(row, names[row], machines))
@@ -152,15 +163,30 @@ class _Reader:
         own: dict[int, Machine] = self.__dict__.setdefault("_held_machines", {})
         return own
 
+    def _of_certificates(self, certificates: Mapping[str, Certificate]) -> dict[str, Floats]:
+        """Take marks of certificates; return the covariances of those that have such."""
+        found: dict[str, Floats] = {}
+        for camera, own in certificates.items():
+            if camera in self.places:
+                raise InputError(
+                    f"the camera {camera} has marks here, and others in its certificate",
+                    file=self.tables.settings.tables["fiducials"],
+                )
+            places, sd, covariance = certificate_marks(self.tables, camera, own)
+            self.places[camera], self.place_sd[camera] = places, sd
+            if covariance is not None:
+                found[camera] = covariance
+        return found
+
     def _certificates(
         self, photos: Photos
-    ) -> tuple[dict[str, dict[str, Floats]], dict[str, dict[str, Floats]], ColumnTable | None]:
+    ) -> tuple[dict[str, dict[str, Floats]], dict[str, dict[str, Floats]]]:
         """Return places and standard deviations of marks by camera."""
         table = self.tables.read("fiducials")
         places: dict[str, dict[str, Floats]] = {}
         deviations: dict[str, dict[str, Floats]] = {}
         if table is None:
-            return places, deviations, None
+            return places, deviations
         xy = table.vectors(("x", "y"))
         table.check_given(xy, ("x", "y"))
         sd = self.tables.deviations(table, "fiducials", ("sd_x", "sd_y"), SD_MARK)
@@ -174,7 +200,7 @@ class _Reader:
                 raise table.error(row, f"the camera {camera} has the fiducial {name} twice")
             places[camera][name] = xy[row]
             deviations.setdefault(camera, {})[name] = sd[row]
-        return places, deviations, table
+        return places, deviations
 
     def _read_marks(self, photos: Photos) -> None:
         """Read the readings of marks."""
@@ -400,7 +426,11 @@ class _Reader:
         read = {(photo.camera, name) for photo in self.photos for name in photo.marks}
         for camera, own in marks.items():
             words = [f"{name}.{axis}".lower().replace("_", " ") for name in own for axis in "xy"]
-            covariance = self.covariances.over("fiducials", camera, words)
+            covariance = self.place_covariances.get(camera)
+            if (given := self.covariances.over("fiducials", camera, words, singular=True)) is not None:
+                file = self.tables.settings.tables["covariances"]
+                xy = np.array([mark.position[:2] for mark in own.values()])
+                covariance = definite(self.tables, camera, xy, given, file)
             if covariance is not None:
                 found.append(KnownTogether("certificate", list(own.values()), covariance=covariance))
                 continue

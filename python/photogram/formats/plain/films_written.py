@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -14,6 +14,7 @@ from photogram.formats.plain.scanners import BENDS, CURVES, GRID, Machine
 from photogram.formats.project import Project
 from photogram.network.films import Film, Mark, Scan
 from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
+from photogram.network.unknowns import Unknown
 
 __all__ = ["INSIDE", "WrittenFilms"]
 
@@ -131,7 +132,7 @@ class WrittenFilms:
                 found.append(("film", photo, FILM, each.precision))
         for own in self.machines.values():
             if own.known is not None:
-                words = ("Sx", "Sy", "alpha", *CURVES)[: len(own.known.precision)]
+                words = [word for each in own.known.joined for word in _words(own, each)]
                 found.append(("scanner", own.scanner.name, words, own.known.precision))
         for camera, marks in self.certificates.items():
             if marks.covariance is not None:
@@ -199,9 +200,12 @@ class WrittenFilms:
     def _machines(self) -> dict[str, Machine]:
         """Return the scanners by their names."""
         found: dict[str, Machine] = {}
-        known = {id(each.joined[0]): each for each in self.together}
+        known = {id(one): each for each in self.together for one in each.joined}
         for film in self.films.values():
-            own = Machine(film.scanner, tuple(film.curves), film.readings, known.get(id(film.scanner)))
+            own = Machine(film.scanner, tuple(film.curves), film.readings, None)
+            of = [known[id(each)] for each in (own.scanner, *own.curves) if id(each) in known]
+            if of:
+                own = replace(own, known=of[0])
             first = found.setdefault(film.scanner.name, own)
             same = first.scanner is own.scanner and first.readings == own.readings
             if not same or [*map(id, first.curves)] != [*map(id, own.curves)]:
@@ -212,8 +216,7 @@ class WrittenFilms:
         machines = self.machines.values()
         names = ("Sx", "Sy", "alpha_rad", *CURVES)[: 21 if any(each.curves for each in machines) else 3]
         values = np.array([_joined(each, "position") for each in machines])[:, : len(names)]
-        # What has a covariance is open by itself: its cells would say that nothing is known of it.
-        sd = np.array([_joined(each, "deviations") * (each.known is None or np.nan) for each in machines])
+        sd = np.array([_own_deviations(each) for each in machines])[:, : len(names)]
         readings = [each.readings for each in machines]
         return {
             "scanner": list(self.machines),
@@ -224,7 +227,7 @@ class WrittenFilms:
             "hx": [each.half_range[0] for each in readings],
             "hy": [each.half_range[1] for each in readings],
             **dict(zip(names, values.T, strict=True)),
-            **{f"sd_{name}": column for name, column in zip(names, sd.T, strict=False)},
+            **{f"sd_{name}": column for name, column in zip(names, sd.T, strict=True)},
         }
 
     def _certificates(self) -> dict[str, _Marks]:
@@ -288,6 +291,22 @@ def _joined(machine: Machine, what: str) -> Floats:
     """Return (21,) numbers of a scanner and its curves; 0 where it has none."""
     own = [getattr(each, what)[:3] for each in (machine.scanner, *machine.curves)]
     return np.concatenate([*own, np.zeros(3 + len(CURVES) - 3 * len(own))])
+
+
+def _words(machine: Machine, unknown: Unknown) -> Sequence[str]:
+    """Return what the table of covariances calls the components of a scanner, or of one of its curves."""
+    at = [*map(id, machine.curves)].index(id(unknown)) if unknown in machine.curves else -1
+    return ("Sx", "Sy", "alpha") if at < 0 else CURVES[3 * at : 3 * at + 3]
+
+
+def _own_deviations(machine: Machine) -> Floats:
+    """Return (21,) deviations; NaN of what has a covariance: cells would say that nothing is known of it."""
+    found = _joined(machine, "deviations")
+    joined = set() if machine.known is None else {*map(id, machine.known.joined)}
+    for k, each in enumerate((machine.scanner, *machine.curves)):
+        if id(each) in joined:
+            found[3 * k : 3 * k + 3] = np.nan
+    return found
 
 
 def _pattern_cells(film: Film) -> dict[str, Any]:

@@ -93,7 +93,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     photos = placed(photos, timed, spheroid)
     images = read_images(tables, photos)
     points = _points(tables, transform, images, given)
-    scanned = read_scanned(tables, photos, read_covariances(tables))
+    scanned = read_scanned(tables, photos, read_covariances(tables), cameras.certificates)
     cameras = on_film(cameras, photos, scanned, tables.messages)
     cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
     xy, sd = image_coordinates(settings, images, cameras, np.asarray(photo_cameras), scanned.photos)
