@@ -13,7 +13,7 @@ from photogram import _photocore
 from photogram.arguments.arrays import frozen, numbers, one_of, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Readings, Scanner
+from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Readings, Scanner, ScannerCurve
 
 __all__ = ["Affine", "FilmModel", "Interior", "conformal", "interior_orientation", "is_mirrored"]
 
@@ -156,6 +156,7 @@ def interior_orientation(
     sd: ArrayLike = 1.0,
     counted: Readings | None = None,
     scanner: Scanner | None = None,
+    curves: Sequence[ScannerCurve] = (),
     mirrored: bool | None = None,
 ) -> Interior:
     """Fit the film of a photo to its fiducial marks, whose places are taken as they are.
@@ -178,6 +179,8 @@ def interior_orientation(
         What readings count; None: mm, y up.
     scanner
         Scales and obliqueness of the scanner; None: it is true.
+    curves
+        The coefficients of its polynomials, six of three, x first; or none.
     mirrored
         Whether the film was seen from the other side; None: three marks at least tell.
 
@@ -199,9 +202,9 @@ def interior_orientation(
             f"the {model} film has {len(names)} unknowns, and {len(q)} marks have {2 * len(q)} coordinates"
         )
     own, machine = counted or Readings(), scanner or Scanner("scanner", sd=0.0)
-    true = true_places(xy, own, machine)
+    true = true_places(xy, own, machine, curves)
     side = _side(q, true, mirrored)
-    fit = _Fit(q, xy, weights, names, own, machine, mirrored=side, projective=model == "projective")
+    fit = _Fit(q, xy, weights, names, own, machine, curves, mirrored=side, projective=model == "projective")
     values = np.zeros(8)
     values[:4] = conformal(q, true, mirrored=side)
     return fit.adjusted(model, values)
@@ -215,9 +218,11 @@ def pairs(name: str, value: ArrayLike) -> Floats:
     return found
 
 
-def true_places(readings: Floats, counted: Readings, scanner: Scanner) -> Floats:
+def true_places(
+    readings: Floats, counted: Readings, scanner: Scanner, curves: Sequence[ScannerCurve] = ()
+) -> Floats:
     """Return (n, 2) the true places of readings on a scanner, mm, y up."""
-    flat = Film(FilmPlacement("p", 0.0), FilmSize("p", 0.0), scanner, counted)
+    flat = Film(FilmPlacement("p", 0.0), FilmSize("p", 0.0), scanner, counted, curves=curves)
     return _photocore.film_places(flat.numbers(), _vectors(flat), readings)
 
 
@@ -241,6 +246,17 @@ def mirror_message(given: bool) -> str:
     return "the film is mirrored: scanned from the other side, or a negative; say mirrored = true"
 
 
+def side_residuals(places: Floats, true: Floats) -> tuple[float, float]:
+    """Return root mean squares (mm) of a conformal fit to marks as they are, and mirrored."""
+    found = []
+    for mirrored in (False, True):
+        t1, t2, theta, m = conformal(places, true, mirrored=mirrored)
+        q = places @ np.array([-1.0 if mirrored else 1.0, 1j])
+        left = true @ np.array([1.0, 1j]) - (t1 + 1j * t2 + (1.0 + m) * np.exp(1j * theta) * q)
+        found.append(float(np.sqrt(np.mean(np.abs(left) ** 2))))
+    return found[0], found[1]
+
+
 @dataclass(frozen=True, eq=False)
 class _Fit:
     """The observation equations of readings of marks that are known."""
@@ -251,6 +267,7 @@ class _Fit:
     names: Sequence[str]
     counted: Readings
     scanner: Scanner
+    curves: Sequence[ScannerCurve]
     mirrored: bool
     projective: bool
 
@@ -262,6 +279,7 @@ class _Fit:
             self.counted,
             bend=FilmBend("p", values[6:]) if len(self.names) > 6 else None,
             projective=self.projective,
+            curves=self.curves,
             mirrored=self.mirrored,
         )
 

@@ -252,7 +252,8 @@ class _Reader:
         self.tables.messages.append(Message(f"photo {photo.name}: its film lies {found}", table.path))
 
     def _true(self, photo: _Photo) -> Floats:
-        return true_places(np.array(photo.readings), photo.machine.readings, photo.machine.scanner)
+        own = photo.machine
+        return true_places(np.array(photo.readings), own.readings, own.scanner, own.curves)
 
     def read(self, found: Scanned) -> None:
         """Put the scans and observations of all photos in their place."""
@@ -394,6 +395,7 @@ class _Reader:
                 sd=np.array(photo.sd),
                 counted=photo.machine.readings,
                 scanner=photo.machine.scanner,
+                curves=photo.machine.curves,
                 mirrored=mirrored,
             ),
         )

@@ -132,8 +132,8 @@ class WrittenFilms:
                 found.append(("film", photo, FILM, each.precision))
         for own in self.machines.values():
             if own.known is not None:
-                words = [word for each in own.known.joined for word in _words(own, each)]
-                found.append(("scanner", own.scanner.name, words, own.known.precision))
+                parts = [word for each in own.known.joined for word in _words(own, each)]
+                found.append(("scanner", own.scanner.name, parts, own.known.precision))
         for camera, marks in self.certificates.items():
             if marks.covariance is not None:
                 words = tuple(f"{name}.{axis}" for name in marks.marks for axis in "xy")

@@ -17,7 +17,7 @@ from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable
 from photogram.messages import Message, nearest, quoted
 from photogram.network.films import PATTERNS, Pattern, Readings, Roll, Scanner, ScannerCurve, Weights
-from photogram.network.observations import KnownTogether, Observation
+from photogram.network.observations import KnownTogether
 from photogram.network.unknowns import Unknown
 
 __all__ = ["BENDS", "CURVES", "DEVICE", "GRID", "FilmKind", "Machine", "read_films", "read_scanners"]
@@ -46,7 +46,7 @@ class Machine:
     scanner: Scanner
     curves: tuple[ScannerCurve, ...]
     readings: Readings
-    known: Observation | None
+    known: KnownTogether | None
 
     def held(self) -> Machine:
         """Return it as errorless."""
@@ -158,7 +158,7 @@ def _calibrated(table: ColumnTable, row: int, file: str, messages: list[Message]
         messages.append(
             Message("its covariance is singular: what it has as known is given a deviation of 1e-6 mm", path)
         )
-    zero = np.linalg.solve(own.matrix, frame.centre_um) * UM
+    zero: Floats = np.linalg.solve(own.matrix, frame.centre_um) * UM
     return _Numbers(
         values, np.where(known, np.inf, 0.0), np.array(frame.half_range_um) * UM, zero, covariance
     )

@@ -163,8 +163,8 @@ TABLES: Mapping[str, Schema] = {
         " known), `scan` (a name that photos share; default: the photo's);"
         " of [film](film.md) `film` (its images are readings), `scanner` (if there are several), `mirrored`"
         " (default: as the marks tell), `certificate` (a file of a"
-        " [certificate](certificates.md): camera and marks), `start_t1`, `start_t2` (mm), `start_theta` (rad; default: as marks"
-        " have them)",
+        " [certificate](certificates.md): camera and marks), `start_t1`, `start_t2` (mm), `start_theta`"
+        " (rad; default: as marks have them)",
         deviations=(1, 3),
         has_system=True,
     ),
