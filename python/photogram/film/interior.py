@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import frozen, numbers, one_of, shaped
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.errors import ContradictionError, InputError
 from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Readings, Scanner, ScannerCurve
 
 __all__ = ["Affine", "FilmModel", "Interior", "conformal", "interior_orientation", "is_mirrored"]
@@ -235,15 +235,20 @@ def _side(q: Floats, true: Floats, given: bool | None) -> bool:
     if given is None and found is None:
         raise InputError("the marks do not tell whether the film is mirrored: say mirrored")
     if given is not None and found is not None and found != given:
-        raise InputError(mirror_message(given))
+        raise ContradictionError(mirror_message(given, side_residuals(q, true)))
     return bool(found if given is None else given)
 
 
-def mirror_message(given: bool) -> str:
-    """Return what is said of marks that tell another side than what is given."""
+def mirror_message(given: bool, apart: tuple[float, float]) -> str:
+    """Return what is said of marks that tell another side than what is given.
+
+    `apart`: root mean squares (mm) of their residuals as they are, and mirrored.
+    """
+    side, other = apart[given], apart[not given]
+    fits = f"its marks are {side:.3g} mm off as is given, and {other:.3g} mm on the other side"
     if given:
-        return "the film is not mirrored, as is given: say mirrored = false"
-    return "the film is mirrored: scanned from the other side, or a negative; say mirrored = true"
+        return f"the film is not mirrored: {fits}; say mirrored = false"
+    return f"the film is mirrored: {fits}: scanned from the other side, or a negative; say mirrored = true"
 
 
 def side_residuals(places: Floats, true: Floats) -> tuple[float, float]:

@@ -106,10 +106,8 @@ def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera
             f"the camera {name} has the model {chosen}: a certificate is of {', '.join(_MODELS)}",
             file=own.file,
         )
-    if tables.settings.image == "px":
-        raise InputError(
-            f"the camera {name} has a certificate, mm, and [units] image is px: mm, or um", file=own.file
-        )
+    if tables.settings.image != "mm":
+        raise InputError(f"the camera {name} has a certificate: [units] image must be mm", file=own.file)
     return own.camera(chosen).replace(name=name)  # type: ignore[arg-type]
 
 

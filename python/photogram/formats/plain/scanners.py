@@ -158,7 +158,7 @@ def _calibrated(table: ColumnTable, row: int, file: str, messages: list[Message]
         messages.append(
             Message("its covariance is singular: what it has as known is given a deviation of 1e-6 mm", path)
         )
-    zero: Floats = np.linalg.solve(own.matrix, frame.centre_um) * UM
+    zero = np.asarray(np.linalg.solve(own.matrix, frame.centre_um), dtype=float) * UM
     return _Numbers(
         values, np.where(known, np.inf, 0.0), np.array(frame.half_range_um) * UM, zero, covariance
     )
