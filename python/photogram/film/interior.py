@@ -26,6 +26,8 @@ UNKNOWNS: dict[str, tuple[str, ...]] = {
     "projective": ("t1", "t2", "theta", "m", "b1", "b2", "g1", "g2"),
 }
 """Unknowns of each model."""
+FAR = 5.0
+"""Millimetres: marks that are as far off on either side are no such marks."""
 _STEPS = 20
 _ENDED = 1e-12
 """Steps of the adjustment at the most, and one so small, in parts of the format, is the last."""
@@ -246,6 +248,8 @@ def mirror_message(given: bool, apart: tuple[float, float]) -> str:
     """
     side, other = apart[given], apart[not given]
     fits = f"its marks are {side:.3g} mm off as is given, and {other:.3g} mm on the other side"
+    if other > FAR:
+        return f"{fits}: they are named wrongly, or those of another camera"
     if given:
         return f"the film is not mirrored: {fits}; say mirrored = false"
     return f"the film is mirrored: {fits}: scanned from the other side, or a negative; say mirrored = true"
