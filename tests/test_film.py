@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from photogram import InputError, Result, adjust
+from photogram import Camera, InputError, Result, adjust, diagnose, first_values, read_result, simulate
 from photogram.film import interior_orientation, which_mark
-from photogram.formats import read
+from photogram.formats import read, to_files
 from photogram.formats.project import Project
-from photogram.network.films import Readings, Scan, Scanner
-from photogram.results.films import film_cofactors, film_values
+from photogram.network.films import Film, FilmPlacement, FilmSize, Readings, Scan, Scanner
 from shared_data import SHARED
 
 FOLDER = SHARED / "film"
@@ -70,7 +69,7 @@ def test_golden_sums() -> None:
 
 def test_golden_values_of_photos_and_films() -> None:
     wanted, result = golden()["full"]["photos"], adjusted()
-    values, cofactors = film_values(result), film_cofactors(result)
+    values, cofactors = result.film, result.film_cofactors
     for row, name in enumerate(result.block.photo_ids):
         own = wanted[name]
         sd = np.array(own["sd_film"])
@@ -231,3 +230,97 @@ def _readings(
     sx, sy, alpha = np.asarray(scanner.value)
     plain = np.linalg.solve([[sx, sy * np.sin(alpha)], [0.0, sy * np.cos(alpha)]], p.T).T
     return np.asarray(counted.origin) + plain / counted.pitch * [1.0, -1.0]
+
+
+@pytest.mark.parametrize("model", ["brown", "brown_forward"])
+def test_a_film_that_does_nothing_changes_nothing(model: str) -> None:
+    """Readings in mm of films as they were: the block of the same images, residuals as measured."""
+    block = simulate(strips=2, photos_per_strip=3, seed=1).block
+    c = float(block.known_distances("the test")[0])
+    radial = {"K1": 3e-8, "P1": 2e-7} if model == "brown" else {"A1": -3e-8, "B1": 2e-7}
+    camera = Camera(
+        model,
+        {"c": c, "xp": 0.02, "yp": -0.01, **radial},
+        {"c": 0.01, "xp": 0.01, "yp": 0.01, next(iter(radial)): 1e-8},
+        unit="mm",
+        weights="measured" if model == "brown" else "corrected",
+    )
+    plain = block.replace(
+        cameras=[camera], photo_cameras=[0] * len(block.photo_ids), principal_distances=None
+    )
+    scanner, counted = Scanner("none", sd=0.0), Readings()
+    scans = [
+        Scan(name, Film(FilmPlacement(name, 0.0, 0.0), FilmSize(name, 0.0, 0.0), scanner, counted))
+        for name in block.photo_ids
+    ]
+    one, other = adjust(plain), adjust(plain.replace(passages=scans))
+    assert other.sum_and_freedom == pytest.approx(one.sum_and_freedom, rel=1e-9)
+    np.testing.assert_allclose(other.point_positions, one.point_positions, atol=1e-6)
+    np.testing.assert_allclose(other.photo_cofactors, one.photo_cofactors, rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(other.residuals, one.residuals, atol=1e-8)
+
+
+def test_cameras_that_films_cannot_have_are_refused(tmp_path: Path) -> None:
+    block = project(tmp_path).block
+    for change, message in (
+        ({"unit": "px"}, r"its camera is in mm"),
+        (
+            {"model": "brown", "parameters": {"c": -152.4}, "sd": 0.0, "covariance": None},
+            r"weights corrected",
+        ),
+    ):
+        camera = block.cameras[0].replace(**change)
+        with pytest.raises(InputError, match=message):
+            block.replace(cameras=[camera])
+    with pytest.raises(InputError, match=r"scanned twice"):
+        block.replace(passages=[*block.passages, block.passages[0]])
+    with pytest.raises(InputError, match=r"readings of a scanned film, which are not written"):
+        to_files(project(tmp_path), "plain")
+
+
+def test_a_bilinear_film_and_a_grid_are_adjusted(tmp_path: Path) -> None:
+    """More unknowns that are known beforehand: as many more rows, and a smaller sum."""
+    own = project(tmp_path, '[film]\nmodel = "bilinear"\n')
+    films = (tmp_path / "films.csv").read_text().splitlines()
+    bilinear = adjust(own.block)
+    assert bilinear.degrees_of_freedom == golden()["full"]["adjustment"]["dof"]
+    assert bilinear.sum_and_freedom[0] < golden()["full"]["adjustment"]["omega"]
+    head = films[0].replace("half_format_mm", "grid_x,grid_y,grid_dx,grid_dy,grid_columns,grid_rows")
+    row = films[1].replace("w1 w2", "grid").replace("113.0", "-115,-115,115,115,3,3")
+    (tmp_path / "films.csv").write_text(f"{head}\n{row}\n")
+    grid = adjust(project_again(tmp_path).block)
+    assert grid.redundancies is not None
+    assert grid.redundancies.total == pytest.approx(grid.degrees_of_freedom, abs=1e-6)
+    nodes = [each for each in grid.unknowns if each.kind == "pattern"]
+    assert len(nodes) == 9
+    assert all(np.isfinite(each.sd).all() for each in nodes)
+
+
+def project_again(folder: Path) -> Project:
+    (folder / "project.toml").write_text('[project]\nformat = 1\n\n[units]\nimage = "mm"\n')
+    return read(folder)
+
+
+def test_a_result_is_saved_and_read_and_told(tmp_path: Path) -> None:
+    result = adjusted()
+    result.to_parquet(tmp_path / "result")
+    again = read_result(tmp_path / "result")
+    np.testing.assert_array_equal(again.film, result.film)
+    np.testing.assert_array_equal(again.film_cofactors, result.film_cofactors)
+    np.testing.assert_array_equal(again.fiducial_residuals, result.fiducial_residuals)
+    assert isinstance(again.block.passages[0], Scan)
+    document = json.loads(result.to_json())
+    assert [each["photo"] for each in document["films"]] == result.block.photo_ids
+    np.testing.assert_array_equal([each["film"] for each in document["films"]], result.film)
+    assert "Film and fiducials" in result.report()
+    assert result.block.image_unit == "px"
+
+
+def test_films_leave_first_values_and_checks_to_the_images_of_cameras(tmp_path: Path) -> None:
+    """Photos without poses are started from readings that are brought back to the camera."""
+    block = project(tmp_path).block
+    unknown = block.replace(photo_positions=np.nan, photo_attitudes=np.nan)
+    started = first_values(unknown)
+    assert not started.missing
+    assert adjust(started.block).sum_and_freedom == pytest.approx(adjusted().sum_and_freedom, rel=1e-6)
+    assert not diagnose(block).grave

@@ -8,6 +8,7 @@ from seen_boards import seen
 from photogram import Camera
 from photogram.errors import InputError
 from photogram.targets import Board, Calibration
+from photogram.targets import first as first_module
 from photogram.targets.first import first_values
 
 BOARD = Board(columns=9, rows=7, spacing=0.04, shape="held")
@@ -96,6 +97,29 @@ def test_a_model_that_corners_hardly_determine_is_named():
     usual = first_values(BOARD, corners)
     assert usual.cameras[0].model == "opencv_fisheye"
     assert str(usual.remarks[0]).startswith(said)
+
+
+def test_a_model_that_is_too_stiff_is_named():
+    camera, size, _ = lens("180 degrees")
+    corners, _ = seen(BOARD, camera, size, views=15)
+    inside = np.hypot(*(corners.xy - [790, 610]).T) < 700
+    first = first_values(BOARD, corners.replace(use=inside), "opencv4")
+    assert "opencv4 fits its corners" in str(first.remarks[0])
+    assert "another lens is needed" in str(first.remarks[0])
+
+
+def test_pictures_that_the_lens_does_not_show_have_no_pose(monkeypatch):
+    """A lens that folds where a picture has its corners."""
+    camera, size, _ = lens("barrel")
+    corners, _ = seen(BOARD, camera, size)
+    folding = Camera("simple_radial", {"f": 1000, "cx": 650, "cy": 470, "k": -2.0}, np.inf)
+    monkeypatch.setattr(first_module, "first_camera", lambda *_: (folding, []))
+    first = first_values(BOARD, corners)
+    assert first.without
+    assert set(first.without.values()) == {"the lens shows fewer than 6 of its corners"}
+    gone = [name in first.without for name in corners.pictures]
+    assert np.isnan(first.poses[gone]).all()
+    assert np.isfinite(first.poses[~np.array(gone)]).all()
 
 
 def test_a_model_that_cannot_show_what_is_seen_is_refused():

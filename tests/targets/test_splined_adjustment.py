@@ -63,7 +63,7 @@ def board() -> Block:
 
 @cache
 def adjusted() -> Result:
-    return adjust(board())
+    return adjust(board(), tolerance=1e-9)
 
 
 def test_golden_cost_and_redundancy() -> None:

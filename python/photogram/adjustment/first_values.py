@@ -24,6 +24,7 @@ from photogram.network.chosen import kept_images, of_photos
 from photogram.network.directions import direction_deviations, image_directions
 from photogram.network.motion import at_rest, flown_by, timed_photos
 from photogram.network.observations import Distance
+from photogram.network.refined import as_seen, is_scanned
 from photogram.show.brief import Brief
 
 __all__ = ["FirstValues", "first_values"]
@@ -141,6 +142,10 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
     """
     if not isinstance(block, Block):
         raise InputError(f"block is not a Block but of the type {type(block).__name__}")
+    if is_scanned(block):
+        found = first_values(as_seen(block), keep_all=keep_all)
+        own = ("image_xy", "image_sd", "passages", "observations")
+        return replace(found, block=found.block.replace(**{name: getattr(block, name) for name in own}))
     if flown_by(block):
         return _beside_trajectories(block, keep_all=keep_all)
     axes = Cartesian.of(block)

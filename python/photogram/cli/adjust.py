@@ -423,12 +423,14 @@ def _files(
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.formats import FORMATS, to_files
     from photogram.formats.adjusted import adjusted, table_files
+    from photogram.network.refined import is_scanned
 
     read = "\n".join(line for title, lines in sections for line in (title, *(f"  {each}" for each in lines)))
     files = {"report.txt": f"{report}\n{read}\n".encode(), **table_files(result)}
     after = adjusted(project, result)
     own = next((name for name, each in FORMATS.items() if each.title == project.title), None)
-    plain = to_files(after, "plain") if own in (None, "plain") else _in_format(after, "plain")
+    whole = own in (None, "plain") and not is_scanned(after.block)
+    plain = to_files(after, "plain") if whole else _in_format(after, "plain")
     files |= {f"adjusted/{name}": content for name, content in plain.items()}
     if own not in (None, "plain"):
         files |= {f"adjusted-{own}/{name}": content for name, content in _in_format(after, str(own)).items()}

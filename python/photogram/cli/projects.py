@@ -279,6 +279,7 @@ def described(project: Project) -> list[Section]:
     from photogram.formats.moving import motions
     from photogram.formats.plain.writing import known_cameras
     from photogram.formats.self_check import agreement, doubts
+    from photogram.network.refined import camera_unit
 
     block = project.block
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
@@ -317,7 +318,7 @@ def described(project: Project) -> list[Section]:
     if found.images:
         conventions.append(
             f"median residual of {found.images} images with the positions of the file: {found.median:.3g}"
-            f" {block.image_unit}"
+            f" {camera_unit(block)}"
         )
     remarks = [str(each) for each in (*project.messages, *doubts(project))]
     return [

@@ -19,6 +19,7 @@ from photogram.diagnosis.weights import weight_hints
 from photogram.errors import AdjustmentError, OutOfMemoryError
 from photogram.messages import Message
 from photogram.network.block import Block
+from photogram.network.refined import as_seen
 from photogram.results.result import Result
 
 __all__ = ["diagnosed", "diagnosis_of", "errors_explained", "explained", "remarks"]
@@ -72,7 +73,7 @@ def remarks(result: Result) -> list[Message]:
 
 def _of_block(block: Block) -> list[Message]:
     """Try conventions of photos at rest, and of those on trajectories."""
-    return [*hints(block), *flown_hints(block)]
+    return [*hints(as_seen(block)), *flown_hints(block)]
 
 
 def _bad(result: Result) -> bool:

@@ -42,6 +42,7 @@ from photogram.network.chosen import kept_images, of_photos
 from photogram.network.motion import flown_by
 from photogram.network.observations import Position
 from photogram.network.rays import Rays
+from photogram.network.refined import as_seen
 from photogram.results.result import Result
 from photogram.results.snooped import Snooped
 from photogram.show.ways import Way
@@ -136,7 +137,7 @@ def check_of(network: object, threads: int | None) -> Diagnosis:
 
 @check_of.register
 def _(network: Block, threads: int | None) -> Diagnosis:
-    return Diagnosis(network.title, *check_block(network, Manner({"threads": threads})))
+    return Diagnosis(network.title, *check_block(as_seen(network), Manner({"threads": threads})))
 
 
 def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:

@@ -14,6 +14,7 @@ from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
 from photogram.network.motion import on_shared
+from photogram.network.refined import camera_images, camera_unit
 from photogram.network.timed import Timed
 from photogram.network.trajectories import Trajectory
 from photogram.network.whereabouts import given_poses
@@ -83,7 +84,7 @@ def _sample(project: Project) -> _Sample:
     photos = block.image_photos[rows]
     cameras, photo_cameras = known_cameras(block)
     by_photo = _rows_of_photos(block, photos) if block.timed else {}
-    places, axes, xy = block.photo_positions[photos], matrices[photos], block.image_xy[rows]
+    places, axes, xy = block.photo_positions[photos], matrices[photos], camera_images(block)[rows]
     for own, trajectory in zip(block.timed, block.trajectories, strict=True):
         of_photo = by_photo[own.photo]
         if len(of_photo):
@@ -146,7 +147,7 @@ def doubts(project: Project) -> list[Message]:
         )
     widths = [size[0] for size in project.sizes if size is not None]
     scale = float(np.median(project.block.camera_scales()))
-    limit = max(GROSS, PART * min(widths)) if widths and project.block.image_unit == "px" else PART * scale
+    limit = max(GROSS, PART * min(widths)) if widths and camera_unit(project.block) == "px" else PART * scale
     if found.median > limit:
         sample = _sample(project)
         helps = [name for name, change in _OTHERS.items() if change(sample).median() * BETTER < found.median]
@@ -154,7 +155,7 @@ def doubts(project: Project) -> list[Message]:
         messages.append(
             Message(
                 f"positions and images do not agree: the median residual is {found.median:.3g}"
-                f" {project.block.image_unit}{advice}"
+                f" {camera_unit(project.block)}{advice}"
             )
         )
     return messages

@@ -18,7 +18,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.network.cameras import Camera, CameraRow, camera_rows
-from photogram.network.films import check_scans
+from photogram.network.films import check_scans, reads_pixels
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import (
@@ -433,7 +433,7 @@ class Block(Valued, Brief):
         observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
         self._check_figures()
         of_photos = self.photo_cameras if self.cameras else None
-        check_scans(self.passages, self.photo_ids, self.cameras, of_photos)
+        check_scans(self.passages, self.photo_ids, self.cameras, of_photos, self.image_photos)
 
     def _check_figures(self) -> None:
         named = {
@@ -519,7 +519,9 @@ class Block(Valued, Brief):
 
     @property
     def image_unit(self) -> str:
-        """What image coordinates are measured in, `mm` or `px`."""
+        """What image coordinates are measured in, `mm` or `px`; of scanned films what readings are."""
+        if self.passages and reads_pixels(self.passages):
+            return "px"
         return str(self.cameras[0].unit) if self.cameras else "mm"
 
     @property

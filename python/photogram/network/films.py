@@ -24,6 +24,7 @@ from photogram.network.unknowns import Unknown
 __all__ = [
     "Film",
     "FilmBend",
+    "FilmNumbers",
     "FilmPlacement",
     "FilmSize",
     "Mark",
@@ -35,6 +36,7 @@ __all__ = [
     "ScannerCurve",
     "Weights",
     "check_scans",
+    "reads_pixels",
 ]
 
 PATTERNS = ("none", "w1 w2", "ebner", "grid")
@@ -42,7 +44,7 @@ PATTERNS = ("none", "w1 w2", "ebner", "grid")
 
 
 @dataclass(frozen=True, eq=False)
-class _Numbers(Unknown):
+class FilmNumbers(Unknown):
     """Up to three numbers and their standard deviations.
 
     Parameters
@@ -62,49 +64,49 @@ class _Numbers(Unknown):
 
 
 @dataclass(frozen=True, eq=False)
-class FilmPlacement(_Numbers):
+class FilmPlacement(FilmNumbers):
     """Where the film of a photo lay: t1, t2 in mm, theta in radians."""
 
     KIND: ClassVar[str] = "film placement"
 
 
 @dataclass(frozen=True, eq=False)
-class FilmSize(_Numbers):
+class FilmSize(FilmNumbers):
     """How the size of the film of a photo has changed: m, b1, b2."""
 
     KIND: ClassVar[str] = "film size"
 
 
 @dataclass(frozen=True, eq=False)
-class FilmBend(_Numbers):
+class FilmBend(FilmNumbers):
     """What is not affine in the film of a photo: h1, h2 or g1, g2 in 1/mm."""
 
     KIND: ClassVar[str] = "film bend"
 
 
 @dataclass(frozen=True, eq=False)
-class Roll(_Numbers):
+class Roll(FilmNumbers):
     """The mean change of size m of the films of a roll."""
 
     KIND: ClassVar[str] = "roll"
 
 
 @dataclass(frozen=True, eq=False)
-class Mark(_Numbers):
+class Mark(FilmNumbers):
     """The place of a fiducial mark in the frame of its camera, mm."""
 
     KIND: ClassVar[str] = "fiducial"
 
 
 @dataclass(frozen=True, eq=False)
-class Weights(_Numbers):
+class Weights(FilmNumbers):
     """Two weights of a pattern, mm."""
 
     KIND: ClassVar[str] = "pattern"
 
 
 @dataclass(frozen=True, eq=False)
-class Scanner(_Numbers):
+class Scanner(FilmNumbers):
     """Sx, Sy and alpha (radians) of a scanner or comparator."""
 
     KIND: ClassVar[str] = "scanner"
@@ -113,7 +115,7 @@ class Scanner(_Numbers):
 
 
 @dataclass(frozen=True, eq=False)
-class ScannerCurve(_Numbers):
+class ScannerCurve(FilmNumbers):
     """Three coefficients of the polynomials of a scanner, mm."""
 
     KIND: ClassVar[str] = "scanner curve"
@@ -291,18 +293,25 @@ class Scan(Passage):
         return self.film.numbers()
 
 
+def reads_pixels(passages: Sequence[Passage]) -> bool:
+    """Whether the readings of scanned films are pixels: a unit of them is no millimetre."""
+    return any(isinstance(each, Scan) and each.film.readings.pitch != 1.0 for each in passages)
+
+
 def check_scans(
     passages: Sequence[Passage],
     photos: Sequence[str],
     cameras: Sequence[Camera],
     photo_cameras: Indices | None,
+    image_photos: Indices,
 ) -> None:
     """Refuse scans of photos whose camera has no frame of marks, and two of one photo.
 
     Raises
     ------
     InputError
-        A camera in pixels, of a comparator of its own, or with residuals where readings are corrected.
+        A camera in pixels, of a comparator of its own, or with residuals where readings are corrected; images
+        in pixels of scans beside such in mm.
     """
     scans = [each for each in passages if isinstance(each, Scan)]
     rows = {name: row for row, name in enumerate(photos)} if scans else {}
@@ -326,3 +335,9 @@ def check_scans(
                 f"the photo {each.photo} is a scanned film: residuals are those of readings, and its camera"
                 " has weights corrected: measured is needed"
             )
+    read = {rows[each.photo] for each in scans if each.film.readings.pitch != 1.0}
+    if read and (others := set(np.unique(image_photos).tolist()) - read):
+        raise InputError(
+            f"the photo {photos[min(read)]} is read in pixels, and {photos[min(others)]} is not: images of a"
+            " block have one unit"
+        )

@@ -16,6 +16,7 @@ from photogram.network.chosen import kept_images, of_photos
 from photogram.network.flown import timed_images
 from photogram.network.given import Given
 from photogram.network.observations import Smoothness, moments
+from photogram.network.refined import camera_images
 
 __all__ = [
     "at_rest",
@@ -83,11 +84,14 @@ def _named(block: Block, names: set[str]) -> Bools:
 
 
 def focal_images(network: Given) -> Floats:
-    """(m, 2) image coordinates in the focal plane, where residuals are: of scanners those of samples."""
-    found = network.image_xy
+    """(m, 2) image coordinates in the focal plane, where residuals are: of scanners those of samples.
+
+    Of scanned films those of the camera, in whose frame films and marks are given.
+    """
     if not isinstance(network, Block):
-        return found
+        return network.image_xy
     block = network
+    found = camera_images(block)
     for each, _, _, own in timed_images(block):
         if each.lines is not None:
             found = found.copy() if found is block.image_xy else found

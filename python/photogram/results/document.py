@@ -11,6 +11,7 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.results.calibration_report import calibration_members
 from photogram.results.features_report import features_document
+from photogram.results.films import film_members
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import control, images, iterations, photos, points, stations, terms_of
 from photogram.results.report import problems_of
@@ -94,6 +95,7 @@ def block_members(result: Result) -> dict[str, Any]:
             else {}
         ),
         **({"unknowns": _unknowns(result)} if result.unknowns else {}),
+        **({"films": film_members(result)} if film_members(result) else {}),
         **({} if result.features is None else {"features": features_document(result.features)}),
         "observations_beside_images": _beside_images(result),
         "check_points": records(check_points(result)),

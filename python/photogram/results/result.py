@@ -29,6 +29,7 @@ from photogram.results.datum import (
     refused,
     relative_datum,
 )
+from photogram.results.films import OnFilm
 from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.restarted import restarted_motion
@@ -89,7 +90,7 @@ class Redundancies(SumsByKind):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Result(AdjustedNetwork):
+class Result(OnFilm, AdjustedNetwork):
     """An adjusted block; the arrays that every network has are those of `AdjustedNetwork`, with k = 6.
 
     The unknowns of a photo are its position and omega, phi, kappa. Positions are X, Y, Z or longitude (rad),

@@ -15,6 +15,7 @@ from photogram.messages import Message, Undetermined
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.core import CoreOptions
+from photogram.network.films import Film, Pattern, Readings
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.motion import scanners
@@ -54,6 +55,9 @@ CHECK_SD = "standard deviation of the given {} of a check point; NaN where not k
 _CLASSES = (
     AdjustedCamera,
     AdjustedUnknown,
+    Film,
+    Pattern,
+    Readings,
     Camera,
     CoreOptions,
     Feature,

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import Message, counted, listed
 from photogram.network.cameras import Camera
 from photogram.targets.board import Board
-from photogram.targets.corners import Corners
+from photogram.targets.corners import FEWEST, Corners
 from photogram.targets.first_camera import first_camera, picture_size
 from photogram.targets.homographies import frontal_tilts
-from photogram.targets.orders import Pictures
+from photogram.targets.orders import Pictures, rays_shown
 from photogram.targets.sensors import Rig, connected, mean_pose
 from photogram.targets.sightings import LISTED, Listings, Sightings
 from photogram.targets.vision import inverted
@@ -23,6 +23,7 @@ from photogram.targets.vision import inverted
 __all__ = ["FirstCalibration", "first_values"]
 
 IN_A_PLANE = "all its points lie in one plane, but those of the board do not"
+HIDDEN = f"the lens shows fewer than {FEWEST} of its corners"
 FRONTAL = math.radians(3.0)
 """Boards tilted by less say nothing of a focal length."""
 
@@ -87,19 +88,14 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
     without = {corners.pictures[row]: IN_A_PLANE for row in np.flatnonzero(seen.in_a_plane()).tolist()}
     without |= corners.poor(board.places)
     usable = np.array([name not in without for name in corners.pictures], dtype=bool)
-    cameras, remarks = [], []
-    for k, name in enumerate(corners.camera_names):
-        own = seen.of((corners.cameras == k) & usable)
-        if not len(own.xy):
-            raise InputError(f"camera {name}: no picture has enough corners: {_reasons(corners, without, k)}")
-        size = picture_size(own, corners.sizes[k])
-        if corners.sizes[k] is None:
-            said = f"taken for {size[0]} x {size[1]} px, about whose middle the corners lie"
-            remarks.append(Message(f"camera {name}: the size of its pictures is not known: {said}"))
-        camera, told = first_camera(own, size, name, model)
-        cameras.append(camera)
-        remarks += told
-    pictures = Pictures(seen, list(corners.pictures), corners.cameras, cameras, usable)
+    cameras, remarks = _cameras(seen, corners, usable, without, model)
+    hidden = usable & (rays_shown(seen, corners.cameras, cameras) < FEWEST)
+    if (hidden == usable).all():
+        raise InputError(
+            f"model: the lens that was found, {cameras[0].model}, shows the corners of no picture"
+        )
+    without |= {corners.pictures[row]: HIDDEN for row in np.flatnonzero(hidden).tolist()}
+    pictures = Pictures(seen, list(corners.pictures), corners.cameras, cameras, usable & ~hidden)
     orders, fits, of_orders = pictures.ordered()
     made = pictures.adjusted(orders, fits)
     rig = connected(made, corners.cameras, corners.views, len(cameras), seen.listings.turns)
@@ -116,6 +112,25 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
         without=without,
         remarks=remarks,
     )
+
+
+def _cameras(
+    seen: Sightings, corners: Corners, usable: Bools, without: dict[str, str], model: str | None
+) -> tuple[list[Camera], list[Message]]:
+    """Return the first values of each camera by its usable pictures, and remarks."""
+    cameras, remarks = [], []
+    for k, name in enumerate(corners.camera_names):
+        own = seen.of((corners.cameras == k) & usable)
+        if not len(own.xy):
+            raise InputError(f"camera {name}: no picture has enough corners: {_reasons(corners, without, k)}")
+        size = picture_size(own, corners.sizes[k])
+        if corners.sizes[k] is None:
+            said = f"taken for {size[0]} x {size[1]} px, about whose middle the corners lie"
+            remarks.append(Message(f"camera {name}: the size of its pictures is not known: {said}"))
+        camera, told = first_camera(own, size, name, model)
+        cameras.append(camera)
+        remarks += told
+    return cameras, remarks
 
 
 def _reasons(corners: Corners, without: dict[str, str], camera: int) -> str:

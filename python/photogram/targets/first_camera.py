@@ -26,6 +26,8 @@ NARROW, WIDEST = math.radians(90.0), math.radians(88.0)
 """The horizontal field below which `opencv5` is usual, and how far from the axis `opencv8` may see."""
 TOLERANCE = 1e-5
 """Of a standard deviation: where steps of an adjustment end that shows what corners determine."""
+TOO_STIFF = 4.0
+"""A lens whose variance is that of its family so many times, which has fewer terms, is not of this kind."""
 NO_WORSE = 1.5
 """What a misfit may grow when one more view takes part."""
 MARGIN = 1.05
@@ -73,6 +75,10 @@ def first_camera(
     for wanted in _wanted(family, seen, size, None if splined else model):
         camera = fitted(family, wanted, size, radius=reach)
         done = _adjusted(own, trial, family, camera)
+        if done is not None and adjusted is not None and done.variance > TOO_STIFF * adjusted.variance:
+            times = math.sqrt(done.variance / adjusted.variance)
+            why = f"{wanted} fits its corners {times:.0f} times worse than a plain {family.model} lens does"
+            remarks.append(Message(f"camera {name}: {why}: another lens is needed"))
         if done is not None and done.is_whole:
             break
         why = f"its corners alone hardly determine the terms of {wanted}"

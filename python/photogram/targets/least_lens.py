@@ -17,10 +17,10 @@ from photogram.targets.imaging import TURNED, motion_partials
 
 __all__ = ["HELD", "Moved", "Points"]
 
-STEPS, CLOSE = 100, 1e-10
-"""Steps of a fit at the most, and the relative fall of the sum of squares with which it ends."""
-WEAKEST, STRONGEST = 1e-14, 1e8
-"""Damping of steps, relative to the normal equations: the least, and the one with which a fit gives up."""
+STEPS, CLOSE, NEAR = 100, 1e-10, 1e-6
+"""Steps of a fit at the most, and the relative fall of the sum of squares with which it ends; of knots."""
+WEAKEST, FIRST, STRONGEST = 1e-14, 1e-6, 1e8
+"""Damping of steps, relative to the normal equations: least, first, and the one with which a fit gives up."""
 MANY = 100
 """Unknowns beyond which equations are solved without looking for their rank."""
 HELD = slice(0, 0)
@@ -96,7 +96,10 @@ class Points:
         moving
             Which of the six steps (dt, w) of the motion are: `slice(3, 6)` rotations.
         """
-        at, damping = start, 1e-6
+        # Images are linear in knots: one step finds them.
+        at, damping, close = start, FIRST, CLOSE
+        if len(free) > MANY:
+            damping, close = WEAKEST, NEAR
         cost, rows, misses = self.linearized(at, free, moving)
         for _ in range(STEPS):
             step = _damped(rows, misses, damping)
@@ -109,7 +112,7 @@ class Points:
                 continue
             fall, at, cost, (rows, misses) = cost - found, trial, found, others
             damping = max(damping / 10, WEAKEST)
-            if fall <= CLOSE * cost:
+            if fall <= close * cost:
                 break
         return at
 
@@ -143,5 +146,5 @@ def _damped(rows: Floats, misses: Floats, damping: float) -> Floats:
     right = scaled.T @ misses
     # Knots are many; damping keeps apart what the images of those at the edge do not.
     many = len(normal) > MANY
-    found: Floats = np.linalg.solve(normal, right) if many else np.linalg.lstsq(normal, right, rcond=None)[0]
-    return found / scale
+    found = np.linalg.solve(normal, right) if many else np.linalg.lstsq(normal, right, rcond=None)[0]
+    return np.asarray(found / scale)

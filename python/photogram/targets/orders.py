@@ -14,12 +14,27 @@ from photogram.targets.homographies import angles_apart, centres, poses, ray_hom
 from photogram.targets.sightings import LISTED, Sightings
 from photogram.targets.small_block import adjusted_views
 
-__all__ = ["Pictures"]
+__all__ = ["Pictures", "rays_shown"]
 
 ROUNDING = 1e-6
 """Radians: pictures that fit to this fit."""
 CLEAR = 1.5
 """What the misfit of an order may be over that of the best, to be taken for as good."""
+
+
+def rays_shown(seen: Sightings, of_cameras: Indices, cameras: list[Camera]) -> Indices:
+    """Return (P,) how many corners of each picture have rays in its camera, which is one of `cameras`."""
+    there = np.isfinite(_rays(seen, of_cameras, cameras)).all(axis=2)
+    return np.asarray(np.count_nonzero(there, axis=1))
+
+
+def _rays(seen: Sightings, of_cameras: Indices, cameras: list[Camera]) -> Floats:
+    """Return (P, n, 3) rays of pictures, those of each by its camera."""
+    found = np.full((*seen.xy.shape[:2], 3), np.nan)
+    for k, camera in enumerate(cameras):
+        own = of_cameras == k
+        found[own] = rays_of(camera, seen.xy[own])
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +66,8 @@ class Pictures:
         rows = np.flatnonzero(self.usable)
         seen = self.seen.of(rows).listed(orders[rows])
         found = np.full((len(orders), 4, 4), np.nan)
-        found[rows] = poses(ray_homographies(seen.coordinates, self._rays(seen, rows)))
+        rays = _rays(seen, self.of_cameras[rows], self.cameras)
+        found[rows] = poses(ray_homographies(seen.coordinates, rays))
         return found
 
     def adjusted(self, orders: Indices, fits: Bools) -> Floats:
@@ -85,14 +101,6 @@ class Pictures:
         fit[self.usable] = fits.any(axis=1)
         return orders, fit, self._told(orders, fits, right)
 
-    def _rays(self, seen: Sightings, rows: Indices) -> Floats:
-        """Return (k, n, 3) rays of pictures that are `rows`, those of each by its camera."""
-        found = np.full((*seen.xy.shape[:2], 3), np.nan)
-        for k, camera in enumerate(self.cameras):
-            own = self.of_cameras[rows] == k
-            found[own] = rays_of(camera, seen.xy[own])
-        return found
-
     def _tried(self) -> tuple[Floats, Floats]:
         """Return how usable pictures fit in each order, radians, and then the sign of z of its camera.
 
@@ -113,7 +121,7 @@ class Pictures:
     def _in_order(self, order: int, rows: Indices) -> tuple[Floats, Floats]:
         """Return the same of some pictures in one order."""
         seen = self.seen.of(rows).listed(np.full(len(rows), order))
-        rays = self._rays(seen, rows)
+        rays = _rays(seen, self.of_cameras[rows], self.cameras)
         found = ray_homographies(seen.coordinates, rays)
         misfit = np.nanmedian(angles_apart(seen.coordinates, rays, found), axis=1)
         if not seen.listings.one_sided:

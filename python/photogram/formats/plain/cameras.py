@@ -27,7 +27,7 @@ _EACH = ("all", "photo", "group")
 
 @dataclass(frozen=True)
 class Cameras:
-    """The cameras of a project: the size of their pictures, whether photos have their own, and weights are said.
+    """The cameras of a project: the size of their pictures, whether photos have their own, their weights.
 
     Cameras of photos that move have a rolling shutter, or a line of sensors in the place of a frame.
     """

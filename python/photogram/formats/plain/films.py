@@ -233,7 +233,7 @@ class _Reader:
             self.tables.messages.append(
                 Message(
                     f"photo {photo.name}: {len(photo.marks)} fiducials, fewer than the {LEAST[model]} of the"
-                    f" {model} film: its unknowns stand on what is known of the film beforehand, and on images"
+                    f" {model} film: its unknowns stand on what is known of films beforehand, and on images"
                 )
             )
 

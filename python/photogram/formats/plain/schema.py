@@ -162,7 +162,7 @@ TABLES: Mapping[str, Schema] = {
         " photos and groups share; default: the photo's), `line_rate` (a factor; 1), `sd_line_rate` (0:"
         " known), `scan` (a name that photos share; default: the photo's);"
         " of [film](film.md) `film` (its images are readings), `scanner` (if there are several), `mirrored`"
-        " (default: as the marks tell), `start_t1`, `start_t2` (mm), `start_theta` (rad; default: as the marks"
+        " (default: as the marks tell), `start_t1`, `start_t2` (mm), `start_theta` (rad; default: as marks"
         " have them)",
         deviations=(1, 3),
         has_system=True,
@@ -195,8 +195,8 @@ TABLES: Mapping[str, Schema] = {
         ("photo", "fiducial"),
         ("photo", "fiducial", "use"),
         ("column", "row", "x", "y", "sd", "sd_x", "sd_y", "sd_column", "sd_row"),
-        "`photo`, `fiducial` (empty of all of a photo: they are found), `column`, `row` (or `x`, `y`); `sd`, or"
-        " `sd_column`, `sd_row`; `use`: readings of marks, as images of the photo",
+        "`photo`, `fiducial` (empty of all of a photo: they are found), `column`, `row` (or `x`, `y`); `sd`,"
+        " or `sd_column`, `sd_row`; `use`: readings of marks, as images of the photo",
         deviations=(1, 2),
     ),
     "films": Schema(
@@ -207,11 +207,12 @@ TABLES: Mapping[str, Schema] = {
             *("half_format_mm", "grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows"),
             *(f"sd_w{k}" for k in range(1, 11)),
         ),
-        "`film`; `model` (`affine`, `conformal`, `bilinear`, `projective`; default: `[film] model`), `m` of the"
-        " roll (0), `sd_m` (0.0005), `sd_photo_m` of single photos about it (0.0001; 0: one size), `sd_b1`,"
-        " `sd_b2` (0.0001), `sd_h1`, `sd_h2` (5e-7 a mm), `sd_g1`, `sd_g2` (2e-7 a mm), `pattern` (`none`,"
-        " `w1 w2`, `ebner`, `grid`), `sd_w1` .. (mm), `half_format_mm`, of grids `grid_x`, `grid_y` of the first"
-        " node, `grid_dx`, `grid_dy` (mm), `grid_columns`, `grid_rows`",
+        "`film`; `model` (`affine`, `conformal`, `bilinear`, `projective`; default: `[film] model`), `m` of"
+        " the roll (0), `sd_m` (0.0005), `sd_photo_m` of single photos about it (0.0001; 0: one size),"
+        " `sd_b1`, `sd_b2` (0.0001), `sd_h1`, `sd_h2` (5e-7 a mm), `sd_g1`, `sd_g2` (2e-7 a mm),"
+        " `pattern` (`none`,"
+        " `w1 w2`, `ebner`, `grid`), `sd_w1` .. (mm), `half_format_mm`, of grids `grid_x`, `grid_y` of the"
+        " first node, `grid_dx`, `grid_dy` (mm), `grid_columns`, `grid_rows`",
     ),
     "scanners": Schema(
         ("scanner", "pitch_mm", "origin_column", "origin_row"),
@@ -220,9 +221,9 @@ TABLES: Mapping[str, Schema] = {
             *("pitch_mm", "origin_column", "origin_row", *_DEVICE, "hx", "hy"),
             *deviation_columns(_DEVICE),
         ),
-        "`scanner`, `pitch_mm`, `origin_column`, `origin_row`; `rows_down` (true), `Sx`, `Sy` (1), `alpha_rad`"
-        " (0), `xA` .. `yJ` (0; mm) over `hx`, `hy` (1; mm), `sd_Sx` .. (0; `inf` unknown): what turns readings"
-        " into true places ([comparator](comparator.md))",
+        "`scanner`, `pitch_mm`, `origin_column`, `origin_row`; `rows_down` (true), `Sx`, `Sy` (1),"
+        " `alpha_rad` (0), `xA` .. `yJ` (0; mm) over `hx`, `hy` (1; mm), `sd_Sx` .. (0; `inf` unknown): what"
+        " turns readings into true places ([comparator](comparator.md))",
     ),
     "control": Schema(
         ("point",),

@@ -12,7 +12,8 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.knots import KNOTTED
 from photogram.targets.calibrated import Calibrated
-from photogram.targets.mrcal_model import INDICES, KEY, PREFIX
+from photogram.targets.mrcal_lenses import PREFIX
+from photogram.targets.mrcal_model import INDICES, KEY
 from photogram.targets.output.rig import Rig
 from photogram.targets.output.terms import TERMS, terms_of
 
@@ -102,6 +103,7 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
     )
     if not fits:
         return None
+    bend = calibrated.bend
     variance = calibrated.result.variance_of_unit_weight or 1.0
     observed, indices = _observations(calibrated)
     core, terms = _freed(calibrated)
@@ -116,7 +118,7 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
         "indices_point_camintrinsics_camextrinsics": "",
         "lensmodel": PREFIX + lenses[0][0],
         "imagersizes": np.array([rig.size(row) for row in range(count)], dtype=np.int32),
-        "calobject_warp": np.array(calibration.bend),
+        "calobject_warp": np.array(calibration.bend if bend is None else bend.position[:2]),
         "do_optimize_intrinsics_core": core,
         "do_optimize_intrinsics_distortions": terms,
         "do_optimize_extrinsics": True,

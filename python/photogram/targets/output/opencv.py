@@ -10,7 +10,7 @@ from photogram.targets.calibrated import Calibrated
 from photogram.targets.output.rig import Rig
 from photogram.targets.output.terms import TERMS, Terms, terms_of
 from photogram.targets.output.yaml import matrix
-from photogram.targets.vision import crossing
+from photogram.targets.vision import cross_matrices
 
 __all__ = ["opencv_yaml"]
 
@@ -87,7 +87,7 @@ def _deviations(camera: AdjustedCamera) -> Floats:
 def _stereo(sensor: Floats, before: Floats, own: Floats) -> list[str]:
     """Return R, T of camera 0 -> this one, E = [T]x R and F = K^-T E K0^-1, its last element 1."""
     rotation, shift = sensor[:3, :3], sensor[:3, 3]
-    essential = crossing(shift) @ rotation
+    essential = cross_matrices(shift) @ rotation
     fundamental = np.linalg.inv(own).T @ essential @ np.linalg.inv(before)
     if fundamental[2, 2]:
         fundamental = fundamental / fundamental[2, 2]

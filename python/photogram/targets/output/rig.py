@@ -83,9 +83,8 @@ class Rig:
 def rig_of(calibrated: Calibrated) -> Rig:
     """Return the cameras of an adjusted calibration."""
     sensors = calibrated.sensors.copy()
-    own = calibrated.sensors_adjusted()
-    loose = [row for row in range(1, len(sensors)) if row not in own]
-    sensors[loose] = np.nan
+    references = np.asarray(calibrated.calibration.references)
+    sensors[(references != 0) & (np.arange(len(sensors)) > 0)] = np.nan
     return Rig(
         cameras=tuple(each.camera for each in calibrated.cameras),
         sizes=tuple(calibrated.calibration.corners.sizes),
