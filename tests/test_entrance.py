@@ -19,7 +19,7 @@ ELSE = {"plan": ["--strips", "2", "--photos-per-strip", "4"], "new": ["made"], "
 """Words of commands that need no input, or no example of it."""
 NEEDED = {"absolute-orientation relative": ["stations.csv"], "convert": ["made"]}
 """Words beside --example."""
-CHANGED = {"absolute-orientation relative": 4, "comparator compare": 4}
+CHANGED = {"absolute-orientation relative": 4, "camera compare": 4, "comparator compare": 4}
 """Exit codes of examples that have something to find."""
 PAGED = [name for name, command in COMMANDS.items() if "html" in inspect.signature(command).parameters]
 

@@ -199,6 +199,33 @@ def level_of_equal_power(noncentrality: float, power: float, dof: float) -> tupl
     be.
     """
 
+def film_readings(
+    numbers: _Floats, vectors: _Floats, places: _Floats
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return readings of places in a camera's frame, and their partials.
+
+    Parameters
+    ----------
+    numbers
+        What is never unknown of a film: mirrored, rows down, pitch, o1, o2, hx, hy; 0, 1 or 2 for nothing, h
+        or g; whether it has a roll and curves; the number of its pattern and what that takes.
+    vectors
+        (k, 3) the numbers of its unknowns: placement, size, h or g, roll, scanner, curves, weights.
+    places
+        (n, 2) mm.
+
+    Returns
+    -------
+    (n, 2) readings, and (n, 2, 10) partials by x, y, t1, t2, theta, m, b1, b2 and both of h or g; NaN where
+    the scanner has no reading.
+    """
+
+def film_places(numbers: _Floats, vectors: _Floats, readings: _Floats) -> NDArray[np.float64]:
+    """Return (n, 2) the places in a camera's frame that have readings (n, 2); NaN where there are none.
+
+    `numbers` and `vectors` as of :func:`film_readings`.
+    """
+
 def camera_models() -> list[tuple[str, tuple[str, list[tuple[str, int]], int, str, str]]]:
     """Return the models of cameras, `CAMERAS`, by their names.
 
@@ -1497,11 +1524,12 @@ class BlockSolution(_NetworkSolution):
     @property
     def adjusted_unknowns(
         self,
-    ) -> list[tuple[list[float], list[float], list[float], list[float], list[float], int]]:
+    ) -> list[tuple[list[float], list[float], list[float], list[float], list[float], list[float], int]]:
         """The adjusted common unknowns, in the order in which they were given.
 
         Change from what was given, position (3), rotation matrix row by row (9), cofactors row by row for
-        rotations about the adjusted axes, redundancy numbers, and the number of observations and images.
+        rotations about the adjusted axes, the same with the unknowns of the one before in its block (none of
+        the first), redundancy numbers, and the number of observations and images.
         """
 
     @property

@@ -98,8 +98,16 @@ pub fn squares<const N: usize>(
     py: Python<'_>,
     matrices: Vec<[[f64; N]; N]>,
 ) -> PyResult<Bound<'_, PyArray3<f64>>> {
+    blocks(py, matrices)
+}
+
+/// Matrices as an (n, M, N) array.
+pub fn blocks<const M: usize, const N: usize>(
+    py: Python<'_>,
+    matrices: Vec<[[f64; N]; M]>,
+) -> PyResult<Bound<'_, PyArray3<f64>>> {
     let count = matrices.len();
-    PyArray1::from_vec(py, matrices.into_flattened().into_flattened()).reshape([count, N, N])
+    PyArray1::from_vec(py, matrices.into_flattened().into_flattened()).reshape([count, M, N])
 }
 
 /// The rows of a matrix.

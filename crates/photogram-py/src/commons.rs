@@ -26,6 +26,8 @@ fn measured(measure: Measure) -> &'static str {
         Measure::Rate => "rate",
         Measure::Time => "time",
         Measure::Ratio => "ratio",
+        Measure::InImage => "in image",
+        Measure::PerImage => "per image",
     }
 }
 
@@ -46,17 +48,20 @@ pub fn mount((photo, frame, sensor): MountRow) -> Mount {
     OnFrame { photo, frame, sensor }.into()
 }
 
-/// Change, position, rotation matrix row by row, cofactors row by row, redundancy numbers, number of observations.
-pub type AdjustedRow = (Vec<f64>, [f64; 3], Vec<f64>, Vec<f64>, Vec<f64>, usize);
+/// Change, position, rotation matrix row by row, cofactors row by row, the same with the one before, redundancy numbers, number of
+/// observations.
+pub type AdjustedRow = (Vec<f64>, [f64; 3], Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, usize);
 
 /// What has become of a common unknown, for Python.
 pub fn adjusted_row(common: &AdjustedCommon) -> AdjustedRow {
-    let AdjustedCommon { change, position, attitude, cofactors, redundancy, observations } = common.clone();
+    let AdjustedCommon { change, position, attitude, cofactors, with_former, redundancy, observations } =
+        common.clone();
     (
         change,
         position,
         attitude.transpose().as_slice().to_vec(),
         cofactors.data.into(),
+        with_former.transpose().as_slice().to_vec(),
         redundancy,
         observations,
     )

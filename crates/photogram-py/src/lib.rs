@@ -8,6 +8,7 @@ mod comparator;
 mod control_networks;
 mod distributions;
 mod features;
+mod films;
 mod geometry;
 mod matching;
 mod memory;
@@ -36,6 +37,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     distributions::register(module)?;
     attitude::register(module)?;
     features::register(module)?;
+    films::register(module)?;
     geometry::register(module)?;
     camera::register(module)?;
     commons::register(module)?;

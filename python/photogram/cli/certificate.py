@@ -47,7 +47,7 @@ def certificate(
     no_html: NoHtml = False,
     quiet: Quiet = False,
 ) -> None:
-    """Check the certificate of a camera, and take marks and lens from it.
+    """Check a camera's certificate: typing errors, marks from distances, lens from its table.
 
     Distances are compared with coordinates; of distances alone the marks are adjusted; a table of distortion
     becomes a lens: all with covariance. A distance that differs from its coordinates by more than 0.010 mm,

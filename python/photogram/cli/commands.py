@@ -79,6 +79,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "Write a simulated block as a GIANT project, or as tables if it moves, and its truth as truth.json.",
         "simulate.simulate",
     ),
+    "certificate": (
+        "Check a camera's certificate: typing errors, marks from distances, lens from its table.",
+        "certificate.certificate",
+    ),
     "giant": (
         "Adjust or check a GIANT project.",
         {"adjust": "giant.giant", "check": "check.check"},
@@ -98,10 +102,6 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
             "correct": "comparator.correct",
             "compare": "comparator.compare",
         },
-    ),
-    "certificate": (
-        "Check a camera's certificate: typing errors, marks from distances, lens from its table.",
-        "certificate.certificate",
     ),
     "camera": (
         "Compare calibrations of cameras over years.",

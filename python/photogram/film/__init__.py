@@ -1,15 +1,18 @@
-"""Film and plates: certificates of their cameras, what years make of these."""
+"""Film and plates: certificates of their cameras, what years make of these, interior orientations."""
 
 from photogram.arguments.annotations import check_arguments
 from photogram.film.certificate import CalibratedMarks, Certificate
 from photogram.film.certificate_check import DistanceDifference, Explanation
 from photogram.film.decentring import Tangential
 from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
+from photogram.film.interior import Affine, Interior, interior_orientation
 from photogram.film.lens_table import Curve, LensParameters, RadialTable
+from photogram.film.which import WhichMark, which_mark
 from photogram.film.years import CameraComparison, DatedCamera, compare_cameras
 
 __all__ = [
     "AdjustedMarks",
+    "Affine",
     "CalibratedMarks",
     "CameraComparison",
     "Certificate",
@@ -18,16 +21,20 @@ __all__ = [
     "DatedCamera",
     "DistanceDifference",
     "Explanation",
+    "Interior",
     "LensParameters",
     "MarkDistance",
     "RadialTable",
     "RightAngle",
     "Tangential",
+    "WhichMark",
     "adjust_distances",
     "compare_cameras",
+    "interior_orientation",
+    "which_mark",
 ]
 
-check_arguments(globals(), ["adjust_distances", "compare_cameras"])
+check_arguments(globals(), ["adjust_distances", "compare_cameras", "interior_orientation", "which_mark"])
 
 WAYS = {
     "document_of": ("certificate_document",),

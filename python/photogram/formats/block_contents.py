@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools
+from photogram.errors import InputError
 from photogram.network.block import Block
+from photogram.network.films import Scan
 from photogram.network.observations import Control, Position
 
-__all__ = ["correlated_control", "lost_observations", "posed"]
+__all__ = ["check_films", "correlated_control", "lost_observations", "posed"]
 
 
 def posed(block: Block) -> Bools:
@@ -37,3 +39,19 @@ def lost_observations(block: Block, gnss: str) -> list[str]:
     if block.passages:
         found.append("what images pass: boards are flat")
     return found
+
+
+def check_films(block: Block, title: str) -> None:
+    """Refuse to write images that are readings of scanned films: a file would have them for images.
+
+    Raises
+    ------
+    InputError
+        Scanned films, or plates.
+    """
+    scanned = [each.photo for each in block.passages if isinstance(each, Scan)]
+    if scanned:
+        raise InputError(
+            f"{title}: the images of the photo {scanned[0]} are readings of a scanned film, which are not"
+            " written; what was read is as it was"
+        )

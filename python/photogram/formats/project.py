@@ -21,6 +21,7 @@ from photogram.network.cameras import Camera
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation
+from photogram.network.passages import Passage
 from photogram.network.rigs import Mount
 from photogram.network.timed import Timed
 from photogram.results.features import Definition
@@ -181,6 +182,7 @@ def assembled(
     observations: Sequence[Observation] = (),
     mounts: Sequence[Mount] = (),
     timed: Sequence[Timed] = (),
+    passages: Sequence[Passage] = (),
     frame: Frame | None = None,
     options: Options | None = None,
     lacks: Sequence[str] = (),
@@ -204,7 +206,7 @@ def assembled(
     name
         Of the project.
     cameras, photo_ids, photo_cameras, point_ids, image_photos, image_points, image_xy, observations, mounts,
-    timed
+    timed, passages
         As in :class:`photogram.Block`.
     point_positions, point_sd, point_check_sd, photo_position_sd, photo_attitude_sd, linear_unit, spheroid,
     photo_to_ground
@@ -267,6 +269,7 @@ def assembled(
             observations=observations,
             mounts=mounts,
             timed=timed,
+            passages=passages,
             linear_unit=linear_unit,
             title=name,
             spheroid=spheroid,

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 from photogram.errors import InputError, PhotogramError
+from photogram.formats.block_contents import check_films
 from photogram.formats.format import Format, Wishes
 from photogram.formats.metadata.adding import with_wished_photos
 from photogram.formats.millimetres import in_pixels, nominal_pixels
@@ -145,6 +146,7 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
     if chosen.write is None:
         writable = ", ".join(name for name, each in FORMATS.items() if each.write)
         raise InputError(f"{chosen.title} is only read; what can be written: {writable}")
+    check_films(project.block, chosen.title)
     if chosen.name != "plain":
         check_held(project.block, chosen.title)
     return chosen.write(_fitting(project, chosen))
@@ -246,6 +248,7 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
         Line scanners, which other formats than the plain project would take for photos.
     """
     chosen = _named(file_format)
+    check_films(project.block, chosen.title)
     if chosen.name != "plain":
         check_held(project.block, chosen.title)
     beside = [counted(len(project.features), "feature")] if project.features else []

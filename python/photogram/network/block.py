@@ -18,6 +18,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.network.cameras import Camera, CameraRow, camera_rows
+from photogram.network.films import check_scans
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import (
@@ -424,6 +425,8 @@ class Block(Valued, Brief):
         self._set("observations", with_knots(self.observations, self.cameras))
         observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
         self._check_figures()
+        of_photos = self.photo_cameras if self.cameras else None
+        check_scans(self.passages, self.photo_ids, self.cameras, of_photos)
 
     def _check_figures(self) -> None:
         named = {

@@ -67,7 +67,7 @@ def _components(kind: str) -> tuple[str, ...]:
 @cache
 def _units(kind: str, linear_unit: str) -> tuple[str, ...]:
     units = {"length": linear_unit, "speed": f"{linear_unit}/s", "angle": "rad", "ratio": ""}
-    units |= {"rate": "rad/s", "time": "s"}
+    units |= {"rate": "rad/s", "time": "s", "in image": "mm", "per image": "1/mm"}
     return tuple(units[measure] for _, measure in _UNKNOWNS[kind])
 
 

@@ -82,7 +82,7 @@ class ObservedKind:
 def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str, ObservedKind]:
     """Return what has become of the observations of a block, by the names of their kinds."""
     found = iter(solution.adjusted_observations)
-    kinds = {}
+    kinds: dict[str, ObservedKind] = {}
     groups = observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
     for rows, (*_, covariances) in groups:
         first = block.observations[rows[0]]
@@ -99,7 +99,7 @@ def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str
                 tables[:, k, observed[k]] = adjusted[:3]
                 single[:, k] = adjusted[3:]
         variances = np.diagonal(covariances, axis1=1, axis2=2)
-        kinds[kind] = ObservedKind(
+        own = ObservedKind(
             kind=kind,
             rows=np.array(rows, dtype=np.int64),
             names=[" - ".join(block.observations[row].of) for row in rows],
@@ -112,7 +112,29 @@ def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str
             squares=single[0].copy(),
             weights=single[1].copy(),
         )
+        kinds[kind] = _together(kinds[kind], own) if kind in kinds else own
     return kinds
+
+
+def _together(first: ObservedKind, second: ObservedKind) -> ObservedKind:
+    """Return observations of one kind, of different numbers of unknowns, in the order of the block."""
+    rows = np.concatenate([first.rows, second.rows])
+    order = np.argsort(rows)
+    names = [*first.names, *second.names]
+
+    def joined(name: str) -> Floats:
+        found: Floats = np.concatenate([getattr(first, name), getattr(second, name)])[order]
+        return found
+
+    numbers = ("sd", "residuals", "redundancy", "standardized", "squares", "weights")
+    return ObservedKind(
+        kind=first.kind,
+        rows=rows[order],
+        names=[names[row] for row in order.tolist()],
+        components=first.components,
+        units=first.units,
+        **{name: joined(name) for name in numbers},
+    )
 
 
 def tested_kind(kind: ObservedKind) -> Observations:

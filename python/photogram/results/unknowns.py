@@ -25,6 +25,13 @@ _PLACED = frozenset(
     )
 )
 """Types with components of `position` for values."""
+_NUMBERS = frozenset(
+    (
+        *("film placement", "film size", "film bend", "roll"),
+        *("fiducial", "pattern", "scanner", "scanner curve"),
+    )
+)
+"""Types whose values are the first of `position`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +59,9 @@ class AdjustedUnknown:
         zero for held ones, NaN without covariances.
     covariance
         (k, k) cofactors times the variance of unit weight.
+    with_former
+        (k, j) cofactors with the unknown before it where both are adjusted as one: the size of a film with
+        its placement; j is 0 of all others.
     redundancy
         (k,) redundancy numbers of weighted components as observations; 0 unless weighted.
     observations
@@ -66,6 +76,7 @@ class AdjustedUnknown:
     attitude: Floats
     cofactors: Floats
     covariance: Floats
+    with_former: Floats
     redundancy: Floats
     observations: int
 
@@ -77,6 +88,7 @@ class AdjustedUnknown:
             self.attitude,
             self.cofactors,
             self.covariance,
+            self.with_former,
             self.redundancy,
         ):
             array.flags.writeable = False
@@ -101,6 +113,8 @@ class AdjustedUnknown:
         """(k,) components of `position` where they are its own, else `change`."""
         own = {"x": 0, "y": 1, "z": 2, "scale": 0, "constant": 1, "height": 2}
         own |= {"offset": 0, "time": 0, "factor": 0}
+        if self.kind in _NUMBERS:
+            return self.position[: len(self.components)]
         if self.kind not in _PLACED:
             return self.change
         found = [
@@ -127,7 +141,7 @@ def adjusted_unknowns(
     # What line rates are multiplied by is of the type of readout times, but a plain number.
     factors = {id(each.rate) for each in block.timed if each.rate is not None}
     for given, row in zip(block.unknowns, solution.adjusted_unknowns, strict=True):
-        change, position, attitude, cofactors, redundancy, observations = row
+        change, position, attitude, cofactors, with_former, redundancy, observations = row
         k = len(change)
         matrix = np.array(cofactors).reshape(k, k)
         found.append(
@@ -140,6 +154,7 @@ def adjusted_unknowns(
                 attitude=np.array(attitude).reshape(3, 3),
                 cofactors=matrix,
                 covariance=matrix * scale,
+                with_former=np.array(with_former).reshape(k, len(with_former) // k),
                 redundancy=np.array(redundancy),
                 observations=observations,
             )

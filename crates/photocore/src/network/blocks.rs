@@ -62,7 +62,7 @@ impl Blocks {
 
 impl Network {
     /// The common unknowns that are not known, together those that are one block: the coefficients of one trajectory by functions that are
-    /// never zero, all of which every image of it touches.
+    /// never zero, all of which every image of it touches, and those of the film of a photo.
     fn commons_by_block(&self) -> Vec<Vec<usize>> {
         let mut leader: Vec<usize> = (0..self.commons.len()).collect();
         let mut uses = vec![0; self.commons.len()];
@@ -70,6 +70,11 @@ impl Network {
         for trajectory in &self.trajectories {
             let alone = |&common: &usize| !self.commons[common].is_held() && uses[common] == 1;
             let together: Vec<usize> = trajectory.everywhere().filter(alone).collect();
+            together.iter().for_each(|&common| leader[common] = together[0]);
+        }
+        for group in self.passages.iter().flat_map(|own| own.together()) {
+            let together: Vec<usize> =
+                group.into_iter().filter(|&common| !self.commons[common].is_held()).collect();
             together.iter().for_each(|&common| leader[common] = together[0]);
         }
         let mut members = vec![vec![]; self.commons.len()];

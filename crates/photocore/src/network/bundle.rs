@@ -70,6 +70,7 @@ impl Network {
             CameraPrior::of(camera, self.first_parameter(&bundle, index)?)
         };
         bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();
+        bundle.find_cells();
         bundle.observations = self.tied_observations(selected, &bundle)?;
         Ok(bundle)
     }

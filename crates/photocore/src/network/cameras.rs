@@ -105,6 +105,9 @@ impl Bundle {
         for (photo, &place) in photos.iter().enumerate() {
             self.mounts.commons(photo, None).into_iter().for_each(|common| of_commons[common].push(place));
         }
+        for (common, photo) in self.passages.own() {
+            of_commons[common].push(photos[photo]);
+        }
         for touches in self.observations.iter().map(|tied| &tied.touches) {
             let points = touches.points.iter().map(|&point| tied[point - self.locals]);
             let places: Vec<[f64; 3]> =

@@ -126,7 +126,8 @@ impl Network {
         let touched = self.observations.iter().flat_map(|own| own.touches().points);
         touched.for_each(|point| given[point] = false);
         let cameras = self.cameras.iter().map(|own| &own.camera).collect();
-        let facts = Facts { space: self.space, given, cameras };
+        let photos = self.photos.iter().map(|own| own.camera).collect();
+        let facts = Facts { space: self.space, given, cameras, photos };
         let bad = |own: &Passage| !own.unknowns().into_iter().all(of_type) || !own.is_of(&facts);
         self.passages.iter().position(bad).map_or(Ok(()), |index| Err(NetworkError::Passage(index)))
     }

@@ -154,7 +154,12 @@ impl Evaluated for At<'_> {
             None => orientation.sight(&stations.points[local]),
             Some(bent) => bundle.sight_bent((stations, bent), group, local),
         };
-        constant.copy_from_slice(&each_camera!(camera, camera => camera.compare(&u, image.xy).0));
+        let film = stations.bent.as_ref().and_then(|bent| bent.film(image.photo));
+        let missing = each_camera!(camera, camera => match film {
+            None => camera.compare(&u, image.xy).0,
+            Some(film) => film.missing(camera.image(&u), bundle.passages.cell(group), image.xy),
+        });
+        constant.copy_from_slice(&missing);
         true
     }
 

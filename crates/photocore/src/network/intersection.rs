@@ -51,14 +51,18 @@ impl Bundle {
 
     /// The rays of a point, each from the pose of its image.
     fn rays(&self, placed: &Placed, point: usize) -> impl Iterator<Item = Ray> {
-        let Placed { photos, commons, mounted } = placed;
+        let Placed { photos, commons, mounted, films } = placed;
         let ray = move |image: usize| {
             let (own, photo) = (&self.images[image], &photos[self.images[image].photo]);
+            let xy = match films.get(own.photo) {
+                Some(Some(film)) => film.place(own.xy, self.passages.cell(image))?,
+                _ => own.xy,
+            };
             let mut pose = Composed::new(false);
             let compose = |mounted: &Mounted| self.compose(mounted, commons, image, &mut pose);
             let composed = mounted.as_ref().is_some_and(compose);
             let orientation = if composed { &pose.orientation } else { &photo.orientation };
-            photo.camera.direction(own.xy).map(|direction| orientation.ray(&direction))
+            photo.camera.direction(xy).map(|direction| orientation.ray(&direction))
         };
         (self.point_images.start[point]..self.point_images.start[point + 1]).filter_map(ray)
     }

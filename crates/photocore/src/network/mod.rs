@@ -54,6 +54,7 @@ mod datum;
 mod effects;
 mod error;
 mod evaluated;
+pub mod film;
 mod group_tests;
 mod groups;
 mod in_block;

@@ -267,7 +267,8 @@ impl Bundle {
         };
         let mut photos: Vec<Station> = (0..self.cameras.len()).map(photo).collect();
         let mounted = self.mount_all(&mut photos, &commons);
-        Placed { photos, commons, mounted }
+        let films = self.passages.films(&commons);
+        Placed { photos, commons, mounted, films }
     }
 
     /// The photos alone.
@@ -323,11 +324,25 @@ impl Bundle {
 
     /// The cofactors of a common unknown; none where it is known.
     pub fn cofactors_of_common(&self, all: &Cofactors, common: usize) -> DMatrix<f64> {
-        let Some(InBlock { block, first, width }) = self.blocks.of_common[common] else {
+        self.cofactors_in_block(all, common, common)
+    }
+
+    /// The cofactors of a common unknown with another of its block; none where it is known.
+    pub fn cofactors_in_block(&self, all: &Cofactors, common: usize, other: usize) -> DMatrix<f64> {
+        let (Some(own), Some(to)) = (self.blocks.of_common[common], self.blocks.of_common[other]) else {
             return DMatrix::zeros(0, 0);
         };
-        let (own, count) = (self.cofactors_of_block(all, block), self.commons[common].kind.unknowns().len());
-        DMatrix::from_fn(count, count, |i, j| own[width * (first + i) + first + j])
+        let square = self.cofactors_of_block(all, own.block);
+        let [rows, columns] = [common, other].map(|own| self.commons[own].kind.unknowns().len());
+        DMatrix::from_fn(rows, columns, |i, j| square[own.width * (own.first + i) + to.first + j])
+    }
+
+    /// The common unknown before another in their block.
+    pub fn former_in_block(&self, common: usize) -> Option<usize> {
+        let InBlock { block, .. } = self.blocks.of_common[common]?;
+        let own = &self.blocks.commons[block - self.cameras.len() - self.blocks.shared.len()];
+        let place = own.iter().position(|&other| other == common)?;
+        Some(own[place.checked_sub(1)?])
     }
 
     /// The orientation of a photo, its pose given, with the columns of its unknowns.
@@ -380,7 +395,7 @@ impl Bundle {
         let photos = &unknowns[self.of_stations()];
         let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_stations().end..]);
         let tied = tied.as_chunks().0.to_vec();
-        let Placed { photos: stations, commons, mounted } = self.placed(photos);
+        let Placed { photos: stations, commons, mounted, films } = self.placed(photos);
         let refracted = self.refraction.map(|refraction| Refracted {
             refraction,
             at_photos: self.verticals_at_photos(&refraction, photos, &stations),
@@ -391,7 +406,7 @@ impl Bundle {
             ),
         });
         let plain = refracted.is_none() && mounted.is_none() && self.passages.is_empty();
-        let bent = (!plain).then_some(Bent { refracted, mounted });
+        let bent = (!plain).then_some(Bent { refracted, mounted, films });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
         let local: &[[f64; 3]] = local.as_chunks().0;
         let mut points = parallel::map_in_place(local.len(), 1024, &|point| place(&local[point]));

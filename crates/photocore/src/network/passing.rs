@@ -2,6 +2,9 @@
 
 use smallvec::{SmallVec, smallvec};
 
+use super::Image;
+use super::commons::CommonState;
+use super::film::FilmOf;
 use super::in_block::InBlock;
 use super::model::Bundle;
 use super::mounts::Composed;
@@ -125,7 +128,7 @@ impl Bundle {
         rows: &mut GroupRows<'_>,
         own: &mut Composed,
     ) {
-        let photo = self.images[group].photo;
+        let (photo, cell) = (self.images[group].photo, self.passages.cell(group));
         let (main, all) = (self.main_block(group), rows.shared.len() / 2);
         let mut slots: SmallVec<[Slot; 32]> = smallvec![Slot { block: main, first: None }];
         let mut place = |blocks: &mut dyn Iterator<Item = usize>, mut first: usize| {
@@ -142,7 +145,8 @@ impl Bundle {
         let (constant, point, retained) = (&mut *rows.constant, &mut *rows.local, &mut *rows.retained);
         let mut inner = GroupRows { constant, local: point, retained, shared: &mut shared };
         let timed = self.compose_timed((stations, bent), group, own);
-        bent.write(self.space, stations, timed.then_some(&*own), &self.images[group], local, &mut inner);
+        let own = timed.then_some(&*own);
+        let read = bent.write(self.space, stations, own, (&self.images[group], cell), local, &mut inner);
         for (row, to) in rows.shared.chunks_exact_mut(all.max(1)).enumerate() {
             let from = &shared[plain * row..][..plain];
             to[..poses].copy_from_slice(&from[..poses]);
@@ -151,7 +155,31 @@ impl Bundle {
         }
         let mut columns = Columns { rows, slots };
         self.step_figure(local, &mut columns);
+        if let (Some(film), Some(read)) = (self.passages.film(photo), read) {
+            let commons = film.commons(cell);
+            film.partials(&read, |slot, by| {
+                let common = commons[slot].0;
+                let Some(place) = self.blocks.of_common[common] else { return };
+                for (k, &(_, component, _)) in self.commons[common].kind.unknowns().iter().enumerate() {
+                    columns.add(place, k, [by[(0, component)], by[(1, component)]]);
+                }
+            });
+        }
         self.step_knots((stations, bent), group, local, &mut columns);
+    }
+
+    /// Finds in which cells of patterns images are, at the values that are given.
+    pub(super) fn find_cells(&mut self) {
+        let grid = |photo| self.passages.film(photo).is_some_and(FilmOf::has_cells);
+        if !(0..self.cameras.len()).any(grid) {
+            return;
+        }
+        let given: Vec<CommonState> =
+            self.commons.iter().map(|own| own.at(&vec![0.0; own.kind.unknowns().len()])).collect();
+        let films = self.passages.films(&given);
+        let cell =
+            |image: &Image| films[image.photo].as_ref().map_or(0, |film| film.cell_of_reading(image.xy));
+        self.passages.cells = self.images.iter().map(cell).collect();
     }
 
     /// The partials by the knots of a lens.

@@ -2,9 +2,13 @@
 
 use super::Image;
 use super::commons::CommonState;
+use super::film::{FilmAt, Read};
 use super::mounts::Composed;
 use crate::geometry::camera::each_camera;
-use crate::geometry::{self, Camera, CameraModel, ObjectSpace, Orientation, POSE, Refraction, Vertical};
+use crate::geometry::film::Reading;
+use crate::geometry::{
+    self, Camera, CameraModel, ObjectSpace, Orientation, POSE, Refraction, Vector3, Vertical,
+};
 use crate::normals::GroupRows;
 
 /// Photos and points at given values of the unknowns.
@@ -18,11 +22,21 @@ pub struct Stations {
     pub bent: Option<Bent>,
 }
 
+impl Stations {
+    /// The standard deviations of an image in the unit of its camera, about.
+    pub fn sd_in_camera(&self, image: &Image) -> [f64; 2] {
+        let film = self.bent.as_ref().and_then(|bent| bent.film(image.photo));
+        image.sd.map(|sd| film.map_or(sd, |film| sd / film.units()))
+    }
+}
+
 /// What images need besides where they are not plain.
 #[derive(Debug)]
 pub struct Bent {
     pub refracted: Option<Refracted>,
     pub mounted: Option<Mounted>,
+    /// By photo, of those that are scanned; nothing at all where none is.
+    pub films: Vec<Option<FilmAt>>,
 }
 
 /// Photos that are mounted.
@@ -40,6 +54,8 @@ pub struct Placed {
     pub commons: Vec<CommonState>,
     /// None where no photo is.
     pub mounted: Option<Mounted>,
+    /// See [`Bent::films`].
+    pub films: Vec<Option<FilmAt>>,
 }
 
 /// A photo at given values of its unknowns.
@@ -65,28 +81,46 @@ impl Mounted {
 }
 
 impl Bent {
-    /// Writes an image, with its pose where it is not that of the photo at its time.
+    /// The film of a photo.
+    pub fn film(&self, photo: usize) -> Option<&FilmAt> {
+        self.films.get(photo)?.as_ref()
+    }
+
+    /// Writes an image in a cell of its film's pattern, with its pose where it is not that of the photo at its time; its reading where the
+    /// photo is scanned.
     pub fn write(
         &self,
         space: ObjectSpace,
         stations: &Stations,
         timed: Option<&Composed>,
-        image: &Image,
+        (image, cell): (&Image, usize),
         local: usize,
         rows: &mut GroupRows<'_>,
-    ) {
+    ) -> Option<Read> {
         let composed = timed.or_else(|| self.mounted.as_ref()?.of(image.photo));
         let camera = &stations.photos[image.photo].camera;
         let timed = timed.map(|own| &own.orientation);
         self.seen(space, stations, timed, image.photo, local, |orientation, point| {
-            let write = |rows: &mut GroupRows<'_>| {
-                each_camera!(camera, camera => write(orientation, camera, point, image, rows));
+            let mut read = None;
+            let write = |rows: &mut GroupRows<'_>| match self.film(image.photo) {
+                None => each_camera!(camera, camera => write(orientation, camera, point, image, rows)),
+                Some(film) => {
+                    let film = (film, cell);
+                    let found = each_camera!(camera, camera => {
+                        write_scanned(orientation, camera, point, (image, film), rows)
+                    });
+                    read = Some(found);
+                }
             };
             match composed {
-                None => write(rows),
+                None => {
+                    let mut write = write;
+                    write(rows)
+                }
                 Some(composed) => composed.write(rows, write),
             }
-        });
+            read
+        })
     }
 
     /// Hands over what a photo sees of a point, and from where; `timed` is its pose where that is not the one at its time.
@@ -123,7 +157,42 @@ pub fn write<C: CameraModel>(
 ) {
     let u = orientation.sight(point);
     let (residual, computed) = camera.compare(&u, image.xy);
-    let projection = orientation.projection(&u, &computed, point);
+    put(orientation, &u, (residual, &computed), point, rows);
+}
+
+/// The same of a photo that is scanned: the computed is the reading of where the camera has the image. The partials by its film are not
+/// among them.
+#[inline(never)]
+pub fn write_scanned<C: CameraModel>(
+    orientation: &Orientation,
+    camera: &C,
+    point: &geometry::Point,
+    (image, (film, cell)): (&Image, (&FilmAt, usize)),
+    rows: &mut GroupRows<'_>,
+) -> Read {
+    let u = orientation.sight(point);
+    let mut computed = camera.linearize(&u);
+    let read = film.read(computed.xy, cell);
+    let Reading { xy, by_q, .. } = &read.reading;
+    let [x, y] = computed.by_u;
+    computed.by_u = by_q.map(|by| by[0] * x + by[1] * y);
+    let [own_x, own_y] = &mut computed.by_parameters;
+    for (x, y) in own_x.as_mut().iter_mut().zip(own_y.as_mut()) {
+        [*x, *y] = by_q.map(|by| by[0] * *x + by[1] * *y);
+    }
+    put(orientation, &u, ([0, 1].map(|k| image.xy[k] - xy[k]), &computed), point, rows);
+    read
+}
+
+#[inline(always)]
+fn put<P: AsRef<[f64]> + Copy>(
+    orientation: &Orientation,
+    u: &Vector3,
+    (residual, computed): ([f64; 2], &geometry::Image<P>),
+    point: &geometry::Point,
+    rows: &mut GroupRows<'_>,
+) {
+    let projection = orientation.projection(u, computed, point);
     let (width, shared) = (rows.retained.len() / 2, rows.shared.len() / 2);
     for row in 0..2 {
         rows.constant[row] = residual[row];

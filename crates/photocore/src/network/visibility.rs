@@ -3,7 +3,7 @@
 use super::problem::Assembled;
 use super::selection::TOGETHER;
 use super::solution::Unseen;
-use super::stations::Station;
+use super::stations::{Placed, Station};
 use super::{Image, Solution};
 use crate::parallel;
 
@@ -16,7 +16,7 @@ impl Solution {
         unknowns: &[f64],
     ) -> Vec<f64> {
         let model = &problem.model;
-        let photos = model.photos(&unknowns[model.of_stations()]);
+        let Placed { photos, films, .. } = model.placed(&unknowns[model.of_stations()]);
         let mut of_shared = vec![None; model.stations()];
         let fold = |(station, block): (&Station, &Option<usize>)| match *block {
             None => station.camera.fold(),
@@ -36,7 +36,10 @@ impl Solution {
                 if !camera.faces(&u) {
                     unseen.behind.push(model.point_images.order[image]);
                 }
-                if folds[photo].is_finite() && camera.radius(&u, xy) > folds[photo] {
+                let film = films.get(photo).and_then(Option::as_ref);
+                let in_camera = || film.map_or(Some(xy), |film| film.place(xy, model.passages.cell(image)));
+                let beyond = |xy| camera.radius(&u, xy) > folds[photo];
+                if folds[photo].is_finite() && in_camera().is_some_and(beyond) {
                     unseen.folded.push(model.point_images.order[image]);
                 }
             }

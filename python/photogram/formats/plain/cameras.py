@@ -27,7 +27,7 @@ _EACH = ("all", "photo", "group")
 
 @dataclass(frozen=True)
 class Cameras:
-    """The cameras of a project: with the size of their pictures, and whether photos have their own.
+    """The cameras of a project: the size of their pictures, whether photos have their own, and weights are said.
 
     Cameras of photos that move have a rolling shutter, or a line of sensors in the place of a frame.
     """
@@ -38,6 +38,7 @@ class Cameras:
     for_each: list[str] = field(default_factory=list)
     shutters: list[Shutter | None] = field(default_factory=list)
     lines: list[LineSensor | None] = field(default_factory=list)
+    weights_given: list[bool] = field(default_factory=list)
 
 
 def read_cameras(tables: Tables) -> Cameras:
@@ -53,7 +54,7 @@ def read_cameras(tables: Tables) -> Cameras:
         raise InputError("has no table of cameras (cameras.csv)", file=tables.settings.path)
     if not table.count:
         raise table.head.error("the table names no cameras")
-    found = Cameras(lines=line_sensors(tables, table))
+    found, weights = Cameras(lines=line_sensors(tables, table)), table.texts("weights")
     for row, own in enumerate(_rows(table)):
         if found.lines[row] is not None:
             own = own.behind_a_lens(table, row)
@@ -67,6 +68,7 @@ def read_cameras(tables: Tables) -> Cameras:
         found.sizes.append(size)
         found.pixel_mm.append(own.pixel_mm)
         found.for_each.append(own.each)
+        found.weights_given.append(bool(weights[row]))
     return replace(
         found,
         cameras=read_covariances(tables).cameras(found.cameras),
@@ -220,6 +222,7 @@ def spread_over_photos(
             found.sizes.append(cameras.sizes[row])
             found.pixel_mm.append(cameras.pixel_mm[row])
             found.for_each.append("all")
+            found.weights_given.append(cameras.weights_given[row])
             found.shutters.append(cameras.shutters[row])
             found.lines.append(cameras.lines[row])
         of_photos.append(places[row, own])

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.shared import made, word_of
@@ -23,6 +24,8 @@ from photogram.network.unknowns import Boresight, Drift, LeverArm, Sensor, Shift
 __all__ = ["Covariances", "covariance_tables", "read_covariances"]
 
 CAMERA = "camera"
+OF_FILMS = ("scanner", "fiducials", "film")
+"""Kinds of things whose covariances readers of their tables ask for by name."""
 _WITH_PHOTOS = {each.KIND for each in (LeverArm, Boresight, Sensor, GyroBias, RotationCoefficient)}
 """Unknowns along, or about, the axes of photos or of bodies."""
 
@@ -92,6 +95,35 @@ class Covariances:
         }
         return made(table, matrix.rows[0], lambda: camera.replace(sd=sd, covariance=(names, found)))
 
+    def names(self, kind: str, name: str) -> set[str]:
+        """Return the words for components that are there of a thing; none where it is not there."""
+        own = self.matrices.get((kind, name), _Matrix())
+        return {word for pair in own.values for word in pair}
+
+    def over(self, kind: str, name: str, components: Sequence[str]) -> Floats | None:
+        """Return the matrix of components of films, scanners or marks; None where it is not there.
+
+        Raises
+        ------
+        InputError
+            Components that there are not, or that are missing.
+        """
+        own = self.matrices.get((kind, name))
+        if own is None:
+            return None
+        assert self.table is not None
+        words = self.names(kind, name)
+        if strange := sorted(words - set(components)):
+            raise self.table.error(
+                own.rows[0], f"{kind} {name} has no {strange[0]}, but {listed(list(components), 8)}"
+            )
+        if missing := [word for word in components if (word, word) not in own.values]:
+            raise self.table.error(own.rows[0], f"{kind} {name}: the covariance of {missing[0]} is missing")
+        found = own.over(components, dict.fromkeys(components, 1.0))
+        if not is_covariance(found):
+            raise self.table.error(own.rows[0], f"the covariances of {kind} {name} are no covariance matrix")
+        return found
+
     def priors(self, unknowns: Iterable[Unknown]) -> list[Observation]:
         """Return what was determined of unknowns together as observations.
 
@@ -103,7 +135,7 @@ class Covariances:
         known = {(each.KIND, each.name): each for each in unknowns}
         found: list[Observation] = []
         for (kind, name), matrix in self.matrices.items():
-            if kind == CAMERA:
+            if kind in (CAMERA, *OF_FILMS):
                 continue
             table = self.table
             assert table is not None

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.image_axes import from_tables, in_unit
 from photogram.formats.plain.photos import Photos
@@ -98,11 +98,12 @@ def sd_is_given(tables: Tables, table: ColumnTable) -> bool:
 
 
 def image_coordinates(
-    settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices
+    settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices, scanned: Bools
 ) -> tuple[Floats, Floats | None]:
     """Return image coordinates and standard deviations in the unit and along the axes of the cameras.
 
-    Those of scanners are samples and lines, whatever the unit of images: their deviations are in this.
+    Those of line scanners are samples and lines, whatever the unit of images: their deviations are in this.
+    Those of scanned films are readings, as they are.
     """
     sd = images.sd if images.sd is None or settings.image != "um" else images.sd * 1e-3
     pixels = settings.image == "px" and settings.image_y == "down"
@@ -114,4 +115,6 @@ def image_coordinates(
             found[own] = in_unit(settings, images.xy[own], pixels=True)
         else:
             found[own] = from_tables(settings, camera, cameras.sizes[row], found[own])
+    own = scanned[images.photos]
+    found[own] = images.xy[own] * (1e-3 if settings.image == "um" else 1.0)
     return found, sd

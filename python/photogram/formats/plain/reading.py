@@ -18,6 +18,7 @@ from photogram.formats.format import Wishes
 from photogram.formats.plain.boards import ASSUMED, read_bends, read_boards
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
+from photogram.formats.plain.films import on_film, read_scanned
 from photogram.formats.plain.images import Images, image_coordinates, read_images, sd_is_given
 from photogram.formats.plain.moving import placed, read_timed
 from photogram.formats.plain.observed import Subjects, read_observations
@@ -91,8 +92,10 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     photos = placed(photos, timed, spheroid)
     images = read_images(tables, photos)
     points = _points(tables, transform, images, given)
+    scanned = read_scanned(tables, photos, read_covariances(tables))
+    cameras = on_film(cameras, photos, scanned, tables.messages)
     cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
-    xy, sd = image_coordinates(settings, images, cameras, np.asarray(photo_cameras))
+    xy, sd = image_coordinates(settings, images, cameras, np.asarray(photo_cameras), scanned.photos)
     mounts, stands = mounted(
         read_frames(tables, rigs, photos.names, photos.taken), photos.names, photos.centres, photos.matrices
     )
@@ -128,7 +131,8 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         image_points=images.points,
         image_xy=xy,
         image_sd=sd,
-        observations=[*observations, *photos.observed, *points.observed],
+        observations=[*observations, *photos.observed, *points.observed, *scanned.observations],
+        passages=scanned.scans,
         mounts=mounts,
         timed=timed,
         frame=transform.frame,

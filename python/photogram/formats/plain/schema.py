@@ -108,6 +108,7 @@ _SD_ANGLES = deviation_columns(ALL_ANGLES[:9])
 _PARAMETERS = tuple(sorted({name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}))
 _ENDS, _DIFFERENCE = ("from", "to"), ("dx", "dy", "dz")
 _ACROSS = ("sd", "sd_x", "sd_y", "cov_xy")
+_DEVICE = ("sx", "sy", "alpha_rad", *(f"{axis}{letter}" for axis in "xy" for letter in "abcdefghj"))
 _CLOCK = ("time_offset", "sd_time_offset")
 _OF_BASES = tuple(
     name
@@ -145,11 +146,13 @@ TABLES: Mapping[str, Schema] = {
         (
             *("photo", "camera", "group", "strip", "frame", "use"),
             *("trajectory", "rig", "sensor", "clock", "scan"),
+            *("film", "scanner", "mirrored"),
         ),
         (
             *(*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ANGLES, *_SD_ROTATIONS, "time"),
             *(*VELOCITY, *RATE, *deviation_columns((*VELOCITY, *RATE))),
             *(*_CLOCK, "line_rate", "sd_line_rate"),
+            *("start_t1", "start_t2", "start_theta"),
         ),
         "`photo`; `camera` (if there are several), `x`, `y`, `z`, angles by `[axes] attitude`, `sd_x` ..,"
         " `sd_omega` .. or `sd_rotation_x` .., `group`, `time` (s), `use`;"
@@ -157,7 +160,10 @@ TABLES: Mapping[str, Schema] = {
         " trajectory `vx` .. (0; unit of length a second), `rate_x` .. (0; rad/s), `sd_vx` .., `sd_rate_x`"
         " .. (empty: free); `time_offset` (0; s), `sd_time_offset` (s; 0: known), `clock` (a name that"
         " photos and groups share; default: the photo's), `line_rate` (a factor; 1), `sd_line_rate` (0:"
-        " known), `scan` (a name that photos share; default: the photo's)",
+        " known), `scan` (a name that photos share; default: the photo's);"
+        " of [film](film.md) `film` (its images are readings), `scanner` (if there are several), `mirrored`"
+        " (default: as the marks tell), `start_t1`, `start_t2` (mm), `start_theta` (rad; default: as the marks"
+        " have them)",
         deviations=(1, 3),
         has_system=True,
     ),
@@ -176,6 +182,47 @@ TABLES: Mapping[str, Schema] = {
         "`point`, `x`, `y`, `z`; `sd_x` ..: initial values, may be left out altogether",
         deviations=(1, 3),
         has_system=True,
+    ),
+    "fiducials": Schema(
+        ("camera", "fiducial", "x", "y"),
+        ("camera", "fiducial", "use"),
+        ("x", "y", "sd", "sd_x", "sd_y"),
+        "`camera`, `fiducial`, `x`, `y` (mm, in the frame of the marks, x right and y up on the positive);"
+        " `sd_x`, `sd_y` (0.002), `use`: the certificate of a film camera",
+        deviations=(1, 2),
+    ),
+    "fiducial_images": Schema(
+        ("photo", "fiducial"),
+        ("photo", "fiducial", "use"),
+        ("column", "row", "x", "y", "sd", "sd_x", "sd_y", "sd_column", "sd_row"),
+        "`photo`, `fiducial` (empty of all of a photo: they are found), `column`, `row` (or `x`, `y`); `sd`, or"
+        " `sd_column`, `sd_row`; `use`: readings of marks, as images of the photo",
+        deviations=(1, 2),
+    ),
+    "films": Schema(
+        ("film",),
+        ("film", "model", "pattern"),
+        (
+            *("m", "sd_m", "sd_photo_m", "sd_b1", "sd_b2", "sd_h1", "sd_h2", "sd_g1", "sd_g2"),
+            *("half_format_mm", "grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows"),
+            *(f"sd_w{k}" for k in range(1, 11)),
+        ),
+        "`film`; `model` (`affine`, `conformal`, `bilinear`, `projective`; default: `[film] model`), `m` of the"
+        " roll (0), `sd_m` (0.0005), `sd_photo_m` of single photos about it (0.0001; 0: one size), `sd_b1`,"
+        " `sd_b2` (0.0001), `sd_h1`, `sd_h2` (5e-7 a mm), `sd_g1`, `sd_g2` (2e-7 a mm), `pattern` (`none`,"
+        " `w1 w2`, `ebner`, `grid`), `sd_w1` .. (mm), `half_format_mm`, of grids `grid_x`, `grid_y` of the first"
+        " node, `grid_dx`, `grid_dy` (mm), `grid_columns`, `grid_rows`",
+    ),
+    "scanners": Schema(
+        ("scanner", "pitch_mm", "origin_column", "origin_row"),
+        ("scanner", "rows_down"),
+        (
+            *("pitch_mm", "origin_column", "origin_row", *_DEVICE, "hx", "hy"),
+            *deviation_columns(_DEVICE),
+        ),
+        "`scanner`, `pitch_mm`, `origin_column`, `origin_row`; `rows_down` (true), `Sx`, `Sy` (1), `alpha_rad`"
+        " (0), `xA` .. `yJ` (0; mm) over `hx`, `hy` (1; mm), `sd_Sx` .. (0; `inf` unknown): what turns readings"
+        " into true places ([comparator](comparator.md))",
     ),
     "control": Schema(
         ("point",),

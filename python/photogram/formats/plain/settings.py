@@ -50,6 +50,8 @@ _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("axes", "rotation"): ("object_to_photo", "photo_to_object"),
     ("axes", "photo"): ("y_up", "y_down"),
     ("time", "scale"): ("none", "utc", "gps", "tai", "et"),
+    ("film", "model"): ("affine", "conformal", "bilinear", "projective"),
+    ("film", "interior"): ("inside", "before"),
     ("adjust", "datum"): ("control", "minimum", "inner"),
     ("adjust", "loss"): ("none", "huber", "cauchy"),
     ("adjust", "unit_variance"): ("constrained", "unity", "redundancy", "free"),
@@ -63,6 +65,7 @@ _KEYS: Mapping[str, tuple[str, ...] | None] = {
     "time": ("origin", "scale"),
     "sd": tuple(WITH_SD),
     "tables": tuple(TABLES),
+    "film": ("model", "interior"),
     "adjust": ("datum", "loss", "unit_variance"),
     **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
     "photos": ("crs", "columns", "roles", "directory", "directory_crs", "mrk_antenna"),
@@ -104,6 +107,9 @@ class Settings:
         Where photographs lie whose files carry positions; None without.
     statement
         What `[check]` and `[statement]` say, as :meth:`photogram.Result.statement` takes it.
+    film, interior
+        The model of films that say none; whether their interior orientation is unknown inside the adjustment,
+        or fitted before it and errorless.
     """
 
     path: Path
@@ -127,6 +133,8 @@ class Settings:
     features: Mapping[str, Definition] = field(default_factory=dict)
     photo_files: PhotoFiles | None = None
     statement: Mapping[str, Any] = field(default_factory=dict)
+    film: str = "affine"
+    interior: str = "inside"
 
     def __post_init__(self) -> None:
         if not self.image_y:
@@ -185,6 +193,8 @@ def read_settings(path: Path) -> Settings:
         features={name: file.feature(name) for name in file.content.get("features", {})},
         photo_files=file.photo_files(),
         statement=read_asked(file, file.word("units", "length")),
+        film=file.word("film", "model"),
+        interior=file.word("film", "interior"),
     )
 
 

@@ -32,7 +32,7 @@ from photogram.formats.plain.settings import Settings, read_settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import ASSUMED_SD, Project
-from photogram.network.block import checked
+from photogram.network.block import checked, refuse_passages
 from photogram.network.core import CoreOptions
 from photogram.network.observations.position import with_epochs
 
@@ -117,6 +117,7 @@ class Streamed:
                 "photos with a rolling shutter, or on trajectories, are read whole: without parts",
                 file=settings.path,
             )
+        refuse_passages(self.project.block, "blocks in parts")
         block = started(checked(self.project.block))
         # A node has some of the observations of a drift only.
         self.block = block.replace(observations=with_epochs(block.observations))
@@ -285,7 +286,9 @@ class Streamed:
         # The column is ours, and no remark is due.
         images = read_images(Tables(settings, []), self._photos)
         cameras = np.asarray(self._photos.cameras)
-        xy, sd = image_coordinates(settings, images, self._cameras, cameras)
+        xy, sd = image_coordinates(
+            settings, images, self._cameras, cameras, np.zeros(len(cameras), dtype=bool)
+        )
         if sd is None:
             sd = np.asarray(ASSUMED_SD[self._cameras.cameras[0].unit or "px"])
         names = list(dict.fromkeys([*self._tied, *images.point_names])) if not number else images.point_names

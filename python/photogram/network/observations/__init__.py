@@ -11,6 +11,7 @@ from photogram.network.observations.control import Control
 from photogram.network.observations.difference import Difference
 from photogram.network.observations.distance import Distance
 from photogram.network.observations.equal_height import EqualHeight
+from photogram.network.observations.fiducial import FILM, Fiducial, KnownFilm, KnownTogether
 from photogram.network.observations.observation import (
     Observation,
     all_trajectories,
@@ -29,12 +30,16 @@ from photogram.network.observations.smoothness import Smoothness
 from photogram.network.observations.velocity import Velocity
 
 __all__ = [
+    "FILM",
     "Attitude",
     "Base",
     "Control",
     "Difference",
     "Distance",
     "EqualHeight",
+    "Fiducial",
+    "KnownFilm",
+    "KnownTogether",
     "Observation",
     "OnLevel",
     "OnLine",

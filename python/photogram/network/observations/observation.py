@@ -268,11 +268,12 @@ def observation_rows(
                 )
         return [known[name] for name in own]
 
-    by_label: dict[str, list[int]] = {}
+    alike: dict[tuple[str, int, int, int], list[int]] = {}
     for row, each in enumerate(observations):
-        by_label.setdefault(each.label, []).append(row)
+        widths = len(each.unknowns), len(each.observed), len(each.precision)
+        alike.setdefault((each.label, *widths), []).append(row)
     groups: list[tuple[list[int], Group]] = []
-    for rows in by_label.values():
+    for rows in alike.values():
         own = [observations[row] for row in rows]
         indices = (
             [places(each, each.points, of_points, "point") for each in own],

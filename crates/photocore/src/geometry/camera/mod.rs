@@ -4,7 +4,7 @@
 //! `cameras!` below.
 
 pub mod backward;
-mod inverse;
+pub(super) mod inverse;
 mod knots;
 mod model;
 mod projections;

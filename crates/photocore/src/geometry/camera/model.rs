@@ -15,7 +15,7 @@ use crate::geometry::axes::Vector3;
 /// of u ([`super::backward::BackwardModel`]).
 pub trait CameraModel: Clone {
     /// Its interior parameters, an array of numbers.
-    type Parameters: Copy + AsRef<[f64]> + for<'a> TryFrom<&'a [f64]>;
+    type Parameters: Copy + AsRef<[f64]> + AsMut<[f64]> + for<'a> TryFrom<&'a [f64]>;
 
     /// What the model is called.
     const NAME: &'static str;

@@ -2,11 +2,10 @@
 
 use super::backward::{BackwardModel, Corrected};
 use super::brown::BrownTerms;
-use super::inverse::{Matrix2, RadialLimit, from_radial, inverted, times, way_back};
+use super::inverse::{RadialLimit, from_radial, times};
 use super::model::Unit;
+use crate::geometry::correction::{Correction, PARAMETERS};
 
-/// Exponents of the terms of a polynomial, the constant behind them: x^4, y^4, x^3, y^3, x^2, y^2, x, y.
-const DEGREES: [i32; 8] = [4, 4, 3, 3, 2, 2, 1, 1];
 const COUNT: usize = 33;
 
 /// Readings of a comparator, corrected by its scales, obliqueness and polynomials, then by radial and tangential terms: backward.
@@ -41,34 +40,14 @@ pub struct OnComparator {
 }
 
 impl OnComparator {
-    /// The linear correction.
-    fn matrix(&self) -> Matrix2 {
+    fn correction(&self) -> Correction {
         let [mx, my, lean] = self.linear;
-        let (sin, cos) = lean.sin_cos();
-        [[1.0 + mx, (1.0 + my) * sin], [0.0, (1.0 + my) * cos]]
+        let (polynomials, half_range) = (self.polynomials, self.half_range);
+        Correction { scales: [1.0 + mx, 1.0 + my], lean, polynomials, half_range }
     }
 
-    /// The nine functions of a linearly corrected place, and their derivatives by it.
-    fn functions(&self, place: [f64; 2]) -> ([f64; 9], [[f64; 2]; 9]) {
-        let arguments = [0, 1].map(|k| place[k] / self.half_range[k]);
-        let (mut values, mut slopes) = ([1.0; 9], [[0.0; 2]; 9]);
-        for (term, degree) in DEGREES.into_iter().enumerate() {
-            let axis = term % 2;
-            values[term] = arguments[axis].powi(degree);
-            slopes[term][axis] = f64::from(degree) * arguments[axis].powi(degree - 1) / self.half_range[axis];
-        }
-        (values, slopes)
-    }
-
-    /// A linearly corrected place with its polynomials, and the partials of that.
-    fn bowed(&self, place: [f64; 2]) -> ([f64; 2], Matrix2) {
-        let (values, slopes) = self.functions(place);
-        let sum = |k: usize| self.polynomials[k].iter().zip(values).map(|(c, value)| c * value).sum::<f64>();
-        let slope = |k: usize, axis: usize| {
-            self.polynomials[k].iter().zip(slopes).map(|(c, by)| c * by[axis]).sum::<f64>()
-        };
-        let by = |k: usize| [0, 1].map(|axis| f64::from(u8::from(k == axis)) + slope(k, axis));
-        ([0, 1].map(|k| place[k] + sum(k)), [by(0), by(1)])
+    fn from_origin(&self, measured: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| measured[k] - self.origin[k])
     }
 }
 
@@ -154,30 +133,18 @@ impl BackwardModel for OnComparator {
     }
 
     fn correct(&self, measured: [f64; 2]) -> Corrected<[f64; COUNT]> {
-        let [x, y] = [0, 1].map(|k| measured[k] - self.origin[k]);
-        let (linear, [_, my, lean]) = (self.matrix(), self.linear);
-        let (sin, cos) = lean.sin_cos();
-        let straight = times(&linear, [x, y]);
-        let (bowed, by_straight) = self.bowed(straight);
-        let place = [0, 1].map(|k| bowed[k] - self.principal_point[k]);
+        let own = self.correction().linearize(self.from_origin(measured));
+        let place = [0, 1].map(|k| own.xy[k] - self.principal_point[k]);
         let bent = self.terms.lens().bend(place);
-        let through = |v: [f64; 2]| times(&bent.by_place, v);
-        let (functions, _) = self.functions(straight);
-        let by_scales = [[x, 0.0], [sin * y, cos * y], [(1.0 + my) * cos * y, -(1.0 + my) * sin * y]]
-            .map(|v| through(times(&by_straight, v)));
-        let by_point = [through([-1.0, 0.0]), through([0.0, -1.0])];
+        let by_point = [[-1.0, 0.0], [0.0, -1.0]].map(|v| times(&bent.by_place, v));
         let by_terms = self.terms.partials(&bent, place);
+        let by_correction =
+            (0..PARAMETERS).map(|k| times(&bent.by_place, own.by_parameters.map(|row| row[k])));
         let mut by_parameters = [[0.0; COUNT]; 2];
-        for (row, own) in by_parameters.iter_mut().enumerate() {
-            let columns = by_point.iter().chain(&by_terms).chain(&by_scales).map(|by| by[row]);
-            own[1..11].iter_mut().zip(columns).for_each(|(own, by)| *own = by);
-            for (term, value) in functions.into_iter().enumerate() {
-                own[11 + term] = bent.by_place[row][0] * value;
-                own[20 + term] = bent.by_place[row][1] * value;
-            }
+        for (k, by) in by_point.into_iter().chain(by_terms).chain(by_correction).enumerate() {
+            (0..2).for_each(|row| by_parameters[row][1 + k] = by[row]);
         }
-        let columns = [[linear[0][0], linear[1][0]], [linear[0][1], linear[1][1]]]
-            .map(|column| through(times(&by_straight, column)));
+        let columns = [0, 1].map(|k| times(&bent.by_place, own.by_reading.map(|row| row[k])));
         let by_measured = [0, 1].map(|row| columns.map(|column| column[row]));
         Corrected { xy: bent.xy, by_measured, by_parameters }
     }
@@ -188,16 +155,13 @@ impl BackwardModel for OnComparator {
             let bent = lens.bend(place);
             (bent.xy, bent.by_place)
         })?;
-        let bowed = [0, 1].map(|k| place[k] + self.principal_point[k]);
-        let straight = way_back(bowed, bowed, |place| self.bowed(place))?;
-        let [x, y] = times(&inverted(self.matrix()), straight);
+        let [x, y] = self.correction().reading([0, 1].map(|k| place[k] + self.principal_point[k]))?;
         Some([self.origin[0] + x, self.origin[1] + y])
     }
 
     fn radius(&self, measured: [f64; 2]) -> f64 {
-        let from = [0, 1].map(|k| measured[k] - self.origin[k]);
-        let (bowed, _) = self.bowed(times(&self.matrix(), from));
-        (bowed[0] - self.principal_point[0]).hypot(bowed[1] - self.principal_point[1])
+        let [x, y] = self.correction().place(self.from_origin(measured));
+        (x - self.principal_point[0]).hypot(y - self.principal_point[1])
     }
 
     fn fold(&self) -> f64 {

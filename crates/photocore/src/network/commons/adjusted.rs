@@ -21,6 +21,8 @@ pub struct AdjustedCommon {
     /// Cofactors (a priori unit weight) of its unknowns, rotations being those about its own axes: zero for those that are
     /// held; NaN where there are none.
     pub cofactors: DMatrix<f64>,
+    /// Cofactors of its unknowns (rows) with those of the common unknown before it in their block; none where it is the first.
+    pub with_former: DMatrix<f64>,
     /// Redundancy numbers of its unknowns as observations of themselves; zero unless weighted, NaN where there are no cofactors.
     pub redundancy: Vec<f64>,
     /// How many observations that took part, images of rigs among them, are of it.
@@ -45,6 +47,7 @@ impl Network {
                 position: common.position,
                 attitude: common.attitude,
                 cofactors: DMatrix::repeat(width, width, missing),
+                with_former: DMatrix::zeros(width, 0),
                 redundancy: vec![missing; width],
                 observations: model.commons[index].uses,
             };
@@ -58,6 +61,11 @@ impl Network {
                 let steps = state.about_own_axes();
                 let own = &steps * model.cofactors_of_common(all, index) * steps.transpose();
                 found.cofactors = (&own + own.transpose()) / 2.0;
+                if let Some(former) = model.former_in_block(index) {
+                    let turned = states[former].about_own_axes();
+                    let mixed = model.cofactors_in_block(all, index, former);
+                    found.with_former = &steps * mixed * turned.transpose();
+                }
             }
             if let Some(all) = &adjustment.prior_redundancy {
                 found.redundancy = all[range].to_vec();

@@ -47,6 +47,10 @@ pub enum Measure {
     Time,
     /// A ratio.
     Ratio,
+    /// A length in an image: mm.
+    InImage,
+    /// A ratio a mm.
+    PerImage,
 }
 
 /// The name of an unknown, which of the six components it is (offsets, then rotations), and what its number stands for.
@@ -124,6 +128,22 @@ kinds! {
     Knot = "knot", Stays, [("x", 0, Ratio), ("y", 1, Ratio)];
     /// w of a figure: how far a target bends, in the middle along its first and along its second axis.
     Bend = "bend", Stays, [("x", 0, Length), ("y", 1, Length)];
+    /// Where the film of a photo lay on a scanner: t and theta.
+    FilmPlacement = "film placement", Stays, [("t1", 0, InImage), ("t2", 1, InImage), ("theta", 2, Angle)];
+    /// How the size of the film of a photo has changed: mean, difference of x and y, shear.
+    FilmSize = "film size", Stays, [("m", 0, Ratio), ("b1", 1, Ratio), ("b2", 2, Ratio)];
+    /// h or g of the film of a photo: what is not affine.
+    FilmBend = "film bend", Stays, [("first", 0, PerImage), ("second", 1, PerImage)];
+    /// The mean change of size of the films of one roll.
+    Roll = "roll", Stays, [("m", 0, Ratio)];
+    /// The place of a fiducial mark in the frame of its camera.
+    Fiducial = "fiducial", Stays, [("x", 0, InImage), ("y", 1, InImage)];
+    /// Two weights of a pattern of deformation.
+    Pattern = "pattern", Stays, [("first", 0, InImage), ("second", 1, InImage)];
+    /// Scales and obliqueness of a scanner or comparator.
+    Scanner = "scanner", Stays, [("Sx", 0, Ratio), ("Sy", 1, Ratio), ("alpha", 2, Angle)];
+    /// Three coefficients of the polynomials of these: six times three are those of x, then of y.
+    ScannerCurve = "scanner curve", Stays, [("first", 0, InImage), ("second", 1, InImage), ("third", 2, InImage)];
     /// d, by which the clock of a receiver is behind that of a trajectory.
     Clock = "clock", Stays, [("offset", 0, Time)];
 }

@@ -105,6 +105,12 @@ macro_rules! kinds {
                 }
             }
 
+            fn components(&self, common: usize) -> usize {
+                match self {
+                    $(Self::$name(own) => own.components(common),)*
+                }
+            }
+
             fn own_check(&self) -> Result<(), Fault> {
                 match self {
                     $(Self::$name(own) => own.check(),)*
@@ -131,6 +137,8 @@ kinds! {
     velocity::Velocity;
     rate::Rate;
     smoothness::Smoothness;
+    fiducial::Fiducial;
+    film::Film;
 }
 
 impl Observation {
@@ -143,13 +151,13 @@ impl Observation {
         if let Some(&photo) = touches.photos.iter().find(|&&photo| photo >= photos) {
             return Err(Fault::NoPhoto(photo));
         }
-        for &(common, needed) in &touches.commons {
+        for (place, &(common, needed)) in touches.commons.iter().enumerate() {
             let own = commons.get(common).ok_or(Fault::NoCommon(common))?;
             if let Some(needed) = needed.filter(|&needed| needed != own.kind) {
                 return Err(Fault::OtherCommon { common, needed });
             }
             // Of any type: all its unknowns are observed.
-            let (components, given) = (own.sd.len(), self.rows());
+            let (components, given) = (own.sd.len(), self.components(place));
             if needed.is_none() && components != given {
                 return Err(Fault::Deviations { components, given });
             }

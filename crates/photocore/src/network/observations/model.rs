@@ -27,6 +27,11 @@ pub trait ObservationModel: Sized {
     /// How many components it has.
     fn rows(&self) -> usize;
 
+    /// How many unknowns a common one of any type has, by its place in [`Touches::commons`].
+    fn components(&self, _common: usize) -> usize {
+        self.rows()
+    }
+
     /// How well these are known.
     fn precision(&self) -> Precision;
 

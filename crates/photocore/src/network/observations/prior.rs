@@ -4,16 +4,16 @@ use nalgebra::DMatrix;
 
 use super::{Named, ObservationModel, Precision, Rows, Sites, Touches};
 
-/// What was observed of a common unknown as one observation with its full covariance, from an adjustment of its own.
+/// What was observed of common unknowns as one observation with its full covariance, from an adjustment of its own.
 ///
 /// v = d - x, x being the unknowns, which count from what is given, and d what was observed of them, where that is another: with rotations
 /// v = Log(R^T R_0), and d is zero. The partials are I.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
-    /// The common unknown; its own standard deviations are infinite.
-    pub common: usize,
-    /// How many unknowns it has.
-    pub components: usize,
+    /// The common unknowns; their own standard deviations are infinite.
+    pub commons: Vec<usize>,
+    /// How many unknowns each of them has.
+    pub components: Vec<usize>,
     /// d; nothing at all where what is given was observed.
     pub observed: Vec<f64>,
     /// Of these.
@@ -23,19 +23,29 @@ pub struct Prior {
 impl ObservationModel for Prior {
     const NAME: &'static str = "prior";
 
+    /// Of a single common unknown d, or nothing; of several how many unknowns each has.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
-        let &[Some(common)] = of.commons else { return None };
-        let (components, observed) = (covariance.nrows(), values.to_vec());
-        let sound = observed.is_empty() || observed.len() == components;
-        sound.then_some(Self { common, components, observed, precision: Precision::Covariance(covariance) })
+        let commons: Vec<usize> = of.commons.iter().copied().collect::<Option<_>>()?;
+        let (components, observed) = match commons[..] {
+            [_] => (vec![covariance.nrows()], values.to_vec()),
+            _ => (values.iter().map(|&own| own as usize).collect(), vec![]),
+        };
+        let sound = components.len() == commons.len()
+            && components.iter().sum::<usize>() == covariance.nrows()
+            && (observed.is_empty() || observed.len() == covariance.nrows());
+        sound.then_some(Self { commons, components, observed, precision: Precision::Covariance(covariance) })
     }
 
     fn touches(&self) -> Touches {
-        Touches { commons: vec![(self.common, None)], ..Touches::default() }
+        Touches { commons: self.commons.iter().map(|&own| (own, None)).collect(), ..Touches::default() }
     }
 
     fn rows(&self) -> usize {
-        self.components
+        self.components.iter().sum()
+    }
+
+    fn components(&self, common: usize) -> usize {
+        self.components[common]
     }
 
     fn precision(&self) -> Precision {
@@ -44,9 +54,13 @@ impl ObservationModel for Prior {
 
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
         let observed = |k: usize| self.observed.get(k).copied().unwrap_or_default();
-        let missing = sites.common(0).unknowns().enumerate().map(|(k, value)| observed(k) - value);
-        rows.residual(0, &missing.collect::<Vec<f64>>());
-        rows.by_itself(0, 0, self.components);
+        let mut row = 0;
+        for (common, &count) in self.components.iter().enumerate() {
+            let missing = sites.common(common).unknowns().enumerate().map(|(k, value)| observed(row + k) - value);
+            rows.residual(row, &missing.collect::<Vec<f64>>());
+            rows.by_itself(row, common, count);
+            row += count;
+        }
     }
 }
 
@@ -57,10 +71,12 @@ mod tests {
 
     #[test]
     fn partials_agree_with_differences() {
-        for (common, components) in [(SENSORS[0], 6), (PLANE, 3)] {
-            let precision = Precision::Deviations(vec![0.01; components]);
-            let observed = vec![0.5; components];
-            agrees(&Prior { common, components, observed, precision }.into());
+        for (commons, components) in
+            [(vec![SENSORS[0]], vec![6]), (vec![PLANE], vec![3]), (vec![PLANE, SENSORS[0]], vec![3, 6])]
+        {
+            let count = components.iter().sum();
+            let (precision, observed) = (Precision::Deviations(vec![0.01; count]), vec![0.5; count]);
+            agrees(&Prior { commons, components, observed, precision }.into());
         }
     }
 }

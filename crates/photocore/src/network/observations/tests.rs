@@ -33,6 +33,11 @@ pub const LINE: usize = 7;
 pub const PLANE: usize = 8;
 pub const SENSORS: [usize; 2] = [9, 11];
 
+/// Where the common unknown of a type is.
+pub fn of_kind(kind: CommonKind) -> usize {
+    CommonKind::ALL.iter().position(|&own| own == kind).unwrap()
+}
+
 /// A space with two places of points and two photos, as unknowns.
 struct Scene {
     space: ObjectSpace,
@@ -56,7 +61,11 @@ fn commons(space: ObjectSpace, [x, y, z]: [f64; 3]) -> Vec<PlacedCommon> {
         let place =
             matches!(kind, CommonKind::Level | CommonKind::PlumbLine | CommonKind::Line | CommonKind::Plane);
         let turns = kind.unknowns().iter().any(|&(_, component, _)| component > 2);
-        let position = if place { [x, y, z + 0.3] } else { [0.4, 0.2 * k as f64, -0.7] };
+        let position = match kind {
+            CommonKind::Scanner => [1.1, 0.9, 0.2],
+            _ if place => [x, y, z + 0.3],
+            _ => [0.4, 0.2 * k as f64, -0.7],
+        };
         let attitude = if turns { rotation([0.2 * k as f64, -0.4, 0.9]) } else { Matrix3::identity() };
         Common { kind, position, attitude, sd: vec![1.0; kind.unknowns().len()] }
     };
@@ -267,7 +276,8 @@ fn common_unknowns_of_other_types_are_refused() {
     assert_eq!(check(level(2).into()), Some(Fault::NoCommon(2)));
     let prior = |components: usize| {
         let precision = Precision::Deviations(vec![1.0; components]);
-        check(super::Prior { common: 1, components, observed: vec![], precision }.into())
+        let (commons, components) = (vec![1], vec![components]);
+        check(super::Prior { commons, components, observed: vec![], precision }.into())
     };
     assert_eq!(prior(3), None);
     assert_eq!(prior(1), Some(Fault::Deviations { components: 3, given: 1 }));

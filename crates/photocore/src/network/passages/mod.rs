@@ -7,7 +7,8 @@ use std::ops::Deref;
 
 use smallvec::SmallVec;
 
-use super::commons::CommonKind;
+use super::commons::{CommonKind, CommonState};
+use super::film::{FilmAt, FilmOf};
 use crate::geometry::camera::Window;
 use crate::geometry::{Camera, ObjectSpace, Vector3};
 
@@ -15,6 +16,11 @@ use crate::geometry::{Camera, ObjectSpace, Vector3};
 pub trait PassageModel {
     /// The common unknowns that it has, with their types.
     fn unknowns(&self) -> Vec<(usize, CommonKind)>;
+
+    /// Those of them that are one block, group by group: whatever touches one of a group touches all.
+    fn together(&self) -> Vec<Vec<usize>> {
+        vec![]
+    }
 
     /// Whether it is one of a network: points, photos and cameras are there, and such as it may have.
     fn is_of(&self, network: &Facts<'_>) -> bool;
@@ -28,6 +34,8 @@ pub struct Facts<'a> {
     pub given: Vec<bool>,
     /// Its cameras.
     pub cameras: Vec<&'a Camera>,
+    /// Of each photo, which camera it has.
+    pub photos: Vec<usize>,
 }
 
 macro_rules! kinds {
@@ -73,6 +81,7 @@ macro_rules! kinds {
 kinds! {
     figure::Figure;
     knots::Knots;
+    scan::Scan;
 }
 
 /// The common unknowns that an image steps with, each once.
@@ -89,6 +98,11 @@ pub(super) struct Passages {
     of_photo: Vec<Option<usize>>,
     /// By image of the model: the knots that it may step with. None at all before they are known.
     windows: Vec<Option<Window>>,
+    scans: Vec<Scan>,
+    /// By photo: its scan.
+    scan_of: Vec<Option<usize>>,
+    /// By image of the model the cell of the pattern where it is; none where there are no patterns of several.
+    pub cells: Vec<usize>,
 }
 
 impl Passages {
@@ -102,6 +116,8 @@ impl Passages {
         if passages.is_empty() {
             return own;
         }
+        let cameras: Vec<usize> = cameras.collect();
+        own.scan_of = vec![None; cameras.len()];
         let mut of_point = vec![None; count];
         for passage in passages {
             match passage {
@@ -112,16 +128,44 @@ impl Passages {
                     own.figures.push(figure.clone());
                 }
                 Passage::Knots(knots) => own.lenses.push(knots.clone()),
+                Passage::Scan(scan) => {
+                    own.scan_of[scan.photo] = Some(own.scans.len());
+                    own.scans.push(scan.clone());
+                }
             }
         }
         own.of_point = points.iter().map(|&point| of_point[point]).collect();
         let lens = |camera: usize| own.lenses.iter().position(|lens| lens.camera == camera);
-        own.of_photo = cameras.map(lens).collect();
+        own.of_photo = cameras.into_iter().map(lens).collect();
         own
     }
 
     pub fn is_empty(&self) -> bool {
-        self.figures.is_empty() && self.lenses.is_empty()
+        self.figures.is_empty() && self.lenses.is_empty() && self.scans.is_empty()
+    }
+
+    /// The film of a photo.
+    pub fn film(&self, photo: usize) -> Option<&FilmOf> {
+        Some(&self.scans[(*self.scan_of.get(photo)?)?].film)
+    }
+
+    /// The films of all photos at given values of the common unknowns; nothing at all where there are none.
+    pub fn films(&self, commons: &[CommonState]) -> Vec<Option<FilmAt>> {
+        if self.scans.is_empty() {
+            return vec![];
+        }
+        let at = |photo| Some(self.film(photo)?.at(&|common| commons.get(common).map(CommonState::vector)));
+        (0..self.scan_of.len()).map(at).collect()
+    }
+
+    /// The common unknowns of films, with their photos.
+    pub fn own(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.scans.iter().flat_map(|own| own.unknowns().into_iter().map(|(common, _)| (common, own.photo)))
+    }
+
+    /// The cell of the pattern where an image is.
+    pub fn cell(&self, image: usize) -> usize {
+        self.cells.get(image).copied().unwrap_or(0)
     }
 
     /// The lenses whose knots are unknown.
@@ -160,6 +204,9 @@ impl Passages {
         let mut all: Own = self.figure(point).map(|(own, _)| own.common).into_iter().collect();
         if let (Some(lens), Some(window)) = (self.lens(photo), self.window(image)) {
             all.extend(window.knots(columns).map(|knot| self.lenses[lens].commons[knot]));
+        }
+        if let Some(film) = self.film(photo) {
+            all.extend(film.commons(self.cell(image)).into_iter().map(|(own, _)| own));
         }
         all
     }

@@ -108,8 +108,8 @@ impl Bundle {
                     .map(|place| camera.image(&orientation.pose().sight(&place)))
             });
             let [.., station] = images[1];
-            let is_close =
-                |xy: &[f64; 2]| (0..2).all(|k| (xy[k] - station[k]).abs() < SAME_PLACE * image.sd[k]);
+            let sd = after.sd_in_camera(image);
+            let is_close = |xy: &[f64; 2]| (0..2).all(|k| (xy[k] - station[k]).abs() < SAME_PLACE * sd[k]);
             images.as_flattened().iter().all(is_close)
         };
         let mut elsewhere =

@@ -83,7 +83,8 @@ impl Bundle {
         images.iter().all(|image| {
             let Station { orientation, camera } = &stations.photos[image.photo];
             let [here, there] = places.map(|place| camera.image(&orientation.pose().sight(&place)));
-            (0..2).all(|k| (here[k] - there[k]).abs() < AT_INFINITY * image.sd[k])
+            let sd = stations.sd_in_camera(image);
+            (0..2).all(|k| (here[k] - there[k]).abs() < AT_INFINITY * sd[k])
         })
     }
 }

@@ -1,0 +1,119 @@
+//! How readings of a comparator or scanner become true places (NOAA TR NOS 57, equations 34 and 63).
+
+use super::camera::Matrix2;
+use super::camera::inverse::{inverted, times, way_back};
+
+/// Coefficients of each polynomial.
+pub const COEFFICIENTS: usize = 9;
+/// Parameters of a correction: scales, lean, the coefficients of x, those of y.
+pub const PARAMETERS: usize = 3 + 2 * COEFFICIENTS;
+/// Exponents of the terms of a polynomial, the constant behind them: x^4, y^4, x^3, y^3, x^2, y^2, x, y.
+const DEGREES: [i32; COEFFICIENTS - 1] = [4, 4, 3, 3, 2, 2, 1, 1];
+
+/// Scales, obliqueness and polynomials of the axes.
+///
+/// ```text
+/// d = (Sx X + Sy sin(alpha) Y, Sy cos(alpha) Y),    (s, t) = (d1/hx, d2/hy)
+/// true = d + (Px, Py),    Px = xA s^4 + xB t^4 + xC s^3 + xD t^3 + xE s^2 + xF t^2 + xG s + xH t + xJ,    Py likewise
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Correction {
+    /// Sx, Sy.
+    pub scales: [f64; 2],
+    /// alpha: the angle between the y axis and the normal to the x axis, towards +x.
+    pub lean: f64,
+    /// Coefficients of Px and Py.
+    pub polynomials: [[f64; COEFFICIENTS]; 2],
+    /// hx, hy.
+    pub half_range: [f64; 2],
+}
+
+/// A corrected place with its partials; the first index is x or y.
+#[derive(Debug, Clone, Copy)]
+pub struct Placed {
+    /// True x, y.
+    pub xy: [f64; 2],
+    /// With respect to the reading.
+    pub by_reading: Matrix2,
+    /// With respect to Sx, Sy, alpha, xA .. xJ, yA .. yJ.
+    pub by_parameters: [[f64; PARAMETERS]; 2],
+}
+
+impl Correction {
+    /// Of an instrument that is true.
+    pub const NONE: Self =
+        Self { scales: [1.0; 2], lean: 0.0, polynomials: [[0.0; COEFFICIENTS]; 2], half_range: [1.0; 2] };
+
+    /// Sx, Sy, alpha, xA .. xJ, yA .. yJ.
+    pub fn parameters(&self) -> [f64; PARAMETERS] {
+        let mut all = [0.0; PARAMETERS];
+        let listed = self.scales.iter().chain([&self.lean]).chain(self.polynomials.as_flattened());
+        all.iter_mut().zip(listed).for_each(|(own, listed)| *own = *listed);
+        all
+    }
+
+    /// With these parameters.
+    #[must_use]
+    pub fn with_parameters(&self, all: &[f64; PARAMETERS]) -> Self {
+        let polynomials = [0, 1].map(|axis| std::array::from_fn(|k| all[3 + COEFFICIENTS * axis + k]));
+        Self { scales: [all[0], all[1]], lean: all[2], polynomials, half_range: self.half_range }
+    }
+
+    /// The linear part.
+    fn matrix(&self) -> Matrix2 {
+        let ([sx, sy], (sin, cos)) = (self.scales, self.lean.sin_cos());
+        [[sx, sy * sin], [0.0, sy * cos]]
+    }
+
+    /// The nine functions of a linearly corrected place, and their derivatives by it.
+    fn functions(&self, place: [f64; 2]) -> ([f64; COEFFICIENTS], [[f64; 2]; COEFFICIENTS]) {
+        let arguments = [0, 1].map(|k| place[k] / self.half_range[k]);
+        let (mut values, mut slopes) = ([1.0; COEFFICIENTS], [[0.0; 2]; COEFFICIENTS]);
+        for (term, degree) in DEGREES.into_iter().enumerate() {
+            let axis = term % 2;
+            values[term] = arguments[axis].powi(degree);
+            slopes[term][axis] = f64::from(degree) * arguments[axis].powi(degree - 1) / self.half_range[axis];
+        }
+        (values, slopes)
+    }
+
+    /// A linearly corrected place with its polynomials, and the partials of that.
+    fn bowed(&self, place: [f64; 2]) -> ([f64; 2], Matrix2) {
+        let (values, slopes) = self.functions(place);
+        let sum = |k: usize| self.polynomials[k].iter().zip(values).map(|(c, value)| c * value).sum::<f64>();
+        let slope = |k: usize, axis: usize| {
+            self.polynomials[k].iter().zip(slopes).map(|(c, by)| c * by[axis]).sum::<f64>()
+        };
+        let by = |k: usize| [0, 1].map(|axis| f64::from(u8::from(k == axis)) + slope(k, axis));
+        ([0, 1].map(|k| place[k] + sum(k)), [by(0), by(1)])
+    }
+
+    /// The true place of a reading.
+    pub fn place(&self, reading: [f64; 2]) -> [f64; 2] {
+        self.bowed(times(&self.matrix(), reading)).0
+    }
+
+    /// The true place of a reading, with all partials.
+    pub fn linearize(&self, reading: [f64; 2]) -> Placed {
+        let ([x, y], linear) = (reading, self.matrix());
+        let ([_, sy], (sin, cos)) = (self.scales, self.lean.sin_cos());
+        let straight = times(&linear, reading);
+        let (xy, by_straight) = self.bowed(straight);
+        let (functions, _) = self.functions(straight);
+        let by_linear = [[x, 0.0], [sin * y, cos * y], [sy * cos * y, -sy * sin * y]];
+        let by_linear = by_linear.map(|column| times(&by_straight, column));
+        let mut by_parameters = [[0.0; PARAMETERS]; 2];
+        for (row, own) in by_parameters.iter_mut().enumerate() {
+            (0..3).for_each(|k| own[k] = by_linear[k][row]);
+            own[3 + COEFFICIENTS * row..][..COEFFICIENTS].copy_from_slice(&functions);
+        }
+        let columns = [0, 1].map(|k| times(&by_straight, linear.map(|row| row[k])));
+        Placed { xy, by_reading: [0, 1].map(|row| columns.map(|column| column[row])), by_parameters }
+    }
+
+    /// The reading of a true place; None where the polynomials turn over.
+    pub fn reading(&self, place: [f64; 2]) -> Option<[f64; 2]> {
+        let straight = way_back(place, place, |straight| self.bowed(straight))?;
+        Some(times(&inverted(self.matrix()), straight))
+    }
+}

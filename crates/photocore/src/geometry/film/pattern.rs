@@ -1,0 +1,164 @@
+//! Systematic deformations of films: sums of given functions of the place, each with a weight.
+
+use smallvec::SmallVec;
+
+use crate::geometry::camera::{Ebner12, Matrix2, OrthogonalSet};
+
+/// Which functions a deformation is made of. All are without dimension: weights are lengths, in mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pattern {
+    /// `w1 x y/h^2` in x and `w2 (x^2 - y^2)/h^2` in y, h half the format.
+    Quadratic {
+        /// h.
+        half: f64,
+    },
+    /// The corrections of Ebner (1976) without the linear e1 and e2, of `x/h` and `y/h`.
+    Ebner {
+        /// h.
+        half: f64,
+    },
+    /// Shifts of the nodes of a grid, bilinear inside the cells; beyond the grid, cells at its edge go on.
+    Grid(Grid),
+}
+
+/// The nodes of a grid, row by row. Weights are the shifts in x and y, node by node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// The first node.
+    pub first: [f64; 2],
+    /// From a node to the next, along x and y.
+    pub spacing: [f64; 2],
+    /// Columns and rows, 2 at least.
+    pub nodes: [usize; 2],
+}
+
+/// A function that is not zero in a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Function {
+    /// The number of its weight among those of the [`Pattern::pairs`] of the cell.
+    pub weight: usize,
+    /// Along x or y.
+    pub axis: usize,
+    /// Its value.
+    pub value: f64,
+    /// Its derivatives by the place.
+    pub slope: [f64; 2],
+}
+
+/// The functions that are not zero in a cell.
+pub type Functions = SmallVec<[Function; 20]>;
+
+/// D at a place, and its partials by the place.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Deformation {
+    /// D, mm.
+    pub shift: [f64; 2],
+    /// dD/dq.
+    pub by_place: Matrix2,
+}
+
+impl Deformation {
+    /// The sum of functions with the given weights.
+    pub fn new(functions: &[Function], weight: impl Fn(usize) -> f64) -> Self {
+        let mut all = Self::default();
+        for own in functions {
+            let weight = weight(own.weight);
+            all.shift[own.axis] += weight * own.value;
+            (0..2).for_each(|k| all.by_place[own.axis][k] += weight * own.slope[k]);
+        }
+        all
+    }
+}
+
+impl Pattern {
+    /// Number of weights.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Quadratic { .. } => 2,
+            Self::Ebner { .. } => 10,
+            Self::Grid(grid) => 2 * grid.nodes[0] * grid.nodes[1],
+        }
+    }
+
+    /// The cell of a place: patterns that are no grid have one.
+    pub fn cell(&self, place: [f64; 2]) -> usize {
+        match self {
+            Self::Quadratic { .. } | Self::Ebner { .. } => 0,
+            Self::Grid(grid) => grid.cell(place),
+        }
+    }
+
+    /// The pairs of weights that count in a cell: weights 2k and 2k + 1 are pair k.
+    pub fn pairs(&self, cell: usize) -> SmallVec<[usize; 5]> {
+        match self {
+            Self::Quadratic { .. } | Self::Ebner { .. } => (0..self.count() / 2).collect(),
+            Self::Grid(grid) => grid.corners(cell).into_iter().collect(),
+        }
+    }
+
+    /// The functions of a cell at a place.
+    pub fn at(&self, cell: usize, place: [f64; 2]) -> Functions {
+        match *self {
+            Self::Quadratic { half } => quadratic(half, place).into_iter().collect(),
+            Self::Ebner { half } => ebner(half, place),
+            Self::Grid(grid) => grid.at(cell, place),
+        }
+    }
+}
+
+fn quadratic(half: f64, [x, y]: [f64; 2]) -> [Function; 2] {
+    let square = half * half;
+    [
+        Function { weight: 0, axis: 0, value: x * y / square, slope: [y / square, x / square] },
+        Function {
+            weight: 1,
+            axis: 1,
+            value: (x * x - y * y) / square,
+            slope: [2.0 * x / square, -2.0 * y / square],
+        },
+    ]
+}
+
+fn ebner(half: f64, place: [f64; 2]) -> Functions {
+    /// e1 and e2.
+    const LINEAR: usize = 2;
+    let [of_x, of_y] = place.map(|value| Ebner12::basis(value / half, 1.0));
+    let nonlinear = Ebner12::TERMS.iter().filter(|term| term.0 >= LINEAR);
+    let function = |&(parameter, axis, number, i, j): &(usize, usize, f64, usize, usize)| {
+        let ((p, by_p), (q, by_q)) = (of_y[i], of_x[j]);
+        let slope = [p * by_q, by_p * q].map(|by| number * by / half);
+        Function { weight: parameter - LINEAR, axis, value: number * p * q, slope }
+    };
+    nonlinear.map(function).collect()
+}
+
+impl Grid {
+    /// Cells are numbered by their first corners.
+    fn cell(&self, place: [f64; 2]) -> usize {
+        let along = |k: usize| {
+            let from_first = (place[k] - self.first[k]) / self.spacing[k];
+            from_first.floor().clamp(0.0, self.nodes[k] as f64 - 2.0) as usize
+        };
+        along(1) * self.nodes[0] + along(0)
+    }
+
+    fn corners(&self, cell: usize) -> [usize; 4] {
+        [cell, cell + 1, cell + self.nodes[0], cell + self.nodes[0] + 1]
+    }
+
+    fn at(&self, cell: usize, place: [f64; 2]) -> Functions {
+        let corner = [cell % self.nodes[0], cell / self.nodes[0]];
+        let along = |k: usize| (place[k] - self.first[k]) / self.spacing[k] - corner[k] as f64;
+        let sides = |k: usize| {
+            let (u, rate) = (along(k), 1.0 / self.spacing[k]);
+            [(1.0 - u, -rate), (u, rate)]
+        };
+        let ([left, right], [low, high]) = (sides(0), sides(1));
+        let corners = [(left, low), (right, low), (left, high), (right, high)];
+        let shifts = corners.into_iter().enumerate().flat_map(|(k, ((of_x, by_x), (of_y, by_y)))| {
+            let (value, slope) = (of_x * of_y, [by_x * of_y, of_x * by_y]);
+            [0, 1].map(|axis| Function { weight: 2 * k + axis, axis, value, slope })
+        });
+        shifts.collect()
+    }
+}

@@ -1,0 +1,227 @@
+//! What the film of a photo is made of in a network: which common unknowns, and what is never unknown.
+
+use nalgebra::Matrix2x3;
+use smallvec::SmallVec;
+
+use super::commons::CommonKind;
+use crate::geometry::Vector3;
+use crate::geometry::correction::{COEFFICIENTS, Correction};
+use crate::geometry::film::{Bend, Deformation, Film, Functions, Grid, Pattern, Reading, Scanner};
+
+/// Common unknowns that hold the coefficients of the polynomials of a scanner.
+const CURVES: usize = 2 * COEFFICIENTS / 3;
+
+/// The film of a photo, or a plate: common unknowns by their indices in the network.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FilmOf {
+    /// Where it lay, a [`CommonKind::FilmPlacement`].
+    pub placement: usize,
+    /// A [`CommonKind::FilmSize`].
+    pub size: usize,
+    /// A [`CommonKind::FilmBend`].
+    pub bend: Option<usize>,
+    /// Whether this is g, not h.
+    pub projective: bool,
+    /// A [`CommonKind::Roll`] whose m is added to that of the photo.
+    pub roll: Option<usize>,
+    /// A [`CommonKind::Scanner`].
+    pub scanner: usize,
+    /// Coefficients of its polynomials: six of [`CommonKind::ScannerCurve`], or none.
+    pub curves: Vec<usize>,
+    /// What its polynomials, origin and unit are; the correction counts for its half range alone.
+    pub readings: Scanner,
+    /// The functions of its deformation.
+    pub pattern: Option<Pattern>,
+    /// The weights of these, pair by pair: [`CommonKind::Pattern`].
+    pub weights: Vec<usize>,
+    /// Whether it was seen from the other side.
+    pub mirrored: bool,
+}
+
+/// The film of a photo at given values of the unknowns.
+#[derive(Debug, Clone)]
+pub struct FilmAt {
+    film: Film,
+    scanner: Scanner,
+    pattern: Option<(Pattern, Vec<[f64; 2]>)>,
+}
+
+/// A reading, and the functions of the pattern that it was computed with.
+#[derive(Debug, Clone)]
+pub struct Read {
+    /// The reading with its partials; NaN where the scanner has none.
+    pub reading: Reading,
+    functions: Functions,
+}
+
+impl FilmOf {
+    /// From indices and numbers, as callers have them: commons in the order of the fields; mirrored, rows down, pitch, o1, o2, hx, hy; 0, 1
+    /// or 2 for nothing, h or g; whether there are a roll and curves; 0 to 3 for no pattern, quadratic, Ebner's or a grid, and its numbers.
+    pub fn from_numbers(commons: &[usize], numbers: &[f64]) -> Option<Self> {
+        let (&[mirrored, down, pitch, o1, o2, hx, hy, bend, roll, curves, pattern], own) =
+            numbers.split_first_chunk()?;
+        let mut commons = commons.iter().copied();
+        let (placement, size) = (commons.next()?, commons.next()?);
+        let mut take = |count: usize| -> Option<Vec<usize>> {
+            let found: Vec<usize> = commons.by_ref().take(count).collect();
+            (found.len() == count).then_some(found)
+        };
+        let one = |number: f64| usize::from(number != 0.0);
+        let (of_bend, of_roll) = (take(one(bend))?.pop(), take(one(roll))?.pop());
+        let (scanner, curves) = (take(1)?[0], take(CURVES * one(curves))?);
+        let pattern = match (pattern, own) {
+            (0.0, []) => None,
+            (1.0, &[half]) => Some(Pattern::Quadratic { half }),
+            (2.0, &[half]) => Some(Pattern::Ebner { half }),
+            (3.0, &[x, y, along_x, along_y, columns, rows]) => {
+                let nodes = [columns as usize, rows as usize];
+                Some(Pattern::Grid(Grid { first: [x, y], spacing: [along_x, along_y], nodes }))
+            }
+            _ => return None,
+        };
+        let correction = Correction { half_range: [hx, hy], ..Correction::NONE };
+        let weights = take(pattern.map_or(0, |own| own.count() / 2))?;
+        commons.next().is_none().then_some(Self {
+            placement,
+            size,
+            bend: of_bend,
+            projective: bend == 2.0,
+            roll: of_roll,
+            scanner,
+            curves,
+            readings: Scanner { correction, pitch, origin: [o1, o2], down: down != 0.0 },
+            pattern,
+            weights,
+            mirrored: mirrored != 0.0,
+        })
+    }
+
+    /// Whether its numbers are such as it can have.
+    pub fn is_sound(&self) -> bool {
+        let Scanner { correction, pitch, origin, .. } = &self.readings;
+        let ranges = correction.half_range.iter().chain([pitch]).all(|&own| own > 0.0 && own.is_finite());
+        let pattern = self.pattern.is_none_or(|pattern| match pattern {
+            Pattern::Quadratic { half } | Pattern::Ebner { half } => half > 0.0 && half.is_finite(),
+            Pattern::Grid(grid) => {
+                grid.spacing.iter().all(|&own| own > 0.0 && own.is_finite())
+                    && grid.first.iter().all(|own| own.is_finite())
+                    && grid.nodes.iter().all(|&nodes| nodes > 1)
+            }
+        });
+        ranges && pattern && origin.iter().all(|own| own.is_finite())
+    }
+
+    /// Whether its pattern has several cells.
+    pub(super) fn has_cells(&self) -> bool {
+        matches!(self.pattern, Some(Pattern::Grid(_)))
+    }
+
+    /// The cell of its pattern where a place is.
+    pub fn cell(&self, place: [f64; 2]) -> usize {
+        self.pattern.map_or(0, |pattern| pattern.cell(place))
+    }
+
+    /// The common unknowns that a reading steps with whose place is in a cell of the pattern; those of [`Self::partials`] are known by
+    /// their number in this list.
+    pub(super) fn commons(&self, cell: usize) -> SmallVec<[(usize, CommonKind); 16]> {
+        let mut all = SmallVec::new();
+        all.push((self.placement, CommonKind::FilmPlacement));
+        all.push((self.size, CommonKind::FilmSize));
+        all.extend(self.bend.map(|own| (own, CommonKind::FilmBend)));
+        all.extend(self.roll.map(|own| (own, CommonKind::Roll)));
+        all.push((self.scanner, CommonKind::Scanner));
+        all.extend(self.curves.iter().map(|&own| (own, CommonKind::ScannerCurve)));
+        let pairs = self.pattern.map(|pattern| pattern.pairs(cell)).unwrap_or_default();
+        all.extend(pairs.into_iter().map(|pair| (self.weights[pair], CommonKind::Pattern)));
+        all
+    }
+
+    /// At given values of the common unknowns; None of those that do not count where it will be asked.
+    pub fn at(&self, common: &dyn Fn(usize) -> Option<Vector3>) -> FilmAt {
+        let vector = |own: usize| common(own).map_or([0.0; 3], |own| own.into());
+        let mut size = vector(self.size);
+        size[0] += self.roll.map_or(0.0, |roll| vector(roll)[0]);
+        let bend = self.bend.map_or(Bend::Flat, |own| {
+            let [first, second, _] = vector(own);
+            if self.projective { Bend::Projective([first, second]) } else { Bend::Bilinear([first, second]) }
+        });
+        let mut parameters = self.readings.correction.parameters();
+        parameters[..3].copy_from_slice(&vector(self.scanner));
+        for (three, &curve) in parameters[3..].chunks_exact_mut(3).zip(&self.curves) {
+            three.copy_from_slice(&vector(curve));
+        }
+        let correction = self.readings.correction.with_parameters(&parameters);
+        let pair = |&own: &usize| {
+            let [first, second, _] = vector(own);
+            [first, second]
+        };
+        FilmAt {
+            film: Film { mirrored: self.mirrored, placement: vector(self.placement), size, bend },
+            scanner: Scanner { correction, ..self.readings },
+            pattern: self.pattern.map(|pattern| (pattern, self.weights.iter().map(pair).collect())),
+        }
+    }
+
+    /// The partials of a reading by the offset of each common unknown of [`Self::commons`].
+    pub(super) fn partials(&self, read: &Read, mut add: impl FnMut(usize, &Matrix2x3<f64>)) {
+        let Read { reading, functions } = read;
+        let three = |rows: [&[f64]; 2]| Matrix2x3::from_fn(|row, k| rows[row].get(k).copied().unwrap_or(0.0));
+        let [x, y] = &reading.by_film;
+        let size = three([&x[3..], &y[3..]]);
+        let mut all: SmallVec<[Matrix2x3<f64>; 16]> = SmallVec::new();
+        all.extend([three([&x[..3], &y[..3]]), size]);
+        all.extend(self.bend.map(|_| three([&reading.by_bend[0], &reading.by_bend[1]])));
+        all.extend(self.roll.map(|_| three([&[size[(0, 0)]], &[size[(1, 0)]]])));
+        let [x, y] = &reading.by_scanner;
+        let groups = x.chunks_exact(3).zip(y.chunks_exact(3)).take(1 + self.curves.len());
+        all.extend(groups.map(|(x, y)| three([x, y])));
+        let pairs = functions.iter().map(|own| own.weight / 2 + 1).max().unwrap_or(0);
+        let first = all.len();
+        all.extend((0..pairs).map(|_| Matrix2x3::zeros()));
+        for own in functions {
+            for row in 0..2 {
+                let by = reading.by_shift[row][own.axis] * own.value;
+                all[first + own.weight / 2][(row, own.weight % 2)] += by;
+            }
+        }
+        all.iter().enumerate().for_each(|(slot, by)| add(slot, by));
+    }
+}
+
+impl FilmAt {
+    /// The reading of a place in the frame of the camera, with the functions of a cell of the pattern.
+    pub fn read(&self, q: [f64; 2], cell: usize) -> Read {
+        let (functions, deformation) = self.deformation(q, cell);
+        let reading = self.film.read(q, &deformation, &self.scanner);
+        Read { reading: reading.unwrap_or(Reading::NONE), functions }
+    }
+
+    /// A reading less that of a place in the frame of the camera.
+    pub(super) fn missing(&self, q: [f64; 2], cell: usize, reading: [f64; 2]) -> [f64; 2] {
+        let xy = self.read(q, cell).reading.xy;
+        [0, 1].map(|k| reading[k] - xy[k])
+    }
+
+    /// The place in the frame of the camera that has a reading.
+    pub fn place(&self, reading: [f64; 2], cell: usize) -> Option<[f64; 2]> {
+        self.film.place(reading, |q| self.deformation(q, cell).1, &self.scanner)
+    }
+
+    /// The cell of the pattern where a reading is.
+    pub fn cell_of_reading(&self, reading: [f64; 2]) -> usize {
+        let place = || self.film.place(reading, |_| Deformation::default(), &self.scanner);
+        self.pattern.as_ref().map_or(0, |(pattern, _)| place().map_or(0, |place| pattern.cell(place)))
+    }
+
+    /// Units of readings in a mm.
+    pub(super) fn units(&self) -> f64 {
+        1.0 / self.scanner.pitch
+    }
+
+    fn deformation(&self, q: [f64; 2], cell: usize) -> (Functions, Deformation) {
+        let Some((pattern, weights)) = &self.pattern else { return Default::default() };
+        let (functions, pairs) = (pattern.at(cell, q), pattern.pairs(cell));
+        let deformation = Deformation::new(&functions, |k| weights[pairs[k / 2]][k % 2]);
+        (functions, deformation)
+    }
+}

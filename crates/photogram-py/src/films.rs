@@ -1,0 +1,64 @@
+//! Readings of scanned films; their documentation is in `_photocore.pyi`.
+
+use numpy::{PyArray2, PyArray3, PyReadonlyArrayDyn};
+use photocore::geometry::Vector3;
+use photocore::network::film::{FilmAt, FilmOf};
+use pyo3::prelude::*;
+
+use crate::arrays::{InputError, blocks, numbers, rows, table};
+
+/// Adds the functions to the extension module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(film_readings, module)?)?;
+    module.add_function(wrap_pyfunction!(film_places, module)?)
+}
+
+/// The film of given numbers, whose common unknowns are these vectors in the order of the film.
+fn film(
+    film: &PyReadonlyArrayDyn<'_, f64>,
+    vectors: &PyReadonlyArrayDyn<'_, f64>,
+) -> PyResult<(FilmOf, FilmAt)> {
+    let vectors = rows::<3>("vectors", vectors)?;
+    let all: Vec<usize> = (0..vectors.len()).collect();
+    let found = FilmOf::from_numbers(&all, &numbers("film", film)?).filter(FilmOf::is_sound);
+    let found = found.ok_or_else(|| InputError::new_err("numbers and vectors are not those of a film"))?;
+    let at = found.at(&|own| vectors.get(own).map(|&own| Vector3::from(own)));
+    Ok((found, at))
+}
+
+/// Readings, and their partials by place, t1 .. b2 and h or g, (n, 2, 10).
+type Readings<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
+
+#[pyfunction]
+fn film_readings<'py>(
+    py: Python<'py>,
+    numbers: PyReadonlyArrayDyn<'py, f64>,
+    vectors: PyReadonlyArrayDyn<'py, f64>,
+    places: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Readings<'py>> {
+    let (own, at) = film(&numbers, &vectors)?;
+    let places = rows::<2>("places", &places)?;
+    let read = |&place: &[f64; 2]| at.read(place, own.cell(place)).reading;
+    let found: Vec<_> = places.iter().map(read).collect();
+    let partials = found.iter().map(|own| {
+        [0, 1].map(|row| {
+            let parts = [&own.by_q[row][..], &own.by_film[row], &own.by_bend[row]];
+            let mut all = parts.into_iter().flatten().copied();
+            std::array::from_fn::<f64, 10, _>(|_| all.next().unwrap_or(f64::NAN))
+        })
+    });
+    let partials = partials.collect();
+    Ok((table(py, found.iter().map(|own| own.xy).collect())?, blocks(py, partials)?))
+}
+
+#[pyfunction]
+fn film_places<'py>(
+    py: Python<'py>,
+    numbers: PyReadonlyArrayDyn<'py, f64>,
+    vectors: PyReadonlyArrayDyn<'py, f64>,
+    readings: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (_, at) = film(&numbers, &vectors)?;
+    let place = |&xy: &[f64; 2]| at.place(xy, at.cell_of_reading(xy)).unwrap_or([f64::NAN; 2]);
+    table(py, rows::<2>("readings", &readings)?.iter().map(place).collect())
+}

@@ -1,0 +1,355 @@
+"""The film of a photo from its fiducial marks alone: what is affine in it, and whether it is mirrored."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram import _photocore
+from photogram.arguments.arrays import frozen, numbers, one_of, shaped
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Readings, Scanner
+
+__all__ = ["Affine", "FilmModel", "Interior", "conformal", "interior_orientation", "is_mirrored"]
+
+FilmModel = Literal["conformal", "affine", "bilinear", "projective"]
+
+UNKNOWNS: dict[str, tuple[str, ...]] = {
+    "conformal": ("t1", "t2", "theta", "m"),
+    "affine": ("t1", "t2", "theta", "m", "b1", "b2"),
+    "bilinear": ("t1", "t2", "theta", "m", "b1", "b2", "h1", "h2"),
+    "projective": ("t1", "t2", "theta", "m", "b1", "b2", "g1", "g2"),
+}
+"""Unknowns of each model."""
+_STEPS = 20
+_ENDED = 1e-12
+"""Steps of the adjustment at the most, and one so small, in parts of the format, is the last."""
+
+
+@dataclass(frozen=True)
+class Affine:
+    """The form of six numbers: reading = a0 + a1 x + a2 y, x and y in the camera's frame.
+
+    Attributes
+    ----------
+    matrix
+        (2, 3) a0, a1, a2 of both coordinates of readings.
+    scale_x, scale_y
+        mm of the reading in a mm of the camera along each axis.
+    between_axes
+        The angle between the images of the axes, less a right angle (radians).
+    rotation
+        The angle of the image of the x axis (radians).
+    sd
+        (4,) standard deviations of the last four.
+    """
+
+    matrix: Floats
+    scale_x: float
+    scale_y: float
+    between_axes: float
+    rotation: float
+    sd: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Interior:
+    """An interior orientation: the film of a photo from its marks.
+
+    Attributes
+    ----------
+    model
+        What is unknown of the film.
+    film
+        (6,) t1, t2 (mm), theta (radians), m, b1, b2.
+    bend
+        (2,) h1, h2 or g1, g2 (1/mm); zero where the model has none.
+    unknowns
+        (k,) names of what is unknown.
+    cofactors
+        (k, k) of these, a priori unit weight.
+    residuals
+        (n, 2) observed minus computed readings.
+    redundancy
+        (n, 2) redundancy numbers.
+    omega
+        Weighted sum of squares of the residuals.
+    degrees_of_freedom
+        2 n less the number of unknowns.
+    mirrored
+        Whether the film was seen from the other side.
+    affine
+        The same as a form of six numbers, where the model is affine or conformal.
+    """
+
+    model: FilmModel
+    film: Floats
+    bend: Floats
+    unknowns: tuple[str, ...]
+    cofactors: Floats
+    residuals: Floats
+    redundancy: Floats
+    omega: float
+    degrees_of_freedom: int
+    mirrored: bool
+    affine: Affine | None
+
+    @property
+    def sd(self) -> Floats:
+        """(k,) standard deviations a priori of the unknowns."""
+        return np.asarray(np.sqrt(np.diagonal(self.cofactors)))
+
+    @property
+    def p(self) -> float:
+        """The probability of a larger weighted sum of squares; NaN without degrees of freedom."""
+        if not self.degrees_of_freedom:
+            return float("nan")
+        return _photocore.chi_square(self.omega, self.degrees_of_freedom)
+
+
+def is_mirrored(places: ArrayLike, true: ArrayLike) -> bool | None:
+    """Return whether an affine map of places (n, 2) to true places (n, 2), y up, changes the side.
+
+    None where fewer than three marks, or marks on a line, do not tell.
+    """
+    q, p = (np.asarray(each, dtype=float) for each in (places, true))
+    if len(q) < 3:
+        return None
+    q, p = q - q.mean(axis=0), p - p.mean(axis=0)
+    moments = q.T @ q
+    if np.linalg.eigvalsh(moments)[0] < 1e-4 * np.trace(moments):
+        return None
+    return bool(np.linalg.det(np.linalg.solve(moments, q.T @ p)) < 0)
+
+
+def conformal(places: ArrayLike, true: ArrayLike, *, mirrored: bool) -> tuple[float, float, float, float]:
+    """Return t1, t2, theta, m of a conformal fit in closed form, of complex numbers: p = t + b q.
+
+    Of mirrored films q is -conj(q); b = (1 + m) exp(i theta).
+
+    Parameters
+    ----------
+    places, true
+        (n, 2) places in the camera's frame and true places on the scanner, mm; two at least.
+    mirrored
+        Whether the film is.
+    """
+    q, p = (np.asarray(each, dtype=float) @ [1, 1j] for each in (places, true))
+    if mirrored:
+        q = -np.conj(q)
+    centre, middle = q.mean(), p.mean()
+    b = np.vdot(q - centre, p - middle) / np.vdot(q - centre, q - centre)
+    t = middle - b * centre
+    return float(t.real), float(t.imag), float(np.angle(b)), float(abs(b) - 1.0)
+
+
+def interior_orientation(
+    places: ArrayLike,
+    readings: ArrayLike,
+    model: FilmModel = "affine",
+    *,
+    sd: ArrayLike = 1.0,
+    counted: Readings | None = None,
+    scanner: Scanner | None = None,
+    mirrored: bool | None = None,
+) -> Interior:
+    """Fit the film of a photo to its fiducial marks, whose places are taken as they are.
+
+    Errors of places are those of all photos of a camera, and no residual of one photo shows them: this fit
+    is no test of a certificate.
+
+    Parameters
+    ----------
+    places
+        (n, 2) places of the marks in the camera's frame, mm, x right and y up.
+    readings
+        (n, 2) what was read, mark by mark.
+    model
+        `conformal`: t1, t2, theta, m; `affine`: with b1, b2; `bilinear`: with h1, h2; `projective`: with
+        g1, g2.
+    sd
+        (n, 2) standard deviations of readings, or one for all.
+    counted
+        What readings count; None: mm, y up.
+    scanner
+        Scales and obliqueness of the scanner; None: it is true.
+    mirrored
+        Whether the film was seen from the other side; None: three marks at least tell.
+
+    Raises
+    ------
+    InputError
+        Fewer marks than the model has unknowns for, marks that do not tell the side, or tell another than
+        what is given.
+    """
+    one_of("model", model, get_args(FilmModel))
+    q = pairs("places", places)
+    xy = shaped("readings", readings, q.shape)
+    weights = 1.0 / np.broadcast_to(np.asarray(sd, dtype=float), xy.shape)
+    if not (np.isfinite(q).all() and np.isfinite(xy).all() and np.isfinite(weights).all()):
+        raise InputError("places, readings and their standard deviations must be finite")
+    names = UNKNOWNS[model]
+    if 2 * len(q) < len(names):
+        raise InputError(
+            f"the {model} film has {len(names)} unknowns, and {len(q)} marks have {2 * len(q)} coordinates"
+        )
+    own, machine = counted or Readings(), scanner or Scanner("scanner", sd=0.0)
+    true = true_places(xy, own, machine)
+    side = _side(q, true, mirrored)
+    fit = _Fit(q, xy, weights, names, own, machine, mirrored=side, projective=model == "projective")
+    values = np.zeros(8)
+    values[:4] = conformal(q, true, mirrored=side)
+    return fit.adjusted(model, values)
+
+
+def pairs(name: str, value: ArrayLike) -> Floats:
+    """Return an array (n, 2), n at least 1."""
+    found = numbers(name, value)
+    if found.ndim != 2 or found.shape[1] != 2 or not len(found):
+        raise InputError(f"{name} has the shape {found.shape}, not (n, 2)")
+    return found
+
+
+def true_places(readings: Floats, counted: Readings, scanner: Scanner) -> Floats:
+    """Return (n, 2) the true places of readings on a scanner, mm, y up."""
+    flat = Film(FilmPlacement("p", 0.0), FilmSize("p", 0.0), scanner, counted)
+    return _photocore.film_places(flat.numbers(), _vectors(flat), readings)
+
+
+def _vectors(film: Film) -> Floats:
+    return np.array([each.position for each in film.unknowns])
+
+
+def _side(q: Floats, true: Floats, given: bool | None) -> bool:
+    found = is_mirrored(q, true)
+    if given is None and found is None:
+        raise InputError("the marks do not tell whether the film is mirrored: say mirrored")
+    if given is not None and found is not None and found != given:
+        raise InputError(mirror_message(given))
+    return bool(found if given is None else given)
+
+
+def mirror_message(given: bool) -> str:
+    """Return what is said of marks that tell another side than what is given."""
+    if given:
+        return "the film is not mirrored, as is given: say mirrored = false"
+    return "the film is mirrored: scanned from the other side, or a negative; say mirrored = true"
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """The observation equations of readings of marks that are known."""
+
+    places: Floats
+    readings: Floats
+    weights: Floats
+    names: Sequence[str]
+    counted: Readings
+    scanner: Scanner
+    mirrored: bool
+    projective: bool
+
+    def film(self, values: Floats) -> Film:
+        return Film(
+            FilmPlacement("p", values[:3]),
+            FilmSize("p", values[3:6]),
+            self.scanner,
+            self.counted,
+            bend=FilmBend("p", values[6:]) if len(self.names) > 6 else None,
+            projective=self.projective,
+            mirrored=self.mirrored,
+        )
+
+    def equations(self, values: Floats) -> tuple[Floats, Floats]:
+        """Return weighted residuals (2 n,) and partials (2 n, k)."""
+        film = self.film(values)
+        computed, partials = _photocore.film_readings(film.numbers(), _vectors(film), self.places)
+        columns = [2 + _place(name) for name in self.names]
+        own = partials[:, :, columns] * self.weights[:, :, np.newaxis]
+        return ((self.readings - computed) * self.weights).ravel(), own.reshape(-1, len(columns))
+
+    def adjusted(self, model: FilmModel, values: Floats) -> Interior:
+        columns = [_place(name) for name in self.names]
+        size = np.abs(self.places).max()
+        for _ in range(_STEPS):
+            right, matrix = self.equations(values)
+            scale = np.linalg.norm(matrix, axis=0)
+            if not (scale > 0).all() or np.linalg.matrix_rank(matrix / scale) < len(columns):
+                raise InputError(
+                    f"the marks do not determine the {model} film: they lie on a line, or together"
+                )
+            step = np.linalg.lstsq(matrix / scale, right, rcond=None)[0] / scale
+            values[columns] += step
+            if np.abs(step * _moves(size)[columns]).max() < _ENDED * size:
+                break
+        else:
+            raise InputError(f"the {model} film does not converge: marks and readings do not belong together")
+        right, matrix = self.equations(values)
+        basis, triangle = np.linalg.qr(matrix)
+        inverse = np.linalg.inv(triangle)
+        cofactors = inverse @ inverse.T
+        return Interior(
+            model=model,
+            film=frozen(values[:6]),
+            bend=frozen(values[6:]),
+            unknowns=tuple(self.names),
+            cofactors=frozen(cofactors),
+            residuals=frozen(right.reshape(-1, 2) / self.weights),
+            redundancy=frozen(1.0 - (basis**2).sum(axis=1).reshape(-1, 2)),
+            omega=float(right @ right),
+            degrees_of_freedom=len(right) - len(columns),
+            mirrored=self.mirrored,
+            affine=self._affine(values, cofactors) if len(self.names) <= 6 else None,
+        )
+
+    def _affine(self, values: Floats, cofactors: Floats) -> Affine:
+        """Return the form of six numbers; the scanner's own differences from an affine map are not in it."""
+        film = self.film(values)
+        at = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        origin, along_x, along_y = _photocore.film_readings(film.numbers(), _vectors(film), at)[0]
+        found, partials = _said(values, mirrored=self.mirrored)
+        own = partials[:, [_place(name) for name in self.names]]
+        sd = np.sqrt(np.einsum("ik,kl,il->i", own, cofactors, own))
+        matrix = np.column_stack([origin, along_x - origin, along_y - origin])
+        scale_x, scale_y, between, rotation = found.tolist()
+        return Affine(frozen(matrix), scale_x, scale_y, between, rotation, frozen(sd))
+
+
+def _place(name: str) -> int:
+    """Return the place of an unknown among t1, t2, theta, m, b1, b2 and h or g."""
+    return UNKNOWNS["projective" if name in ("g1", "g2") else "bilinear"].index(name)
+
+
+def _moves(size: float) -> Floats:
+    """Return (8,) by how much a unit of each unknown moves a mark at the edge."""
+    return np.array([1.0, 1.0, size, size, size, size, size**2, size**2])
+
+
+def _said(values: Floats, *, mirrored: bool) -> tuple[Floats, Floats]:
+    """Return scales, angle between axes and rotation, and their partials by the six of the film.
+
+    The columns of R J (I + S) are the images of the axes.
+    """
+    theta, m, b1, b2 = values[2:6]
+    side = -1.0 if mirrored else 1.0
+    straight = np.array([[side * (1 + m + b1), side * b2], [b2, 1 + m - b1]])
+    x, y = straight[:, 0], straight[:, 1]
+    # By m, b1, b2.
+    by_x = np.array([[side, side, 0.0], [0.0, 0.0, 1.0]])
+    by_y = np.array([[0.0, 0.0, side], [1.0, -1.0, 0.0]])
+    lengths = np.hypot(*x), np.hypot(*y)
+    turns = np.arctan2(x[1], x[0]), np.arctan2(y[1], y[0])
+    of_x = np.array([-x[1], x[0]]) @ by_x / lengths[0] ** 2
+    of_y = np.array([-y[1], y[0]]) @ by_y / lengths[1] ** 2
+    partials = np.zeros((4, 6))
+    partials[0, 3:], partials[1, 3:] = x @ by_x / lengths[0], y @ by_y / lengths[1]
+    partials[2, 3:] = side * (of_y - of_x)
+    partials[3, 3:], partials[3, 2] = of_x, 1.0
+    between = side * (turns[1] - turns[0]) - np.pi / 2
+    between = (between + np.pi) % (2 * np.pi) - np.pi
+    return np.array([*lengths, between, turns[0] + theta]), partials

@@ -1,0 +1,328 @@
+"""Scanned films and measured plates: what their readings have in common, and what images of them pass.
+
+From the camera's frame q (mm, x right, y up, seen as the positive) to a reading:
+n = q + [m + b1, b2; b2, m - b1] q + D(q); e = n + (h1 x y, h2 x y) or n/(1 + g1 x + g2 y);
+p = R(theta) J e + t; the reading is what the scanner has where p is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import names, shaped, shown
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.network.cameras import Camera
+from photogram.network.passages import Passage
+from photogram.network.unknowns import Unknown
+
+__all__ = [
+    "Film",
+    "FilmBend",
+    "FilmPlacement",
+    "FilmSize",
+    "Mark",
+    "Pattern",
+    "Readings",
+    "Roll",
+    "Scan",
+    "Scanner",
+    "ScannerCurve",
+    "Weights",
+    "check_scans",
+]
+
+PATTERNS = ("none", "w1 w2", "ebner", "grid")
+"""By the number under which the core knows each."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Numbers(Unknown):
+    """Up to three numbers and their standard deviations.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    value, sd
+        Of its unknowns, or one for all.
+    """
+
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+
+    def _position(self) -> Floats:
+        count = len(self.components)
+        return np.append(shaped(f"value of {self.title}", self.value, (count,)), np.zeros(3 - count))
+
+
+@dataclass(frozen=True, eq=False)
+class FilmPlacement(_Numbers):
+    """Where the film of a photo lay: t1, t2 in mm, theta in radians."""
+
+    KIND: ClassVar[str] = "film placement"
+
+
+@dataclass(frozen=True, eq=False)
+class FilmSize(_Numbers):
+    """How the size of the film of a photo has changed: m, b1, b2."""
+
+    KIND: ClassVar[str] = "film size"
+
+
+@dataclass(frozen=True, eq=False)
+class FilmBend(_Numbers):
+    """What is not affine in the film of a photo: h1, h2 or g1, g2 in 1/mm."""
+
+    KIND: ClassVar[str] = "film bend"
+
+
+@dataclass(frozen=True, eq=False)
+class Roll(_Numbers):
+    """The mean change of size m of the films of a roll."""
+
+    KIND: ClassVar[str] = "roll"
+
+
+@dataclass(frozen=True, eq=False)
+class Mark(_Numbers):
+    """The place of a fiducial mark in the frame of its camera, mm."""
+
+    KIND: ClassVar[str] = "fiducial"
+
+
+@dataclass(frozen=True, eq=False)
+class Weights(_Numbers):
+    """Two weights of a pattern, mm."""
+
+    KIND: ClassVar[str] = "pattern"
+
+
+@dataclass(frozen=True, eq=False)
+class Scanner(_Numbers):
+    """Sx, Sy and alpha (radians) of a scanner or comparator."""
+
+    KIND: ClassVar[str] = "scanner"
+
+    value: ArrayLike = (1.0, 1.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ScannerCurve(_Numbers):
+    """Three coefficients of the polynomials of a scanner, mm."""
+
+    KIND: ClassVar[str] = "scanner curve"
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What readings of a scanner count.
+
+    Parameters
+    ----------
+    pitch
+        mm in a unit of readings.
+    origin
+        (o1, o2): the reading from which the scanner's correction counts.
+    down
+        Whether the second coordinate counts down, as rows do.
+    half_range
+        (hx, hy) mm, of the scanner's polynomials.
+    """
+
+    pitch: float = 1.0
+    origin: tuple[float, float] = (0.0, 0.0)
+    down: bool = False
+    half_range: tuple[float, float] = (1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        for name, shape in (("pitch", ()), ("origin", (2,)), ("half_range", (2,))):
+            value = shaped(f"{name} of readings", getattr(self, name), shape)
+            if not np.isfinite(value).all() or (name != "origin" and not (value > 0).all()):
+                raise InputError(f"{name} of readings cannot be {value.tolist()}")
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """A systematic deformation D(q) of films: functions of the place, each with a weight.
+
+    Parameters
+    ----------
+    kind
+        `w1 w2`: `w1 x y/h^2` in x, `w2 (x^2 - y^2)/h^2` in y; `ebner`: those of Ebner (1976) without the
+        linear two, of x/h and y/h; `grid`: shifts of nodes, bilinear between.
+    numbers
+        h in mm; of a grid the x, y of its first node, its spacing along x and y in mm, numbers of columns and
+        of rows.
+    weights
+        Two each: 1, 5 or, row by row, one for each node.
+    """
+
+    kind: str
+    numbers: ArrayLike
+    weights: Sequence[Weights]
+
+    def __post_init__(self) -> None:
+        if self.kind not in PATTERNS[1:]:
+            raise InputError(f"there is no pattern {shown(self.kind)}, but {', '.join(PATTERNS[1:])}")
+        count = 6 if self.kind == "grid" else 1
+        own = shaped(f"numbers of the pattern {self.kind}", self.numbers, (count,))
+        positive = own[2:] if self.kind == "grid" else own
+        if not (np.isfinite(own).all() and (positive > 0).all() and (own[4:] >= 2).all()):
+            raise InputError(f"numbers of the pattern {self.kind} cannot be {own.tolist()}")
+        object.__setattr__(self, "numbers", own)
+        needed = {"w1 w2": 1, "ebner": 5}.get(self.kind, int(np.prod(own[4:])))
+        if len(self.weights) != needed or not all(isinstance(each, Weights) for each in self.weights):
+            raise InputError(f"the pattern {self.kind} has {needed} Weights of two")
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """The film of a photo, or a plate: what its readings are made of.
+
+    Parameters
+    ----------
+    placement, size
+        Its own.
+    scanner
+        What read it, one object for all that it has read.
+    readings
+        What these count.
+    bend
+        h or, with `projective`, g; None: the film is affine.
+    projective
+        Whether `bend` is g.
+    roll
+        A roll whose m is added to that of `size`; None: that is the whole of it.
+    curves
+        The coefficients of the scanner's polynomials, six of three, x first; or none.
+    pattern
+        Its systematic deformation.
+    mirrored
+        Whether it was seen from the other side.
+    """
+
+    placement: FilmPlacement
+    size: FilmSize
+    scanner: Scanner
+    readings: Readings
+    bend: FilmBend | None = None
+    projective: bool = False
+    roll: Roll | None = None
+    curves: Sequence[ScannerCurve] = ()
+    pattern: Pattern | None = None
+    mirrored: bool = False
+
+    def __post_init__(self) -> None:
+        parts = (
+            ("placement", FilmPlacement),
+            ("size", FilmSize),
+            ("scanner", Scanner),
+            ("readings", Readings),
+        )
+        for name, kind in parts:
+            if not isinstance(getattr(self, name), kind):
+                raise InputError(f"the {name} of a film is no {kind.__name__}: {shown(getattr(self, name))}")
+        if len(self.curves) not in (0, 6):
+            raise InputError(
+                f"a scanner has six curves of three coefficients, or none, not {len(self.curves)}"
+            )
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What it is made of, in the order of the core."""
+        weights = () if self.pattern is None else tuple(self.pattern.weights)
+        single = (self.placement, self.size, self.bend, self.roll, self.scanner)
+        return (*(each for each in single if each is not None), *self.curves, *weights)
+
+    def numbers(self) -> Floats:
+        """Return what else the core takes."""
+        own = self.readings
+        bend = 0 if self.bend is None else 2 if self.projective else 1
+        pattern = 0 if self.pattern is None else PATTERNS.index(self.pattern.kind)
+        first = [
+            *(self.mirrored, own.down, own.pitch, *own.origin, *own.half_range),
+            *(bend, self.roll is not None, bool(self.curves), pattern),
+        ]
+        rest = [] if self.pattern is None else np.asarray(self.pattern.numbers).tolist()
+        return np.array([*first, *rest], dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
+class Scan(Passage):
+    """That the images of a photo are readings of a scanned film or of a plate on a comparator.
+
+    Parameters
+    ----------
+    photo
+        Its name; its camera is in mm.
+    film
+        Its film.
+    """
+
+    KIND = "scan"
+
+    photo: str
+    film: Film
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "photo", names("scan", [self.photo])[0])
+        if not isinstance(self.film, Film):
+            raise InputError(f"the film of the photo {self.photo} is no Film: {shown(self.film)}")
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Those of its film."""
+        return self.film.unknowns
+
+    def of(self, points: Mapping[str, int], photos: Mapping[str, int]) -> list[int]:
+        """Return the row of its photo."""
+        if self.photo not in photos:
+            raise InputError(f"the block has no photo {self.photo}, which a scan names")
+        return [photos[self.photo]]
+
+    def numbers(self) -> Floats:
+        """Return those of its film."""
+        return self.film.numbers()
+
+
+def check_scans(
+    passages: Sequence[Passage],
+    photos: Sequence[str],
+    cameras: Sequence[Camera],
+    photo_cameras: Indices | None,
+) -> None:
+    """Refuse scans of photos whose camera has no frame of marks, and two of one photo.
+
+    Raises
+    ------
+    InputError
+        A camera in pixels, of a comparator of its own, or with residuals where readings are corrected.
+    """
+    scans = [each for each in passages if isinstance(each, Scan)]
+    rows = {name: row for row, name in enumerate(photos)} if scans else {}
+    seen: set[str] = set()
+    for each in scans:
+        if each.photo in seen:
+            raise InputError(f"the photo {each.photo} is scanned twice")
+        seen.add(each.photo)
+        if photo_cameras is None:
+            continue
+        camera = cameras[int(photo_cameras[rows[each.photo]])]
+        if camera.unit != "mm" or camera.image_y == "down":
+            raise InputError(f"the photo {each.photo} is a scanned film: its camera is in mm, y up")
+        if camera.model.startswith("on_comparator"):
+            raise InputError(
+                f"the photo {each.photo} is a scanned film, and its camera is on_comparator, which has a"
+                " scanner of its own: brown, with the comparator as a scanner"
+            )
+        if camera.direction == "backward" and camera.weights == "corrected":
+            raise InputError(
+                f"the photo {each.photo} is a scanned film: residuals are those of readings, and its camera"
+                " has weights corrected: measured is needed"
+            )

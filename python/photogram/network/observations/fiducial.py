@@ -1,0 +1,217 @@
+"""Readings of fiducial marks, and what is known of films, marks and scanners beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from photogram.arguments.arrays import names, shaped, shown
+from photogram.errors import InputError
+from photogram.network.films import Film, FilmPlacement, FilmSize, Mark, Roll
+from photogram.network.observations.observation import Observation
+from photogram.network.unknowns import Unknown
+
+__all__ = ["FILM", "Fiducial", "KnownFilm", "KnownTogether"]
+
+FILM = ("t1", "t2", "theta", "m", "b1", "b2")
+"""The unknowns of the film of a photo: mm, radians, ratios."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fiducial(Observation):
+    """The reading of a fiducial mark on a photo.
+
+    Parameters
+    ----------
+    photo
+        Its name, for reports.
+    mark
+        Where it is in the camera's frame, one object for all photos of that.
+    film
+        That of the photo.
+    reading
+        (2,) in the unit of the scanner's readings.
+    sd
+        (2,) standard deviations of the same, or one for both.
+    covariance
+        (2, 2) covariance matrix of the same, in place of `sd`.
+
+    Raises
+    ------
+    InputError
+        What is no mark or film, values that are not finite, standard deviations that give no weight.
+    """
+
+    KIND = "fiducial"
+    VALUES = (("reading", (2,)),)
+    COMPONENTS = ("x", "y")
+
+    photo: str
+    mark: Mark
+    film: Film
+    reading: ArrayLike
+    sd: ArrayLike | None = None
+    covariance: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.mark, Mark) or not isinstance(self.film, Film):
+            raise InputError(f"a fiducial is of a Mark and a Film, not of {shown(self.mark)}")
+        self._set("photo", names("fiducial", [self.photo])[0])
+        super().__post_init__()
+        self._set("unknowns", (self.mark, *self.film.unknowns))
+        near = self.mark.position[:2]
+        self._set("observed", np.concatenate([self.observed, near, self.film.numbers()]))
+
+    @property
+    def of(self) -> tuple[str, ...]:
+        """The photo and the mark."""
+        return self.photo, self.mark.name
+
+    def units(self, linear_unit: str) -> tuple[str, ...]:
+        """Return that of readings."""
+        return ("mm" if self.film.readings.pitch == 1.0 else "px",) * 2
+
+
+@dataclass(frozen=True, eq=False)
+class KnownFilm(Observation):
+    """Some of t1, t2, theta, m, b1, b2 of the film of a photo; m about that of its roll.
+
+    Parameters
+    ----------
+    photo
+        Its name, for reports.
+    placement, size
+        Those of the film; their own standard deviations of what is observed are infinite.
+    roll
+        The roll; None: m is known by itself.
+    known
+        (k,) which of the six, by name.
+    values
+        (k,) what was observed.
+    sd
+        (k,) standard deviations of the same, or one for all.
+    covariance
+        (k, k) covariance matrix of the same, in place of `sd`.
+
+    Raises
+    ------
+    InputError
+        Other names, values that are not finite, standard deviations that give no weight.
+    """
+
+    KIND = "film"
+    UNKNOWNS = (("placement", FilmPlacement), ("size", FilmSize), ("roll", Roll))
+    NEEDS = frozenset({"placement", "size"})
+
+    photo: str
+    placement: FilmPlacement
+    size: FilmSize
+    roll: Roll | None
+    known: Sequence[str]
+    values: ArrayLike
+    sd: ArrayLike | None = None
+    covariance: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        self._set("photo", names("film", [self.photo])[0])
+        known = tuple(self.known)
+        if not set(known) <= set(FILM) or len(set(known)) < len(known) or not known:
+            raise InputError(f"of the film of {self.photo} {', '.join(FILM)} are known, not {shown(known)}")
+        self._set("known", known)
+        super().__post_init__()
+        values = shaped(f"values of {self.name}", self.values, (len(known),))
+        if not np.isfinite(values).all():
+            raise InputError(f"{self.name} has values that are not finite: {values.tolist()}")
+        self._set("observed", np.concatenate([[FILM.index(name) for name in known], values]))
+
+    @property
+    def of(self) -> tuple[str, ...]:
+        """The photo."""
+        return (self.photo,)
+
+    @property
+    def label(self) -> str:
+        """Those of which the same is known stand together."""
+        same = self.known == FILM[3:]
+        return self.KIND if same else f"{self.KIND}, {' '.join(self.known)}"
+
+    @property
+    def own_components(self) -> tuple[str, ...]:
+        """Those that are known; m about the roll's."""
+        about = "m" if self.roll is None else "m - roll"
+        return tuple(about if name == "m" else name for name in self.known)
+
+    def units(self, linear_unit: str) -> tuple[str, ...]:
+        """Return those of the six."""
+        return tuple({"t1": "mm", "t2": "mm", "theta": "rad"}.get(name, "") for name in self.known)
+
+
+@dataclass(frozen=True, eq=False)
+class KnownTogether(Observation):
+    """What is given of several unknowns as one observation with its covariance: a certificate, a calibration.
+
+    Parameters
+    ----------
+    title
+        Under which such observations stand together in results: `certificate`, `scanner`.
+    joined
+        The unknowns; their own standard deviations are infinite.
+    sd
+        (k,) standard deviations of all their unknowns.
+    covariance
+        (k, k) their covariance matrix, in place of `sd`.
+
+    Raises
+    ------
+    InputError
+        What is no unknown, both or none of `sd` and `covariance`, or such as give no weight.
+    """
+
+    KIND = "prior"
+
+    title: str
+    joined: Sequence[Unknown]
+    sd: ArrayLike | None = None
+    covariance: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        self._set("title", names("prior", [self.title])[0])
+        own = tuple(self.joined)
+        if not own or not all(isinstance(each, Unknown) for each in own):
+            raise InputError(f"what is known together is no list of unknowns: {shown(self.joined)}")
+        if len({id(each) for each in own}) < len(own):
+            raise InputError(f"what is known together as {self.title} has one unknown twice")
+        self._set("joined", own)
+        super().__post_init__()
+        self._set("unknowns", own)
+        widths = [len(each.components) for each in own] if len(own) > 1 else []
+        self._set("observed", np.array(widths, dtype=float))
+
+    @property
+    def of(self) -> tuple[str, ...]:
+        """The unknowns."""
+        return tuple(each.name for each in self.joined)
+
+    @property
+    def name(self) -> str:
+        """Its title and the unknowns."""
+        return f"{self.title} {', '.join(self.of)}"
+
+    @property
+    def label(self) -> str:
+        """Its title."""
+        return self.title
+
+    def units(self, linear_unit: str) -> tuple[str, ...]:
+        """Return those of the unknowns."""
+        return tuple(unit for each in self.joined for unit in each.units(linear_unit))
+
+    @property
+    def own_components(self) -> tuple[str, ...]:
+        """Those of the unknowns, with their names where there are several."""
+        if len(self.joined) == 1:
+            return self.joined[0].components
+        return tuple(f"{each.name} {name}" for each in self.joined for name in each.components)
