@@ -21,12 +21,12 @@ from photogram.io import json
 from photogram.io.csv_text import csv_text
 from photogram.network.cameras import Camera
 from photogram.show.brief import Brief, Rows
-from photogram.targets.compared import Difference
-from photogram.targets.difference import Fitted, points_at
+from photogram.targets.compared import CameraDifference
 from photogram.targets.imaging import TURNED
 from photogram.targets.least_lens import HELD, Moved, Points
 from photogram.targets.lens_fit import GRID, KNOTS, fitted_in_stages, free_names, lens_of, shows, within
 from photogram.targets.maps import distance_text, image_grid
+from photogram.targets.motion_fit import Fitted, points_at
 from photogram.targets.output.rig import Rig
 
 __all__ = ["Conversion", "convert_lens"]
@@ -53,7 +53,7 @@ class Conversion(Brief):
 
     source: Camera
     camera: Camera
-    difference: Difference
+    difference: CameraDifference
     names: tuple[str, ...]
     covariance: Floats | None
 
@@ -221,7 +221,7 @@ def convert_lens(
     return Conversion(
         source=source,
         camera=_camera(found.camera, free, passed),
-        difference=Difference(
+        difference=CameraDifference(
             cameras=(source.title, found.camera.model),
             size=size,
             unit="m",

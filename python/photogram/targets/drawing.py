@@ -17,8 +17,8 @@ from photogram.arguments.types import Bools, Floats
 from photogram.plots.panels import Where, handed_out, note, panels, placed
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, COLOURS, FAINT, INK, ORDERED, VERMILION
-from photogram.targets.compared import Difference
-from photogram.targets.cross_validated import CrossValidation
+from photogram.targets.compared import CameraDifference
+from photogram.targets.cross_validation import CrossValidation
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def draw_uncertainty(found: UncertaintyMap, path: Path | None = None, ax: Where 
     return placed(partial(_uncertainty, found), path, ax)
 
 
-def draw_difference(found: Difference, path: Path | None = None, ax: Where = None) -> Any:
+def draw_difference(found: CameraDifference, path: Path | None = None, ax: Where = None) -> Any:
     """Draw the difference of two calibrations: its length as contours, its vectors; a panel each distance.
 
     Parameters
@@ -160,7 +160,7 @@ def _uncertainty(found: UncertaintyMap, ax: Where) -> Any:
     return handed_out([axes])
 
 
-def _difference(found: Difference, ax: Where) -> Any:
+def _difference(found: CameraDifference, ax: Where) -> Any:
     chi2 = found.chi2
     rows = len(found.distances)
     columns = 1 if chi2 is None else 2
