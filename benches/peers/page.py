@@ -10,6 +10,7 @@ import machine
 import phases
 from agreement import Agreement
 from runs import Measured, Record, main_seconds, main_step, package
+
 from targets import GIB, Target, covariance_seconds, growth, targets
 
 

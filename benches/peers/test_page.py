@@ -9,6 +9,7 @@ import page
 import pytest
 from phases import operations
 from runs import Measured, Plan, Runs, Size
+
 from targets import Target, growth, targets
 
 SMALL = {"import": 0.1, "small block": 0.005}
