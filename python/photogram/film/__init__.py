@@ -7,7 +7,7 @@ from photogram.film.decentring import Tangential
 from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
 from photogram.film.interior import Affine, Interior, interior_orientation
 from photogram.film.lens_table import Curve, LensParameters, RadialTable
-from photogram.film.which import WhichMark, which_mark
+from photogram.film.which import FilmWay, WhichMark, which_mark
 from photogram.film.years import CameraComparison, DatedCamera, compare_cameras
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "DatedCamera",
     "DistanceDifference",
     "Explanation",
+    "FilmWay",
     "Interior",
     "LensParameters",
     "MarkDistance",
