@@ -1,12 +1,15 @@
 """Which marks are to be looked at first: of the certificate, of a photo, or one reading."""
 
+import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from photogram import Result, adjust
+from photogram import InputError, Result, adjust
 from photogram.diagnosis.adjusted import diagnosed
 from photogram.diagnosis.film_marks import mark_hints
+from photogram.film import compare_steps
 from photogram.formats import read
 from shared_data import SHARED
 from test_film import project
@@ -23,6 +26,28 @@ def adjusted(folder: Path, table: str, change: dict[tuple[str, str], dict[int, f
             line[column] = repr(float(line[column]) + by)
     (folder / table).write_text("\n".join(map(",".join, lines)) + "\n")
     return adjust(read(folder).block)
+
+
+def test_two_steps_have_smaller_standard_deviations(tmp_path: Path) -> None:
+    inside = adjusted(tmp_path, "fiducials.csv", {})
+    with (tmp_path / "project.toml").open("a") as settings:
+        settings.write('\n[film]\ninterior = "before"\n')
+    before = adjust(read(tmp_path).block)
+    golden = json.loads((SHARED / "film" / "film.json").read_text())
+    sd = [
+        np.array([golden[which]["points"][name]["sd"] for name in golden["full"]["points"]])
+        for which in ("full", "two_steps")
+    ]
+    ratio = 100.0 * (np.median(sd[1] / sd[0], axis=0) - 1.0)
+    said = compare_steps(before, inside)
+    assert said.startswith(
+        f"standard deviations of points differ by {ratio[0]:+.1f} % in X, {ratio[1]:+.1f} % in Y"
+    )
+    assert ratio[1] < 0
+    with pytest.raises(InputError, match="different points"):
+        compare_steps(
+            before, adjust(before.block.replace(point_ids=[f"q{k}" for k in before.block.point_ids]))
+        )
 
 
 def test_good_marks_have_no_hint(tmp_path: Path) -> None:
