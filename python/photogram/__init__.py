@@ -33,14 +33,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.variance_function import variance_function
     from photogram.diagnosis.diagnose import diagnose
     from photogram.distributed.adjust import adjust_in_parts
-    from photogram.errors import (
-        AdjustmentError,
-        ContradictionError,
-        InputError,
-        OutOfMemoryError,
-        PhotogramError,
-        RankError,
-    )
+    from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, PhotogramError, RankError
     from photogram.formats.results import read_result
     from photogram.messages import Message
     from photogram.network.attitudes import Attitudes
@@ -74,7 +67,6 @@ __all__ = [
     "Block",
     "Camera",
     "Cleaned",
-    "ContradictionError",
     "Differences",
     "Distance",
     "Feature",
@@ -146,7 +138,6 @@ _HOMES = {
     "FirstValues": "adjustment.first_values",
     "GroupSums": "results.group_sums",
     "InnerConstraints": "network.datum",
-    "ContradictionError": "errors",
     "InputError": "errors",
     "Iteration": "results.iteration",
     "LeverArm": "network.unknowns",
