@@ -61,9 +61,7 @@ COMMENTS = {
         "The covariance of what the certificate determines is in covariances.csv.",
     ],
     "covariances": ["Of the camera and of the scanner, from their calibrations; what is not listed is zero."],
-    "fiducials": [
-        "The marks of the camera by its certificate, mm, seen as the positive."
-    ],
+    "fiducials": ["The marks of the camera by its certificate, mm, seen as the positive."],
     "fiducial_images": ["Readings of the marks, pixels of the scan. A mark that is not there was lost."],
     "films": [
         "What films of a roll have in common: m, the change of size, and a pattern with weights in mm.",
