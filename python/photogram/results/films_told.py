@@ -178,7 +178,7 @@ def film_lines(result: Result) -> list[str]:
     scales = stacked(photos, "photo", [(said, ".7f"), (said_sd, ".7f")])
     every, *device = scanner_table(result)
     return [
-        *films,
+        *(line.rstrip() for line in films),
         *("", "reading = a0 + a1 x + a2 y, x and y in the frame of the marks (mm)", *forms),
         *("", "mm of the film in a mm of the camera; angle between the axes less 90 degrees", *scales),
         *("", "certificate and adjusted; mean residuals of readings in the frame of the camera"),
