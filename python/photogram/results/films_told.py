@@ -47,7 +47,9 @@ def film_table(result: Result) -> list[Quantity]:
     tests = np.where(np.isfinite(largest), largest, np.nan)
     return [
         _photos(result),
-        Quantity(result.film[rows], axes, "value", "value", "value", "{} of the film", "value", figures=7),
+        Quantity(
+            result.film[rows], axes, "value", "value", "value", "{} of the film", "value", "{}", figures=7
+        ),
         Quantity(result.film_sd[rows], axes, "deviation", "sd", "sd", "sd of {}", "sd", head="sd {}"),
         Quantity(read, kind="number", name="marks", member="marks", head="Marks", decimals=0),
         Quantity(
