@@ -22,6 +22,7 @@ class Kind(StrEnum):
     METROLOGY = "metrology"
     SURVEY = "survey"
     ROLLING = "rolling"
+    ARCHIVE = "archive"
     NIGHT = "night"
 
 
@@ -30,6 +31,7 @@ SOURCES = {
     Kind.METROLOGY: ("flange",),
     Kind.SURVEY: ("survey",),
     Kind.ROLLING: ("rolling",),
+    Kind.ARCHIVE: ("archive",),
     Kind.NIGHT: ("exposures",),
 }
 """Packaged examples, directories of photogram.examples."""
@@ -48,7 +50,7 @@ def new(
         typer.Option(
             help="block: photos of a drone with control. metrology: targets and scale bars, no control."
             " survey: check points enough to state an accuracy. rolling: photos of a drone with a rolling"
-            " shutter. night: exposures of stars."
+            " shutter. archive: scanned film with fiducial marks. night: exposures of stars."
         ),
     ] = Kind.BLOCK,
     overwrite: Annotated[

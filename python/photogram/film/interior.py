@@ -13,6 +13,7 @@ from photogram import _photocore
 from photogram.arguments.arrays import frozen, numbers, one_of, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
+from photogram.network.film_form import Affine, affine_form
 from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Readings, Scanner, ScannerCurve
 
 __all__ = ["Affine", "FilmModel", "Interior", "conformal", "interior_orientation", "is_mirrored"]
@@ -31,32 +32,6 @@ FAR = 5.0
 _STEPS = 20
 _ENDED = 1e-12
 """Steps of the adjustment at the most, and one so small, in parts of the format, is the last."""
-
-
-@dataclass(frozen=True)
-class Affine:
-    """The form of six numbers: reading = a0 + a1 x + a2 y, x and y in the camera's frame.
-
-    Attributes
-    ----------
-    matrix
-        (2, 3) a0, a1, a2 of both coordinates of readings.
-    scale_x, scale_y
-        mm of the reading in a mm of the camera along each axis.
-    between_axes
-        The angle between the images of the axes, less a right angle (radians).
-    rotation
-        The angle of the image of the x axis (radians).
-    sd
-        (4,) standard deviations of the last four.
-    """
-
-    matrix: Floats
-    scale_x: float
-    scale_y: float
-    between_axes: float
-    rotation: float
-    sd: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,14 +312,10 @@ class _Fit:
     def _affine(self, values: Floats, cofactors: Floats) -> Affine:
         """Return the form of six numbers; the scanner's own differences from an affine map are not in it."""
         film = self.film(values)
-        at = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-        origin, along_x, along_y = _photocore.film_readings(film.numbers(), _vectors(film), at)[0]
-        found, partials = _said(values, mirrored=self.mirrored)
-        own = partials[:, [_place(name) for name in self.names]]
-        sd = np.sqrt(np.einsum("ik,kl,il->i", own, cofactors, own))
-        matrix = np.column_stack([origin, along_x - origin, along_y - origin])
-        scale_x, scale_y, between, rotation = found.tolist()
-        return Affine(frozen(matrix), scale_x, scale_y, between, rotation, frozen(sd))
+        places = [_place(name) for name in self.names]
+        of_film = np.zeros((6, 6))
+        of_film[np.ix_(places, places)] = cofactors
+        return affine_form(film, [*_vectors(film)], of_film)
 
 
 def _place(name: str) -> int:
@@ -355,28 +326,3 @@ def _place(name: str) -> int:
 def _moves(size: float) -> Floats:
     """Return (8,) by how much a unit of each unknown moves a mark at the edge."""
     return np.array([1.0, 1.0, size, size, size, size, size**2, size**2])
-
-
-def _said(values: Floats, *, mirrored: bool) -> tuple[Floats, Floats]:
-    """Return scales, angle between axes and rotation, and their partials by the six of the film.
-
-    The columns of R J (I + S) are the images of the axes.
-    """
-    theta, m, b1, b2 = values[2:6]
-    side = -1.0 if mirrored else 1.0
-    straight = np.array([[side * (1 + m + b1), side * b2], [b2, 1 + m - b1]])
-    x, y = straight[:, 0], straight[:, 1]
-    # By m, b1, b2.
-    by_x = np.array([[side, side, 0.0], [0.0, 0.0, 1.0]])
-    by_y = np.array([[0.0, 0.0, side], [1.0, -1.0, 0.0]])
-    lengths = np.hypot(*x), np.hypot(*y)
-    turns = np.arctan2(x[1], x[0]), np.arctan2(y[1], y[0])
-    of_x = np.array([-x[1], x[0]]) @ by_x / lengths[0] ** 2
-    of_y = np.array([-y[1], y[0]]) @ by_y / lengths[1] ** 2
-    partials = np.zeros((4, 6))
-    partials[0, 3:], partials[1, 3:] = x @ by_x / lengths[0], y @ by_y / lengths[1]
-    partials[2, 3:] = side * (of_y - of_x)
-    partials[3, 3:], partials[3, 2] = of_x, 1.0
-    between = side * (turns[1] - turns[0]) - np.pi / 2
-    between = (between + np.pi) % (2 * np.pi) - np.pi
-    return np.array([*lengths, between, turns[0] + theta]), partials
