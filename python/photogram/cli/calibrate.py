@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -126,8 +127,8 @@ class Seen:
         ),
     ] = None
 
-    def read(self, path: Path) -> Calibration:
-        """Read what lies at a path."""
+    def read(self, path: Path, progress: Callable[[str], None] | None = None) -> Calibration:
+        """Read what lies at a path; `progress` is told which photograph is searched."""
         from photogram.targets import read
 
         if (path / "project.toml").exists():
@@ -148,6 +149,7 @@ class Seen:
             within=self.within,
             size=None if self.size is None else _pair(self.size, "--size"),
             sd0=self._sd0(),
+            progress=progress,
             **given,
         )
 
@@ -215,7 +217,7 @@ def calibrate(
         typer.Argument(
             metavar="PATH",
             help="Corners of a board: a file of mrcal, OpenCV or Kalibr, a table, or a folder with one and a"
-            " board.toml (docs/targets.md).",
+            " board.toml; or a folder with photographs of it (docs/targets.md).",
         ),
     ],
     out: Annotated[
@@ -247,8 +249,8 @@ def calibrate(
         pictures = documents.pictures(job, target)
         if path.is_dir():
             job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))
-        with job.status("reading corners, finding first values"):
-            calibration = seen.read(path)
+        with job.status("reading corners, finding first values") as status:
+            calibration = seen.read(path, None if status is None else status.update)
         for message in calibration.messages if not quiet else ():
             print_remark(str(message))
         how: dict[str, Any] = {
