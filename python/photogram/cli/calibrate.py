@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 __all__ = ["calibrate"]
 
 
+EXAMPLE = ("board",)
+"""The packaged example, a directory of photogram.examples."""
+
+
 class ShapeName(StrEnum):
     """What of a board is unknown."""
 
@@ -212,14 +216,18 @@ def _pair(text: str, option: str) -> tuple[int, int]:
 def calibrate(
     job: Job,
     path: Annotated[
-        Path,
+        Path | None,
         Reads.FILE,
         typer.Argument(
             metavar="PATH",
+            show_default=False,
             help="Corners of a board: a file of mrcal, OpenCV or Kalibr, a table, or a folder with one and a"
             " board.toml; or a folder with photographs of it (docs/targets.md).",
         ),
     ],
+    example: Annotated[
+        bool, typer.Option("--example", help="Calibrate the packaged example instead: twenty pictures.")
+    ] = False,
     out: Annotated[
         Path | None,
         Writes.DIRECTORY,
@@ -243,9 +251,11 @@ def calibrate(
     Needs no start values. The report, tables of views, points, corners and cameras, and the adjusted project
     go to --out.
     """
-    target = out or default_out(path, "-calibrated")
-    documents.place(target)
     with job:
+        if path is None:
+            path = job.packaged(*EXAMPLE)
+        target = out or (Path("example-calibrated") if example else default_out(path, "-calibrated"))
+        documents.place(target)
         pictures = documents.pictures(job, target)
         if path.is_dir():
             job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))
@@ -263,7 +273,7 @@ def calibrate(
             _adjusted(job, calibration, how, threads, snooping),
             lambda other: seen.read(other).adjust(**how, threads=threads),
         )
-        files = _files(found)
+        files = _files(found, pictures.ending)
         page = documents.page(job, "calibrate", target, partial(_page, found))
         job.finish(
             {target / name: content for name, content in files.items()} | pictures.of(found.result) | page,
@@ -286,7 +296,7 @@ def _adjusted(
         return calibration.adjust(**how, threads=threads, progress=progress)
 
 
-def _files(found: Calibrated) -> dict[str, bytes]:
+def _files(found: Calibrated, ending: str | None) -> dict[str, bytes]:
     """Make everything that goes to the directory, before anything is written."""
     from photogram.formats import to_files
     from photogram.formats.adjusted import table_files
@@ -294,7 +304,7 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
     from photogram.targets.tables import views
-    from photogram.targets.worth_files import worth_files
+    from photogram.targets.worth_files import worth_files, worth_pictures
 
     files = {"report.txt": found.report().encode(), **table_files(found.result)}
     files["views.csv"] = csv_text(frame(views(found)))
@@ -302,6 +312,7 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     files |= {f"adjusted/{name}": content for name, content in plain.items()}
     if found.worth is not None:
         files |= worth_files(found.worth)
+        files |= {} if ending is None else worth_pictures(found.worth, ending)
     if found.snooped is not None:
         files["removed.csv"] = found.snooped.table().to_csv(index=False).encode()
     return files

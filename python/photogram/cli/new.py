@@ -23,6 +23,7 @@ class Kind(StrEnum):
     SURVEY = "survey"
     ROLLING = "rolling"
     NIGHT = "night"
+    BOARD = "board"
 
 
 SOURCES = {
@@ -31,6 +32,7 @@ SOURCES = {
     Kind.SURVEY: ("survey",),
     Kind.ROLLING: ("rolling",),
     Kind.NIGHT: ("exposures",),
+    Kind.BOARD: ("board",),
 }
 """Packaged examples, directories of photogram.examples."""
 
@@ -48,7 +50,7 @@ def new(
         typer.Option(
             help="block: photos of a drone with control. metrology: targets and scale bars, no control."
             " survey: check points enough to state an accuracy. rolling: photos of a drone with a rolling"
-            " shutter. night: exposures of stars."
+            " shutter. night: exposures of stars. board: corners of a chessboard in pictures."
         ),
     ] = Kind.BLOCK,
     overwrite: Annotated[
@@ -59,12 +61,12 @@ def new(
     """Write a small real project as tables, with comments that say what may stand there.
 
     Replace the tables by your own; `photogram adjust DIR` adjusts it, `photogram stellar-camera exposures
-    DIR/night.toml` a night.
+    DIR/night.toml` a night, `photogram calibrate DIR` a camera that sees a board.
     """
     with job:
         from photogram.errors import InputError
 
-        if any((out / name).exists() for name in ("project.toml", "night.toml")) and not overwrite:
+        if any((out / name).exists() for name in ("project.toml", "night.toml", "board.toml")) and not overwrite:
             raise InputError("holds a project; --overwrite allows it to be replaced", file=out)
         source = job.packaged(*SOURCES[kind])
         files = {out / each.name: each.read_bytes() for each in sorted(source.iterdir()) if each.is_file()}

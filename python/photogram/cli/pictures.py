@@ -49,6 +49,11 @@ class Pictures:
         need_matplotlib()
         job.writes(*(out / f"{name}.{self._ending}" for name in PICTURES))
 
+    @property
+    def ending(self) -> str | None:
+        """The format; None where no pictures are asked for."""
+        return None if self._out is None else self._ending
+
     def of(self, result: AdjustedNetwork) -> dict[Path, bytes]:
         """Return the pictures of a result as files."""
         if self._out is None:
