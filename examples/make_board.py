@@ -62,9 +62,9 @@ the files and always gives the same ones.
 """
 
 
-def held(random: np.random.Generator, reach: tuple[float, float], away: tuple[float, float]) -> np.ndarray:
-    """Return a pose, board -> camera: its middle so far off the axis (tangent), so far away (metres), tilted."""
-    about, off = random.uniform(0, 2 * np.pi), random.uniform(*reach)
+def held(random: np.random.Generator, about: float, reach: tuple[float, float], away: tuple[float, float]):
+    """Return a pose, board -> camera: its middle in a direction, off the axis (tangent) and away (metres)."""
+    off = random.uniform(*reach)
     ray = np.array([off * np.cos(about), 0.75 * off * np.sin(about), 1.0])
     tilt, turn = random.uniform(0, 2 * np.pi), random.uniform(-30, 30)
     size = random.uniform(10, 38)
@@ -80,8 +80,8 @@ def held(random: np.random.Generator, reach: tuple[float, float], away: tuple[fl
 def simulated() -> Calibration:
     """Return the calibration with its corners, errors drawn."""
     random = np.random.default_rng(SEED)
-    poses = [held(random, (0.0, 0.1), (0.6, 0.8)) for _ in range(10)]
-    poses += [held(random, (0.3, 0.5), (0.45, 0.9)) for _ in range(10)]
+    poses = [held(random, 0.63 * k, (0.0, 0.1), (0.6, 0.8)) for k in range(10)]
+    poses += [held(random, 0.63 * k, (0.38, 0.5), (0.4, 0.9)) for k in range(10)]
     names = [f"{place}{number:02d}.jpg" for place in ("middle", "edge") for number in range(1, 11)]
     rows = []
     for number, pose in enumerate(poses):

@@ -224,7 +224,7 @@ def calibrate(
             help="Corners of a board: a file of mrcal, OpenCV or Kalibr, a table, or a folder with one and a"
             " board.toml; or a folder with photographs of it (docs/targets.md).",
         ),
-    ],
+    ] = None,
     example: Annotated[
         bool, typer.Option("--example", help="Calibrate the packaged example instead: twenty pictures.")
     ] = False,

@@ -66,7 +66,8 @@ def new(
     with job:
         from photogram.errors import InputError
 
-        if any((out / name).exists() for name in ("project.toml", "night.toml", "board.toml")) and not overwrite:
+        own = ("project.toml", "night.toml", "board.toml")
+        if any((out / name).exists() for name in own) and not overwrite:
             raise InputError("holds a project; --overwrite allows it to be replaced", file=out)
         source = job.packaged(*SOURCES[kind])
         files = {out / each.name: each.read_bytes() for each in sorted(source.iterdir()) if each.is_file()}

@@ -6,6 +6,8 @@ from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from photogram.results.findings import block_findings
 from photogram.results.snooped import Snooped
 from photogram.show.ways import findings_of
@@ -63,6 +65,7 @@ def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
     wrong = [_systematic(each) for each in cross if not each.explained]
     stiff = bool(wrong) or any(each.significant for each in found.systematic)
     other = [OTHER_LENS] if stiff else []
+    unknown = [_deviation_asked(calibrated)] if isinstance(calibrated.result, UnknownWeight) else []
     missing = [line for each in shown for line in each.next]
     agreeing = [f"{', '.join(each.cameras)}: {each.verdict}" for each in cross if each.explained]
     return replace(
@@ -71,8 +74,21 @@ def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
         remarks=[*(each.sentence for each in shown), *agreeing, *found.remarks],
         weigh="--shape points",
         calibrate="",
-        if_usable=[*other, *missing],
-        if_withheld=[*other, *missing],
+        if_usable=[*unknown, *other, *missing],
+        if_withheld=[*unknown, *other, *missing],
+    )
+
+
+def _deviation_asked(calibrated: Calibrated) -> str:
+    """Ask for the standard deviation of corners, and say which one their residuals have."""
+    result = calibrated.result
+    used = result.used_images
+    weighted = (result.residuals[used] / result.image_given_sd[used]) ** 2
+    sd = float(np.sqrt(weighted.sum() / np.nansum(result.redundancy[used])))
+    return (
+        f"Say how well corners are measured: their residuals are those of `--sd images={sd:.2g}`. Without it"
+        " what is known of the board counts in proportion to one pixel, and board and corners cannot be told"
+        " apart."
     )
 
 
