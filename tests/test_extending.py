@@ -20,6 +20,7 @@ PACKAGE = [
     and path.parent.name != "stellar"
     and path != ROOT / "python" / "photogram" / "network" / "lens.py"
     and ROOT / "python" / "photogram" / "formats" not in path.parents
+    and ROOT / "python" / "photogram" / "targets" / "output" not in path.parents
 ]
 """Without the calibration by stars, whose plots have a radial axis, the known lenses of planetary cameras, of
 which one has that name, and the files of other programs, which say what lenses and formats are called."""

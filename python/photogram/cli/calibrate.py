@@ -15,7 +15,7 @@ from photogram.cli.adjust import LossName
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option
+from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option, pair
 from photogram.cli.progress import shown
 from photogram.cli.projects import Deviations, OriginName, with_options
 from photogram.cli.uncertainty import AS_USUAL, Uncertainty
@@ -151,7 +151,7 @@ class Seen:
             model=self.model,
             cameras=self.cameras or [],
             within=self.within,
-            size=None if self.size is None else _pair(self.size, "--size"),
+            size=None if self.size is None else pair(self.size, "--size"),
             sd0=self._sd0(),
             progress=progress,
             **given,
@@ -180,7 +180,7 @@ class Seen:
             if self.spacing is not None:
                 raise typer.BadParameter("goes with --board CxR", param_hint="--spacing")
             return None if self.board is None else Path(self.board)
-        columns, rows = _pair(self.board, "--board")
+        columns, rows = pair(self.board, "--board")
         if self.spacing is None:
             raise typer.BadParameter("needs --spacing", param_hint="--board")
         return Board(columns=columns, rows=rows, spacing=self.spacing)
@@ -196,16 +196,6 @@ class Seen:
 
 AS_FOUND = Seen()
 """As the files say."""
-
-
-def _pair(text: str, option: str) -> tuple[int, int]:
-    """Return two numbers with an x between them."""
-    first, x, second = text.lower().partition("x")
-    if not (x and first.strip().isdecimal() and second.strip().isdecimal()):
-        raise typer.BadParameter(
-            f"is two numbers, 10x7, or a file that is there, not {text}", param_hint=option
-        )
-    return int(first), int(second)
 
 
 @with_job
@@ -241,6 +231,15 @@ def calibrate(
         PriorName | None,
         typer.Option(help="Take corners out as mrcal does, to reproduce its results.", show_default=False),
     ] = None,
+    to: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FORMAT",
+            help="Write the cameras as opencv_yaml, ros_camera_info, kalibr_camchain or mrcal, too; again for"
+            " each.",
+            show_default=False,
+        ),
+    ] = None,
     uncertainty: Uncertainty = AS_USUAL,
     threads: Threads = None,
     strict: Strict = False,
@@ -273,10 +272,11 @@ def calibrate(
             _adjusted(job, calibration, how, threads, snooping),
             lambda other: seen.read(other).adjust(**how, threads=threads),
         )
-        files = _files(found, pictures.ending)
+        files = _files(found) | _cameras(found, to or [])
         page = documents.page(job, "calibrate", target, partial(_page, found))
+        drawn = pictures.of(found.result) | pictures.of_worth(found.worth)
         job.finish(
-            {target / name: content for name, content in files.items()} | pictures.of(found.result) | page,
+            {target / name: content for name, content in files.items()} | drawn | page,
             documents.as_json(found),
             summary=lambda: _summarise(found),
             code=uncertainty.exit_code(found, found.verdict.exit_code(strict=strict)),
@@ -296,7 +296,7 @@ def _adjusted(
         return calibration.adjust(**how, threads=threads, progress=progress)
 
 
-def _files(found: Calibrated, ending: str | None) -> dict[str, bytes]:
+def _files(found: Calibrated) -> dict[str, bytes]:
     """Make everything that goes to the directory, before anything is written."""
     from photogram.formats import to_files
     from photogram.formats.adjusted import table_files
@@ -304,7 +304,7 @@ def _files(found: Calibrated, ending: str | None) -> dict[str, bytes]:
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
     from photogram.targets.tables import views
-    from photogram.targets.worth_files import worth_files, worth_pictures
+    from photogram.targets.worth_files import worth_files
 
     files = {"report.txt": found.report().encode(), **table_files(found.result)}
     files["views.csv"] = csv_text(frame(views(found)))
@@ -312,10 +312,20 @@ def _files(found: Calibrated, ending: str | None) -> dict[str, bytes]:
     files |= {f"adjusted/{name}": content for name, content in plain.items()}
     if found.worth is not None:
         files |= worth_files(found.worth)
-        files |= {} if ending is None else worth_pictures(found.worth, ending)
     if found.snooped is not None:
         files["removed.csv"] = found.snooped.table().to_csv(index=False).encode()
     return files
+
+
+def _cameras(found: Calibrated, formats: list[str]) -> dict[str, bytes]:
+    """Make the files of the cameras in the formats of other programs, and their joint covariance."""
+    from photogram.targets import camera_files
+    from photogram.targets.output.covariances import FILE, cameras_covariance
+
+    made = {
+        f"{name}/{file}": content for name in formats for file, content in camera_files(found, name).items()
+    }
+    return made | {FILE: cameras_covariance(found)}
 
 
 def _page(found: Calibrated) -> Any:

@@ -15,8 +15,8 @@ from photogram.cli.job import Job, Reads
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
-    from photogram.targets.cross_validated import Into
-    from photogram.targets.worth import Asked
+    from photogram.targets.cross_validation import Into
+    from photogram.targets.worth import WorthOptions
 
 __all__ = ["AS_USUAL", "Uncertainty"]
 
@@ -78,11 +78,11 @@ class Uncertainty:
         int, typer.Option(min=0, metavar="K", help="Find the K views that would help most.")
     ] = 0
 
-    def asked(self) -> Asked:
+    def asked(self) -> WorthOptions:
         """Return what is asked of a calibration."""
-        from photogram.targets.worth import Asked
+        from photogram.targets.worth import WorthOptions
 
-        return Asked(
+        return WorthOptions(
             distances=self._distances(),
             datum=self.map_datum.value,
             noise_only=self.noise_only,
@@ -123,12 +123,12 @@ class Uncertainty:
         calibrated
             Reads and adjusts another one, with the options of this.
         """
+        from photogram.targets.appraisal import appraise
         from photogram.targets.differences import difference
         from photogram.targets.findings import judged
-        from photogram.targets.worth import worth
 
         with job.status("uncertainty") as status:
-            own = worth(found, self.asked(), None if status is None else status.update)
+            own = appraise(found, self.asked(), None if status is None else status.update)
         if self.compare_with is None:
             return judged(found, own)
         other = calibrated(self.compare_with)

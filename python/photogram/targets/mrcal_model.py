@@ -21,21 +21,14 @@ from photogram.network.cameras import Camera
 from photogram.targets.board import Board
 from photogram.targets.calibration import Calibration
 from photogram.targets.corners import Corners
+from photogram.targets.mrcal_lenses import freed, lens_of_mrcal
 from photogram.targets.npz_arrays import Arrays, read_arrays
 from photogram.targets.vision import inverted, of_vectors
 
-__all__ = ["KEY", "read_model"]
+__all__ = ["KEY", "read_lens", "read_model"]
 
 KEY = "optimization_inputs"
 INDICES = "indices_frame_camintrinsics_camextrinsics"
-PREFIX = "LENSMODEL_"
-OPENCV = "opencv_pinhole"
-_LENSES = {
-    "PINHOLE": ("pinhole", 4),
-    "STEREOGRAPHIC": ("stereographic", 4),
-    **{f"OPENCV{terms}": (OPENCV, 4 + terms) for terms in (4, 5, 8, 12)},
-}
-"""Models of mrcal by the name here, with as many of its parameters."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +80,25 @@ def read_model(path: Path) -> Calibration:
     )
 
 
-def _packed(path: Path) -> bytes:
+def read_lens(path: Path) -> tuple[Camera, tuple[int, int]]:
+    """Read the camera of a `.cameramodel`, held, and width and height of its pictures.
+
+    Raises
+    ------
+    InputError
+        The file is no such text, or its lens is not taken.
+    """
+    content = _content(path)
+    try:
+        camera = lens_of_mrcal(content["lensmodel"], [*map(float, content["intrinsics"])], path.stem)
+        width, height = map(int, content["imagersize"])
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        message = error.message if isinstance(error, InputError) else f"is no camera model: {error!r}"
+        raise InputError(message, file=path) from None
+    return camera, (width, height)
+
+
+def _content(path: Path) -> dict[str, Any]:
     text = read_text(path)
     try:
         # Literals only: names, calls and operations are refused.
@@ -97,7 +108,11 @@ def _packed(path: Path) -> bytes:
         raise InputError(f"is no dictionary of Python: {error}", file=path, record=record) from None
     if not isinstance(content, dict) or "lensmodel" not in content:
         raise InputError("is no camera model of mrcal: it has no lensmodel", file=path)
-    packed = content.get(KEY)
+    return content
+
+
+def _packed(path: Path) -> bytes:
+    packed = _content(path).get(KEY)
     if not isinstance(packed, bytes):
         raise InputError(f"holds a camera, but no corners: it has no {KEY}", file=path)
     try:
@@ -126,20 +141,12 @@ def _freed(arrays: Arrays) -> _Free:
 
 
 def _cameras(arrays: Arrays, free: _Free) -> list[Camera]:
-    lens = arrays.text("lensmodel")
-    own = _LENSES.get(lens.removeprefix(PREFIX))
-    if own is None:
-        names = ", ".join(_LENSES)
-        raise arrays.error("lensmodel", f"{lens} is none of those that are calibrated: {names}")
-    model, count = own
-    rows = arrays.numbers("intrinsics", None, count)
-    cameras = []
-    for number, values in enumerate(rows.tolist()):
-        terms = Camera(model, {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0}).names[:count]
-        freed = (terms[:4] if free.core else ()) + (terms[4:] if free.lens else ())
-        given = dict(zip(terms, values, strict=True))
-        cameras.append(Camera(model, given, dict.fromkeys(freed, np.inf), name=f"camera {number}"))
-    return cameras
+    model, rows = arrays.text("lensmodel"), arrays.numbers("intrinsics", None, None)
+    try:
+        own = [lens_of_mrcal(model, row, f"camera {number}") for number, row in enumerate(rows.tolist())]
+    except InputError as error:
+        raise InputError(error.message, file=arrays.path) from None
+    return [freed(each, model, free.core, free.lens) for each in own]
 
 
 def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -12,20 +11,19 @@ from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.show.brief import Brief, Rows
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.datums import datum_rows
 from photogram.targets.housing import Housing
 from photogram.targets.housings import camera_number, housed_with, housing_of, size_of
 from photogram.targets.imaging import rays
-from photogram.targets.maps import distance_text, image_grid
-from photogram.targets.new_views import Candidate, NewView, best_views
+from photogram.targets.maps import image_grid
+from photogram.targets.new_views import Candidate, Suggestions, best_views
 from photogram.targets.picture_parts import parts_of
 from photogram.targets.projection import common_partials, worst
 from photogram.targets.uncertainty import checked_distance
 from photogram.targets.vision import composed, inverted
 
-__all__ = ["Suggestions", "candidate_views", "suggest_views"]
+__all__ = ["candidate_views", "suggest_views"]
 
 DISTANCES = (0.1, 0.5, 0.9)
 """Quantiles of how far boards were, which are the distances of candidates."""
@@ -41,45 +39,6 @@ TILTS = {
 TURNS = {"": 0.0, f"turned by {TURN:g} degrees": TURN}
 GRID = (12, 8)
 """Pixels whose uncertainty is compared."""
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Suggestions(Brief):
-    """Views of the board that would help most, each with those before it.
-
-    Attributes
-    ----------
-    camera, distance, unit
-        Of the map of uncertainty in the datum `corners`, which is to become better.
-    pixels
-        (n, 2) of the map.
-    before
-        (n,) standard deviations in the worst direction as they are, pixels.
-    views
-        The views, in the order in which to take them.
-    """
-
-    camera: str
-    distance: float
-    unit: str
-    pixels: Floats
-    before: Floats
-    views: tuple[NewView, ...]
-
-    @property
-    def sentences(self) -> list[str]:
-        """What to do, and what comes of it, a line for each view."""
-        largest, said = float(self.before.max()), []
-        for each in self.views:
-            said.append(f"{each.candidate.name}: largest {largest:.3g} -> {each.largest:.3g} px")
-            largest = each.largest
-        return said
-
-    def brief(self) -> tuple[str, Rows]:
-        """Return them in a few lines."""
-        at = distance_text(self.distance, self.unit)
-        title = f"Views to take next, for the uncertainty of {self.camera} {at}"
-        return title, [(f"{number}", said) for number, said in enumerate(self.sentences, 1)]
 
 
 def suggest_views(
