@@ -6,10 +6,11 @@ from seen_boards import seen
 
 from photogram import Camera
 from photogram.targets import Board, Calibration
-from photogram.targets.appraisal import Asked, appraise
+from photogram.targets.appraisal import appraise
 from photogram.targets.document import calibration_document
 from photogram.targets.findings import judged
 from photogram.targets.showing import showings
+from photogram.targets.worth import WorthOptions
 
 BOARD = Board(columns=9, rows=7, spacing=0.03, shape="held")
 TRUTH = Camera(
@@ -71,7 +72,7 @@ def test_check_points_are_no_word_of_calibrations():
 
 def test_other_views_judge_and_all_say_the_same():
     found = calibrated()
-    whole = judged(found, appraise(found, Asked(grid=(6, 4))))
+    whole = judged(found, appraise(found, WorthOptions(grid=(6, 4))))
     assert any("cross-validation explained" in each for each in whole.verdict.lines)
     assert whole.result.verdict == whole.verdict
     assert whole.verdict.headline.encode() in whole.to_html()
@@ -86,7 +87,7 @@ def test_a_lens_that_is_too_stiff_is_named():
     held = plain.replace(sd={"fx": np.inf, "fy": np.inf, "cx": np.inf, "cy": np.inf})
     corners, poses = seen(BOARD, TRUTH, SIZE, views=14, seed=3, sd=0.2)
     found = Calibration(board=BOARD, corners=corners, cameras=[held], poses=poses, sd0=0.2).adjust()
-    whole = judged(found, appraise(found, Asked(grid=(6, 4))))
+    whole = judged(found, appraise(found, WorthOptions(grid=(6, 4))))
     assert not whole.verdict.usable
     assert any("--model opencv8" in each for each in whole.verdict.next)
     assert any(each.name == "cross-validation of camera" for each in whole.verdict.tests)

@@ -13,12 +13,12 @@ from photogram.results.snooped import Snooped
 from photogram.show.ways import findings_of
 from photogram.statistics.findings import Findings, Systematic
 from photogram.statistics.verdict import LARGEST_FACTOR, verdict
-from photogram.targets.agreement import EXPLAINED
 from photogram.targets.calibrated import Calibrated, UnknownWeight
+from photogram.targets.difference_test import EXPLAINED
 from photogram.targets.showing import showings
 
 if TYPE_CHECKING:
-    from photogram.targets.cross_validated import CrossValidation
+    from photogram.targets.cross_validation import CrossValidation
     from photogram.targets.worth import Worth
 
 __all__ = ["findings", "judged"]
