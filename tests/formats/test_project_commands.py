@@ -47,7 +47,7 @@ def test_new_begins_a_project_of_each_kind(run, tmp_path, kind):
         assert all(path.is_file() for path in inputs(night))
 
 
-@pytest.mark.parametrize("name", ["make_targets", "make_rolling", "make_archive"])
+@pytest.mark.parametrize("name", ["make_board", "make_targets", "make_rolling", "make_archive"])
 def test_an_example_is_what_its_script_makes(tmp_path, name):
     script = runpy.run_path(str(Path(__file__).parents[2] / "examples" / f"{name}.py"))
     script["main"]([str(tmp_path)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
     from photogram.targets import Board, Calibrated, Calibration
 
 __all__ = ["calibrate"]
+
+
+EXAMPLE = ("board",)
+"""The packaged example, a directory of photogram.examples."""
 
 
 class ShapeName(StrEnum):
@@ -126,8 +131,8 @@ class Seen:
         ),
     ] = None
 
-    def read(self, path: Path) -> Calibration:
-        """Read what lies at a path."""
+    def read(self, path: Path, progress: Callable[[str], None] | None = None) -> Calibration:
+        """Read what lies at a path; `progress` is told which photograph is searched."""
         from photogram.targets import read
 
         if (path / "project.toml").exists():
@@ -148,6 +153,7 @@ class Seen:
             within=self.within,
             size=None if self.size is None else pair(self.size, "--size"),
             sd0=self._sd0(),
+            progress=progress,
             **given,
         )
 
@@ -200,14 +206,18 @@ AS_FOUND = Seen()
 def calibrate(
     job: Job,
     path: Annotated[
-        Path,
+        Path | None,
         Reads.FILE,
         typer.Argument(
             metavar="PATH",
+            show_default=False,
             help="Corners of a board: a file of mrcal, OpenCV or Kalibr, a table, or a folder with one and a"
-            " board.toml (docs/targets.md).",
+            " board.toml; or a folder with photographs of it (docs/targets.md).",
         ),
-    ],
+    ] = None,
+    example: Annotated[
+        bool, typer.Option("--example", help="Calibrate the packaged example instead: twenty pictures.")
+    ] = False,
     out: Annotated[
         Path | None,
         Writes.DIRECTORY,
@@ -240,14 +250,16 @@ def calibrate(
     Needs no start values. The report, tables of views, points, corners and cameras, and the adjusted project
     go to --out.
     """
-    target = out or default_out(path, "-calibrated")
-    documents.place(target)
     with job:
+        if path is None:
+            path = job.packaged(*EXAMPLE)
+        target = out or (Path("example-calibrated") if example else default_out(path, "-calibrated"))
+        documents.place(target)
         pictures = documents.pictures(job, target)
         if path.is_dir():
             job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))
-        with job.status("reading corners, finding first values"):
-            calibration = seen.read(path)
+        with job.status("reading corners, finding first values") as status:
+            calibration = seen.read(path, None if status is None else status.update)
         for message in calibration.messages if not quiet else ():
             print_remark(str(message))
         how: dict[str, Any] = {

@@ -43,6 +43,7 @@ EXTRAS = {
     "jinja2": "report",
     "matplotlib": "plots",
     "PIL": "photos",
+    "cv2": "targets",
     "geopandas": "gis",
     "pyogrio": "gis",
     "pyproj": "gis",

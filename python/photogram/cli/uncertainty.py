@@ -125,18 +125,19 @@ class Uncertainty:
         """
         from photogram.targets.appraisal import appraise
         from photogram.targets.differences import difference
+        from photogram.targets.findings import judged
 
         with job.status("uncertainty") as status:
             own = appraise(found, self.asked(), None if status is None else status.update)
         if self.compare_with is None:
-            return replace(found, worth=own)
+            return judged(found, own)
         other = calibrated(self.compare_with)
         distances = self._distances() or [math.inf]
         apart = [
             difference(found, other, distances, camera=number)
             for number in range(min(len(found.cameras), len(other.cameras)))
         ]
-        return replace(found, worth=replace(own, differences=tuple(apart)))
+        return judged(found, replace(own, differences=tuple(apart)))
 
     def exit_code(self, found: Calibrated, code: int) -> int:
         """Return the exit code: 4 where a map is above what is needed, or there is none to say so."""

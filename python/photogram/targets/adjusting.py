@@ -15,6 +15,7 @@ from photogram.arguments.arrays import one_of
 from photogram.errors import InputError
 from photogram.results.result import Result
 from photogram.targets.calibrated import Calibrated, with_unknown_weight
+from photogram.targets.findings import judged
 from photogram.targets.outliers import marked_as_mrcal
 from photogram.targets.regularisation import regularised
 from photogram.targets.start import Start
@@ -43,7 +44,9 @@ def adjusted_start(
     told = replace(result, messages=[*start.messages, *result.messages])
     if start.sd0 is None:
         told = with_unknown_weight(told)
-    return Calibrated(calibration=start, result=told, unregularised=free if start.regularise else None)
+    return judged(
+        Calibrated(calibration=start, result=told, unregularised=free if start.regularise else None)
+    )
 
 
 def _with_priors(start: Start, free: Result, threads: int | None) -> Result:
@@ -66,5 +69,4 @@ def snooped_start(start: Start, **options: Any) -> Calibrated:
     assert isinstance(result, Result)
     own = start.with_images_of(result.block)
     told = replace(result, messages=[*own.messages, *result.messages])
-    vars(told)["verdict"] = found.verdict
-    return Calibrated(calibration=own, result=told, snooped=found)
+    return judged(Calibrated(calibration=own, result=told, snooped=found))
