@@ -13,6 +13,7 @@ from photogram import Camera, InputError
 from photogram.targets import read
 from photogram.targets.datums import datum_rows
 from photogram.targets.differences import difference
+from photogram.targets.drawing import steps_of_125
 from photogram.targets.housings import housing_of
 from photogram.targets.imaging import imaged, rays
 from photogram.targets.stereo import distance_uncertainty, triangulate
@@ -181,3 +182,11 @@ def test_the_file_of_mrcal_gives_its_map():
         own = projection_uncertainty(found, 0, data["pixels"], distance)
         expected = np.array(data[name]["corners_cofactors"])
         assert np.abs(own / scale - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "steps"),
+    [(0.06, 0.3, [0.05, 0.1, 0.2, 0.5]), (1.0, 1.0, [1.0, 2.0]), (3.0, 12.0, [2.0, 5.0, 10.0, 20.0])],
+)
+def test_contours_enclose_what_they_show(low, high, steps):
+    assert steps_of_125(low, high) == pytest.approx(steps)

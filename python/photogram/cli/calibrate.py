@@ -262,8 +262,9 @@ def calibrate(
         )
         files = _files(found) | _cameras(found, to or [], uncertainty.need)
         page = documents.page(job, "calibrate", target, partial(_page, found))
+        drawn = pictures.of(found.result) | pictures.of_worth(found.worth)
         job.finish(
-            {target / name: content for name, content in files.items()} | pictures.of(found.result) | page,
+            {target / name: content for name, content in files.items()} | drawn | page,
             documents.as_json(found),
             summary=lambda: _summarise(found),
             code=uncertainty.exit_code(found, found.verdict.exit_code(strict=strict)),

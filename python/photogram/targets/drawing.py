@@ -144,9 +144,9 @@ def draw_uncertainty_against_distance(
 def steps_of_125(low: float, high: float) -> Floats:
     """Return values 1, 2, 5 times powers of ten that enclose what lies between two positive numbers."""
     start = round_length(low)
-    powers = np.arange(math.floor(math.log10(start)), math.ceil(math.log10(high)) + 1)
+    powers = np.arange(math.floor(math.log10(start)), math.floor(math.log10(high)) + 2)
     steps = np.concatenate([np.array([1.0, 2.0, 5.0]) * 10.0**power for power in powers])
-    above = np.flatnonzero(steps >= high * (1 - 1e-9))
+    above = np.flatnonzero(steps > high)
     return np.asarray(steps[(steps >= start * (1 - 1e-9)) & (np.arange(len(steps)) <= above[0])])
 
 
@@ -267,7 +267,7 @@ def _contours(
     high = float(positive.max())
     levels = steps_of_125(max(float(positive.min()), lowest * high), high)
     norm = LogNorm(levels[0], levels[-1])
-    shown = np.ma.masked_invalid(values)
+    shown = np.ma.masked_invalid(np.where(values > 0, values, np.nan))
     places = np.arange(SHADES * (len(levels) - 1) + 1) / SHADES
     shades = np.exp(np.interp(places, np.arange(len(levels)), np.log(levels)))
     filled = axes.contourf(columns, rows, shown, shades, cmap=ORDERED, norm=norm, extend="min")
