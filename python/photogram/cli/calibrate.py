@@ -272,7 +272,7 @@ def calibrate(
             _adjusted(job, calibration, how, threads, snooping),
             lambda other: seen.read(other).adjust(**how, threads=threads),
         )
-        files = _files(found) | _cameras(found, to or [])
+        files = _files(found) | _cameras(found, to or [], uncertainty.need)
         page = documents.page(job, "calibrate", target, partial(_page, found))
         drawn = pictures.of(found.result) | pictures.of_worth(found.worth)
         job.finish(
@@ -317,13 +317,15 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     return files
 
 
-def _cameras(found: Calibrated, formats: list[str]) -> dict[str, bytes]:
+def _cameras(found: Calibrated, formats: list[str], need: float | None) -> dict[str, bytes]:
     """Make the files of the cameras in the formats of other programs, and their joint covariance."""
     from photogram.targets import camera_files
     from photogram.targets.output.covariances import FILE, cameras_covariance
 
     made = {
-        f"{name}/{file}": content for name in formats for file, content in camera_files(found, name).items()
+        f"{name}/{file}": content
+        for name in formats
+        for file, content in camera_files(found, name, need if name == "mrcal" else None).items()
     }
     return made | {FILE: cameras_covariance(found)}
 

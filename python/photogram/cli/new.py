@@ -22,6 +22,7 @@ class Kind(StrEnum):
     METROLOGY = "metrology"
     SURVEY = "survey"
     ROLLING = "rolling"
+    ARCHIVE = "archive"
     NIGHT = "night"
     BOARD = "board"
 
@@ -31,6 +32,7 @@ SOURCES = {
     Kind.METROLOGY: ("flange",),
     Kind.SURVEY: ("survey",),
     Kind.ROLLING: ("rolling",),
+    Kind.ARCHIVE: ("archive",),
     Kind.NIGHT: ("exposures",),
     Kind.BOARD: ("board",),
 }
@@ -50,7 +52,8 @@ def new(
         typer.Option(
             help="block: photos of a drone with control. metrology: targets and scale bars, no control."
             " survey: check points enough to state an accuracy. rolling: photos of a drone with a rolling"
-            " shutter. night: exposures of stars. board: corners of a chessboard in pictures."
+            " shutter. archive: scanned film with fiducial marks. night: exposures of stars. board: corners"
+            " of a chessboard in pictures."
         ),
     ] = Kind.BLOCK,
     overwrite: Annotated[

@@ -11,6 +11,7 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import length, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.network.knots import beyond_knots
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.datums import DatumName, datum_rows
 from photogram.targets.housing import Housing
@@ -64,7 +65,12 @@ def projection_uncertainty(
     number = camera_number(result, camera)
     housing, own = _with(result, number, noise_only)
     rows = _rows(result, number, housing, own, datum, checked_distance(distance))
-    return housing.variance * projection_cofactors(housing, own, where, distance, rows)
+    found = housing.variance * projection_cofactors(housing, own, where, distance, rows)
+    seen = result.cameras[number].camera
+    if seen.knots is not None:
+        # Beyond the knots the polynomials at the edge go on, and nobody knows them.
+        found[beyond_knots(seen.parameters, seen.rays(where))] = np.nan
+    return found
 
 
 def uncertainty_map(
