@@ -13,6 +13,7 @@ from photogram.adjustment.robust import Loss
 from photogram.adjustment.snooping import snoop
 from photogram.arguments.arrays import one_of
 from photogram.errors import InputError
+from photogram.network.block import Block
 from photogram.results.result import Result
 from photogram.targets.calibrated import Calibrated, with_unknown_weight
 from photogram.targets.findings import judged
@@ -35,8 +36,10 @@ def adjusted_start(
     if outliers is not None:
         one_of("outliers", outliers, ("mrcal",))
     while True:
-        free = adjust(start.block(), loss=loss, threads=threads, progress=progress, verdict=True)
-        result = _with_priors(start, free, threads)
+        how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress, "verdict": True}
+        # Knots that no image touches are determined by priors alone.
+        free = None if _has_knots(start) else adjust(start.block(), **how)
+        result = adjust(_weighted(start), **how) if free is None else _with_priors(start, free, threads)
         worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
         if not (worse.any() and result.converged):
             break
@@ -49,22 +52,32 @@ def adjusted_start(
     )
 
 
+def _has_knots(start: Start) -> bool:
+    return any(each.knot_unknowns for each in start.cameras)
+
+
+def _weighted(start: Start) -> Block:
+    """Return the block of a calibration with the priors of its cameras."""
+    if start.regularise is None:
+        return start.block()
+    observed = 2 * len(start.board.places) * len(start.corners.pictures)
+    return start.block(regularised(start.cameras, start.corners.sizes, observed))
+
+
 def _with_priors(start: Start, free: Result, threads: int | None) -> Result:
     """Return the adjustment with the priors of cameras, from where that without them has ended."""
     if start.regularise is None:
         return free
-    observed = 2 * len(start.board.places) * len(start.corners.pictures)
-    cameras = regularised(start.cameras, start.corners.sizes, observed)
-    found = adjusted_again(start.block(cameras), free.options, free.state, threads=threads)
+    found = adjusted_again(_weighted(start), free.options, free.state, threads=threads)
     assert isinstance(found, Result)
     return found
 
 
 def snooped_start(start: Start, **options: Any) -> Calibrated:
     """Take gross errors out one after the other, and adjust what is left; see :meth:`Calibration.snoop`."""
-    if start.regularise is not None:
+    if start.regularise is not None and not _has_knots(start):
         raise InputError("gross errors are taken out without priors of cameras: regularise is None")
-    found = snoop(start.block(), **options)
+    found = snoop(_weighted(start), **options)
     result = found.judged
     assert isinstance(result, Result)
     own = start.with_images_of(result.block)

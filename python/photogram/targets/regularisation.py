@@ -5,6 +5,10 @@ With n = 2 (corners of the board) (pictures), whatever is missing, and n_d lens 
     lambda p = 0,  lambda^2 = 0.0025 n / (4 n_d)         every lens term; 5 lambda for k4, k5, k6
     mu (cx - (w - 1)/2) = 0,  mu^2 = 0.0025 n / (2 K 500^2)       likewise cy; K cameras
 
+and, of splined lenses, with n_d displacements of knots, lambda^2 = 0.0025 n / (0.04 n_d):
+
+    lambda (e . d) = 0,  10 lambda (e x d) = 0        e: from the middle of the knots; in it (1, 0), and lambda
+
 as rows of unit weight in pixels, whatever the standard deviation of corners.
 """
 
@@ -13,16 +17,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 
-__all__ = ["SPLINED", "regularised"]
+__all__ = ["regularised"]
 
-SPLINED = "splined_stereographic"
 CORE = ("fx", "fy", "f", "cx", "cy")
 DENOMINATOR = ("k4", "k5", "k6")
 SHARE, ROUGH, FAR = 0.0025, 4.0, 500.0
 FIRMER = 5.0
+ROUGH_KNOTS, ACROSS = 0.04, 10.0
 
 
 def regularised(
@@ -42,15 +49,14 @@ def regularised(
     Raises
     ------
     InputError
-        A camera whose pictures have no known size; a splined one, which has priors of its own.
+        A camera whose pictures have no known size.
     """
     terms = [[name for name in each.names if name not in CORE and _free(each, name)] for each in cameras]
     count = sum(map(len, terms))
     mu = math.sqrt(SHARE * observed / (2 * len(cameras) * FAR**2))
+    knots = sum(len(each.knot_names) for each in cameras if each.knot_unknowns)
     found = []
     for camera, size, own in zip(cameras, sizes, terms, strict=True):
-        if camera.model == SPLINED:
-            raise InputError(f"the camera {camera.title} is splined: its knots have priors of their own")
         if size is None:
             raise InputError(f"the camera {camera.title}: the centre of its pictures needs their size")
         firm = math.sqrt(SHARE * observed / (ROUGH * count)) if count else math.inf
@@ -63,7 +69,26 @@ def regularised(
         values = {name: value for name, (value, _) in priors.items()}
         sd = {name: each for name, (_, each) in priors.items()}
         given = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
-        found.append(camera.replace(parameters={**camera.parameters, **values}, sd={**given, **sd}))
+        found.append(
+            camera.replace(
+                parameters={**camera.parameters, **values},
+                sd={**given, **sd},
+                knot_sd=_of_knots(camera, math.sqrt(SHARE * observed / (ROUGH_KNOTS * knots)))
+                if camera.knot_unknowns
+                else camera.knot_sd,
+            )
+        )
+    return found
+
+
+def _of_knots(camera: Camera, firm: float) -> Floats:
+    """Return (ny, nx, 2) standard deviations of knots, radial and tangential; one in the very middle is as
+    free across as along."""
+    assert camera.knots is not None
+    rows, columns, _ = camera.knots.shape
+    found = np.tile([1 / firm, 1 / (ACROSS * firm)], (rows, columns, 1))
+    if rows % 2 and columns % 2:
+        found[rows // 2, columns // 2] = 1 / firm
     return found
 
 
