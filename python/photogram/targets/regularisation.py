@@ -83,7 +83,8 @@ def regularised(
 
 def _of_knots(camera: Camera, firm: float) -> Floats:
     """Return (ny, nx, 2) standard deviations of knots, radial and tangential; one in the very middle is as
-    free across as along."""
+    free across as along.
+    """
     assert camera.knots is not None
     rows, columns, _ = camera.knots.shape
     found = np.tile([1 / firm, 1 / (ACROSS * firm)], (rows, columns, 1))
