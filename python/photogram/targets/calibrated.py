@@ -25,7 +25,7 @@ from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 from photogram.targets.worth import Worth
 
-__all__ = ["STEPS", "Calibrated", "Part", "UnknownWeight", "with_unknown_weight"]
+__all__ = ["STEPS", "Calibrated", "Part", "UnknownWeight", "deviation_of_corners", "with_unknown_weight"]
 
 Part = Literal["cameras", "sensors", "board", "views"]
 """What has cofactors."""
@@ -49,6 +49,13 @@ class UnknownWeight(Result):
 def with_unknown_weight(result: Result) -> Result:
     """Return a result as one whose unit weight nobody knows."""
     return UnknownWeight(**{each.name: getattr(result, each.name) for each in fields(Result)})
+
+
+def deviation_of_corners(result: Result) -> float:
+    """Return the standard deviation of a corner of level 0 that residuals have, in those that were given."""
+    used = result.used_images
+    weighted = (result.residuals[used] / result.image_given_sd[used]) ** 2
+    return float(np.sqrt(weighted.sum() / np.nansum(result.redundancy[used])))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -6,14 +6,12 @@ from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from photogram.results.findings import block_findings
 from photogram.results.snooped import Snooped
 from photogram.show.ways import findings_of
 from photogram.statistics.findings import Findings, Systematic
 from photogram.statistics.verdict import LARGEST_FACTOR, verdict
-from photogram.targets.calibrated import Calibrated, UnknownWeight
+from photogram.targets.calibrated import Calibrated, UnknownWeight, deviation_of_corners
 from photogram.targets.difference_test import EXPLAINED
 from photogram.targets.showing import showings
 
@@ -81,14 +79,10 @@ def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
 
 def _deviation_asked(calibrated: Calibrated) -> str:
     """Ask for the standard deviation of corners, and say which one their residuals have."""
-    result = calibrated.result
-    used = result.used_images
-    weighted = (result.residuals[used] / result.image_given_sd[used]) ** 2
-    sd = float(np.sqrt(weighted.sum() / np.nansum(result.redundancy[used])))
+    sd = calibrated.calibration.assumed * deviation_of_corners(calibrated.result)
     return (
-        f"Say how well corners are measured: their residuals are those of `--sd images={sd:.2g}`. Without it"
-        " what is known of the board counts in proportion to one pixel, and board and corners cannot be told"
-        " apart."
+        f"Say how well corners are measured: their residuals are those of `--sd images={sd:.2g}`. Until then"
+        " what is known of the board is weighed against these, and nothing tests them."
     )
 
 

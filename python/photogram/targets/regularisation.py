@@ -7,7 +7,7 @@ With n = 2 (corners of the board) (pictures), whatever is missing, and n_d lens 
 
 and, of splined lenses, with n_d displacements of knots, lambda^2 = 0.0025 n / (0.04 n_d):
 
-    lambda (e . d) = 0,  10 lambda (e x d) = 0        e: from the middle of the knots; in it (1, 0), and lambda
+    lambda (e . d) = 0,  10 lambda (e x d) = 0      e: from the middle of the knots; in it (1, 0), and lambda
 
 as rows of unit weight in pixels, whatever the standard deviation of corners.
 """
@@ -82,9 +82,7 @@ def regularised(
 
 
 def _of_knots(camera: Camera, firm: float) -> Floats:
-    """Return (ny, nx, 2) standard deviations of knots, radial and tangential; one in the very middle is as
-    free across as along.
-    """
+    """Return (ny, nx, 2) standard deviations of knots, radial and tangential; alike in the very middle."""
     assert camera.knots is not None
     rows, columns, _ = camera.knots.shape
     found = np.tile([1 / firm, 1 / (ACROSS * firm)], (rows, columns, 1))
