@@ -4,7 +4,8 @@
 
 The network is the packaged example of GIANT, the camera that of examples/self_calibration.py; the field of
 residuals is a simulated block whose camera bends a little more than the adjustment knows, the features are
-those of the example of metrology, the map of the statement is that of the example of a survey.
+those of the example of metrology, films those of the example of an archive, the map of the statement is that
+of the example of a survey.
 """
 
 from __future__ import annotations
@@ -56,6 +57,12 @@ def part() -> Result:
     return with_features(result, project.features)
 
 
+def scanned() -> Result:
+    """Return the packaged example of an archive, adjusted."""
+    project = formats.read(str(files("photogram") / "examples" / "archive"))
+    return adjust(project.block, unit_variance="unity")
+
+
 def stated() -> Figure:
     """Return the map on the first sheet of the statement of the packaged survey."""
     project = formats.read(str(files("photogram") / "examples" / "survey"))
@@ -74,6 +81,7 @@ def results() -> dict[str, tuple[Result, tuple[str, ...]]]:
         "lens": (adjust(measured()), ("correlations", "distortion")),
         "bent": (adjust(bent()), ("residuals",)),
         "part": (part(), ("features",)),
+        "scanned": (scanned(), ("films",)),
     }
 
 

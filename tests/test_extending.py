@@ -20,9 +20,12 @@ PACKAGE = [
     and path.parent.name != "stellar"
     and path != ROOT / "python" / "photogram" / "network" / "lens.py"
     and ROOT / "python" / "photogram" / "formats" not in path.parents
+    and ROOT / "python" / "photogram" / "targets" / "output" not in path.parents
+    and path != ROOT / "python" / "photogram" / "film" / "certificate_file.py"
 ]
 """Without the calibration by stars, whose plots have a radial axis, the known lenses of planetary cameras, of
-which one has that name, and the files of other programs, which say what lenses and formats are called."""
+which one has that name, certificates, which have a table of it, and the files of other programs, which say
+what lenses and formats are called."""
 CRATE = [path for path in (ROOT / "crates" / "photocore" / "src").rglob("*.rs") if path.name != "golden.rs"]
 BINDING = [*(ROOT / "crates" / "photogram-py" / "src").rglob("*.rs")]
 EXTENSIONS = {

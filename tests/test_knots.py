@@ -8,6 +8,7 @@ import pytest
 
 from photogram import Block, Camera, InputError, adjust
 from photogram.network.attitudes import Attitudes
+from photogram.network.knots import beyond_knots
 from shared_data import SHARED
 
 TARGETS = SHARED / "targets"
@@ -80,6 +81,18 @@ def test_without_displacements_it_is_stereographic():
     u = looking(np.random.default_rng(1).normal(size=(50, 3)))
     np.testing.assert_allclose(plain.project(u), stereographic.project(u), rtol=1e-13)
     np.testing.assert_allclose(plain.rays(plain.project(u)), stereographic.rays(plain.project(u)), atol=1e-12)
+
+
+def test_what_lies_beyond_the_knots_is_told(camera):
+    """Of order 3 an image has two knots on either side: i in 1 .. nx - 2, j in 1 .. ny - 2."""
+    per_place = (11 - 3) / (4 * np.tan(np.radians(30)))
+    ends = np.array([(11 - 1) / 2 - 1, (8 - 1) / 2 - 1]) / per_place
+    places = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1]]) * ends
+    square = (places**2).sum(axis=1, keepdims=True)
+    for part, told in ((0.999, False), (1.001, True)):
+        own = part * places
+        u = looking(np.column_stack([4 * own, 4 - part**2 * square]))
+        assert (beyond_knots(camera.parameters, u) == told).all()
 
 
 def test_cameras_with_knots_are_values(camera, knots):

@@ -21,8 +21,8 @@ from photogram.plots.pictured import pictured
 from photogram.show.pictures import drawn
 
 ALWAYS = {"network", "residuals", "redundancy", "tests"}
-OF_LENSES = [name for name in PICTURES if name != "features"]
-"""Of networks with unknown lenses, to which nothing is fitted."""
+OF_LENSES = [name for name in PICTURES if name not in ("features", "films")]
+"""Of networks with unknown lenses, to which nothing is fitted, without films."""
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,14 @@ from typing import Any
 
 from photogram.messages import locate
 
-__all__ = ["AdjustmentError", "InputError", "OutOfMemoryError", "PhotogramError", "RankError"]
+__all__ = [
+    "AdjustmentError",
+    "ContradictionError",
+    "InputError",
+    "OutOfMemoryError",
+    "PhotogramError",
+    "RankError",
+]
 
 
 class PhotogramError(Exception):
@@ -45,6 +52,10 @@ class InputError(PhotogramError, ValueError):
         self.file = file
         self.record = record
         self.text = text
+
+
+class ContradictionError(InputError):
+    """Input that can be read and contradicts itself: what would be made of it could not be used."""
 
 
 class AdjustmentError(PhotogramError):

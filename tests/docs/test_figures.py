@@ -103,6 +103,8 @@ SENTENCES = {
     "blunders.md": 1,
     "giant-check.md": 4,
     "tutorials/aerial-block.md": 4,
+    "tutorials/archive.md": 2,
+    "tutorials/calibration.md": 4,
     "tutorials/drone.md": 3,
     "tutorials/metrology.md": 5,
     "tutorials/rolling-shutter.md": 6,

@@ -13,8 +13,8 @@ from photogram import adjust, formats
 from photogram.stellar.night_file import inputs
 
 
-@pytest.mark.parametrize("kind", ["metrology", "survey", "rolling", "night"])
-def test_new_begins_a_metrology_job_a_survey_a_drone_or_a_night(run, tmp_path, kind):
+@pytest.mark.parametrize("kind", ["metrology", "survey", "rolling", "archive", "night"])
+def test_new_begins_a_project_of_each_kind(run, tmp_path, kind):
     assert run("new", "own", "--kind", kind).exit_code == 0
     refused = run("new", "own")
     assert refused.exit_code == 1
@@ -35,13 +35,19 @@ def test_new_begins_a_metrology_job_a_survey_a_drone_or_a_night(run, tmp_path, k
         (readout,) = unknowns[unknowns["kind"] == "readout"].to_dict("records")
         assert abs(readout["value"] - 0.0276) < 2 * readout["sd"]
         assert readout["sd"] < 0.001
+    elif kind == "archive":
+        done = run("adjust", "own", "--no-html")
+        assert done.exit_code == 0, done.output
+        assert "47 observations of the kind fiducial" in done.output
+        assert "Accepted" in done.output
+        assert "Problems\n  none" in done.output
     else:
         night = tmp_path / "own" / "night.toml"
         assert inputs(night) == [night, night.with_name("images.csv")]
         assert all(path.is_file() for path in inputs(night))
 
 
-@pytest.mark.parametrize("name", ["make_targets", "make_rolling"])
+@pytest.mark.parametrize("name", ["make_board", "make_targets", "make_rolling", "make_archive"])
 def test_an_example_is_what_its_script_makes(tmp_path, name):
     script = runpy.run_path(str(Path(__file__).parents[2] / "examples" / f"{name}.py"))
     script["main"]([str(tmp_path)])

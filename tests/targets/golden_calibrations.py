@@ -11,7 +11,7 @@ import numpy as np
 from given_targets import DATA, NAMES, golden
 
 from photogram import Camera, _photocore
-from photogram.targets.housing import Housing, Seen, mean_motion
+from photogram.targets.housing import Housing, SeenCorners, mean_motion
 from photogram.targets.view_rows import view_rows
 from photogram.targets.vision import composed, of_vectors
 
@@ -52,7 +52,7 @@ def rig_corners():
     """Return the corners of both cameras."""
     corners = np.array(golden("rig_small")["corners"])
     views, cameras, points = corners[:, :3].astype(np.int64).T
-    return Seen(cameras, views, points, corners[:, 3:5], 0.3 * 2.0 ** corners[:, 5])
+    return SeenCorners(cameras, views, points, corners[:, 3:5], 0.3 * 2.0 ** corners[:, 5])
 
 
 @cache
@@ -75,7 +75,7 @@ def opencv8():
     points_by_board = bent(*given["observations_board"].shape[1:3])
     spacing = float(given["calibration_object_spacing"])
     board = grid(*given["observations_board"].shape[1:3], spacing) + points_by_board @ found["board_bend"]
-    seen = Seen(np.zeros_like(views), views, points, rows[:, :2], 1 / rows[:, 2])
+    seen = SeenCorners(np.zeros_like(views), views, points, rows[:, :2], 1 / rows[:, 2])
     frames = given["frames_rt_toref"]
     poses = of_vectors(frames)
     scale = found["regularisation_scale"]

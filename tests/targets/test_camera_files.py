@@ -16,6 +16,8 @@ from photogram.targets import Calibration, camera_files, first_values
 from photogram.targets.mrcal_model import read_model
 from photogram.targets.output.covariances import cameras_covariance
 from photogram.targets.output.formats import CAMERA_FORMATS
+from photogram.targets.projection import worst
+from photogram.targets.uncertainty import projection_uncertainty, uncertainty_map
 
 pytestmark = needs_golden
 
@@ -176,3 +178,21 @@ def test_covariances_are_joint(pair):
     assert found["names"] == names
     np.testing.assert_allclose(found["covariance"], cofactors * found["sigma0"] ** 2)
     assert found["datum"] == "axes"
+
+
+def test_the_valid_region_is_where_the_camera_is_known(pair):
+    need = 1.1 * np.nanmin(uncertainty_map(pair, 1).sd)
+    models = [ast.literal_eval(each.decode()) for each in camera_files(pair, "mrcal", need).values()]
+    outline = np.array(models[1]["valid_intrinsics_region"])
+    np.testing.assert_array_equal(outline[0], outline[-1])
+    assert worst(projection_uncertainty(pair, 1, outline)).max() < 1.01 * need
+    assert worst(projection_uncertainty(pair, 1, [outline.mean(axis=0)])) < need
+    # A little farther out it is known less well, but where the picture ends.
+    size = np.array(pair.calibration.corners.sizes[1])
+    ends = ((outline < 2) | (outline > size - 3)).any(axis=1)
+    farther = outline.mean(axis=0) + 1.1 * (outline - outline.mean(axis=0))
+    assert (worst(projection_uncertainty(pair, 1, farther[~ends])) > need).mean() > 0.95
+    with pytest.raises(InputError, match="nowhere known to 1e-06 px"):
+        camera_files(pair, "mrcal", 1e-6)
+    with pytest.raises(InputError, match="need: opencv_yaml has no region"):
+        camera_files(pair, "opencv_yaml", need)

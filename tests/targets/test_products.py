@@ -1,15 +1,19 @@
 """What is computed of an adjusted calibration, as users ask for it."""
 
 import io
+from functools import cache
 
+import given_targets
 import numpy as np
 import pytest
 from given_targets import golden
 from golden_calibrations import adjusted_rig
 
 from photogram import Camera, InputError
+from photogram.targets import read
 from photogram.targets.datums import datum_rows
 from photogram.targets.differences import difference
+from photogram.targets.drawing import steps_of_125
 from photogram.targets.housings import housing_of
 from photogram.targets.imaging import imaged, rays
 from photogram.targets.stereo import distance_uncertainty, triangulate
@@ -145,3 +149,44 @@ def test_what_is_refused(calibrated):
     ):
         with pytest.raises(InputError, match=words):
             refused()
+
+
+@pytest.mark.parametrize("distance", ["infinity", "1 m"])
+@pytest.mark.parametrize("camera", [0, 1])
+def test_maps_with_a_board_of_two_parabolas(camera, distance):
+    expected = golden("rig_small")["uncertainty_two_parabolas_mean_frames"][f"camera {camera}, {distance}"]
+    found = bent_rig()
+    pixels = golden("rig_small")["uncertainty"]["pixels"]
+    away = np.inf if distance == "infinity" else 1.0
+    own = projection_uncertainty(found, camera, pixels, away, "mean-frames") / found.result.covariance_scale
+    cofactors = np.array(expected["cofactors"])
+    largest = np.abs(cofactors).max(axis=(1, 2))
+    assert (np.abs(own - cofactors).max(axis=(1, 2)) < 1e-6 * largest).all()
+
+
+@cache
+def bent_rig():
+    return given_targets.rig_small("bend").adjust()
+
+
+def test_the_file_of_mrcal_gives_its_map():
+    """Corners, board, start and priors of a `.cameramodel`: the uncertainty that mrcal computes of it."""
+    data = golden("mrcal_opencv8")["uncertainty"]
+    found = read(given_targets.DATA / "opencv8-0.cameramodel").adjust()
+    scale = found.result.covariance_scale
+    for name, distance in (("infinity", np.inf), ("1 m", 1.0)):
+        own = projection_uncertainty(found, 0, data["pixels"], distance, "mean-frames", noise_only=True)
+        expected = np.array(data[name]["mean_frames_covariance_mrcal_2_2"]) / data["sigma"] ** 2
+        largest = np.abs(expected).max(axis=(1, 2))
+        assert (np.abs(own / scale - expected).max(axis=(1, 2)) < 2e-6 * largest).all()
+        own = projection_uncertainty(found, 0, data["pixels"], distance)
+        expected = np.array(data[name]["corners_cofactors"])
+        assert np.abs(own / scale - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "steps"),
+    [(0.06, 0.3, [0.05, 0.1, 0.2, 0.5]), (1.0, 1.0, [1.0, 2.0]), (3.0, 12.0, [2.0, 5.0, 10.0, 20.0])],
+)
+def test_contours_enclose_what_they_show(low, high, steps):
+    assert steps_of_125(low, high) == pytest.approx(steps)

@@ -356,7 +356,8 @@ fn of_commons() -> Vec<Observation> {
     };
     let base = |length: f64| -> Observation { Base { first: None, second: SENSOR, length, sd: 2e-3 }.into() };
     let precision = covariance(&[0.02, 0.02, 0.03, 0.02, 0.03, 0.02]);
-    let prior: Observation = Prior { common: SENSOR, components: 6, precision }.into();
+    let prior: Observation =
+        Prior { commons: vec![SENSOR], components: vec![6], observed: vec![], precision }.into();
     let lists = [
         [(0, -2.0), (1, -1.5), (2, 0.0), (3, 1.0), (4, 1.5), (6, 2.0)].map(|(k, t)| gnss(k, t)).to_vec(),
         [0, 2, 4, 5, 8].map(imu).to_vec(),
@@ -629,7 +630,10 @@ mod dense {
                         all.push(own.length - (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt());
                     }
                     Observation::Prior(own) => {
-                        all.extend((0..own.components).map(|k| -x[self.first(own.common) + k]));
+                        let each = own.commons.iter().zip(&own.components);
+                        all.extend(each.flat_map(|(&common, &count)| {
+                            (0..count).map(move |k| -x[self.first(common) + k])
+                        }));
                     }
                     Observation::Relative(own) => {
                         let ((ci, ai), (cj, aj)) = (photo(own.photos[0]), photo(own.photos[1]));
@@ -841,9 +845,9 @@ fn every_kind_agrees_with_dense_algebra() {
     close(solution.sums_of_squares.total(), square, square, 1e-9, "sum of squares");
     close(solution.variance_of_unit_weight.unwrap(), square / freedom as f64, 1.0, 1e-9, "variance");
     let names: Vec<&str> = solution.kinds(&network).iter().map(|sums| sums.kind).collect();
-    // The last three are of trajectories.
-    let kinds = photocore::network::observations::KINDS;
-    assert_eq!(names, kinds[..kinds.len() - 3]);
+    // Those that follow are of trajectories, and of cameras.
+    let kinds = photocore::network::observations::KINDS.iter().copied();
+    assert_eq!(names, kinds.take_while(|&kind| kind != "velocity").collect::<Vec<&str>>());
     let counts: Vec<[usize; 2]> =
         solution.kinds(&network).iter().map(|sums| [sums.observations, sums.components]).collect();
     let counted = [
@@ -855,6 +859,7 @@ fn every_kind_agrees_with_dense_algebra() {
         [5, 5],
         [2, 4],
         [3, 6],
+        [2, 2],
         [8, 24],
         [7, 21],
         [4, 24],

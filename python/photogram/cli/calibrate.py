@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -14,7 +15,7 @@ from photogram.cli.adjust import LossName
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option
+from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option, pair
 from photogram.cli.progress import shown
 from photogram.cli.projects import Deviations, OriginName, with_options
 from photogram.cli.uncertainty import AS_USUAL, Uncertainty
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
     from photogram.targets import Board, Calibrated, Calibration
 
 __all__ = ["calibrate"]
+
+
+EXAMPLE = ("board",)
+"""The packaged example, a directory of photogram.examples."""
 
 
 class ShapeName(StrEnum):
@@ -143,8 +148,8 @@ class Seen:
         ),
     ] = None
 
-    def read(self, path: Path) -> Calibration:
-        """Read what lies at a path."""
+    def read(self, path: Path, progress: Callable[[str], None] | None = None) -> Calibration:
+        """Read what lies at a path; `progress` is told which photograph is searched."""
         from photogram.targets import read
 
         if (path / "project.toml").exists():
@@ -161,12 +166,13 @@ class Seen:
             board=self._board(),
             unit=self.unit,
             model=self.model,
-            knots=None if self.knots is None else _pair(self.knots, "--knots"),
+            knots=None if self.knots is None else pair(self.knots, "--knots"),
             knot_sd=None if self.knot_sd is None else _deviations(self.knot_sd),
             cameras=self.cameras or [],
             within=self.within,
-            size=None if self.size is None else _pair(self.size, "--size"),
+            size=None if self.size is None else pair(self.size, "--size"),
             sd0=self._sd0(),
+            progress=progress,
             **given,
         )
 
@@ -193,7 +199,7 @@ class Seen:
             if self.spacing is not None:
                 raise typer.BadParameter("goes with --board CxR", param_hint="--spacing")
             return None if self.board is None else Path(self.board)
-        columns, rows = _pair(self.board, "--board")
+        columns, rows = pair(self.board, "--board")
         if self.spacing is None:
             raise typer.BadParameter("needs --spacing", param_hint="--board")
         return Board(columns=columns, rows=rows, spacing=self.spacing)
@@ -209,16 +215,6 @@ class Seen:
 
 AS_FOUND = Seen()
 """As the files say."""
-
-
-def _pair(text: str, option: str) -> tuple[int, int]:
-    """Return two numbers with an x between them."""
-    first, x, second = text.lower().partition("x")
-    if not (x and first.strip().isdecimal() and second.strip().isdecimal()):
-        raise typer.BadParameter(
-            f"is two numbers, 10x7, or a file that is there, not {text}", param_hint=option
-        )
-    return int(first), int(second)
 
 
 def _deviations(text: str) -> tuple[float, float]:
@@ -238,14 +234,18 @@ def _deviations(text: str) -> tuple[float, float]:
 def calibrate(
     job: Job,
     path: Annotated[
-        Path,
+        Path | None,
         Reads.FILE,
         typer.Argument(
             metavar="PATH",
+            show_default=False,
             help="Corners of a board: a file of mrcal, OpenCV or Kalibr, a table, or a folder with one and a"
-            " board.toml (docs/targets.md).",
+            " board.toml; or a folder with photographs of it (docs/targets.md).",
         ),
-    ],
+    ] = None,
+    example: Annotated[
+        bool, typer.Option("--example", help="Calibrate the packaged example instead: twenty pictures.")
+    ] = False,
     out: Annotated[
         Path | None,
         Writes.DIRECTORY,
@@ -259,6 +259,15 @@ def calibrate(
         PriorName | None,
         typer.Option(help="Take corners out as mrcal does, to reproduce its results.", show_default=False),
     ] = None,
+    to: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FORMAT",
+            help="Write the cameras as opencv_yaml, ros_camera_info, kalibr_camchain or mrcal, too; again for"
+            " each.",
+            show_default=False,
+        ),
+    ] = None,
     uncertainty: Uncertainty = AS_USUAL,
     threads: Threads = None,
     strict: Strict = False,
@@ -269,14 +278,16 @@ def calibrate(
     Needs no start values. The report, tables of views, points, corners and cameras, and the adjusted project
     go to --out.
     """
-    target = out or default_out(path, "-calibrated")
-    documents.place(target)
     with job:
+        if path is None:
+            path = job.packaged(*EXAMPLE)
+        target = out or (Path("example-calibrated") if example else default_out(path, "-calibrated"))
+        documents.place(target)
         pictures = documents.pictures(job, target)
         if path.is_dir():
             job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))
-        with job.status("reading corners, finding first values"):
-            calibration = seen.read(path)
+        with job.status("reading corners, finding first values") as status:
+            calibration = seen.read(path, None if status is None else status.update)
         for message in calibration.messages if not quiet else ():
             print_remark(str(message))
         how: dict[str, Any] = {
@@ -289,10 +300,11 @@ def calibrate(
             _adjusted(job, calibration, how, threads, snooping),
             lambda other: seen.read(other).adjust(**how, threads=threads),
         )
-        files = _files(found)
+        files = _files(found) | _cameras(found, to or [], uncertainty.need)
         page = documents.page(job, "calibrate", target, partial(_page, found))
+        drawn = pictures.of(found.result) | pictures.of_worth(found.worth)
         job.finish(
-            {target / name: content for name, content in files.items()} | pictures.of(found.result) | page,
+            {target / name: content for name, content in files.items()} | drawn | page,
             documents.as_json(found),
             summary=lambda: _summarise(found),
             code=uncertainty.exit_code(found, found.verdict.exit_code(strict=strict)),
@@ -331,6 +343,19 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     if found.snooped is not None:
         files["removed.csv"] = found.snooped.table().to_csv(index=False).encode()
     return files
+
+
+def _cameras(found: Calibrated, formats: list[str], need: float | None) -> dict[str, bytes]:
+    """Make the files of the cameras in the formats of other programs, and their joint covariance."""
+    from photogram.targets import camera_files
+    from photogram.targets.output.covariances import FILE, cameras_covariance
+
+    made = {
+        f"{name}/{file}": content
+        for name in formats
+        for file, content in camera_files(found, name, need if name == "mrcal" else None).items()
+    }
+    return made | {FILE: cameras_covariance(found)}
 
 
 def _page(found: Calibrated) -> Any:

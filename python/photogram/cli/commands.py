@@ -47,6 +47,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "Write a project in another format, and say what that has no place for.",
         "convert.convert",
     ),
+    "convert-lens": (
+        "Fit a lens of another model to what a camera shows, and say what it misses.",
+        "convert_lens.convert_lens",
+    ),
     "metadata": (
         "Say where photos were taken by their files: EXIF, XMP, .MRK, geo.txt ...; write a table.",
         "metadata.metadata",

@@ -32,6 +32,7 @@ __all__ = [
 
 INPUT_ERROR = 1
 NOT_CONVERGED = 3
+NOT_USABLE = 4
 SHOWN = 24
 """Lines of a section that the summary of a command shows at most."""
 
@@ -42,6 +43,7 @@ EXTRAS = {
     "jinja2": "report",
     "matplotlib": "plots",
     "PIL": "photos",
+    "cv2": "targets",
     "geopandas": "gis",
     "pyogrio": "gis",
     "pyproj": "gis",
@@ -100,7 +102,7 @@ def print_remark(text: object) -> None:
 @contextmanager
 def failures() -> Iterator[None]:
     """Turn errors of the input and of the adjustment into a message and an exit code."""
-    from photogram.errors import AdjustmentError, PhotogramError
+    from photogram.errors import AdjustmentError, ContradictionError, PhotogramError
 
     try:
         yield
@@ -108,6 +110,8 @@ def failures() -> Iterator[None]:
         _fail(str(error) or "there is not enough memory", INPUT_ERROR)
     except AdjustmentError as error:
         _fail(str(error), NOT_CONVERGED)
+    except ContradictionError as error:
+        _fail(str(error), NOT_USABLE)
     except PhotogramError as error:
         _fail(str(error), INPUT_ERROR)
     except ModuleNotFoundError as error:

@@ -22,7 +22,9 @@ class Kind(StrEnum):
     METROLOGY = "metrology"
     SURVEY = "survey"
     ROLLING = "rolling"
+    ARCHIVE = "archive"
     NIGHT = "night"
+    BOARD = "board"
 
 
 SOURCES = {
@@ -30,7 +32,9 @@ SOURCES = {
     Kind.METROLOGY: ("flange",),
     Kind.SURVEY: ("survey",),
     Kind.ROLLING: ("rolling",),
+    Kind.ARCHIVE: ("archive",),
     Kind.NIGHT: ("exposures",),
+    Kind.BOARD: ("board",),
 }
 """Packaged examples, directories of photogram.examples."""
 
@@ -48,7 +52,8 @@ def new(
         typer.Option(
             help="block: photos of a drone with control. metrology: targets and scale bars, no control."
             " survey: check points enough to state an accuracy. rolling: photos of a drone with a rolling"
-            " shutter. night: exposures of stars."
+            " shutter. archive: scanned film with fiducial marks. night: exposures of stars. board: corners"
+            " of a chessboard in pictures."
         ),
     ] = Kind.BLOCK,
     overwrite: Annotated[
@@ -59,12 +64,13 @@ def new(
     """Write a small real project as tables, with comments that say what may stand there.
 
     Replace the tables by your own; `photogram adjust DIR` adjusts it, `photogram stellar-camera exposures
-    DIR/night.toml` a night.
+    DIR/night.toml` a night, `photogram calibrate DIR` a camera that sees a board.
     """
     with job:
         from photogram.errors import InputError
 
-        if any((out / name).exists() for name in ("project.toml", "night.toml")) and not overwrite:
+        own = ("project.toml", "night.toml", "board.toml")
+        if any((out / name).exists() for name in own) and not overwrite:
             raise InputError("holds a project; --overwrite allows it to be replaced", file=out)
         source = job.packaged(*SOURCES[kind])
         files = {out / each.name: each.read_bytes() for each in sorted(source.iterdir()) if each.is_file()}

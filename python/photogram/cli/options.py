@@ -38,6 +38,7 @@ __all__ = [
     "default_out",
     "example_out",
     "out_option",
+    "pair",
     "picture_places",
 ]
 
@@ -198,3 +199,16 @@ def default_out(source: Path, ending: str) -> Path:
     place = Path(os.path.realpath(source))
     parent = place.parent if os.access(place.parent, os.W_OK) else Path()
     return parent / f"{place.name if place.is_dir() else place.stem}{ending}"
+
+
+def pair(text: str, option: str) -> tuple[int, int]:
+    """Return two numbers with an x between them."""
+    first, x, second = text.lower().partition("x")
+    if not (x and first.strip().isdecimal() and second.strip().isdecimal()):
+        raise typer.BadParameter(
+            f"is two numbers, 10x7, or a file that is there, not {text}"
+            if option == "--board"
+            else f"is two numbers, 10x7, not {text}",
+            param_hint=option,
+        )
+    return int(first), int(second)

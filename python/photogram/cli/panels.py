@@ -20,7 +20,7 @@ PANELS = {
     " self_calibrate keep_all keep_repeated as_published weights method polynomial"
     " estimate_grid each_case angle lens common_scale without any_roll blind air_refraction"
     " water_refraction water_level water_index limits invert extrapolate components regularise"
-    " together calibrate",
+    " together calibrate radius distances intrinsics_only knot_grid",
     "Gross errors": "snoop level fdr unit_weight outliers",
     "Uncertainty": "map_distance map_datum noise_only need cross_validate compare_with suggest",
     "Features": "distance line plane circle sphere cylinder k coverage",

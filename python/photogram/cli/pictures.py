@@ -12,6 +12,7 @@ from photogram.cli.options import PictureFormat
 
 if TYPE_CHECKING:
     from photogram.results.network import AdjustedNetwork
+    from photogram.targets.worth import Worth
 
 __all__ = ["Pictures"]
 
@@ -56,3 +57,11 @@ class Pictures:
         from photogram.plots import picture_files
 
         return picture_files(result, self._out, self._ending)
+
+    def of_worth(self, worth: Worth | None) -> dict[Path, bytes]:
+        """Return the pictures of what a calibration is worth as files."""
+        if self._out is None or worth is None:
+            return {}
+        from photogram.targets.worth_files import worth_pictures
+
+        return {self._out / name: content for name, content in worth_pictures(worth, self._ending).items()}

@@ -15,8 +15,8 @@ from photogram.cli.job import Job, Reads
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
-    from photogram.targets.cross_validated import Into
-    from photogram.targets.worth import Asked
+    from photogram.targets.cross_validation import Into
+    from photogram.targets.worth import WorthOptions
 
 __all__ = ["AS_USUAL", "Uncertainty"]
 
@@ -78,11 +78,11 @@ class Uncertainty:
         int, typer.Option(min=0, metavar="K", help="Find the K views that would help most.")
     ] = 0
 
-    def asked(self) -> Asked:
+    def asked(self) -> WorthOptions:
         """Return what is asked of a calibration."""
-        from photogram.targets.worth import Asked
+        from photogram.targets.worth import WorthOptions
 
-        return Asked(
+        return WorthOptions(
             distances=self._distances(),
             datum=self.map_datum.value,
             noise_only=self.noise_only,
@@ -123,20 +123,21 @@ class Uncertainty:
         calibrated
             Reads and adjusts another one, with the options of this.
         """
+        from photogram.targets.appraisal import appraise
         from photogram.targets.differences import difference
-        from photogram.targets.worth import worth
+        from photogram.targets.findings import judged
 
         with job.status("uncertainty") as status:
-            own = worth(found, self.asked(), None if status is None else status.update)
+            own = appraise(found, self.asked(), None if status is None else status.update)
         if self.compare_with is None:
-            return replace(found, worth=own)
+            return judged(found, own)
         other = calibrated(self.compare_with)
         distances = self._distances() or [math.inf]
         apart = [
             difference(found, other, distances, camera=number)
             for number in range(min(len(found.cameras), len(other.cameras)))
         ]
-        return replace(found, worth=replace(own, differences=tuple(apart)))
+        return judged(found, replace(own, differences=tuple(apart)))
 
     def exit_code(self, found: Calibrated, code: int) -> int:
         """Return the exit code: 4 where a map is above what is needed, or there is none to say so."""

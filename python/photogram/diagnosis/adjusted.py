@@ -10,6 +10,7 @@ from photogram.adjustment.first_values import FirstValues
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.clocks import known_offsets
 from photogram.diagnosis.conventions import hints
+from photogram.diagnosis.film_marks import mark_hints
 from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section
 from photogram.diagnosis.flown_hints import flown_hints
 from photogram.diagnosis.names import with_exchanges
@@ -67,8 +68,10 @@ def explained(result: Result) -> list[Message]:
 
 
 def remarks(result: Result) -> list[Message]:
-    """Name what fits and is hardly what was meant: readouts against their direction, offsets of clocks."""
-    return [*backward_readouts(result), *known_offsets(result)] if result.converged else []
+    """Name what fits and is hardly what was meant: directions of readouts, offsets of clocks, marks."""
+    if not result.converged:
+        return []
+    return [*backward_readouts(result), *known_offsets(result), *mark_hints(result)]
 
 
 def _of_block(block: Block) -> list[Message]:

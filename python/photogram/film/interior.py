@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import frozen, numbers, one_of, shaped
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
-from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Readings, Scanner
+from photogram.errors import ContradictionError, InputError
+from photogram.network.film_form import Affine, affine_form
+from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Readings, Scanner, ScannerCurve
 
 __all__ = ["Affine", "FilmModel", "Interior", "conformal", "interior_orientation", "is_mirrored"]
 
@@ -26,35 +27,11 @@ UNKNOWNS: dict[str, tuple[str, ...]] = {
     "projective": ("t1", "t2", "theta", "m", "b1", "b2", "g1", "g2"),
 }
 """Unknowns of each model."""
+FAR = 5.0
+"""Millimetres: marks that are as far off on either side are no such marks."""
 _STEPS = 20
 _ENDED = 1e-12
 """Steps of the adjustment at the most, and one so small, in parts of the format, is the last."""
-
-
-@dataclass(frozen=True)
-class Affine:
-    """The form of six numbers: reading = a0 + a1 x + a2 y, x and y in the camera's frame.
-
-    Attributes
-    ----------
-    matrix
-        (2, 3) a0, a1, a2 of both coordinates of readings.
-    scale_x, scale_y
-        mm of the reading in a mm of the camera along each axis.
-    between_axes
-        The angle between the images of the axes, less a right angle (radians).
-    rotation
-        The angle of the image of the x axis (radians).
-    sd
-        (4,) standard deviations of the last four.
-    """
-
-    matrix: Floats
-    scale_x: float
-    scale_y: float
-    between_axes: float
-    rotation: float
-    sd: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +133,7 @@ def interior_orientation(
     sd: ArrayLike = 1.0,
     counted: Readings | None = None,
     scanner: Scanner | None = None,
+    curves: Sequence[ScannerCurve] = (),
     mirrored: bool | None = None,
 ) -> Interior:
     """Fit the film of a photo to its fiducial marks, whose places are taken as they are.
@@ -178,6 +156,8 @@ def interior_orientation(
         What readings count; None: mm, y up.
     scanner
         Scales and obliqueness of the scanner; None: it is true.
+    curves
+        The coefficients of its polynomials, six of three, x first; or none.
     mirrored
         Whether the film was seen from the other side; None: three marks at least tell.
 
@@ -199,9 +179,9 @@ def interior_orientation(
             f"the {model} film has {len(names)} unknowns, and {len(q)} marks have {2 * len(q)} coordinates"
         )
     own, machine = counted or Readings(), scanner or Scanner("scanner", sd=0.0)
-    true = true_places(xy, own, machine)
+    true = true_places(xy, own, machine, curves)
     side = _side(q, true, mirrored)
-    fit = _Fit(q, xy, weights, names, own, machine, mirrored=side, projective=model == "projective")
+    fit = _Fit(q, xy, weights, names, own, machine, curves, mirrored=side, projective=model == "projective")
     values = np.zeros(8)
     values[:4] = conformal(q, true, mirrored=side)
     return fit.adjusted(model, values)
@@ -215,9 +195,11 @@ def pairs(name: str, value: ArrayLike) -> Floats:
     return found
 
 
-def true_places(readings: Floats, counted: Readings, scanner: Scanner) -> Floats:
+def true_places(
+    readings: Floats, counted: Readings, scanner: Scanner, curves: Sequence[ScannerCurve] = ()
+) -> Floats:
     """Return (n, 2) the true places of readings on a scanner, mm, y up."""
-    flat = Film(FilmPlacement("p", 0.0), FilmSize("p", 0.0), scanner, counted)
+    flat = Film(FilmPlacement("p", 0.0), FilmSize("p", 0.0), scanner, counted, curves=curves)
     return _photocore.film_places(flat.numbers(), _vectors(flat), readings)
 
 
@@ -230,15 +212,33 @@ def _side(q: Floats, true: Floats, given: bool | None) -> bool:
     if given is None and found is None:
         raise InputError("the marks do not tell whether the film is mirrored: say mirrored")
     if given is not None and found is not None and found != given:
-        raise InputError(mirror_message(given))
+        raise ContradictionError(mirror_message(given, side_residuals(q, true)))
     return bool(found if given is None else given)
 
 
-def mirror_message(given: bool) -> str:
-    """Return what is said of marks that tell another side than what is given."""
+def mirror_message(given: bool, apart: tuple[float, float]) -> str:
+    """Return what is said of marks that tell another side than what is given.
+
+    `apart`: root mean squares (mm) of their residuals as they are, and mirrored.
+    """
+    side, other = apart[given], apart[not given]
+    fits = f"its marks are {side:.3g} mm off as is given, and {other:.3g} mm on the other side"
+    if other > FAR:
+        return f"{fits}: they are named wrongly, or those of another camera"
     if given:
-        return "the film is not mirrored, as is given: say mirrored = false"
-    return "the film is mirrored: scanned from the other side, or a negative; say mirrored = true"
+        return f"the film is not mirrored: {fits}; say mirrored = false"
+    return f"the film is mirrored: {fits}: scanned from the other side, or a negative; say mirrored = true"
+
+
+def side_residuals(places: Floats, true: Floats) -> tuple[float, float]:
+    """Return root mean squares (mm) of a conformal fit to marks as they are, and mirrored."""
+    found = []
+    for mirrored in (False, True):
+        t1, t2, theta, m = conformal(places, true, mirrored=mirrored)
+        q = places @ np.array([-1.0 if mirrored else 1.0, 1j])
+        left = true @ np.array([1.0, 1j]) - (t1 + 1j * t2 + (1.0 + m) * np.exp(1j * theta) * q)
+        found.append(float(np.sqrt(np.mean(np.abs(left) ** 2))))
+    return found[0], found[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,6 +251,7 @@ class _Fit:
     names: Sequence[str]
     counted: Readings
     scanner: Scanner
+    curves: Sequence[ScannerCurve]
     mirrored: bool
     projective: bool
 
@@ -262,6 +263,7 @@ class _Fit:
             self.counted,
             bend=FilmBend("p", values[6:]) if len(self.names) > 6 else None,
             projective=self.projective,
+            curves=self.curves,
             mirrored=self.mirrored,
         )
 
@@ -310,14 +312,10 @@ class _Fit:
     def _affine(self, values: Floats, cofactors: Floats) -> Affine:
         """Return the form of six numbers; the scanner's own differences from an affine map are not in it."""
         film = self.film(values)
-        at = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-        origin, along_x, along_y = _photocore.film_readings(film.numbers(), _vectors(film), at)[0]
-        found, partials = _said(values, mirrored=self.mirrored)
-        own = partials[:, [_place(name) for name in self.names]]
-        sd = np.sqrt(np.einsum("ik,kl,il->i", own, cofactors, own))
-        matrix = np.column_stack([origin, along_x - origin, along_y - origin])
-        scale_x, scale_y, between, rotation = found.tolist()
-        return Affine(frozen(matrix), scale_x, scale_y, between, rotation, frozen(sd))
+        places = [_place(name) for name in self.names]
+        of_film = np.zeros((6, 6))
+        of_film[np.ix_(places, places)] = cofactors
+        return affine_form(film, [*_vectors(film)], of_film)
 
 
 def _place(name: str) -> int:
@@ -328,28 +326,3 @@ def _place(name: str) -> int:
 def _moves(size: float) -> Floats:
     """Return (8,) by how much a unit of each unknown moves a mark at the edge."""
     return np.array([1.0, 1.0, size, size, size, size, size**2, size**2])
-
-
-def _said(values: Floats, *, mirrored: bool) -> tuple[Floats, Floats]:
-    """Return scales, angle between axes and rotation, and their partials by the six of the film.
-
-    The columns of R J (I + S) are the images of the axes.
-    """
-    theta, m, b1, b2 = values[2:6]
-    side = -1.0 if mirrored else 1.0
-    straight = np.array([[side * (1 + m + b1), side * b2], [b2, 1 + m - b1]])
-    x, y = straight[:, 0], straight[:, 1]
-    # By m, b1, b2.
-    by_x = np.array([[side, side, 0.0], [0.0, 0.0, 1.0]])
-    by_y = np.array([[0.0, 0.0, side], [1.0, -1.0, 0.0]])
-    lengths = np.hypot(*x), np.hypot(*y)
-    turns = np.arctan2(x[1], x[0]), np.arctan2(y[1], y[0])
-    of_x = np.array([-x[1], x[0]]) @ by_x / lengths[0] ** 2
-    of_y = np.array([-y[1], y[0]]) @ by_y / lengths[1] ** 2
-    partials = np.zeros((4, 6))
-    partials[0, 3:], partials[1, 3:] = x @ by_x / lengths[0], y @ by_y / lengths[1]
-    partials[2, 3:] = side * (of_y - of_x)
-    partials[3, 3:], partials[3, 2] = of_x, 1.0
-    between = side * (turns[1] - turns[0]) - np.pi / 2
-    between = (between + np.pi) % (2 * np.pi) - np.pi
-    return np.array([*lengths, between, turns[0] + theta]), partials

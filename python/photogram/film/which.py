@@ -12,7 +12,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.film.interior import pairs
 
-__all__ = ["DECIDED", "WhichMark", "which_mark"]
+__all__ = ["DECIDED", "FilmWay", "WhichMark", "which_mark"]
 
 CHANCE = 1e-4
 """Of a wrong choice among the eight."""
@@ -20,6 +20,26 @@ DECIDED = 2.0 * float(np.log(8.0 / CHANCE))
 """By how much the weighted sum of squares of the runner-up must exceed that of the best."""
 NEAR = 0.1
 """A reading as far from every mark, in parts of the format, is of none of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class FilmWay:
+    """A way in which a film may lie.
+
+    Attributes
+    ----------
+    marks
+        (n,) the number of the mark of each reading.
+    quarter_turns, mirrored
+        As of :class:`WhichMark`.
+    """
+
+    marks: Indices
+    quarter_turns: int
+    mirrored: bool
+
+    def __str__(self) -> str:
+        return f"turned by {90 * self.quarter_turns} degrees{', mirrored' if self.mirrored else ''}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +59,8 @@ class WhichMark:
         where readings are of no marks.
     decided
         Whether the runner-up is so much worse that the best is sure.
+    alike
+        The best, and those that cannot be told from it.
     """
 
     marks: Indices
@@ -46,12 +68,10 @@ class WhichMark:
     mirrored: bool
     omega: Floats
     decided: bool
+    alike: tuple[FilmWay, ...]
 
     def __str__(self) -> str:
-        if not self.decided:
-            return "cannot be told from the marks: quarter turn or side"
-        side = ", mirrored" if self.mirrored else ""
-        return f"turned by {90 * self.quarter_turns} degrees{side}"
+        return str(self.alike[0]) if self.decided else "cannot be told from the marks: quarter turn or side"
 
 
 def which_mark(places: ArrayLike, true: ArrayLike, *, sd: float = 0.004) -> WhichMark:
@@ -86,13 +106,14 @@ def which_mark(places: ArrayLike, true: ArrayLike, *, sd: float = 0.004) -> Whic
     best = int(np.argmin(omega))
     if not np.isfinite(omega[best]):
         raise InputError("the readings without names are of no marks of the camera, however the film lies")
-    others = np.delete(omega, best)
+    alike = sorted(np.flatnonzero(omega - omega[best] <= DECIDED).tolist(), key=lambda k: k != best)
     return WhichMark(
         marks=frozen(ways[best][0]),
         quarter_turns=best % 4,
         mirrored=best >= 4,
         omega=frozen(omega),
-        decided=bool((others - omega[best] > DECIDED).all()),
+        decided=len(alike) == 1,
+        alike=tuple(FilmWay(frozen(ways[k][0]), k % 4, k >= 4) for k in alike),
     )
 
 

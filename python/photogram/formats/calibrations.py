@@ -22,7 +22,7 @@ from photogram.targets.corners import Corners
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
 
-__all__ = ["TITLE", "adjusted_project", "calibration_of", "project_of"]
+__all__ = ["MIDDLE", "TITLE", "adjusted_project", "calibration_of", "project_of", "shifted"]
 
 TITLE = "corners of a board"
 MIDDLE = 0.5
@@ -77,7 +77,7 @@ def calibration_of(project: Project) -> Calibration:
     return Calibration(
         board=_with_places(board, block, number),
         corners=corners,
-        cameras=[_shifted(each, -MIDDLE) for each in block.cameras],
+        cameras=[shifted(each, -MIDDLE) for each in block.cameras],
         poses=vision_poses(block.photo_positions[seen], attitudes),
         sensors=sensors,
         references=references,
@@ -170,7 +170,7 @@ def _with_places(board: Board, block: Block, number: Indices) -> Board:
 
 def from_corner(block: Block) -> Block:
     """Return a block whose pixels count from the middle of the first as one that counts from its corner."""
-    return block.replace(cameras=[_shifted(each) for each in block.cameras], image_xy=block.image_xy + MIDDLE)
+    return block.replace(cameras=[shifted(each) for each in block.cameras], image_xy=block.image_xy + MIDDLE)
 
 
 def adjusted_project(calibrated: Calibrated) -> Project:
@@ -186,9 +186,9 @@ def adjusted_project(calibrated: Calibrated) -> Project:
     )
 
 
-def _shifted(camera: Camera, by: float = MIDDLE) -> Camera:
+def shifted(camera: Camera, by: float = MIDDLE) -> Camera:
     """Return a camera whose principal point counts from elsewhere: the corner of the first pixel."""
-    if "w" in camera.names:
+    if "w" in camera.names or not {"cx", "cy"} <= {*camera.names}:
         return camera  # from the middle of the picture, which is the same place
     centre = {name: camera.parameters[name] + by for name in ("cx", "cy")}
     return camera.replace(parameters={**camera.parameters, **centre})

@@ -89,9 +89,6 @@ class Format:
         What of a project gets lost in the format, in sentences.
     results
         Files with what an adjustment found that go beside an adjusted project in the format; None: none.
-    adjusting
-        Makes of a call that adjusts a block once, with options by name, what adjusts the block of a project
-        in the format as that asks for; None: once is all.
     files
         The file that is written, the first of them where there are several, and patterns of the names by
         which a user may say the format; empty for a format that is a folder.
@@ -101,6 +98,9 @@ class Format:
         Whether it holds longitudes and latitudes; what is written in others is in a topocentric frame.
     folders
         Names of folders that say the format, beside its own name.
+    adjusting
+        Makes of a call that adjusts a block once, with options by name, what adjusts the block of a project
+        in the format as that asks for; None: once is all.
     """
 
     name: str
@@ -110,8 +110,8 @@ class Format:
     write: Callable[[Project], Mapping[str, bytes]] | None = None
     cannot_hold: Callable[[Project], list[str]] = lambda _: []
     results: Callable[[Project, Result], Mapping[str, bytes]] | None = None
-    adjusting: Callable[[Project, Callable[..., Result]], Callable[..., Result]] | None = None
     files: tuple[str, ...] = ()
     folders: tuple[str, ...] = ()
     pixels: bool = False
     geographic: bool = False
+    adjusting: Callable[[Project, Callable[..., Result]], Callable[..., Result]] | None = None

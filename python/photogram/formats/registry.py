@@ -147,8 +147,8 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
     if chosen.write is None:
         writable = ", ".join(name for name, each in FORMATS.items() if each.write)
         raise InputError(f"{chosen.title} is only read; what can be written: {writable}")
-    check_films(project.block, chosen.title)
     if chosen.name != "plain":
+        check_films(project.block, chosen.title)
         check_held(project.block, chosen.title)
     return chosen.write(_fitting(project, chosen))
 
@@ -249,8 +249,8 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
         Line scanners, which other formats than the plain project would take for photos.
     """
     chosen = _named(file_format)
-    check_films(project.block, chosen.title)
     if chosen.name != "plain":
+        check_films(project.block, chosen.title)
         check_held(project.block, chosen.title)
     beside = [counted(len(project.features), "feature")] if project.features else []
     beside += parts_of_asked(project.statement) + lost_motions(project.block)

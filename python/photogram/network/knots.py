@@ -10,11 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import frozen, numbers, shaped
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.network.unknowns import Unknown
 
-__all__ = ["KNOTTED", "Knot", "checked_knot_sd", "checked_knots", "knot_names", "knot_unknowns", "outside"]
+__all__ = [
+    "KNOTTED",
+    "Knot",
+    "beyond_knots",
+    "checked_knot_sd",
+    "checked_knots",
+    "knot_names",
+    "knot_unknowns",
+]
 
 KNOTTED = "splined_stereographic"
 """The model that has knots."""
@@ -148,7 +156,7 @@ def knot_names(knots: Floats | None) -> tuple[str, ...]:
     return tuple(f"d{axis}_{i}_{j}" for j in range(rows) for i in range(columns) for axis in "xy")
 
 
-def outside(parameters: Mapping[str, float], u: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def beyond_knots(parameters: Mapping[str, float], u: Floats) -> Bools:
     """Return (n,) whether directions lie beyond the knots, where the polynomials at the edge go on.
 
     Parameters
@@ -162,5 +170,4 @@ def outside(parameters: Mapping[str, float], u: Floats) -> np.ndarray[tuple[int,
     places = 2 * u[:, :2] * [1, -1] / (np.linalg.norm(u, axis=1) - u[:, 2])[:, np.newaxis]
     per_place = (parameters["nx"] - order) / (4 * math.tan(math.radians(parameters["fov_x_deg"]) / 4))
     reach = (np.array([parameters["nx"], parameters["ny"]]) - order) / 2 / per_place
-    found: np.ndarray[tuple[int, ...], np.dtype[np.bool_]] = ~(np.abs(places) <= reach).all(axis=1)
-    return found
+    return np.asarray(~(np.abs(places) <= reach).all(axis=1))

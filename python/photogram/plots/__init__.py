@@ -7,6 +7,7 @@ from photogram.plots.accessor import PICTURES, Plots, figures, picture_files
 from photogram.plots.correlations import correlations
 from photogram.plots.distortion import distortion
 from photogram.plots.features import features
+from photogram.plots.films import films
 from photogram.plots.network import network
 from photogram.plots.redundancy import redundancy
 from photogram.plots.residuals import residuals
@@ -19,6 +20,7 @@ __all__ = [
     "distortion",
     "features",
     "figures",
+    "films",
     "network",
     "picture_files",
     "redundancy",

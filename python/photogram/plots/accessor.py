@@ -11,6 +11,7 @@ from photogram.errors import InputError
 from photogram.plots.correlations import correlations
 from photogram.plots.distortion import distortion
 from photogram.plots.features import features
+from photogram.plots.films import films
 from photogram.plots.network import network
 from photogram.plots.panels import Where, figure_of
 from photogram.plots.redundancy import redundancy
@@ -32,6 +33,7 @@ PICTURES: dict[str, Callable[..., Any]] = {
     "correlations": correlations,
     "distortion": distortion,
     "features": features,
+    "films": films,
 }
 """The pictures by name, in the order in which a reader looks at them."""
 
@@ -79,6 +81,10 @@ class Plots:
         """Draw deviations of points from their features; see :func:`photogram.plots.features`."""
         return features(self._result, ax)
 
+    def films(self, ax: Where = None) -> Any:
+        """Draw residuals of marks and patterns of films; see :func:`photogram.plots.films`."""
+        return films(self._result, ax)
+
     def trajectory(self, ax: Where = None, *, name: str | None = None) -> Any:
         """Draw the corrections of a trajectory over time; see :func:`photogram.plots.trajectories`."""
         return trajectory(self._result, ax, name=name)
@@ -111,7 +117,7 @@ def figures(result: object, names: Sequence[str] = tuple(PICTURES)) -> dict[str,
     """Return pictures of a result by name, each a figure that belongs to no window.
 
     Those that there is nothing of are left out: correlations and distortion of known cameras, redundancy and
-    tests without covariances, features where none are fitted.
+    tests without covariances, features where none are fitted, films where nothing is scanned.
 
     Parameters
     ----------
@@ -119,7 +125,7 @@ def figures(result: object, names: Sequence[str] = tuple(PICTURES)) -> dict[str,
         An adjusted block or collection.
     names
         Which, of `network`, `residuals`, `redundancy`, `tests`, `correlations`, `distortion`,
-        `features`.
+        `features`, `films`.
 
     Raises
     ------

@@ -203,6 +203,26 @@ class Deviations:
         return small[self.unit] if self.unit in small and largest < 1.0 else (1.0, self.unit)
 
 
+@dataclass(frozen=True, eq=False)
+class VectorField:
+    """Small vectors over the frame of a camera.
+
+    Attributes
+    ----------
+    title
+        What they are.
+    places, vectors
+        (n, 2) both, mm.
+    labels
+        What the places are called, or nothing.
+    """
+
+    title: str
+    places: Floats
+    vectors: Floats
+    labels: Sequence[str] = ()
+
+
 class Pictured(ABC):
     """What is drawn of an adjusted network. Each part is computed when it is asked for."""
 
@@ -256,6 +276,11 @@ class Pictured(ABC):
     @property
     def deviations(self) -> list[Deviations]:
         """Features with deviations of points."""
+        return []
+
+    @property
+    def films(self) -> list[VectorField]:
+        """Mean residuals of the marks of cameras, and patterns of films."""
         return []
 
 

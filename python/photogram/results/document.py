@@ -11,7 +11,7 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.results.calibration_report import calibration_members
 from photogram.results.features_report import features_document
-from photogram.results.films import film_members
+from photogram.results.films_told import fiducial_members, film_members, scanner_members
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import control, images, iterations, photos, points, stations, terms_of
 from photogram.results.report import problems_of
@@ -95,11 +95,19 @@ def block_members(result: Result) -> dict[str, Any]:
             else {}
         ),
         **({"unknowns": _unknowns(result)} if result.unknowns else {}),
-        **({"films": film_members(result)} if film_members(result) else {}),
+        **(_films(result) if result.films else {}),
         **({} if result.features is None else {"features": features_document(result.features)}),
         "observations_beside_images": _beside_images(result),
         "check_points": records(check_points(result)),
         "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
+    }
+
+
+def _films(result: Result) -> dict[str, Any]:
+    return {
+        "films": film_members(result),
+        "fiducials": fiducial_members(result),
+        "scanners": scanner_members(result),
     }
 
 

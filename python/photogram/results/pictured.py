@@ -12,11 +12,22 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network import geometry
 from photogram.network.motion import scanners
 from photogram.network.rays import LocalAxes, local_axes
-from photogram.plots.pictured import Correlated, Curve, Curves, Deviations, Images, Pictured, Plan, pictured
+from photogram.plots.pictured import (
+    Correlated,
+    Curve,
+    Curves,
+    Deviations,
+    Images,
+    Pictured,
+    Plan,
+    VectorField,
+    pictured,
+)
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.ellipses import metric_covariances
 from photogram.results.features import Features, directions
+from photogram.results.films_drawn import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observed import tested_observations
@@ -179,6 +190,13 @@ class PicturedBlock(PicturedNetwork):
             for each in found
             if each.deviations.size
         ]
+
+    @property
+    def films(self) -> list[VectorField]:
+        """Mean residuals of the marks of cameras, and patterns of films."""
+        if not self.result.films:
+            return []
+        return [*mean_mark_residuals(self.result), *film_patterns(self.result)]
 
 
 def _bands(**sds: Floats) -> dict[str, Floats]:

@@ -19,7 +19,7 @@ from photogram.results.axes import image_axes, point_axes
 from photogram.results.calibration_report import calibration_sections
 from photogram.results.courses import POSES, courses_table, notable, notable_courses
 from photogram.results.features_report import features_sections
-from photogram.results.films import film_table, mark_table
+from photogram.results.films_told import film_lines
 from photogram.results.iteration import iteration_lines
 from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork
@@ -110,7 +110,7 @@ def details(result: Result) -> list[Section]:
         ),
         *calibration_sections(result),
         ("Cameras that are held", _held_cameras(result)),
-        ("Film and fiducials: films of photos, then marks", _films(result)),
+        ("Film and fiducials: films of photos, marks, scanners", film_lines(result)),
         ("Unknowns that observations have in common", _unknowns(result)),
         ("Trajectories: their corrections, in the span of their tables", _courses(result)),
         ("Photos", _photos(result)),
@@ -327,17 +327,6 @@ def _unknowns(result: Result) -> list[str]:
     first = field(titles, _width(titles.values, 28), head="unknown")
     lines = table_lines([*first, *field(names, 22, head="component"), *chain(*fields)])
     return [*lines, *([note] if note else [])]
-
-
-def _films(result: Result) -> list[str]:
-    """Write the films of photos, and the marks of cameras."""
-    photos, values, sd, marks, largest = film_table(result)
-    if not len(photos.values):
-        return []
-    first = [*field(marks, 8, ".0f", "marks"), *field(largest, 10, ".2f", "largest w")]
-    films = stacked(photos, "photo", [(values, ".7f"), (sd, ".7f")], first)
-    names, *numbers = mark_table(result)
-    return [*films, "", *stacked(names, "fiducial", [(each, ".4f") for each in numbers])]
 
 
 def _decimals_of(sd: Quantity, least: int) -> list[str]:

@@ -1,29 +1,83 @@
 """Calibration with targets: boards, their corners in pictures, and what these say of cameras and rigs."""
 
 from photogram.arguments.annotations import check_arguments
+from photogram.targets.appraisal import appraise
 from photogram.targets.board import Board
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.calibration import Calibration
+from photogram.targets.compared import CameraDifference
 from photogram.targets.conversion import Conversion, convert_lens
 from photogram.targets.corners import Corners
+from photogram.targets.cross_validated import cross_validate
+from photogram.targets.cross_validation import CrossValidation
+from photogram.targets.differences import difference
 from photogram.targets.first import FirstCalibration, first_values
+from photogram.targets.maps import UncertaintyCurve, UncertaintyMap
+from photogram.targets.new_views import Candidate, NewView, Suggestions
 from photogram.targets.output.formats import camera_files
 from photogram.targets.reading import read
+from photogram.targets.residual_groups import residual_groups
+from photogram.targets.simulation import simulate_corners
+from photogram.targets.stereo import distance_uncertainty, triangulate
+from photogram.targets.suggestions import suggest_views
+from photogram.targets.triangulation import Triangulated
+from photogram.targets.uncertainty import (
+    projection_uncertainty,
+    uncertainty_against_distance,
+    uncertainty_map,
+)
+from photogram.targets.worth import Worth, WorthOptions
 
 __all__ = [
     "Board",
     "Calibrated",
     "Calibration",
+    "CameraDifference",
+    "Candidate",
     "Conversion",
     "Corners",
+    "CrossValidation",
     "FirstCalibration",
+    "NewView",
+    "Suggestions",
+    "Triangulated",
+    "UncertaintyCurve",
+    "UncertaintyMap",
+    "Worth",
+    "WorthOptions",
+    "appraise",
     "camera_files",
     "convert_lens",
+    "cross_validate",
+    "difference",
+    "distance_uncertainty",
     "first_values",
+    "projection_uncertainty",
     "read",
+    "residual_groups",
+    "simulate_corners",
+    "suggest_views",
+    "triangulate",
+    "uncertainty_against_distance",
+    "uncertainty_map",
 ]
 
-check_arguments(globals(), set(__all__) - {"Calibrated", "Conversion", "FirstCalibration"})
+_MADE = {
+    "Calibrated",
+    "CameraDifference",
+    "Conversion",
+    "CrossValidation",
+    "FirstCalibration",
+    "NewView",
+    "Suggestions",
+    "Triangulated",
+    "UncertaintyCurve",
+    "UncertaintyMap",
+    "Worth",
+}
+"""What functions make, and users do not."""
+
+check_arguments(globals(), set(__all__) - _MADE)
 
 WAYS = {
     "document_of": ("document",),

@@ -15,7 +15,8 @@ from photogram.arguments.arrays import one_of
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.results.result import Result
-from photogram.targets.calibrated import Calibrated, with_unknown_weight
+from photogram.targets.calibrated import Calibrated, deviation_of_corners, with_unknown_weight
+from photogram.targets.findings import judged
 from photogram.targets.outliers import marked_as_mrcal
 from photogram.targets.regularisation import regularised
 from photogram.targets.start import Start
@@ -24,6 +25,9 @@ __all__ = ["adjusted_start", "snooped_start"]
 
 ROUGHLY, FINELY = 0.5, 1e-7
 """Of a standard deviation: where the first and the last steps of a splined lens end."""
+ROUNDS = 8
+"""In which the standard deviation of corners is found, at the most, and the change that is none."""
+CHANGE = 0.01
 
 
 def adjusted_start(
@@ -37,19 +41,34 @@ def adjusted_start(
     """Adjust cameras, sensors, views and the board together; see :meth:`Calibration.adjust`."""
     if outliers is not None:
         one_of("outliers", outliers, ("mrcal",))
+    rounds = 0
     while True:
         how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress, "verdict": True}
         # Knots that no image touches are determined by priors alone.
         free = None if _has_knots(start) else adjust(start.block(), **how)
         result = _knotted(start, how) if free is None else _with_priors(start, free, threads)
         worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
-        if not (worse.any() and result.converged):
+        if worse.any() and result.converged:
+            start = start.without(worse)
+        elif (sd := _sd_to_assume(start, result)) is not None and rounds < ROUNDS:
+            start, rounds = start.replace(assumed=sd), rounds + 1
+        else:
             break
-        start = start.without(worse)
     told = replace(result, messages=[*start.messages, *result.messages])
     if start.sd0 is None:
         told = with_unknown_weight(told)
-    return Calibrated(calibration=start, result=told, unregularised=free if start.regularise else None)
+    return judged(
+        Calibrated(calibration=start, result=told, unregularised=free if start.regularise else None)
+    )
+
+
+def _sd_to_assume(start: Start, result: Result) -> float | None:
+    """Return another standard deviation of corners to weigh the board against; None where none is asked."""
+    if start.sd0 is not None or start.shape != "points" or not result.converged:
+        return None
+    found = deviation_of_corners(result)
+    # Corners that fit to the last digit are made, not measured.
+    return start.assumed * found if abs(found - 1) > CHANGE and start.assumed * found > 1e-6 else None
 
 
 def _knotted(start: Start, how: dict[str, Any]) -> Result:
@@ -98,5 +117,4 @@ def snooped_start(start: Start, **options: Any) -> Calibrated:
     assert isinstance(result, Result)
     own = start.with_images_of(result.block)
     told = replace(result, messages=[*own.messages, *result.messages])
-    vars(told)["verdict"] = found.verdict
-    return Calibrated(calibration=own, result=told, snooped=found)
+    return judged(Calibrated(calibration=own, result=told, snooped=found))

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.network.attitudes import Attitudes
-from photogram.network.cameras import Camera
 from photogram.network.passages import Bend
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
@@ -24,14 +23,14 @@ from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
+from photogram.targets.worth import Worth
 
-if TYPE_CHECKING:
-    from photogram.targets.worth import Worth
-
-__all__ = ["STEPS", "Calibrated", "Part", "UnknownWeight", "with_unknown_weight"]
+__all__ = ["STEPS", "Calibrated", "Part", "UnknownWeight", "deviation_of_corners", "with_unknown_weight"]
 
 Part = Literal["cameras", "sensors", "board", "views"]
 """What has cofactors."""
+Chosen = tuple[list[str], list[tuple[str, list[str]]], list[Floats]]
+"""Names of unknowns, what they are in the result, and their partials by steps of the block."""
 STEPS = ("tx", "ty", "tz", "wx", "wy", "wz")
 """Steps of a pose in vision axes: R <- Exp(w) R, t <- t + dt."""
 
@@ -50,6 +49,13 @@ class UnknownWeight(Result):
 def with_unknown_weight(result: Result) -> Result:
     """Return a result as one whose unit weight nobody knows."""
     return UnknownWeight(**{each.name: getattr(result, each.name) for each in fields(Result)})
+
+
+def deviation_of_corners(result: Result) -> float:
+    """Return the standard deviation of a corner of level 0 that residuals have, in those that were given."""
+    used = result.used_images
+    weighted = (result.residuals[used] / result.image_given_sd[used]) ** 2
+    return float(np.sqrt(weighted.sum() / np.nansum(result.redundancy[used])))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -138,8 +144,8 @@ class Calibrated(Brief, Shown):
         Parameters
         ----------
         parts
-            In the order of rows: `cameras` (of each all parameters; held ones have zeros; and its unknown
-            knots), `sensors` and `views` (six
+            In the order of rows: `cameras` (all parameters, and knots that are unknown; what is held has
+            zeros), `sensors` and `views` (six
             steps each: R <- Exp(w) R, t <- t + dt in vision axes; dt, then w), `board` (x, y, z of the points
             that pictures show, or `bend_x` and `bend_y`).
 
@@ -185,49 +191,42 @@ class Calibrated(Brief, Shown):
             start += len(each)
         return self.result.covariances().combined(own, wanted) / self.result.covariance_scale
 
-    def _selected(self, parts: Sequence[Part]) -> tuple[list[str], list[tuple[str, list[str]]], list[Floats]]:
-        """Return names of unknowns, what they are in the result, and their partials by steps of the block."""
+    def _selected(self, parts: Sequence[Part]) -> Chosen:
         names: list[str] = []
         wanted: list[tuple[str, list[str]]] = []
         steps: list[Floats] = []
         for part in parts:
             one_of("part of a calibration", part, get_args(Part))
-            if part == "cameras":
-                for camera in self.cameras:
-                    names += [f"{camera.name} {name}" for name in _names_of(camera.camera)]
-                    wanted += _selected_of(camera)
-                    steps.append(np.eye(len(_names_of(camera.camera))))
-                continue
-            own_names, selection, partials = getattr(self, f"_{part}")()
+            own_names, selections, partials = getattr(self, f"_{part}")()
             names += own_names
-            wanted += [selection] if selection[1] else []
+            wanted += [each for each in selections if each[1]]
             steps += partials
         return names, wanted, steps
 
-    def _sensors(self) -> tuple[list[str], tuple[str, list[str]], list[Floats]]:
+    def _cameras(self) -> Chosen:
+        names: list[str] = []
+        selections: list[tuple[str, list[str]]] = []
+        for each, given in zip(self.cameras, self.result.block.cameras, strict=True):
+            knots = [knot.name for knot in given.knot_unknowns]
+            own = each.names + (given.knot_names if knots else ())
+            names += [f"{each.name} {name}" for name in own]
+            selections += [("camera", [each.name]), ("unknown", knots)]
+        return names, selections, [np.eye(len(names))]
+
+    def _sensors(self) -> Chosen:
         rows = self.sensors_adjusted()
         own = [self.cameras[row].name for row in rows]
         names = [f"{name} {step}" for name in own for step in STEPS]
-        return names, ("unknown", own), [sensor_steps(self.sensors[row]) for row in rows]
+        return names, [("unknown", own)], [sensor_steps(self.sensors[row]) for row in rows]
 
-    def _board(self) -> tuple[list[str], tuple[str, list[str]], list[Floats]]:
+    def _board(self) -> Chosen:
         if self.bend is not None:
-            return ["bend_x", "bend_y"], ("unknown", [self.bend.name]), [np.eye(2)]
+            return ["bend_x", "bend_y"], [("unknown", [self.bend.name])], [np.eye(2)]
         seen = np.flatnonzero(self.result.used_points).tolist()
         own = [self.calibration.board.names[row] for row in seen]
-        return [f"{name}.{axis}" for name in own for axis in "xyz"], ("point", own), [np.eye(3)] * len(own)
+        return [f"{name}.{axis}" for name in own for axis in "xyz"], [("point", own)], [np.eye(3)] * len(own)
 
-    def _views(self) -> tuple[list[str], tuple[str, list[str]], list[Floats]]:
+    def _views(self) -> Chosen:
         photos = [self.result.block.photo_ids[row] for row in self.photos.tolist()]
         names = [f"view {view} {step}" for view in range(len(photos)) for step in STEPS]
-        return names, ("step", photos), [view_steps(pose) for pose in self.poses]
-
-
-def _names_of(camera: Camera) -> tuple[str, ...]:
-    """Return the parameters of a camera, and behind them its knots where these were unknown."""
-    return camera.names + (camera.knot_names if camera.knot_unknowns else ())
-
-
-def _selected_of(camera: AdjustedCamera) -> list[tuple[str, list[str]]]:
-    knots = [each.name for each in camera.camera.knot_unknowns]
-    return [("camera", [camera.name]), *([("unknown", knots)] if knots else [])]
+        return names, [("step", photos)], [view_steps(pose) for pose in self.poses]

@@ -46,6 +46,9 @@ class Calibration(Start):
         of the shape `held` is held.
     messages
         Remarks of whoever read it.
+    assumed
+        Where `sd0` is None: the standard deviation of a corner, pixels, that weighted points of the board are
+        weighed against; the adjustment finds it.
 
     Raises
     ------

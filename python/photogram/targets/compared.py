@@ -11,15 +11,15 @@ from photogram.arguments.types import Bools, Floats
 from photogram.network.cameras import Camera
 from photogram.network.hull import hull, outside
 from photogram.show.brief import Brief, Rows
-from photogram.targets.agreement import Agreement
 from photogram.targets.datums import fixed_points
-from photogram.targets.difference import Criterion, Fitted, differences_at, fitted_motion, points_at
+from photogram.targets.difference_test import DifferenceTest
 from photogram.targets.housing import transformed
 from photogram.targets.imaging import imaged, unknown_of, values_of
 from photogram.targets.maps import distance_text, image_grid
+from photogram.targets.motion_fit import Criterion, Fitted, differences_at, fitted_motion, points_at
 from photogram.targets.projection import of_functions, point_partials, worst
 
-__all__ = ["Difference", "Side", "compared"]
+__all__ = ["CameraDifference", "Side", "compared"]
 
 DEFINED = 1e-5
 """Of the largest: what the cofactors of differences over a grid say less of is rounding."""
@@ -66,7 +66,7 @@ class Side:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Difference(Brief):
+class CameraDifference(Brief):
     """Where two calibrated cameras image the same points.
 
     Attributes
@@ -103,7 +103,7 @@ class Difference(Brief):
     covariances: Floats | None
     inside: Bools
     shared: float
-    test: Agreement | None
+    test: DifferenceTest | None
 
     @property
     def rotation(self) -> float:
@@ -204,7 +204,7 @@ def compared(
     criterion: Criterion = "pixels",
     radius: float | None = None,
     grid: tuple[int, int] = (60, 40),
-) -> Difference:
+) -> CameraDifference:
     """Compare two cameras.
 
     Parameters
@@ -233,7 +233,7 @@ def compared(
     expected = _Expected(a, b, fitted, near, distances) if known else None
     shape = (len(distances), len(rows), len(columns), 2)
     shared = _shared(a.corners, b.corners)
-    return Difference(
+    return CameraDifference(
         cameras=(a.name, b.name),
         size=size,
         unit=unit,
@@ -310,7 +310,7 @@ class _Expected:
             found.append(own + self.b.covariances(self._moved(points, finite), finite, self.rows[1]))
         return np.stack(found)
 
-    def test(self, size: tuple[int, int], distances: tuple[float, ...]) -> Agreement:
+    def test(self, size: tuple[int, int], distances: tuple[float, ...]) -> DifferenceTest:
         """Test both together: parameters where the model is the same, else the differences over a grid."""
         a, b = self.a, self.b
         assert a.covariance is not None
@@ -319,7 +319,7 @@ class _Expected:
         if a.camera.model == b.camera.model and np.array_equal(unknown, unknown_of(b.camera)):
             change = (values_of(b.camera) - values_of(a.camera))[unknown]
             chi2 = float(change @ np.linalg.solve(a.covariance + b.covariance, change))
-            return Agreement.of("parameters of both cameras", chi2, len(change))
+            return DifferenceTest.of("parameters of both cameras", chi2, len(change))
         pixels = image_grid(size, TESTED)[2]
         pixels = pixels[a.sees(pixels)]
         vectors, effects = [], []
@@ -337,13 +337,13 @@ class _Expected:
         return _tested(np.concatenate(vectors), np.concatenate(effects))
 
 
-def _tested(vectors: Floats, effects: Floats) -> Agreement:
+def _tested(vectors: Floats, effects: Floats) -> DifferenceTest:
     """Test (n, 2) vectors by (n, 2, r) F of their covariance F F', which has no more than r dimensions."""
     known = np.isfinite(vectors).all(axis=1) & np.isfinite(effects).all(axis=(1, 2))
     u, s, _ = np.linalg.svd(effects[known].reshape(-1, effects.shape[2]), full_matrices=False)
     defined = s > DEFINED * s[0]
     chi2 = float((((u.T @ vectors[known].ravel())[defined] / s[defined]) ** 2).sum())
-    return Agreement.of("differences over the picture", chi2, int(np.count_nonzero(defined)))
+    return DifferenceTest.of("differences over the picture", chi2, int(np.count_nonzero(defined)))
 
 
 def _root(covariance: Floats | None) -> Floats:

@@ -17,14 +17,17 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import is_covariance, number, whole_number
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
+from photogram.io import json
+from photogram.io.csv_text import csv_text
 from photogram.network.cameras import Camera
 from photogram.show.brief import Brief, Rows
-from photogram.targets.compared import Difference
-from photogram.targets.difference import Fitted, points_at
+from photogram.targets.compared import CameraDifference
 from photogram.targets.imaging import TURNED
 from photogram.targets.least_lens import HELD, Moved, Points
 from photogram.targets.lens_fit import GRID, KNOTS, fitted_in_stages, free_names, lens_of, shows, within
 from photogram.targets.maps import distance_text, image_grid
+from photogram.targets.motion_fit import Fitted, points_at
+from photogram.targets.output.rig import Rig
 
 __all__ = ["Conversion", "convert_lens"]
 
@@ -50,7 +53,7 @@ class Conversion(Brief):
 
     source: Camera
     camera: Camera
-    difference: Difference
+    difference: CameraDifference
     names: tuple[str, ...]
     covariance: Floats | None
 
@@ -101,6 +104,52 @@ class Conversion(Brief):
         shift = ", ".join(f"{each:.3g}" for each in found.translation)
         turn = f"{found.rotation:.3g} degrees" if np.any(found.fitted.motion != np.eye(4)) else "none"
         return f"{turn}, {shift} {found.unit}" if found.fitted.finite else turn
+
+    def to_csv(self) -> bytes:
+        """Return a row for each distance and pixel: column, row, dx, dy; empty where nothing is shown."""
+        found = self.difference
+        down, across = np.meshgrid(found.rows, found.columns, indexing="ij")
+        times = len(found.distances)
+        return csv_text(
+            {
+                "distance": np.repeat(found.distances, across.size),
+                "column": np.tile(across.ravel(), times),
+                "row": np.tile(down.ravel(), times),
+                "dx": found.vectors[..., 0].ravel(),
+                "dy": found.vectors[..., 1].ravel(),
+            }
+        )
+
+    def to_json(self) -> bytes:
+        """Return the whole conversion as a JSON document."""
+        found, own = self.difference, self.camera
+        return json.to_json(
+            {
+                "kind": "lens conversion",
+                "source": {"name": self.source.title, "model": self.source.model},
+                "model": own.model,
+                "parameters": dict(own.parameters),
+                "knots": own.knots,
+                "size": list(found.size),
+                "pixel_origin": "center",
+                "distances": [each if math.isfinite(each) else None for each in found.distances],
+                "motion": found.fitted.motion,
+                "rms": self.rms,
+                "largest": self.largest,
+                "largest_at": list(self.where),
+                "not_shown": self.unseen,
+                "columns": found.columns,
+                "rows": found.rows,
+                "difference": found.vectors,
+                "names": list(self.names),
+                "covariance": self.covariance,
+            }
+        )
+
+    def rig(self) -> Rig:
+        """Return the new camera as files of other programs take it."""
+        own = self.camera.replace(name=self.source.title)
+        return Rig(cameras=(own,), sizes=(self.difference.size,), sensors=np.eye(4)[np.newaxis])
 
     def report(self) -> str:
         """Return the same as text."""
@@ -172,7 +221,7 @@ def convert_lens(
     return Conversion(
         source=source,
         camera=_camera(found.camera, free, passed),
-        difference=Difference(
+        difference=CameraDifference(
             cameras=(source.title, found.camera.model),
             size=size,
             unit="m",

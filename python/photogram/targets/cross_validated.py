@@ -3,105 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from photogram.adjustment.adjustment import adjust, adjusted_again
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
-from photogram.show.brief import Brief, Rows
-from photogram.targets.agreement import EXPLAINED, Agreement
 from photogram.targets.calibrated import Calibrated
-from photogram.targets.cross_validation import CrossMap, cross_map, parts_agree, splits
-from photogram.targets.housing import Housing
+from photogram.targets.cross_validation import CrossValidation, Into, parts_agree, splits
 from photogram.targets.housings import camera_number, housed_with, housing_of
 
 if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
     from photogram.results.result import Result
 
-__all__ = ["CrossValidation", "Into", "cross_validate"]
-
-Into = Literal["odd", "halves"] | int
-"""How views are split."""
+__all__ = ["cross_validate"]
 
 FEWEST = 3
 """Views of a part."""
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class CrossValidation(Brief):
-    """Parts of the views, adjusted by themselves, and how they agree.
-
-    Attributes
-    ----------
-    into
-        How the views were split.
-    cameras
-        Names of the cameras, which are in one housing.
-    parts
-        Of each split the views of its two parts.
-    tests
-        Of each split the tests of the cameras, and of all with their sensors where there are several.
-    whole, housings
-        The housing by all views, and of each split by its two parts.
-    """
-
-    into: str
-    cameras: tuple[str, ...]
-    parts: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
-    tests: tuple[tuple[Agreement, ...], ...]
-    whole: Housing
-    housings: tuple[tuple[Housing, Housing], ...]
-
-    @property
-    def explained(self) -> bool:
-        """Whether covariances explain how parts differ: no p below 0.01 over the number of splits."""
-        return min(each[-1].probability for each in self.tests) > EXPLAINED / len(self.tests)
-
-    @property
-    def factor(self) -> float:
-        """By which the parts differ more than their standard deviations say, in the mean of the splits."""
-        return float(np.sqrt(np.mean([each[-1].factor ** 2 for each in self.tests])))
-
-    @property
-    def verdict(self) -> str:
-        """What it says of every map of uncertainty."""
-        probability = min(each[-1].probability for each in self.tests)
-        if self.explained:
-            return f"cross-validation explained (p {probability:.2g})"
-        return (
-            f"cross-validation: the maps are too small by about {self.factor:.2g} (p {probability:.2g}): the"
-            " lens, the board or the weights are not as modelled"
-        )
-
-    def brief(self) -> tuple[str, Rows]:
-        """Return splits and tests in a few lines."""
-        rows = []
-        for (a, b), tests in zip(self.parts, self.tests, strict=True):
-            said = ", ".join(
-                f"{each.name} chi2 {each.chi2:.4g} of {each.dof} (p {each.probability:.2g})" for each in tests
-            )
-            rows.append((f"{len(a)} + {len(b)} views", said))
-        return "Cross-validation", [*rows, ("verdict", self.verdict)]
-
-    def map(self, camera: int, pixels: Floats, distance: float, split: int = 0) -> CrossMap:
-        """Return where the two parts of a split image the same points.
-
-        Parameters
-        ----------
-        camera
-            Number of the camera in the housing.
-        pixels, distance
-            (n, 2) where, and how far from the centre of the camera; infinite: directions.
-        split
-            Which.
-        """
-        return cross_map(self.whole, *self.housings[split], camera, pixels, distance)
 
 
 def cross_validate(

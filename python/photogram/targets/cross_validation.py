@@ -14,18 +14,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.targets.agreement import Agreement
+from photogram.show.brief import Brief, Rows
 from photogram.targets.datums import datum_rows
+from photogram.targets.difference_test import EXPLAINED, DifferenceTest
 from photogram.targets.housing import Housing
 from photogram.targets.imaging import unknown_of, values_of
 from photogram.targets.projection import common_partials
 
-__all__ = ["CrossMap", "changes_between", "cross_map", "parts_agree", "splits"]
+__all__ = ["CrossMap", "CrossValidation", "Into", "changes_between", "cross_map", "parts_agree", "splits"]
+
+Into = Literal["odd", "halves"] | int
+"""How views are split."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +85,7 @@ def changes_between(a: Housing, b: Housing) -> tuple[Floats, Floats]:
 
 def parts_agree(
     a: Housing, b: Housing, names: Sequence[str], unit: tuple[float, float] = (1.0, math.inf)
-) -> list[Agreement]:
+) -> list[DifferenceTest]:
     """Test the differences of two parts, of each camera, and of all cameras and sensors together.
 
     Parameters
@@ -100,7 +105,7 @@ def parts_agree(
     found = []
     for name, own in groups.items():
         chi2 = float(change[own] @ np.linalg.solve(cofactors[own, own], change[own])) / variance
-        found.append(Agreement.of(name, chi2, len(change[own]), freedom))
+        found.append(DifferenceTest.of(name, chi2, len(change[own]), freedom))
     return found
 
 
@@ -112,3 +117,74 @@ def cross_map(
     partials = common_partials(whole, camera, pixels, distance, rows)
     change, cofactors = changes_between(a, b)
     return CrossMap(partials @ change, whole.variance * partials @ cofactors @ partials.transpose(0, 2, 1))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class CrossValidation(Brief):
+    """Parts of the views, adjusted by themselves, and how they agree.
+
+    Attributes
+    ----------
+    into
+        How the views were split.
+    cameras
+        Names of the cameras, which are in one housing.
+    parts
+        Of each split the views of its two parts.
+    tests
+        Of each split the tests of the cameras, and of all with their sensors where there are several.
+    whole, housings
+        The housing by all views, and of each split by its two parts.
+    """
+
+    into: str
+    cameras: tuple[str, ...]
+    parts: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
+    tests: tuple[tuple[DifferenceTest, ...], ...]
+    whole: Housing
+    housings: tuple[tuple[Housing, Housing], ...]
+
+    @property
+    def explained(self) -> bool:
+        """Whether covariances explain how parts differ: no p below 0.01 over the number of splits."""
+        return min(each[-1].probability for each in self.tests) > EXPLAINED / len(self.tests)
+
+    @property
+    def factor(self) -> float:
+        """By which the parts differ more than their standard deviations say, in the mean of the splits."""
+        return float(np.sqrt(np.mean([each[-1].factor ** 2 for each in self.tests])))
+
+    @property
+    def verdict(self) -> str:
+        """What it says of every map of uncertainty."""
+        probability = min(each[-1].probability for each in self.tests)
+        if self.explained:
+            return f"cross-validation explained (p {probability:.2g})"
+        return (
+            f"cross-validation: the maps are too small by about {self.factor:.2g} (p {probability:.2g}): the"
+            " lens, the board or the weights are not as modelled"
+        )
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return splits and tests in a few lines."""
+        rows = []
+        for (a, b), tests in zip(self.parts, self.tests, strict=True):
+            said = ", ".join(
+                f"{each.name} chi2 {each.chi2:.4g} of {each.dof} (p {each.probability:.2g})" for each in tests
+            )
+            rows.append((f"{len(a)} + {len(b)} views", said))
+        return "Cross-validation", [*rows, ("verdict", self.verdict)]
+
+    def map(self, camera: int, pixels: Floats, distance: float, split: int = 0) -> CrossMap:
+        """Return where the two parts of a split image the same points.
+
+        Parameters
+        ----------
+        camera
+            Number of the camera in the housing.
+        pixels, distance
+            (n, 2) where, and how far from the centre of the camera; infinite: directions.
+        split
+            Which.
+        """
+        return cross_map(self.whole, *self.housings[split], camera, pixels, distance)

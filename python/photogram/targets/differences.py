@@ -11,10 +11,10 @@ from photogram.arguments.arrays import shown
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.targets.calibrated import Calibrated
-from photogram.targets.compared import Difference, Side, compared
+from photogram.targets.compared import CameraDifference, Side, compared
 from photogram.targets.datums import datum_rows
-from photogram.targets.difference import Criterion
 from photogram.targets.housings import camera_number, housing_of, size_of
+from photogram.targets.motion_fit import Criterion
 from photogram.targets.uncertainty import checked_distance
 
 __all__ = ["difference"]
@@ -30,7 +30,7 @@ def difference(
     criterion: Criterion = "pixels",
     radius: float | None = None,
     grid: tuple[int, int] = (60, 40),
-) -> Difference:
+) -> CameraDifference:
     """Compare two calibrations: where they image the same points, the motion of their axes out.
 
     Parameters

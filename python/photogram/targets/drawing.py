@@ -17,8 +17,8 @@ from photogram.arguments.types import Bools, Floats
 from photogram.plots.panels import Where, handed_out, note, panels, placed
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, COLOURS, FAINT, INK, ORDERED, VERMILION
-from photogram.targets.compared import Difference
-from photogram.targets.cross_validated import CrossValidation
+from photogram.targets.compared import CameraDifference
+from photogram.targets.cross_validation import CrossValidation
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def draw_uncertainty(found: UncertaintyMap, path: Path | None = None, ax: Where 
     return placed(partial(_uncertainty, found), path, ax)
 
 
-def draw_difference(found: Difference, path: Path | None = None, ax: Where = None) -> Any:
+def draw_difference(found: CameraDifference, path: Path | None = None, ax: Where = None) -> Any:
     """Draw the difference of two calibrations: its length as contours, its vectors; a panel each distance.
 
     Parameters
@@ -144,9 +144,9 @@ def draw_uncertainty_against_distance(
 def steps_of_125(low: float, high: float) -> Floats:
     """Return values 1, 2, 5 times powers of ten that enclose what lies between two positive numbers."""
     start = round_length(low)
-    powers = np.arange(math.floor(math.log10(start)), math.ceil(math.log10(high)) + 1)
+    powers = np.arange(math.floor(math.log10(start)), math.floor(math.log10(high)) + 2)
     steps = np.concatenate([np.array([1.0, 2.0, 5.0]) * 10.0**power for power in powers])
-    above = np.flatnonzero(steps >= high * (1 - 1e-9))
+    above = np.flatnonzero(steps > high)
     return np.asarray(steps[(steps >= start * (1 - 1e-9)) & (np.arange(len(steps)) <= above[0])])
 
 
@@ -160,7 +160,7 @@ def _uncertainty(found: UncertaintyMap, ax: Where) -> Any:
     return handed_out([axes])
 
 
-def _difference(found: Difference, ax: Where) -> Any:
+def _difference(found: CameraDifference, ax: Where) -> Any:
     chi2 = found.chi2
     rows = len(found.distances)
     columns = 1 if chi2 is None else 2
@@ -267,7 +267,7 @@ def _contours(
     high = float(positive.max())
     levels = steps_of_125(max(float(positive.min()), lowest * high), high)
     norm = LogNorm(levels[0], levels[-1])
-    shown = np.ma.masked_invalid(values)
+    shown = np.ma.masked_invalid(np.where(values > 0, values, np.nan))
     places = np.arange(SHADES * (len(levels) - 1) + 1) / SHADES
     shades = np.exp(np.interp(places, np.arange(len(levels)), np.log(levels)))
     filled = axes.contourf(columns, rows, shown, shades, cmap=ORDERED, norm=norm, extend="min")

@@ -16,11 +16,11 @@ from photogram.network.cameras import Camera
 from photogram.targets.imaging import unknown_of
 from photogram.targets.vision import cross_matrices
 
-__all__ = ["Housing", "Seen", "mean_motion", "transformed"]
+__all__ = ["Housing", "SeenCorners", "mean_motion", "transformed"]
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class SeenCorners:
     """The m corners that took part.
 
     Attributes
@@ -39,9 +39,9 @@ class Seen:
     xy: Floats
     sd: Floats
 
-    def __getitem__(self, which: Bools) -> Seen:
+    def __getitem__(self, which: Bools) -> SeenCorners:
         """Return some of them."""
-        return Seen(
+        return SeenCorners(
             self.cameras[which], self.views[which], self.points[which], self.xy[which], self.sd[which]
         )
 
@@ -82,7 +82,7 @@ class Housing:
     poses: Floats
     points: Floats
     points_by_board: Floats
-    seen: Seen
+    seen: SeenCorners
     cofactors: Floats
     weights: Floats
     variance: float = 1.0

@@ -11,7 +11,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.knots import Knot
 from photogram.targets.calibrated import Calibrated
-from photogram.targets.housing import Housing, Seen, mean_motion
+from photogram.targets.housing import Housing, SeenCorners, mean_motion
 from photogram.targets.imaging import unknown_of
 
 __all__ = ["camera_number", "housed_with", "housing_of", "size_of"]
@@ -107,14 +107,14 @@ def _points_by_board(calibrated: Calibrated) -> Floats:
     return found.reshape(len(found), 3, -1)
 
 
-def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> Seen:
+def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> SeenCorners:
     """Return the corners that took part; views and cameras are numbered within the housing."""
     result, corners = calibrated.result, calibrated.calibration.corners
     block = result.block
     used = result.used_images & np.isin(corners.cameras[block.image_photos], cameras)
     used &= result.image_weights > 0
     photos = block.image_photos[used]
-    return Seen(
+    return SeenCorners(
         cameras=np.array([cameras.index(each) for each in corners.cameras[photos].tolist()], dtype=np.int64),
         views=np.searchsorted(views, corners.views[photos]),
         points=block.image_points[used],
@@ -125,10 +125,10 @@ def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> Seen:
 
 def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses: Floats) -> Floats:
     """Return the cofactors of common unknowns and of the mean motion of the boards."""
-    found = [each.camera for each in calibrated.cameras]
-    lengths = [len(each.names) + 2 * len(each.knot_unknowns) for each in found]
+    given = calibrated.result.block.cameras
+    lengths = [len(each.names) + 2 * len(each.knot_unknowns) for each in given]
     starts = np.concatenate([[0], np.cumsum(lengths)])
-    kept = [starts[each] + np.flatnonzero(unknown_of(found[each])) for each in cameras]
+    kept = [starts[each] + np.flatnonzero(unknown_of(calibrated.cameras[each].camera)) for each in cameras]
     sensors, board = calibrated.sensors_adjusted(), _board_size(calibrated)
     kept += [starts[-1] + 6 * sensors.index(each) + np.arange(6) for each in cameras[1:]]
     kept.append(starts[-1] + 6 * len(sensors) + np.arange(board))
@@ -142,6 +142,11 @@ def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses
     return calibrated.combined(partials, parts)
 
 
+def _weight_of(knot: Knot) -> Floats:
+    """Return (2, 2) of the observation that a knot is 0."""
+    return np.zeros((2, 2)) if knot.covariance is None else np.asarray(np.linalg.inv(knot.covariance))
+
+
 def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
     """Return the inverse covariances of what was known before: priors of cameras, nominal points."""
     block, rows = calibrated.result.block, _board_rows(calibrated)
@@ -153,7 +158,8 @@ def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
         covariance = block.cameras[each].prior_covariance
         if covariance is not None:
             own[np.ix_(weighted, weighted)] = np.linalg.inv(covariance)
-        blocks += [own, *map(_weight, block.cameras[each].knot_unknowns)]
+        knots = [knot for knot in block.cameras[each].knot_unknowns if np.any(knot.sd)]
+        blocks += [own, *(_weight_of(knot) for knot in knots)]
     blocks += [np.zeros((6, 6))] * (len(cameras) - 1)
     points = np.diag(1 / block.point_sd[rows].ravel() ** 2)
     blocks.append(points if calibrated.bend is None else np.zeros((2, 2)))
@@ -163,8 +169,3 @@ def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
         found[start : start + len(own), start : start + len(own)] = own
         start += len(own)
     return found
-
-
-def _weight(knot: Knot) -> Floats:
-    """Return the (2, 2) inverse covariance of what was known of a knot."""
-    return np.zeros((2, 2)) if knot.covariance is None else np.asarray(np.linalg.inv(knot.covariance))

@@ -43,6 +43,8 @@ class Measured:
         (I,) seconds.
     sizes
         Width and height by the name of a camera, of all by "".
+    picture_sizes
+        I widths and heights, where pictures themselves say them.
     board
         The board, where the file says it.
     messages
@@ -60,6 +62,7 @@ class Measured:
     views: Sequence[str] | None = None
     times: Floats | None = None
     sizes: Mapping[str, Size] = field(default_factory=dict)
+    picture_sizes: Sequence[Size] = ()
     board: Board | None = None
     messages: Sequence[Message] = ()
 
@@ -121,6 +124,7 @@ def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
     pictures = [measured.images[row] for row in kept]
     if len(set(pictures)) < len(pictures):
         pictures = [f"{names[row]}/{measured.images[row]}" for row in kept]
+    sizes = {**measured.sizes, **_sizes_of_pictures(measured, names, kept, how)}
     shift = 0.5 if how.origin == "corner" else 0.0
     try:
         corners = Corners(
@@ -129,7 +133,7 @@ def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
             views=views,
             times=None if measured.times is None else measured.times[rows],
             camera_names=camera_names,
-            sizes=[how.size or measured.sizes.get(name) or measured.sizes.get("") for name in camera_names],
+            sizes=[how.size or sizes.get(name) or sizes.get("") for name in camera_names],
             picture=place[measured.image[own]],
             point=measured.point[own],
             xy=measured.xy[own] - shift,
@@ -139,6 +143,23 @@ def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
     except InputError as error:
         raise InputError(error.message, file=measured.path) from None
     return corners, messages
+
+
+def _sizes_of_pictures(
+    measured: Measured, names: Sequence[str], rows: list[int], how: Grouping
+) -> dict[str, Size]:
+    """Return the size of the pictures of each camera, where pictures say it: they are alike."""
+    found: dict[str, Size] = {}
+    for row in rows if measured.picture_sizes else ():
+        width, height = measured.picture_sizes[row]
+        wide, high = how.size or found.setdefault(names[row], (width, height))
+        if (wide, high) != (width, height):
+            raise InputError(
+                f"the picture {measured.images[row]} has {width} x {height} pixels, others of its camera"
+                f" {wide} x {high}: what is calibrated is a camera whose pictures are alike",
+                file=measured.path,
+            )
+    return found
 
 
 def _in_order(names: Sequence[str], rows: list[int], how: Grouping) -> list[int]:

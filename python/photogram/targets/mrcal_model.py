@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ast
 import base64
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,26 +18,17 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.files import read_text
 from photogram.network.cameras import Camera
-from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board
 from photogram.targets.calibration import Calibration
 from photogram.targets.corners import Corners
+from photogram.targets.mrcal_lenses import freed, lens_of_mrcal
 from photogram.targets.npz_arrays import Arrays, read_arrays
 from photogram.targets.vision import inverted, of_vectors
 
-__all__ = ["KEY", "read_model"]
+__all__ = ["KEY", "read_lens", "read_model"]
 
 KEY = "optimization_inputs"
 INDICES = "indices_frame_camintrinsics_camextrinsics"
-PREFIX = "LENSMODEL_"
-OPENCV = "opencv_pinhole"
-_LENSES = {
-    "PINHOLE": ("pinhole", 4),
-    "STEREOGRAPHIC": ("stereographic", 4),
-    **{f"OPENCV{terms}": (OPENCV, 4 + terms) for terms in (4, 5, 8, 12)},
-}
-"""Models of mrcal by the name here, with as many of its parameters."""
-_SPLINED = re.compile(r"SPLINED_STEREOGRAPHIC_order=([23])_Nx=(\d+)_Ny=(\d+)_fov_x_deg=([0-9.eE+-]+)")
 
 
 @dataclass(frozen=True)
@@ -90,7 +80,25 @@ def read_model(path: Path) -> Calibration:
     )
 
 
-def _packed(path: Path) -> bytes:
+def read_lens(path: Path) -> tuple[Camera, tuple[int, int]]:
+    """Read the camera of a `.cameramodel`, held, and width and height of its pictures.
+
+    Raises
+    ------
+    InputError
+        The file is no such text, or its lens is not taken.
+    """
+    content = _content(path)
+    try:
+        camera = lens_of_mrcal(content["lensmodel"], [*map(float, content["intrinsics"])], path.stem)
+        width, height = map(int, content["imagersize"])
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        message = error.message if isinstance(error, InputError) else f"is no camera model: {error!r}"
+        raise InputError(message, file=path) from None
+    return camera, (width, height)
+
+
+def _content(path: Path) -> dict[str, Any]:
     text = read_text(path)
     try:
         # Literals only: names, calls and operations are refused.
@@ -100,7 +108,11 @@ def _packed(path: Path) -> bytes:
         raise InputError(f"is no dictionary of Python: {error}", file=path, record=record) from None
     if not isinstance(content, dict) or "lensmodel" not in content:
         raise InputError("is no camera model of mrcal: it has no lensmodel", file=path)
-    packed = content.get(KEY)
+    return content
+
+
+def _packed(path: Path) -> bytes:
+    packed = _content(path).get(KEY)
     if not isinstance(packed, bytes):
         raise InputError(f"holds a camera, but no corners: it has no {KEY}", file=path)
     try:
@@ -129,43 +141,12 @@ def _freed(arrays: Arrays) -> _Free:
 
 
 def _cameras(arrays: Arrays, free: _Free) -> list[Camera]:
-    lens = arrays.text("lensmodel")
-    if splined := _SPLINED.fullmatch(lens.removeprefix(PREFIX)):
-        return _splined_cameras(arrays, free, *map(float, splined.groups()))
-    own = _LENSES.get(lens.removeprefix(PREFIX))
-    if own is None:
-        names = ", ".join([*_LENSES, "SPLINED_STEREOGRAPHIC_order=..."])
-        raise arrays.error("lensmodel", f"{lens} is none of those that are calibrated: {names}")
-    model, count = own
-    rows = arrays.numbers("intrinsics", None, count)
-    cameras = []
-    for number, values in enumerate(rows.tolist()):
-        terms = Camera(model, {"fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0}).names[:count]
-        freed = (terms[:4] if free.core else ()) + (terms[4:] if free.lens else ())
-        given = dict(zip(terms, values, strict=True))
-        cameras.append(Camera(model, given, dict.fromkeys(freed, np.inf), name=f"camera {number}"))
-    return cameras
-
-
-def _splined_cameras(
-    arrays: Arrays, free: _Free, order: float, nx: float, ny: float, fov: float
-) -> list[Camera]:
-    """Return cameras with knots: fx, fy, cx, cy, then dx, dy of each knot, row by row."""
-    core = ("fx", "fy", "cx", "cy")
-    shape = (int(ny), int(nx), 2)
-    rows = arrays.numbers("intrinsics", None, len(core) + 2 * shape[0] * shape[1])
-    constants = {"order": order, "nx": nx, "ny": ny, "fov_x_deg": fov}
-    return [
-        Camera(
-            KNOTTED,
-            dict(zip(core, values[: len(core)].tolist(), strict=True)) | constants,
-            dict.fromkeys(core if free.core else (), np.inf),
-            name=f"camera {number}",
-            knots=values[len(core) :].reshape(shape),
-            knot_sd=np.full(2, np.inf if free.lens else 0.0),
-        )
-        for number, values in enumerate(rows)
-    ]
+    model, rows = arrays.text("lensmodel"), arrays.numbers("intrinsics", None, None)
+    try:
+        own = [lens_of_mrcal(model, row, f"camera {number}") for number, row in enumerate(rows.tolist())]
+    except InputError as error:
+        raise InputError(error.message, file=arrays.path) from None
+    return [freed(each, model, free.core, free.lens) for each in own]
 
 
 def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats]:

@@ -15,12 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.show.brief import Brief, Rows
 from photogram.targets.housing import Housing, transformed
 from photogram.targets.imaging import rays
+from photogram.targets.maps import distance_text
 from photogram.targets.projection import of_functions, worst
 from photogram.targets.view_rows import view_rows
 
-__all__ = ["Added", "Candidate", "NewView", "added_by", "best_views", "seen_from"]
+__all__ = ["Added", "Candidate", "NewView", "Suggestions", "added_by", "best_views", "seen_from"]
 
 FEWEST = 12
 """Corners that a picture must have to count."""
@@ -99,6 +101,45 @@ class NewView:
     def rms(self) -> float:
         """Root mean square over the map."""
         return float(np.sqrt(np.mean(self.sd**2)))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Suggestions(Brief):
+    """Views of the board that would help most, each with those before it.
+
+    Attributes
+    ----------
+    camera, distance, unit
+        Of the map of uncertainty in the datum `corners`, which is to become better.
+    pixels
+        (n, 2) of the map.
+    before
+        (n,) standard deviations in the worst direction as they are, pixels.
+    views
+        The views, in the order in which to take them.
+    """
+
+    camera: str
+    distance: float
+    unit: str
+    pixels: Floats
+    before: Floats
+    views: tuple[NewView, ...]
+
+    @property
+    def sentences(self) -> list[str]:
+        """What to do, and what comes of it, a line for each view."""
+        largest, said = float(self.before.max()), []
+        for each in self.views:
+            said.append(f"{each.candidate.name}: largest {largest:.3g} -> {each.largest:.3g} px")
+            largest = each.largest
+        return said
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return them in a few lines."""
+        at = distance_text(self.distance, self.unit)
+        title = f"Views to take next, for the uncertainty of {self.camera} {at}"
+        return title, [(f"{number}", said) for number, said in enumerate(self.sentences, 1)]
 
 
 def seen_from(housing: Housing, pose: Floats, sizes: Floats) -> tuple[Indices, Indices]:

@@ -10,9 +10,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
-from photogram.network.knots import outside
 from photogram.targets.housing import Housing
-from photogram.targets.imaging import TURNED, imaged, motion_partials, rays
+from photogram.targets.imaging import imaged, motion_partials, rays
 
 __all__ = [
     "common_partials",
@@ -67,12 +66,9 @@ def common_partials(housing: Housing, camera: int, pixels: Floats, distance: flo
 
 
 def image_partials(camera: Camera, pixels: Floats, distance: float) -> Floats:
-    """Return (n, 2, p + 6) J = (K, Pi G) of points at (n, 2) pixels and a distance; NaN beyond knots."""
+    """Return (n, 2, p + 6) J = (K, Pi G) of points at (n, 2) pixels and a distance."""
     finite = bool(np.isfinite(distance))
-    points = rays(camera, pixels)
-    if camera.knots is not None:
-        points = np.where(outside(camera.parameters, points * TURNED)[:, np.newaxis], np.nan, points)
-    return point_partials(camera, points * (distance if finite else 1.0), finite)
+    return point_partials(camera, rays(camera, pixels) * (distance if finite else 1.0), finite)
 
 
 def point_partials(camera: Camera, points: Floats, finite: bool) -> Floats:

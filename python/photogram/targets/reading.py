@@ -23,6 +23,7 @@ from photogram.targets.corner_tables import (
     read_table,
     read_vnl,
 )
+from photogram.targets.detection import detected, is_picture
 from photogram.targets.first import first_values
 from photogram.targets.knot_weights import with_knot_sd
 from photogram.targets.lens_fit import KNOTS
@@ -33,6 +34,7 @@ from photogram.targets.start import Regularisation, Synchronisation
 
 __all__ = ["holds_targets", "read"]
 
+NO_BOARD_SEEN = "pictures, but no board: write board.toml or give --board 9x6 --spacing 0.025"
 NO_BOARD = "corners, but no board: write board.toml or give --board 10x10 --spacing 0.077"
 MODEL = ".cameramodel"
 MOST = 2000
@@ -109,7 +111,8 @@ def holds_targets(path: Path) -> bool:
         models, boards, corners = _sorted(path)
     if boards and not path.is_dir():
         return False
-    return bool(models or (boards and corners) or any(form.clear for form in corners))
+    seen = corners or (boards and any(map(is_picture, _files(path))))
+    return bool(models or (boards and seen) or any(form.clear for form in corners))
 
 
 def read(
@@ -129,14 +132,16 @@ def read(
     size: tuple[int, int] | None = None,
     sd0: float | None = None,
     regularise: Regularisation | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Calibration:
-    """Read corners of a board, and find values to start from.
+    """Read corners of a board, or find them in photographs, and find values to start from.
 
     Parameters
     ----------
     path
         A file of corners (`.vnl` and `.cameramodel` of mrcal, tables, YAML, XML, JSON or `.npz` of OpenCV),
-        or a folder with such files and the description of a board.
+        or a folder with such files, or else with photographs (needs `pip install 'photogram[targets]'`),
+        and the description of a board.
     board
         The board, or a file that describes it. None: that in the folder, or in the file of corners.
     shape, unit
@@ -152,6 +157,8 @@ def read(
         `known`: images of one view were taken at one time; `none`: each has a pose of its own.
     sd0, regularise
         As of :class:`Calibration`.
+    progress
+        Is told which photograph is searched for the board.
 
     Raises
     ------
@@ -178,7 +185,13 @@ def read(
     how = Grouping(
         cameras, views, within, sync == "none", size, "corner" if pixel_origin == "corner" else "center"
     )
-    found = _measured(path, corners, own)
+    pictures = [] if corners else [each for each in _files(path) if is_picture(each)]
+    if pictures and own is None:
+        raise InputError(NO_BOARD_SEEN, file=path)
+    if pictures and own is not None:
+        found = detected(path, pictures, own, progress)
+    else:
+        found = _measured(path, corners, own)
     own = found.board if own is None else own
     if own is None:
         raise InputError(NO_BOARD, file=path)

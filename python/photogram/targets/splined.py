@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram import _photocore
-from photogram.network.knots import Knot, outside
+from photogram.network.knots import Knot, beyond_knots
 from photogram.network.observations.prior import Prior
 from photogram.results.cameras import AdjustedCamera
 from photogram.targets.calibrated import Calibrated
@@ -69,7 +69,7 @@ def _beyond(calibrated: Calibrated, number: int) -> list[str]:
     adjusted: AdjustedCamera = calibrated.cameras[number]
     camera = adjusted.camera
     rays = camera.rays(grid_of_pixels(size))
-    share = float(outside(camera.parameters, rays).mean())
+    share = float(beyond_knots(camera.parameters, rays).mean())
     if not share:
         return [f"{adjusted.name}: the whole picture is within its knots"]
     count = (int(camera.parameters["nx"]), int(camera.parameters["ny"]))

@@ -48,6 +48,7 @@ class Start(Valued, Brief):
     regularise: Regularisation | None = None
     bend: tuple[float, float] = (0.0, 0.0)
     messages: Sequence[Message] = field(default=())
+    assumed: float = 1.0
 
     def __post_init__(self) -> None:
         one_of("sync", self.sync, get_args(Synchronisation))
@@ -174,7 +175,7 @@ class Start(Valued, Brief):
             image_photos=corners.picture[use],
             image_points=corners.point[use],
             image_xy=corners.xy[use],
-            image_sd=np.repeat(corners.sd[use, np.newaxis] * (self.sd0 or 1.0), 2, axis=1),
+            image_sd=np.repeat(corners.sd[use, np.newaxis] * (self.sd0 or self.assumed), 2, axis=1),
             mounts=self._mounts(names, photo),
             linear_unit=self.board.unit,
             passages=self._passages(),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -12,28 +11,24 @@ from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.show.brief import Brief, Rows
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.datums import datum_rows
 from photogram.targets.housing import Housing
 from photogram.targets.housings import camera_number, housed_with, housing_of, size_of
 from photogram.targets.imaging import rays
-from photogram.targets.maps import distance_text, image_grid
-from photogram.targets.new_views import Candidate, NewView, best_views
+from photogram.targets.maps import image_grid
+from photogram.targets.new_views import Candidate, Suggestions, best_views
+from photogram.targets.picture_parts import parts_of
 from photogram.targets.projection import common_partials, worst
 from photogram.targets.uncertainty import checked_distance
 from photogram.targets.vision import composed, inverted
 
-__all__ = ["Suggestions", "candidate_views", "suggest_views"]
+__all__ = ["candidate_views", "suggest_views"]
 
-CELLS = (5, 4)
-"""Of the picture, in whose middles the middle of the board is held."""
 DISTANCES = (0.1, 0.5, 0.9)
 """Quantiles of how far boards were, which are the distances of candidates."""
 TILT, TURN = 30.0, 90.0
 """Degrees."""
-ACROSS = ("left", "left of the middle", "", "right of the middle", "right")
-DOWN = ("upper", "above the middle", "below the middle", "lower")
 TILTS = {
     "": (0.0, 0.0),
     f"tilted {TILT:g} degrees about x": (TILT, 0.0),
@@ -44,45 +39,6 @@ TILTS = {
 TURNS = {"": 0.0, f"turned by {TURN:g} degrees": TURN}
 GRID = (12, 8)
 """Pixels whose uncertainty is compared."""
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Suggestions(Brief):
-    """Views of the board that would help most, each with those before it.
-
-    Attributes
-    ----------
-    camera, distance, unit
-        Of the map of uncertainty in the datum `corners`, which is to become better.
-    pixels
-        (n, 2) of the map.
-    before
-        (n,) standard deviations in the worst direction as they are, pixels.
-    views
-        The views, in the order in which to take them.
-    """
-
-    camera: str
-    distance: float
-    unit: str
-    pixels: Floats
-    before: Floats
-    views: tuple[NewView, ...]
-
-    @property
-    def sentences(self) -> list[str]:
-        """What to do, and what comes of it, a line for each view."""
-        largest, said = float(self.before.max()), []
-        for each in self.views:
-            said.append(f"{each.candidate.name}: largest {largest:.3g} -> {each.largest:.3g} px")
-            largest = each.largest
-        return said
-
-    def brief(self) -> tuple[str, Rows]:
-        """Return them in a few lines."""
-        at = distance_text(self.distance, self.unit)
-        title = f"Views to take next, for the uncertainty of {self.camera} {at}"
-        return title, [(f"{number}", said) for number, said in enumerate(self.sentences, 1)]
 
 
 def suggest_views(
@@ -170,24 +126,10 @@ def candidate_views(housing: Housing, camera: int, size: tuple[int, int], unit: 
 
 def _cells(housing: Housing, camera: int, size: tuple[int, int]) -> Iterator[tuple[str, Floats]]:
     """Yield places of the picture in words, and where they look; none where nothing is seen."""
-    across, down = (
-        (np.arange(count) + 0.5) / count * (side - 1) for count, side in zip(CELLS, size, strict=True)
-    )
-    for (row, y), (column, x) in product(enumerate(down), enumerate(across)):
-        towards = rays(housing.cameras[camera], np.array([[x, y]]))[0]
+    for part in parts_of(size):
+        towards = rays(housing.cameras[camera], np.array([part.middle]))[0]
         if np.isfinite(towards).all():
-            yield _place(column, row), towards
-
-
-def _place(column: int, row: int) -> str:
-    """Return a cell in words: `upper left corner`, `left edge, above the middle`, `below the middle`."""
-    at_side, at_end = column in (0, CELLS[0] - 1), row in (0, CELLS[1] - 1)
-    if at_side and at_end:
-        return f"{DOWN[row]} {ACROSS[column]} corner"
-    if at_side or at_end:
-        edge, along = (ACROSS[column], DOWN[row]) if at_side else (DOWN[row], ACROSS[column])
-        return f"{edge} edge" + (f", {along}" if along else "")
-    return " and ".join(filter(None, (DOWN[row], ACROSS[column])))
+            yield part.name, towards
 
 
 def _facing(towards: Floats) -> Floats:

@@ -11,12 +11,13 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import length, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.network.knots import beyond_knots
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.datums import DatumName, datum_rows
-from photogram.targets.difference import points_at
 from photogram.targets.housing import Housing
 from photogram.targets.housings import camera_number, housing_of, size_of
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, image_grid
+from photogram.targets.motion_fit import points_at
 from photogram.targets.projection import projection_cofactors, worst
 
 __all__ = ["checked_distance", "projection_uncertainty", "uncertainty_against_distance", "uncertainty_map"]
@@ -64,7 +65,12 @@ def projection_uncertainty(
     number = camera_number(result, camera)
     housing, own = _with(result, number, noise_only)
     rows = _rows(result, number, housing, own, datum, checked_distance(distance))
-    return housing.variance * projection_cofactors(housing, own, where, distance, rows)
+    found = housing.variance * projection_cofactors(housing, own, where, distance, rows)
+    seen = result.cameras[number].camera
+    if seen.knots is not None:
+        # Beyond the knots the polynomials at the edge go on, and nobody knows them.
+        found[beyond_knots(seen.parameters, seen.rays(where))] = np.nan
+    return found
 
 
 def uncertainty_map(

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from photogram.show.pictures import drawn
-from photogram.targets.compared import Difference
-from photogram.targets.cross_validated import CrossValidation
-from photogram.targets.cross_validation import changes_between
+from photogram.targets.compared import CameraDifference
+from photogram.targets.cross_validation import CrossValidation, changes_between
 from photogram.targets.maps import UncertaintyMap
-from photogram.targets.suggestions import Suggestions
+from photogram.targets.new_views import Suggestions
 from photogram.targets.worth import Worth
 from photogram.targets.worth_page import drawings
 
@@ -88,7 +87,7 @@ def _cross(found: CrossValidation) -> dict[str, Any]:
     }
 
 
-def _difference(found: Difference) -> dict[str, Any]:
+def _difference(found: CameraDifference) -> dict[str, Any]:
     test = found.test
     return {
         "cameras": list(found.cameras),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from photogram.plots.panels import figure_of
 from photogram.show.page import Drawing, Fact, Facts, Layers, Part, Remarks, Section
-from photogram.targets.compared import Difference
+from photogram.targets.compared import CameraDifference
 from photogram.targets.drawing import draw_cross_validation, draw_difference, draw_uncertainty
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.worth import Worth
@@ -79,7 +79,7 @@ def _of_map(found: UncertaintyMap) -> Drawing:
     return Drawing(f"map-{_name(found)}", _title(found), CAPTION, _figure(partial(draw_uncertainty, found)))
 
 
-def _of_difference(found: Difference) -> Drawing:
+def _of_difference(found: CameraDifference) -> Drawing:
     name = f"difference-{found.cameras[0]}-{found.cameras[1]}".replace(" ", "-")
     return Drawing(name, "Difference", APART, _figure(partial(draw_difference, found)))
 

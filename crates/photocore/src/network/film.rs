@@ -28,14 +28,38 @@ pub struct FilmOf {
     pub scanner: usize,
     /// Coefficients of its polynomials: six of [`CommonKind::ScannerCurve`], or none.
     pub curves: Vec<usize>,
-    /// What its polynomials, origin and unit are; the correction counts for its half range alone.
-    pub readings: Scanner,
+    /// What its readings count.
+    pub readings: Readings,
     /// The functions of its deformation.
     pub pattern: Option<Pattern>,
     /// The weights of these, pair by pair: [`CommonKind::Pattern`].
     pub weights: Vec<usize>,
     /// Whether it was seen from the other side.
     pub mirrored: bool,
+}
+
+/// What the readings of a scanner count: never unknown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Readings {
+    /// mm in a unit of readings.
+    pub pitch: f64,
+    /// o1, o2.
+    pub origin: [f64; 2],
+    /// Whether the second coordinate counts down.
+    pub down: bool,
+    /// hx, hy of its polynomials.
+    pub half_range: [f64; 2],
+}
+
+impl Readings {
+    /// The scanner with the given parameters of its correction, as far as there are any.
+    fn scanner(&self, parameters: impl Iterator<Item = f64>) -> Scanner {
+        let Self { pitch, origin, down, half_range } = *self;
+        let mut all = Correction::NONE.parameters();
+        all.iter_mut().zip(parameters).for_each(|(own, given)| *own = given);
+        let correction = Correction { half_range, ..Correction::NONE }.with_parameters(&all);
+        Scanner { correction, pitch, origin, down }
+    }
 }
 
 /// The film of a photo at given values of the unknowns.
@@ -79,7 +103,6 @@ impl FilmOf {
             }
             _ => return None,
         };
-        let correction = Correction { half_range: [hx, hy], ..Correction::NONE };
         let weights = take(pattern.map_or(0, |own| own.count() / 2))?;
         commons.next().is_none().then_some(Self {
             placement,
@@ -89,7 +112,7 @@ impl FilmOf {
             roll: of_roll,
             scanner,
             curves,
-            readings: Scanner { correction, pitch, origin: [o1, o2], down: down != 0.0 },
+            readings: Readings { pitch, origin: [o1, o2], down: down != 0.0, half_range: [hx, hy] },
             pattern,
             weights,
             mirrored: mirrored != 0.0,
@@ -98,8 +121,8 @@ impl FilmOf {
 
     /// Whether its numbers are such as it can have.
     pub fn is_sound(&self) -> bool {
-        let Scanner { correction, pitch, origin, .. } = &self.readings;
-        let ranges = correction.half_range.iter().chain([pitch]).all(|&own| own > 0.0 && own.is_finite());
+        let Readings { pitch, origin, half_range, .. } = &self.readings;
+        let ranges = half_range.iter().chain([pitch]).all(|&own| own > 0.0 && own.is_finite());
         let pattern = self.pattern.is_none_or(|pattern| match pattern {
             Pattern::Quadratic { half } | Pattern::Ebner { half } => half > 0.0 && half.is_finite(),
             Pattern::Grid(grid) => {
@@ -145,19 +168,15 @@ impl FilmOf {
             let [first, second, _] = vector(own);
             if self.projective { Bend::Projective([first, second]) } else { Bend::Bilinear([first, second]) }
         });
-        let mut parameters = self.readings.correction.parameters();
-        parameters[..3].copy_from_slice(&vector(self.scanner));
-        for (three, &curve) in parameters[3..].chunks_exact_mut(3).zip(&self.curves) {
-            three.copy_from_slice(&vector(curve));
-        }
-        let correction = self.readings.correction.with_parameters(&parameters);
+        let parameters = std::iter::once(&self.scanner).chain(&self.curves).flat_map(|&own| vector(own));
+        let scanner = self.readings.scanner(parameters);
         let pair = |&own: &usize| {
             let [first, second, _] = vector(own);
             [first, second]
         };
         FilmAt {
             film: Film { mirrored: self.mirrored, placement: vector(self.placement), size, bend },
-            scanner: Scanner { correction, ..self.readings },
+            scanner,
             pattern: self.pattern.map(|pattern| (pattern, self.weights.iter().map(pair).collect())),
         }
     }

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import cast, get_args
+from typing import TYPE_CHECKING, cast, get_args
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.plain.certificates import certified, read_certificates
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
 from photogram.formats.plain.knots import with_knots
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
-from photogram.messages import quoted
+from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera, Weights
 from photogram.network.timed import LineSensor, Shutter
+
+if TYPE_CHECKING:
+    from photogram.film import Certificate
 
 __all__ = ["Cameras", "read_cameras", "spread_over_photos"]
 
@@ -30,7 +34,8 @@ _EACH = ("all", "photo", "group")
 class Cameras:
     """The cameras of a project: the size of their pictures, whether photos have their own, their weights.
 
-    Cameras of photos that move have a rolling shutter, or a line of sensors in the place of a frame.
+    Cameras of photos that move have a rolling shutter, or a line of sensors in the place of a frame; those of
+    films may have certificates, by their names.
     """
 
     cameras: list[Camera] = field(default_factory=list)
@@ -40,6 +45,7 @@ class Cameras:
     shutters: list[Shutter | None] = field(default_factory=list)
     lines: list[LineSensor | None] = field(default_factory=list)
     weights_given: list[bool] = field(default_factory=list)
+    certificates: dict[str, Certificate] = field(default_factory=dict)
 
 
 def read_cameras(tables: Tables) -> Cameras:
@@ -56,6 +62,8 @@ def read_cameras(tables: Tables) -> Cameras:
     if not table.count:
         raise table.head.error("the table names no cameras")
     found, weights = Cameras(lines=line_sensors(tables, table)), table.texts("weights")
+    certificates = read_certificates(tables)
+    found.certificates.update(certificates)
     for row, own in enumerate(_rows(table)):
         if found.lines[row] is not None:
             own = own.behind_a_lens(table, row)
@@ -63,7 +71,11 @@ def read_cameras(tables: Tables) -> Cameras:
             raise table.error(row, f"column for_each: {quoted(own.each)} is none of {', '.join(_EACH)}")
         size = _size(table, row, own)
         try:
-            found.cameras.append(_camera(tables, table, row, own, size))
+            certificate = _of_camera(tables, table, row, own, certificates)
+            if certificate is None:
+                found.cameras.append(_camera(tables, table, row, own, size))
+            else:
+                found.cameras.append(certified(tables, own.name, own.model, certificate))
         except InputError as error:
             raise (error if error.file else table.error(row, error.message)) from None
         found.sizes.append(size)
@@ -75,6 +87,22 @@ def read_cameras(tables: Tables) -> Cameras:
         cameras=with_knots(tables, read_covariances(tables).cameras(found.cameras)),
         shutters=shutters(tables, table, found.cameras, found.sizes),
     )
+
+
+def _of_camera(
+    tables: Tables, table: ColumnTable, row: int, own: _Row, certificates: Mapping[str, Certificate]
+) -> Certificate | None:
+    """Return the certificate that a camera is taken from; None where the table says what it is."""
+    certificate = certificates.get(own.name)
+    if certificate is None or certificate.c is None:
+        return None
+    if own.values or own.deviations:
+        message = f"camera {own.name}: it is as the table has it; of its certificate marks alone are taken"
+        tables.messages.append(Message(message, table.path))
+        return None
+    if read_covariances(tables).names("camera", own.name):
+        raise table.error(row, f"the camera {own.name} has a certificate, and a covariance in covariances")
+    return certificate
 
 
 @dataclass(frozen=True)

@@ -101,8 +101,12 @@ class Covariances:
         own = self.matrices.get((kind, name), _Matrix())
         return {word for pair in own.values for word in pair}
 
-    def over(self, kind: str, name: str, components: Sequence[str]) -> Floats | None:
+    def over(
+        self, kind: str, name: str, components: Sequence[str], *, singular: bool = False
+    ) -> Floats | None:
         """Return the matrix of components of films, scanners or marks; None where it is not there.
+
+        It may be singular where it is said so.
 
         Raises
         ------
@@ -121,7 +125,7 @@ class Covariances:
         if missing := [word for word in components if (word, word) not in own.values]:
             raise self.table.error(own.rows[0], f"{kind} {name}: the covariance of {missing[0]} is missing")
         found = own.over(components, dict.fromkeys(components, 1.0))
-        if not is_covariance(found):
+        if not is_covariance(found, singular=singular):
             raise self.table.error(own.rows[0], f"the covariances of {kind} {name} are no covariance matrix")
         return found
 
@@ -189,8 +193,16 @@ def read_covariances(tables: Tables) -> Covariances:
     return Covariances(tables, table, matrices)
 
 
-def covariance_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs) -> dict[str, dict[str, Any]]:
-    """Return the table of what was determined together of cameras and of unknowns."""
+def covariance_tables(
+    block: Block,
+    cameras: Sequence[Camera],
+    rigs: Rigs,
+    more: Iterable[tuple[str, str, Sequence[str], Floats]],
+) -> dict[str, dict[str, Any]]:
+    """Return the table of what was determined together of cameras, of unknowns, and of `more`.
+
+    That is by kind, name, components and covariance matrix.
+    """
     rows: list[tuple[str, str, str, str, float]] = []
     for each in cameras:
         if each.covariance is not None:
@@ -205,6 +217,8 @@ def covariance_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs) -> di
         units = np.array(list(_units(unknown, DEGREE).values()))
         matrix = prior.precision * units * units[:, np.newaxis]
         rows += _pairs(unknown.KIND, _name(unknown, rigs), unknown.components, matrix)
+    for kind, name, components, matrix in more:
+        rows += _pairs(kind, name, components, matrix)
     if not rows:
         return {}
     columns = ("kind", "name", "first", "second", "covariance")

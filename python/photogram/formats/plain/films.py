@@ -10,18 +10,22 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.errors import InputError
+from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import (
     FilmModel,
     conformal,
     interior_orientation,
     is_mirrored,
     mirror_message,
+    side_residuals,
     true_places,
 )
 from photogram.film.which import which_mark
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.covariances import Covariances
+from photogram.formats.plain.fiducials import read_fiducials
+from photogram.formats.plain.film_sides import Lying, Seen, way_by_images
+from photogram.formats.plain.films_written import INSIDE
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine, read_films, read_scanners
 from photogram.formats.plain.shared import made
@@ -30,12 +34,10 @@ from photogram.io.delimited import FALSE, TRUE, ColumnTable
 from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera
 from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Mark, Readings, Scan, Scanner
-from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
+from photogram.network.observations import FILM, Fiducial, KnownFilm, Observation
 
 __all__ = ["Scanned", "on_film", "read_scanned"]
 
-SD_MARK = 0.002
-"""mm, of places in a certificate that does not say it: they are printed to 0.001."""
 LEAST = {"conformal": 2, "affine": 3, "bilinear": 4, "projective": 4}
 """Marks that determine a film."""
 _START = ("start_t1", "start_t2", "start_theta")
@@ -43,11 +45,26 @@ _START = ("start_t1", "start_t2", "start_theta")
 
 @dataclass(frozen=True)
 class Scanned:
-    """Photos whose images are readings: which they are, what images pass, and what was observed."""
+    """Photos whose images are readings: which they are, what images pass, and what was observed.
+
+    Attributes
+    ----------
+    photos
+        (P,) which they are.
+    scans, observations
+        What images pass, and what was observed.
+    inside
+        The same where films are fitted before, with all that was read of them: tables are written of it.
+    """
 
     photos: Bools
     scans: list[Scan] = field(default_factory=list)
     observations: list[Observation] = field(default_factory=list)
+    inside: list[tuple[list[Scan], list[Observation]]] = field(default_factory=list)
+
+    def details(self) -> dict[str, object]:
+        """Return what writing tables needs beside the block, for the details of a project."""
+        return {INSIDE: self.inside[0]} if self.inside else {}
 
 
 @dataclass
@@ -64,7 +81,7 @@ class _Photo:
     sd: list[Floats] = field(default_factory=list)
 
 
-def read_scanned(tables: Tables, photos: Photos, covariances: Covariances) -> Scanned:
+def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanned:
     """Read which photos are scanned films or plates, and all that belongs to these.
 
     Raises
@@ -73,6 +90,7 @@ def read_scanned(tables: Tables, photos: Photos, covariances: Covariances) -> Sc
         Films, scanners and marks that are not there, photos that are mirrored against what is given, marks
         that cannot be told.
     """
+    photos = seen.photos
     films = [photos.table.texts("film")[row] for row in photos.rows.tolist()]
     scanned = np.array([bool(name) for name in films], dtype=bool)
     for table in ("fiducial_images", "fiducials", "films", "scanners"):
@@ -83,7 +101,18 @@ def read_scanned(tables: Tables, photos: Photos, covariances: Covariances) -> Sc
             )
     found = Scanned(scanned)
     if scanned.any():
-        _Reader(tables, photos, covariances, films).read(found)
+        if tables.settings.image == "um":
+            raise InputError(
+                "[units] image is um: cameras of films are in mm, and readings in the unit of their scanner",
+                file=tables.settings.path,
+            )
+        before = tables.settings.interior == "before"
+        _Reader(tables, seen, covariances, films, before=before).read(found)
+        if before:
+            inside = Scanned(scanned)
+            silent = replace(tables, messages=[])
+            _Reader(silent, seen, covariances, films, before=False).read(inside)
+            found.inside.append((inside.scans, inside.observations))
     return found
 
 
@@ -91,13 +120,22 @@ class _Reader:
     """Reads the films of photos."""
 
     def __init__(
-        self, tables: Tables, photos: Photos, covariances: Covariances, films: Sequence[str]
+        self,
+        tables: Tables,
+        seen: Seen,
+        covariances: Covariances,
+        films: Sequence[str],
+        *,
+        before: bool,
     ) -> None:
+        photos, certificates = seen.photos, seen.cameras.certificates
+        self.seen = seen
         self.tables, self.table, self.covariances = tables, photos.table, covariances
-        self.before = tables.settings.interior == "before"
+        self.before = before
         machines = read_scanners(tables, covariances)
         self.kinds = read_films(tables, list(dict.fromkeys(filter(None, films))), tables.settings.film)
-        self.places, self.place_sd, self.certificates = self._certificates(photos)
+        self.fiducials = read_fiducials(tables, set(photos.taken), certificates)
+        self.places = self.fiducials.places
         names = self.table.texts("scanner")
         self.photos = [
             _Photo(name, row, camera, film, self._machine(row, names[row], machines))
@@ -123,30 +161,6 @@ class _Reader:
     def _held(self) -> dict[int, Machine]:
         own: dict[int, Machine] = self.__dict__.setdefault("_held_machines", {})
         return own
-
-    def _certificates(
-        self, photos: Photos
-    ) -> tuple[dict[str, dict[str, Floats]], dict[str, dict[str, Floats]], ColumnTable | None]:
-        """Return places and standard deviations of marks by camera."""
-        table = self.tables.read("fiducials")
-        places: dict[str, dict[str, Floats]] = {}
-        deviations: dict[str, dict[str, Floats]] = {}
-        if table is None:
-            return places, deviations, None
-        xy = table.vectors(("x", "y"))
-        table.check_given(xy, ("x", "y"))
-        sd = self.tables.deviations(table, "fiducials", ("sd_x", "sd_y"), SD_MARK)
-        use, cameras = table.flags("use"), set(photos.taken)
-        for row, (camera, name) in enumerate(
-            zip(table.texts("camera"), table.texts("fiducial"), strict=True)
-        ):
-            if not use[row] or camera not in cameras:
-                continue
-            if name in places.setdefault(camera, {}):
-                raise table.error(row, f"the camera {camera} has the fiducial {name} twice")
-            places[camera][name] = xy[row]
-            deviations.setdefault(camera, {})[name] = sd[row]
-        return places, deviations, table
 
     def _read_marks(self, photos: Photos) -> None:
         """Read the readings of marks."""
@@ -192,13 +206,30 @@ class _Reader:
             found = which_mark(np.array(list(places.values())).reshape(-1, 2), self._true(photo))
         except InputError as error:
             raise table.head.error(f"photo {photo.name}: {error.message}") from None
-        if not found.decided:
-            raise table.head.error(f"photo {photo.name}: {found}; give the names of its fiducials")
-        photo.marks[:] = [list(places)[k] for k in found.marks.tolist()]
-        self.tables.messages.append(Message(f"photo {photo.name}: its film lies {found}", table.path))
+        given = self._given_side(photo)
+        ways = [each for each in found.alike if given in (None, each.mirrored)]
+        if len(ways) != 1:
+            lying = [Lying(np.array([*places.values()])[way.marks], way.mirrored) for way in ways]
+            chosen = self._by_images(photo, lying)
+            if chosen is None:
+                raise table.head.error(
+                    f"photo {photo.name}: {found}, nor from points that it shows; give the names of its"
+                    " fiducials"
+                )
+            ways = [ways[chosen]]
+        photo.marks[:] = [list(places)[k] for k in ways[0].marks.tolist()]
+        self.tables.messages.append(Message(f"photo {photo.name}: its film lies {ways[0]}", table.path))
+
+    def _by_images(self, photo: _Photo, ways: Sequence[Lying]) -> int | None:
+        """Return which way a film lies by its pose and images of points that are known."""
+        readings, seen = self.seen.of(photo.name)
+        own = photo.machine
+        images = true_places(readings, own.readings, own.scanner, own.curves)
+        return way_by_images(ways, self._true(photo), images, seen)
 
     def _true(self, photo: _Photo) -> Floats:
-        return true_places(np.array(photo.readings), photo.machine.readings, photo.machine.scanner)
+        own = photo.machine
+        return true_places(np.array(photo.readings), own.readings, own.scanner, own.curves)
 
     def read(self, found: Scanned) -> None:
         """Put the scans and observations of all photos in their place."""
@@ -215,14 +246,15 @@ class _Reader:
             found.scans.append(Scan(photo.name, film))
             if self.before:
                 continue
-            found.observations.append(self._known(photo, film))
+            found.observations.extend(self._known(photo, film))
             found.observations.extend(
                 Fiducial(photo.name, marks[photo.camera][name], film, reading, sd=sd)
                 for name, reading, sd in zip(photo.marks, photo.readings, photo.sd, strict=True)
             )
             self._remark(photo)
         if not self.before:
-            found.observations.extend(self._known_marks(marks))
+            read = {(photo.camera, name) for photo in self.photos for name in photo.marks}
+            found.observations.extend(self.fiducials.known(marks, read, self.covariances))
             machines = {id(each.machine): each.machine for each in self.photos}
             found.observations.extend(each.known for each in machines.values() if each.known is not None)
 
@@ -239,11 +271,11 @@ class _Reader:
 
     def _starts(self) -> list[tuple[bool, Floats]]:
         """Return the side of each photo, and where t1, t2 and theta start."""
-        given, sides = self.table.vectors(_START), self.table.texts("mirrored")
+        given = self.table.vectors(_START)
         found: list[tuple[bool, Floats | None]] = []
         for photo in self.photos:
             row = photo.row
-            mirrored = self._side(photo, sides[row])
+            mirrored = self._side(photo)
             start: Floats | None = None if np.isnan(given[row]).any() else given[row]
             if start is None and len(photo.marks) > 1:
                 q = np.array([self.places[photo.camera][name] for name in photo.marks])
@@ -254,23 +286,31 @@ class _Reader:
             for k, (mirrored, start) in enumerate(found)
         ]
 
-    def _side(self, photo: _Photo, word: str) -> bool:
-        """Return whether a photo is mirrored: as is given, or as its marks tell."""
-        if word and word.lower() not in TRUE | FALSE:
+    def _given_side(self, photo: _Photo) -> bool | None:
+        """Return whether a photo is said to be mirrored."""
+        word = self.table.texts("mirrored")[photo.row].lower()
+        if word and word not in TRUE | FALSE:
             raise self.table.error(photo.row, f"column mirrored: {quoted(word)} is neither true nor false")
-        given = None if not word else word.lower() in TRUE
+        return None if not word else word in TRUE
+
+    def _side(self, photo: _Photo) -> bool:
+        """Return whether a photo is mirrored: as is given, or as its marks tell, or images with its pose."""
+        given = self._given_side(photo)
         q = np.array([self.places[photo.camera][name] for name in photo.marks]).reshape(-1, 2)
-        found = is_mirrored(q, self._true(photo)) if len(q) > 2 else None
+        true = self._true(photo) if len(q) else q
+        found = is_mirrored(q, true)
         if given is not None and found is not None and found != given:
-            raise self.table.error(photo.row, f"photo {photo.name}: {mirror_message(given)}")
-        if given is None and found is None:
-            if self.table.texts("mirrored") and len(q):
-                self.tables.messages.append(
-                    Message(
-                        f"photo {photo.name}: its marks do not tell the side; it is taken as not mirrored"
-                    )
-                )
-            return False
+            error = self.table.error(
+                photo.row, f"photo {photo.name}: {mirror_message(given, side_residuals(q, true))}"
+            )
+            raise ContradictionError(error.message, file=error.file, record=error.record, text=error.text)
+        if found is None and given is None and len(q) > 1:
+            chosen = self._by_images(photo, [Lying(q, False), Lying(q, True)])
+            found = None if chosen is None else bool(chosen)
+        if given is None and found is None and len(q):
+            self.tables.messages.append(
+                Message(f"photo {photo.name}: its marks do not tell the side; it is taken as not mirrored")
+            )
         return bool(found if given is None else given)
 
     def _neighbour(self, k: int, found: Sequence[tuple[bool, Floats | None]]) -> Floats:
@@ -340,13 +380,14 @@ class _Reader:
                 sd=np.array(photo.sd),
                 counted=photo.machine.readings,
                 scanner=photo.machine.scanner,
+                curves=photo.machine.curves,
                 mirrored=mirrored,
             ),
         )
         return partial(FilmPlacement, photo.name, fit.film[:3], 0.0), fit.film[3:].tolist(), fit.bend
 
-    def _known(self, photo: _Photo, film: Film) -> Observation:
-        """Return what is known of a film beforehand."""
+    def _known(self, photo: _Photo, film: Film) -> list[Observation]:
+        """Return what is known of a film beforehand; nothing of one that is free."""
         kind = self.kinds[photo.film]
         roll = None if film.roll is not None else kind.roll
         names = [
@@ -359,33 +400,12 @@ class _Reader:
         covariance = self.covariances.over("film", photo.name, FILM)
         if covariance is not None:
             full = [*film.placement.position.tolist(), *(values[name] for name in FILM[3:])]
-            return KnownFilm(photo.name, film.placement, film.size, roll, FILM, full, covariance=covariance)
-        return KnownFilm(
-            photo.name,
-            film.placement,
-            film.size,
-            roll,
-            names,
-            [values[n] for n in names],
-            sd=[sd[n] for n in names],
-        )
-
-    def _known_marks(self, marks: Mapping[str, Mapping[str, Mark]]) -> list[Observation]:
-        """Return certificates: a covariance of all marks of a camera, or each mark by itself."""
-        found: list[Observation] = []
-        read = {(photo.camera, name) for photo in self.photos for name in photo.marks}
-        for camera, own in marks.items():
-            words = [f"{name}.{axis}".lower() for name in own for axis in "xy"]
-            covariance = self.covariances.over("fiducials", camera, words)
-            if covariance is not None:
-                found.append(KnownTogether("certificate", list(own.values()), covariance=covariance))
-                continue
-            found += [
-                KnownTogether("certificate", [mark], sd=self.place_sd[camera][name])
-                for name, mark in own.items()
-                if (camera, name) in read
-            ]
-        return found
+            own = photo.name, film.placement, film.size, roll
+            return [KnownFilm(*own, FILM, full, covariance=covariance)]
+        if not names:
+            return []
+        own = photo.name, film.placement, film.size, roll
+        return [KnownFilm(*own, names, [values[n] for n in names], sd=[sd[n] for n in names])]
 
 
 def on_film(cameras: Cameras, photos: Photos, scanned: Scanned, messages: list[Message]) -> Cameras:

@@ -11,6 +11,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.covariances import covariance_tables
+from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.groups import (
     Antenna,
     Inertial,
@@ -221,7 +222,7 @@ def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observati
     ]
 
 
-def observed_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs) -> _Columns:
+def observed_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs, films: WrittenFilms) -> _Columns:
     """Return the tables of all observations beside images, of what they have in common, and of rigs."""
     return {
         **_antenna_tables(block),
@@ -229,7 +230,8 @@ def observed_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs) -> _Col
         **kind_tables(block),
         **_pose_tables(block),
         **rigs.tables(block),
-        **covariance_tables(block, cameras, rigs),
+        **films.tables(),
+        **covariance_tables(block, cameras, rigs, films.covariances()),
     }
 
 

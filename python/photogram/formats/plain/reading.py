@@ -18,6 +18,7 @@ from photogram.formats.format import Wishes
 from photogram.formats.plain.boards import ASSUMED, read_bends, read_boards
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
+from photogram.formats.plain.film_sides import Seen
 from photogram.formats.plain.films import on_film, read_scanned
 from photogram.formats.plain.images import Images, image_coordinates, read_images, sd_is_given
 from photogram.formats.plain.moving import placed, read_timed
@@ -93,7 +94,8 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     photos = placed(photos, timed, spheroid)
     images = read_images(tables, photos)
     points = _points(tables, transform, images, given)
-    scanned = read_scanned(tables, photos, read_covariances(tables))
+    known = np.where(np.isfinite(points.positions), points.positions, points.starts)
+    scanned = read_scanned(tables, Seen(images, known, photos, cameras), read_covariances(tables))
     cameras = on_film(cameras, photos, scanned, tables.messages)
     cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
     xy, sd = image_coordinates(settings, images, cameras, np.asarray(photo_cameras), scanned.photos)
@@ -142,7 +144,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         linear_unit=settings.length,
         spheroid=spheroid,
         photo_to_ground=settings.attitude == "omega_phi_kappa" and settings.rotation == "photo_to_object",
-        details={"settings": settings, ASSUMED: assumed},
+        details={"settings": settings, ASSUMED: assumed, **scanned.details()},
     ).replace(
         sd_taken=True,
         boards=boards,

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
+from photogram.arguments.arrays import is_covariance
+from photogram.arguments.types import Floats
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable
-from photogram.messages import nearest, quoted
+from photogram.messages import Message, nearest, quoted
 from photogram.network.films import PATTERNS, Pattern, Readings, Roll, Scanner, ScannerCurve, Weights
-from photogram.network.observations import KnownTogether, Observation
+from photogram.network.observations import KnownTogether
 from photogram.network.unknowns import Unknown
 
-__all__ = ["BENDS", "CURVES", "DEVICE", "FilmKind", "Machine", "read_films", "read_scanners"]
+__all__ = ["BENDS", "CURVES", "DEVICE", "GRID", "FilmKind", "Machine", "read_films", "read_scanners"]
 
 DEVICE = ("sx", "sy", "alpha_rad")
 """Columns of scales and obliqueness of a scanner."""
@@ -28,7 +30,12 @@ BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}
 """What is not affine in films, by their model."""
 _BEND_SD = {"bilinear": 5e-7, "projective": 2e-7}
 _WEIGHTS = tuple(f"w{k}" for k in range(1, 11))
-_GRID = ("grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows")
+GRID = ("grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows")
+"""Numbers of a pattern of shifts of nodes."""
+UM = 1e-3
+"""In millimetres."""
+KNOWN = 1e-6
+"""Deviation of what a singular covariance of a scanner has as known (mm, a ratio, radians)."""
 MODELS = ("affine", "conformal", "bilinear", "projective")
 
 
@@ -39,7 +46,7 @@ class Machine:
     scanner: Scanner
     curves: tuple[ScannerCurve, ...]
     readings: Readings
-    known: Observation | None
+    known: KnownTogether | None
 
     def held(self) -> Machine:
         """Return it as errorless."""
@@ -81,42 +88,112 @@ def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine
     half = np.column_stack([table.numbers(name, 1.0) for name in ("hx", "hy")])
     # Rows are told from y, which counts up, by where the project has its readings.
     down = table.flags("rows_down") if "rows_down" in table else np.ones(table.count, dtype=bool)
+    files = table.texts("calibration")
     found = {}
     for row, name in enumerate(names):
+        if files[row]:
+            _check_alone(table, row, name, covariances)
+            numbers = _calibrated(table, row, files[row], tables.messages)
+        else:
+            numbers = _Numbers(given[row], sd[row], half[row])
         pitch, *origin = counts[row].tolist()
-        readings = made(
-            table,
-            row,
-            partial(Readings, pitch, (origin[0], origin[1]), bool(down[row]), tuple(half[row].tolist())),
-        )
-        found[name] = _machine(table, row, name, given[row], sd[row], readings, covariances)
+        zero = numbers.zero / pitch * [1.0, -1.0 if down[row] else 1.0] + origin
+        counted = pitch, tuple(zero.tolist()), bool(down[row]), tuple(numbers.half.tolist())
+        readings = made(table, row, partial(Readings, *counted))
+        found[name] = _machine(table, row, name, numbers, readings, covariances)
     return found
 
 
+@dataclass(frozen=True)
+class _Numbers:
+    """Sx, Sy, alpha and 18 coefficients of a scanner (mm), and what is known of them.
+
+    Attributes
+    ----------
+    values, sd
+        (21,) of which those are open that have a covariance.
+    half
+        (2,) half ranges of the polynomials, mm.
+    zero
+        (2,) where these count from, mm from the origin of readings.
+    covariance
+        (21, 21); None where there is none.
+    """
+
+    values: Floats
+    sd: Floats
+    half: Floats
+    zero: Floats = field(default_factory=lambda: np.zeros(2))
+    covariance: Floats | None = None
+
+
+def _check_alone(table: ColumnTable, row: int, name: str, covariances: Covariances) -> None:
+    """Refuse what a calibration says beside it."""
+    for column in (*DEVICE, *CURVES, "hx", "hy", *(f"sd_{each}" for each in (*DEVICE, *CURVES))):
+        if not math.isnan(table.numbers(column, infinite=True)[row]):
+            raise table.error(row, f"column {column}: the calibration of the scanner {name} says this")
+    if covariances.names("scanner", name):
+        raise table.error(row, f"the scanner {name} has a calibration, and a covariance in covariances")
+
+
+def _calibrated(table: ColumnTable, row: int, file: str, messages: list[Message]) -> _Numbers:
+    """Return what the file of a comparator's calibration says, or that of its correction.
+
+    Where its covariance is singular, what it has as known is given a thousandth of a micrometre.
+    """
+    from photogram.comparator.correction import Correction
+    from photogram.comparator.polynomial import Frame
+
+    path = table.path.parent / file
+    own = Correction.read(path)
+    frame = Frame.metres() if own.polynomial is None else own.polynomial.frame
+    scaled = np.zeros(18) if own.polynomial is None else own.polynomial.scaled_um.ravel()
+    unit = np.array([1.0] * 3 + [UM] * 18)
+    values = np.array([own.scale_x, own.scale_y, own.nonorthogonality_rad, *scaled.tolist()]) * unit
+    covariance = own.covariance * unit * unit[:, np.newaxis]
+    known = np.repeat((np.diag(covariance).reshape(7, 3) > 0).any(axis=1), 3)
+    part = covariance[np.ix_(known, known)]
+    if known.any() and not is_covariance(part):
+        covariance = covariance + np.diag(np.where(known, KNOWN**2, 0.0))
+        messages.append(
+            Message("its covariance is singular: what it has as known is given a deviation of 1e-6 mm", path)
+        )
+    zero = np.asarray(np.linalg.solve(own.matrix, frame.centre_um), dtype=float) * UM
+    return _Numbers(
+        values, np.where(known, np.inf, 0.0), np.array(frame.half_range_um) * UM, zero, covariance
+    )
+
+
 def _machine(
-    table: ColumnTable,
-    row: int,
-    name: str,
-    given: np.ndarray,
-    sd: np.ndarray,
-    readings: Readings,
-    covariances: Covariances,
+    table: ColumnTable, row: int, name: str, numbers: _Numbers, readings: Readings, covariances: Covariances
 ) -> Machine:
-    parts: list[tuple[str, type[Unknown], slice]] = [(name, Scanner, slice(3))]
-    if given[3:].any() or sd[3:].any() or covariances.names("scanner", name) - {"sx", "sy", "alpha"}:
-        starts = range(3, 3 + len(CURVES), 3)
-        parts += [(f"{name} {k}", ScannerCurve, slice(at, at + 3)) for k, at in enumerate(starts, 1)]
-    words = ["sx", "sy", "alpha", *CURVES][: 3 * len(parts)]
-    covariance = covariances.over("scanner", name, words)
-    free = np.full(len(words), np.inf) if covariance is not None else sd
-
-    def unknown(kind: type[Unknown], title: str, own: slice) -> Unknown:
-        return made(table, row, lambda: kind(title, given[own], free[own]))  # type: ignore[call-arg]
-
-    scanner, *curves = (unknown(kind, title, own) for title, kind, own in parts)
+    """Return a scanner with its curves, if it has such, and what is known of both together."""
+    words, named = ["sx", "sy", "alpha", *CURVES], covariances.names("scanner", name)
+    # By the first of their three numbers.
+    parts: dict[int, tuple[type[Unknown], str]] = {0: (Scanner, name)}
+    if numbers.values[3:].any() or numbers.sd[3:].any() or named - set(words[:3]):
+        parts |= {3 * k: (ScannerCurve, f"{name} {k}") for k in range(1, 7)}
+    sd = numbers.sd.copy()
+    if numbers.covariance is not None:
+        joined = [at for at in parts if np.isinf(sd[at])]
+    else:
+        # A covariance is of all three of an unknown, or of none.
+        joined = [at for at in parts if named & set(words[at : at + 3])] or [0] * bool(named)
+    rows = [at + k for at in joined for k in range(3)]
+    sd[rows] = np.inf
+    unknowns: dict[int, Unknown] = {
+        at: made(table, row, partial(kind, title, numbers.values[at : at + 3], sd[at : at + 3]))  # type: ignore[call-arg]
+        for at, (kind, title) in parts.items()
+    }
+    if numbers.covariance is None:
+        covariance = covariances.over("scanner", name, [words[k] for k in rows])
+    else:
+        covariance = numbers.covariance[np.ix_(rows, rows)] if rows else None
     known = None
     if covariance is not None:
-        known = made(table, row, lambda: KnownTogether("scanner", [scanner, *curves], covariance=covariance))
+        together = [unknowns[at] for at in joined]
+        known = made(table, row, partial(KnownTogether, "scanner", together, covariance=covariance))
+    scanner, *curves = unknowns.values()
     assert isinstance(scanner, Scanner)
     return Machine(scanner, tuple(each for each in curves if isinstance(each, ScannerCurve)), readings, known)
 
@@ -181,7 +258,7 @@ def _pattern(table: ColumnTable, row: int, film: str) -> Pattern | None:
         raise table.error(row, f"column pattern: there is no {quoted(kind)}{nearest(kind, PATTERNS)}")
     if kind == "none":
         return None
-    columns = _GRID if kind == "grid" else ("half_format_mm",)
+    columns = GRID if kind == "grid" else ("half_format_mm",)
     values = table.vectors(columns)[row]
     missing = [name for name, value in zip(columns, values, strict=True) if math.isnan(value)]
     if missing:

@@ -146,7 +146,7 @@ TABLES: Mapping[str, Schema] = {
         (
             *("photo", "camera", "group", "strip", "frame", "use"),
             *("trajectory", "rig", "sensor", "clock", "scan"),
-            *("film", "scanner", "mirrored"),
+            *("film", "scanner", "mirrored", "certificate"),
         ),
         (
             *(*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ANGLES, *_SD_ROTATIONS, "time"),
@@ -162,8 +162,9 @@ TABLES: Mapping[str, Schema] = {
         " photos and groups share; default: the photo's), `line_rate` (a factor; 1), `sd_line_rate` (0:"
         " known), `scan` (a name that photos share; default: the photo's);"
         " of [film](film.md) `film` (its images are readings), `scanner` (if there are several), `mirrored`"
-        " (default: as the marks tell), `start_t1`, `start_t2` (mm), `start_theta` (rad; default: as marks"
-        " have them)",
+        " (default: as the marks tell), `certificate` (a file of a"
+        " [certificate](certificates.md): camera and marks), `start_t1`, `start_t2` (mm), `start_theta`"
+        " (rad; default: as marks have them)",
         deviations=(1, 3),
         has_system=True,
     ),
@@ -216,14 +217,15 @@ TABLES: Mapping[str, Schema] = {
     ),
     "scanners": Schema(
         ("scanner", "pitch_mm", "origin_column", "origin_row"),
-        ("scanner", "rows_down"),
+        ("scanner", "rows_down", "calibration"),
         (
             *("pitch_mm", "origin_column", "origin_row", *_DEVICE, "hx", "hy"),
             *deviation_columns(_DEVICE),
         ),
         "`scanner`, `pitch_mm`, `origin_column`, `origin_row`; `rows_down` (true), `Sx`, `Sy` (1),"
         " `alpha_rad` (0), `xA` .. `yJ` (0; mm) over `hx`, `hy` (1; mm), `sd_Sx` .. (0; `inf` unknown): what"
-        " turns readings into true places ([comparator](comparator.md))",
+        " turns readings into true places ([comparator](comparator.md)); or `calibration` (the file of"
+        " `photogram comparator --json`; the origin is then the reading at its zero)",
     ),
     "control": Schema(
         ("point",),

@@ -65,7 +65,7 @@ _KEYS: Mapping[str, tuple[str, ...] | None] = {
     "time": ("origin", "scale"),
     "sd": tuple(WITH_SD),
     "tables": tuple(TABLES),
-    "film": ("model", "interior"),
+    "film": ("model", "interior", "certificate"),
     "adjust": ("datum", "loss", "unit_variance"),
     **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
     "photos": ("crs", "columns", "roles", "directory", "directory_crs", "mrk_antenna"),
@@ -110,6 +110,8 @@ class Settings:
     film, interior
         The model of films that say none; whether their interior orientation is unknown inside the adjustment,
         or fitted before it and errorless.
+    certificate
+        The file of the certificate of the camera of films; None without.
     """
 
     path: Path
@@ -135,6 +137,7 @@ class Settings:
     statement: Mapping[str, Any] = field(default_factory=dict)
     film: str = "affine"
     interior: str = "inside"
+    certificate: Path | None = None
 
     def __post_init__(self) -> None:
         if not self.image_y:
@@ -195,6 +198,7 @@ def read_settings(path: Path) -> Settings:
         statement=read_asked(file, file.word("units", "length")),
         film=file.word("film", "model"),
         interior=file.word("film", "interior"),
+        certificate=file.certificate(),
     )
 
 
@@ -226,6 +230,15 @@ class _File(Sections):
         if not (self.path.parent / directory).is_dir():
             self.fail("photos", "directory", f"there is no folder {directory}")
         return PhotoFiles(self.path.parent / directory, crs or None, antenna)
+
+    def certificate(self) -> Path | None:
+        """Return the file of the certificate of the camera of films."""
+        if not self.has("film", "certificate"):
+            return None
+        path = self.path.parent / self.text("film", "certificate")
+        if not path.is_file():
+            self.fail("film", "certificate", f"there is no file {path.name}")
+        return path
 
     def feature(self, name: str) -> Definition:
         """Return the kind of a feature, and the points that it goes through."""

@@ -12,6 +12,7 @@ from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control
 from photogram.formats.plain.boards import ASSUMED, boards_table, levels
 from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
+from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.image_axes import to_tables
 from photogram.formats.plain.knots import knots_table
 from photogram.formats.plain.moving import line_times_table, moving_columns
@@ -31,6 +32,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Control, Position
+from photogram.network.refined import camera_unit
 from photogram.network.timed import LineSensor
 from photogram.results.features import Definition
 
@@ -100,35 +102,38 @@ def write(project: Project) -> Mapping[str, bytes]:
     cameras, photo_cameras = known_cameras(block)
     rigs = Rigs(block, [cameras[row].name for row in photo_cameras])
     exposures = of_cameras(block, cameras, photo_cameras)
-    scanned = np.array([isinstance(each, LineSensor) for each in exposures])[photo_cameras]
+    films = WrittenFilms(project, [cameras[row].name for row in photo_cameras])
+    lines = np.array([isinstance(each, LineSensor) for each in exposures])[photo_cameras]
     image_y = _image_y(project, cameras, exposures)
-    lines_alone = block.image_unit != "px" and bool(scanned[block.image_photos].all())
-    names = ["column", "row"] if image_y == "down" or lines_alone else ["x", "y"]
+    lines_alone = camera_unit(block) != "px" and bool(lines[block.image_photos].all())
+    names = ["column", "row"] if image_y == "down" or lines_alone or films.pixels else ["x", "y"]
+    # Samples and lines, and readings of films, are as they are.
+    plain = lines | np.array([name in films.films for name in block.photo_ids])
     pictures = _pictures(project, cameras)
     tables = {
         "cameras": _with_exposures(
             camera_table(project, cameras), exposure_columns(cameras, exposures, *pictures, image_y)
         ),
-        "photos": _photos(block, [cameras[row].name for row in photo_cameras], rigs),
-        "images": _images(project, names, _written_xy(project, cameras, photo_cameras, scanned, image_y)),
+        "photos": _photos(block, [cameras[row].name for row in photo_cameras], rigs) | films.photo_columns(),
+        "images": _images(project, names, _written_xy(project, cameras, photo_cameras, plain, image_y)),
         "points": _points(project),
         "control": control_table(project),
         **trajectory_tables(block),
         "smoothness": smoothness_table(block),
         "line_times": line_times_table(block),
-        **observed_tables(block, cameras, rigs),
+        **observed_tables(block, cameras, rigs, films),
         "boards": boards_table(project.boards, block),
         "knots": knots_table(cameras),
         "lengths": lengths_table(project.statement.get("lengths", ())),
     }
     files = {f"{name}.csv": csv_text(columns) for name, columns in tables.items() if columns}
-    settings = _settings(project, image_y).encode()
+    settings = _settings(project, image_y, films).encode()
     return {"project.toml": settings, **files, **asked_files(project.statement)}
 
 
 def _image_y(project: Project, cameras: Sequence[Camera], exposures: Sequence[Exposure]) -> str:
     """Return where image coordinates of frames count to: down from the corner, or up from the middle."""
-    if project.block.image_unit != "px":
+    if camera_unit(project.block) != "px":
         return "up"
     sizes, _ = _pictures(project, cameras)
     frames = [row for row, each in enumerate(exposures) if not isinstance(each, LineSensor)]
@@ -165,20 +170,20 @@ def _with_exposures(table: Mapping[str, Any], more: Mapping[str, Any]) -> dict[s
 
 
 def _written_xy(
-    project: Project, cameras: Sequence[Camera], photo_cameras: Sequence[int], scanned: Bools, image_y: str
+    project: Project, cameras: Sequence[Camera], photo_cameras: Sequence[int], plain: Bools, image_y: str
 ) -> Floats:
     """Return image coordinates as the table has them: samples and lines of scanners as they are."""
     block = project.block
     found, of_images = block.image_xy.copy(), np.array(photo_cameras)[block.image_photos]
     sizes, _ = _pictures(project, cameras)
     for row, camera in enumerate(cameras):
-        own = (of_images == row) & ~scanned[block.image_photos]
+        own = (of_images == row) & ~plain[block.image_photos]
         if own.any():
             found[own] = to_tables(image_y, camera, sizes[row], found[own])
     return found
 
 
-def _settings(project: Project, image_y: str) -> str:
+def _settings(project: Project, image_y: str, films: WrittenFilms) -> str:
     block, frame, options = project.block, project.frame, project.options
     lines = [
         "[project]",
@@ -195,11 +200,11 @@ def _settings(project: Project, image_y: str) -> str:
     if block.spheroid is not None:
         lines.append(f"ellipsoid = [{block.spheroid.a!r}, {block.spheroid.b!r}]")
     unit = block.linear_unit if block.linear_unit in LENGTHS else "m"
-    lines += ["", "[units]", f'length = "{unit}"', 'angle = "deg"', f'image = "{block.image_unit}"']
+    lines += ["", "[units]", f'length = "{unit}"', 'angle = "deg"', f'image = "{camera_unit(block)}"']
     lines += ["", "[axes]", f'image_y = "{image_y}"']
     if block.photo_to_ground:
         lines.append('rotation = "photo_to_object"')
-    lines += [*_time(project), "", "[adjust]"]
+    lines += [*_time(project), *films.settings(), "", "[adjust]"]
     if options.datum is not None:
         lines.append(f'datum = "{options.datum}"')
     lines += [f'loss = "{options.loss or "none"}"', f'unit_variance = "{options.unit_variance}"', ""]

@@ -8,9 +8,9 @@ import numpy as np
 
 from photogram.results.axes import point_axes
 from photogram.results.courses import POSES, courses_table, notable, notable_courses
-from photogram.results.films import film_table, mark_table
 from photogram.results.page.cameras import cameras_section
 from photogram.results.page.features import features_section
+from photogram.results.page.films import films_section
 from photogram.results.page.parts import network_page, size_section
 from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import beside_section, check_section, control_section, stations_section
@@ -35,7 +35,7 @@ def block_page(result: Result) -> Page:
         beside_section(result),
         stations_section(result),
         cameras_section(result, [pictures[name] for name in ("correlations", "distortion")]),
-        _films_section(result),
+        films_section(result, pictures["films"]),
         _unknowns_section(result),
     ]
     return network_page(
@@ -113,18 +113,6 @@ def _redundancy_tables(result: Result) -> list[Table]:
     )
     table = page_table("Redundancy by kind of observation", redundancy_by_kind(result), note)
     return [table] if table.rows else []
-
-
-def _films_section(result: Result) -> Section:
-    films = film_table(result)
-    if not len(films[0].values):
-        return Section("films", "Film and fiducials", [])
-    intro = (
-        "Where films lay and how their size has changed, and the marks of cameras: what the adjustment has"
-        " moved a certificate by, and the mean residuals of the readings of a mark."
-    )
-    tables = [page_table("Films", films), page_table("Fiducial marks", mark_table(result))]
-    return Section("films", "Film and fiducials", tables, intro)
 
 
 def _unknowns_section(result: Result) -> Section:

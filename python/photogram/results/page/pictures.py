@@ -47,6 +47,11 @@ CAPTIONS = {
         "Deviations of points from their features",
         "Outside positive, of a plane on the side of its normal; bars are U to either side.",
     ),
+    "films": (
+        "Residuals of fiducial marks, and patterns of films",
+        "Means over all photos, in the frame of the camera: marks that stay off on all of them are those of"
+        " the certificate, or a pattern that was left out. Patterns as the adjustment has them.",
+    ),
 }
 """Title and caption by name."""
 

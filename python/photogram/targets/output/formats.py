@@ -6,12 +6,15 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from photogram.arguments.arrays import one_of
+from photogram.errors import InputError
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.output.kalibr import kalibr_camchain
 from photogram.targets.output.mrcal import mrcal_models
 from photogram.targets.output.opencv import opencv_yaml
 from photogram.targets.output.rig import Rig, rig_of
 from photogram.targets.output.ros import ros_camera_info
+from photogram.targets.output.valid import valid_region
+from photogram.targets.uncertainty import uncertainty_map
 
 __all__ = ["CAMERA_FORMATS", "camera_files"]
 
@@ -26,7 +29,7 @@ CAMERA_FORMATS: Mapping[str, Callable[[Rig], dict[str, bytes]]] = MappingProxyTy
 """What makes the files of each, by their names."""
 
 
-def camera_files(calibrated: Calibrated, to: str) -> dict[str, bytes]:
+def camera_files(calibrated: Calibrated, to: str, need: float | None = None) -> dict[str, bytes]:
     """Return the cameras of an adjusted calibration in the format of another program.
 
     Parameters
@@ -36,6 +39,9 @@ def camera_files(calibrated: Calibrated, to: str) -> dict[str, bytes]:
     to
         `opencv_yaml`, `ros_camera_info` (a file a camera), `kalibr_camchain` (one file), `mrcal` (a
         `.cameramodel` a camera, with the calibration where mrcal could have made it).
+    need
+        Of `mrcal`: the largest standard deviation (pixels, of directions) inside the
+        `valid_intrinsics_region` of its cameras; None: there is no such region.
 
     Returns
     -------
@@ -45,7 +51,13 @@ def camera_files(calibrated: Calibrated, to: str) -> dict[str, bytes]:
     ------
     InputError
         A format that there is not, a lens that it cannot hold: the message has the command that fits one that
-        it can.
+        it can. `need` with another format, or no pixel that is so well known.
     """
     one_of("format of cameras", to, list(CAMERA_FORMATS))
-    return CAMERA_FORMATS[to](rig_of(calibrated))
+    rig = rig_of(calibrated)
+    if need is None:
+        return CAMERA_FORMATS[to](rig)
+    if to != "mrcal":
+        raise InputError(f"need: {to} has no region of a camera that is known well enough; mrcal has")
+    maps = (uncertainty_map(calibrated, row) for row in range(len(rig.cameras)))
+    return mrcal_models(rig, {row: valid_region(each, need) for row, each in enumerate(maps)})

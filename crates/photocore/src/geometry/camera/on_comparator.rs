@@ -46,7 +46,7 @@ impl OnComparator {
         Correction { scales: [1.0 + mx, 1.0 + my], lean, polynomials, half_range }
     }
 
-    fn from_origin(&self, measured: [f64; 2]) -> [f64; 2] {
+    fn counted(&self, measured: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|k| measured[k] - self.origin[k])
     }
 }
@@ -133,7 +133,7 @@ impl BackwardModel for OnComparator {
     }
 
     fn correct(&self, measured: [f64; 2]) -> Corrected<[f64; COUNT]> {
-        let own = self.correction().linearize(self.from_origin(measured));
+        let own = self.correction().linearize(self.counted(measured));
         let place = [0, 1].map(|k| own.xy[k] - self.principal_point[k]);
         let bent = self.terms.lens().bend(place);
         let by_point = [[-1.0, 0.0], [0.0, -1.0]].map(|v| times(&bent.by_place, v));
@@ -160,7 +160,7 @@ impl BackwardModel for OnComparator {
     }
 
     fn radius(&self, measured: [f64; 2]) -> f64 {
-        let [x, y] = self.correction().place(self.from_origin(measured));
+        let [x, y] = self.correction().place(self.counted(measured));
         (x - self.principal_point[0]).hypot(y - self.principal_point[1])
     }
 

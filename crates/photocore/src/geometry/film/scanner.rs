@@ -39,14 +39,14 @@ impl Scanner {
     }
 
     /// A reading in mm from the origin, y up.
-    fn from_origin(&self, xy: [f64; 2]) -> [f64; 2] {
+    fn counted(&self, xy: [f64; 2]) -> [f64; 2] {
         let units = self.units();
         [0, 1].map(|k| (xy[k] - self.origin[k]) / units[k])
     }
 
     /// The true place of a reading.
     pub fn place(&self, xy: [f64; 2]) -> [f64; 2] {
-        self.correction.place(self.from_origin(xy))
+        self.correction.place(self.counted(xy))
     }
 
     /// The reading of a true place; None where the correction has no way back.

@@ -76,13 +76,12 @@ impl ObservationModel for Fiducial {
 mod tests {
     use super::super::tests::{agrees, of_kind};
     use super::{CommonKind, Fiducial, FilmOf, Precision};
-    use crate::geometry::correction::Correction;
-    use crate::geometry::film::{Pattern, Scanner};
+    use crate::geometry::film::Pattern;
+    use crate::network::film::Readings;
 
     #[test]
     fn partials_agree_with_differences() {
         for (pattern, projective) in [(None, true), (Some(Pattern::Quadratic { half: 3.0 }), false)] {
-            let correction = Correction { half_range: [9.0; 2], ..Correction::NONE };
             let film = FilmOf {
                 placement: of_kind(CommonKind::FilmPlacement),
                 size: of_kind(CommonKind::FilmSize),
@@ -91,7 +90,7 @@ mod tests {
                 roll: projective.then(|| of_kind(CommonKind::Roll)),
                 scanner: of_kind(CommonKind::Scanner),
                 curves: vec![],
-                readings: Scanner { correction, pitch: 0.5, origin: [3.0, 4.0], down: projective },
+                readings: Readings { pitch: 0.5, origin: [3.0, 4.0], down: projective, half_range: [9.0; 2] },
                 weights: pattern.map_or(vec![], |_| vec![of_kind(CommonKind::Pattern)]),
                 pattern,
                 mirrored: projective,

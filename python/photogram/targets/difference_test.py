@@ -10,14 +10,14 @@ import numpy as np
 
 from photogram.statistics.distributions import log_chi_square, log_fisher
 
-__all__ = ["Agreement"]
+__all__ = ["DifferenceTest"]
 
 EXPLAINED = 0.01
 """Probability beyond which calibrations differ as they should."""
 
 
 @dataclass(frozen=True)
-class Agreement:
+class DifferenceTest:
     """The test of a difference of two calibrations.
 
     Attributes

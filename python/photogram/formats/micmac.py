@@ -1,0 +1,177 @@
+"""Fiducial marks of MicMac: `MeasuresCamera.xml` (mm), and `Ori-InterneScan/MeasuresIm-NAME.xml` (pixels)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.film.interior import is_mirrored
+from photogram.formats.plain.films_written import WrittenFilms
+from photogram.formats.plain.writing import known_cameras
+from photogram.formats.project import Project
+from photogram.formats.xml_stream import Element, read_stream, root_of
+
+__all__ = ["MicmacMarks", "read_marks", "write_marks"]
+
+SET, OF_IMAGE = "SetOfMesureAppuisFlottants", "MesureAppuiFlottant1Im"
+SCANS, CAMERA = "Ori-InterneScan", "MeasuresCamera.xml"
+
+
+@dataclass(frozen=True, eq=False)
+class MicmacMarks:
+    """Fiducial marks of a camera, and what was read of them.
+
+    Attributes
+    ----------
+    places
+        By mark (x, y), mm, y up.
+    readings
+        By photo and mark (column, row).
+    turned
+        Whether y of the file counts down, so that it was turned.
+    remarks
+        What was decided while it was read.
+    """
+
+    places: Mapping[str, Floats]
+    readings: Mapping[str, Mapping[str, Floats]]
+    turned: bool
+    remarks: tuple[str, ...]
+
+    def tables(self, camera: str) -> dict[str, dict[str, Any]]:
+        """Return the tables `fiducials` and `fiducial_images` of a plain project, whose camera this is."""
+        rows = [(photo, mark, xy) for photo, own in self.readings.items() for mark, xy in own.items()]
+        places, read = (
+            np.array(list(each)).reshape(-1, 2) for each in (self.places.values(), [r[2] for r in rows])
+        )
+        return {
+            "fiducials": {
+                "camera": [camera] * len(self.places),
+                "fiducial": list(self.places),
+                "x": places[:, 0],
+                "y": places[:, 1],
+            },
+            "fiducial_images": {
+                "photo": [row[0] for row in rows],
+                "fiducial": [row[1] for row in rows],
+                "column": read[:, 0],
+                "row": read[:, 1],
+            },
+        }
+
+
+def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
+    """Read the marks of a folder of MicMac.
+
+    Whether y of `MeasuresCamera.xml` counts up or down is not said there: it is taken as most scans have it.
+
+    Parameters
+    ----------
+    folder
+        With `Ori-InterneScan`, or that itself.
+    camera
+        The file of the camera; None: `MeasuresCamera.xml` in `Ori-InterneScan`, or beside it.
+
+    Raises
+    ------
+    InputError
+        Files that are missing, cannot be read, or are of something else; a mark that is there twice, or that
+        the camera has not.
+    """
+    scans = folder / SCANS if (folder / SCANS).is_dir() else folder
+    files = sorted(scans.glob("MeasuresIm-*.xml"))
+    if not files:
+        raise InputError("has no MeasuresIm-*.xml", file=scans)
+    beside = [path for path in (scans / CAMERA, folder / CAMERA, scans.parent / CAMERA) if path.is_file()]
+    path = camera or next(iter(beside), scans / CAMERA)
+    places = _measures(path)
+    if len(places) != 1:
+        raise InputError(f"is of {len(places)} images: the marks of one camera are read", file=path)
+    (down,) = places.values()
+    readings: dict[str, dict[str, Floats]] = {}
+    for file in files:
+        for photo, own in _measures(file).items():
+            if strange := next((mark for mark in own if mark not in down), None):
+                raise InputError(f"the camera has no mark {strange}", file=file)
+            if photo in readings:
+                raise InputError(f"the photo {photo} is in two files", file=file)
+            readings[photo] = own
+    turned, remark = _turned(down, readings)
+    sign = np.array([1.0, -1.0 if turned else 1.0])
+    return MicmacMarks({mark: xy * sign for mark, xy in down.items()}, readings, turned, (remark,))
+
+
+def _turned(places: Mapping[str, Floats], readings: Mapping[str, Mapping[str, Floats]]) -> tuple[bool, str]:
+    """Return whether y of a camera counts down, as rows do, by most photos; and what is said of it."""
+    sides = [is_mirrored([places[mark] for mark in own], list(own.values())) for own in readings.values()]
+    down, up = sides.count(False), sides.count(True)
+    if not down and not up:
+        return True, "no photo tells whether y of the camera counts up or down: down is taken"
+    way = "down" if down >= up else "up"
+    rest = min(down, up)
+    return down >= up, (
+        f"y of the camera is taken to count {way}, as {max(down, up)} of {down + up} scans have it that are"
+        " not mirrored" + (f"; {rest} are mirrored then" if rest else "") + ": if the scans are, all are"
+    )
+
+
+def _measures(path: Path) -> dict[str, dict[str, Floats]]:
+    """Return what a file has by image and name; the root is a set, or one image."""
+    found: dict[str, dict[str, Floats]] = {}
+
+    def take(element: Element) -> None:
+        own = found.setdefault(element.word("NameIm", path.stem), {})
+        for each in element.all("OneMesureAF1I"):
+            name = each.need("NamePt").text.strip()
+            if not name or name in own:
+                raise each.error(f"the mark {name} is there twice" if name else "has a mark without a name")
+            own[name] = each.need("PtIm").numbers(2)
+
+    root, _ = root_of(path)
+    read_stream(path, {OF_IMAGE: take}, OF_IMAGE if root == OF_IMAGE else SET)
+    return found
+
+
+def write_marks(project: Project) -> dict[str, bytes]:
+    """Return the files of the marks of a project with scanned films: pixels, and mm with y down.
+
+    Raises
+    ------
+    InputError
+        There are none, readings that are no pixels, or marks of several cameras.
+    """
+    cameras, which = known_cameras(project.block)
+    films = WrittenFilms(project, [cameras[row].name for row in which])
+    if not films.readings or not films.pixels:
+        raise InputError("MicMac has readings of marks in pixels of scans, and this project has none")
+    if len(films.certificates) != 1:
+        raise InputError(f"MicMac has one camera, and marks are of {', '.join(films.certificates)}")
+    (certificate,) = films.certificates.values()
+    places = {name: mark.position[:2] * [1.0, -1.0] for name, mark in certificate.marks.items()}
+    photos: dict[str, dict[str, Floats]] = {}
+    for each in films.readings:
+        photos.setdefault(each.photo, {})[films.by_mark[id(each.mark)]] = each.observed[:2]
+    files = {
+        f"{SCANS}/MeasuresIm-{photo}.xml": _document(photo, own, whole=True) for photo, own in photos.items()
+    }
+    return {f"{SCANS}/{CAMERA}": _document("Glob", places, whole=False)} | files
+
+
+def _document(image: str, marks: Mapping[str, Floats], *, whole: bool) -> bytes:
+    lines = [f"<{OF_IMAGE}>", f"<NameIm>{escape(image)}</NameIm>"]
+    for name, xy in marks.items():
+        x, y = xy.tolist()
+        lines.append(
+            f"<OneMesureAF1I><NamePt>{escape(name)}</NamePt><PtIm>{x!r} {y!r}</PtIm></OneMesureAF1I>"
+        )
+    lines.append(f"</{OF_IMAGE}>")
+    if whole:
+        lines = [f"<{SET}>", *lines, f"</{SET}>"]
+    return "\n".join(['<?xml version="1.0" ?>', *lines, ""]).encode()

@@ -1,0 +1,182 @@
+"""Corners from photographs of a board (needs `pip install 'photogram[targets]'`).
+
+Pixels count from 0 at the centre of the first one, as files hold them: an orientation in the head of a
+picture is not applied, since a camera is calibrated as its sensor is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.io.files import read_bytes
+from photogram.messages import Message, counted, listed
+from photogram.targets.board import Board
+from photogram.targets.markers import charuco_tags, grid_tags
+from photogram.targets.measured import Measured
+from photogram.targets.saddles import Picture, refined
+
+__all__ = ["detected", "is_picture"]
+
+SUFFIXES = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".tif", ".tiff", ".webp"})
+Found = tuple[Indices, Floats]
+"""Numbers of points of the board, and where they are: (n,), (n, 2)."""
+PART = 0.4
+"""Half the side of the window of a corner, over the least distance to its neighbours."""
+
+
+def is_picture(path: Path) -> bool:
+    """Return whether a file is a picture, by its name."""
+    return path.suffix.lower() in SUFFIXES
+
+
+def detected(
+    path: Path, files: Sequence[Path], board: Board, progress: Callable[[str], None] | None = None
+) -> Measured:
+    """Find a board in photographs.
+
+    Parameters
+    ----------
+    path
+        What was asked for, which errors name.
+    files
+        The pictures. Where they lie in several folders, each folder is a camera.
+    board
+        What to look for.
+    progress
+        Is told which picture is searched.
+
+    Raises
+    ------
+    InputError
+        OpenCV is absent, a board whose targets nobody knows by their look, a file that is no picture, a board
+        that no picture shows.
+    """
+    cv2 = _opencv(path)
+    find = _finder(cv2, board, path)
+    found: list[tuple[Path, tuple[int, int], Found]] = []
+    without = []
+    for number, file in enumerate(files, 1):
+        if progress is not None:
+            progress(f"looking for the board in {file.name}, {number} of {len(files)}")
+        picture = _picture(cv2, file)
+        corners = find(picture)
+        if corners is None or not len(corners[0]):
+            without.append(_name(path, file))
+        else:
+            found.append((file, (picture.shape[1], picture.shape[0]), corners))
+    if not found:
+        raise InputError(
+            f"no board ({board.described}) is found in {counted(len(files), 'picture')}: columns and rows of"
+            " a chessboard are counted in corners between squares",
+            file=path,
+        )
+    told = [Message(f"no board is found in {listed(without)}")] if without else []
+    return _measured(path, found, told)
+
+
+def _opencv(path: Path) -> Any:
+    try:
+        import cv2
+    except ModuleNotFoundError:
+        raise InputError(
+            "corners of a board in photographs need OpenCV: pip install 'photogram[targets]'", file=path
+        ) from None
+    return cv2
+
+
+def _picture(cv2: Any, file: Path) -> Picture:
+    """Return the grey values of a picture as its file holds them."""
+    content = np.frombuffer(read_bytes(file), dtype=np.uint8)
+    how = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
+    found = cv2.imdecode(content, how) if len(content) else None
+    if found is None:
+        raise InputError("is no picture that OpenCV can read", file=file)
+    return np.asarray(found)
+
+
+def _name(path: Path, file: Path) -> str:
+    return file.relative_to(path).as_posix() if path.is_dir() else file.name
+
+
+def _measured(
+    path: Path, found: Sequence[tuple[Path, tuple[int, int], Found]], told: list[Message]
+) -> Measured:
+    """Return what was found as the corners of a file."""
+    folders = [file.parent.name for file, _, _ in found]
+    several = len({file.parent for file, _, _ in found}) > 1
+    counts = [len(points) for _, _, (points, _) in found]
+    total = sum(counts)
+    return Measured(
+        path=path,
+        images=[_name(path, file) for file, _, _ in found],
+        image=np.repeat(np.arange(len(found)), counts),
+        point=np.concatenate([points for _, _, (points, _) in found]),
+        xy=np.concatenate([xy for _, _, (_, xy) in found]),
+        sd=np.ones(total),
+        use=np.ones(total, dtype=bool),
+        cameras=folders if several else None,
+        picture_sizes=[size for _, size, _ in found],
+        messages=told,
+    )
+
+
+def _finder(cv2: Any, board: Board, path: Path) -> Callable[[Picture], Found | None]:
+    """Return what looks for a board in a picture."""
+    if board.kind == "points":
+        raise InputError(
+            "targets that lie anywhere are not looked for in photographs: give their corners", file=path
+        )
+    if board.kind in ("charuco", "aprilgrid"):
+        tags = charuco_tags(cv2, board) if board.kind == "charuco" else grid_tags(cv2, board)
+        return tags.corners
+    ways = {"chessboard": _chessboard, "circles": _circles, "asymmetric_circles": _circles}
+    return lambda picture: _numbered(ways[board.kind](cv2, board, picture))
+
+
+def _numbered(xy: Floats | None) -> Found | None:
+    return None if xy is None else (np.arange(len(xy)), xy)
+
+
+def _chessboard(cv2: Any, board: Board, picture: Picture) -> Floats | None:
+    """Return all corners, found by the detector of sectors or else by that of squares."""
+    size = board.grid
+    how = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
+    there, xy = cv2.findChessboardCornersSB(picture, size, flags=how)
+    if not there:
+        how = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
+        there, xy = cv2.findChessboardCorners(picture, size, flags=how)
+    if not there:
+        return None
+    start = _flat(xy)
+    return refined(cv2, picture, start, PART * _nearest(start.reshape(*size[::-1], 2)))
+
+
+def _circles(cv2: Any, board: Board, picture: Picture) -> Floats | None:
+    """Return the centres of all circles."""
+    skewed = board.kind == "asymmetric_circles"
+    how = cv2.CALIB_CB_ASYMMETRIC_GRID if skewed else cv2.CALIB_CB_SYMMETRIC_GRID
+    for more in (0, cv2.CALIB_CB_CLUSTERING):
+        there, xy = cv2.findCirclesGrid(picture, board.grid, flags=how | more)
+        if there:
+            return _flat(xy)
+    return None
+
+
+def _nearest(grid: Floats) -> Floats:
+    """Return (n,) distances of corners (rows, columns, 2) to the next one along their row or column."""
+    found = np.full(grid.shape[:2], np.inf)
+    for turned, own in ((grid, found), (grid.swapaxes(0, 1), found.T)):
+        apart = np.linalg.norm(np.diff(turned, axis=0), axis=2)
+        own[1:] = np.minimum(own[1:], apart)
+        own[:-1] = np.minimum(own[:-1], apart)
+    return found.ravel()
+
+
+def _flat(xy: Any) -> Floats:
+    return np.asarray(xy, dtype=np.float64).reshape(-1, 2)

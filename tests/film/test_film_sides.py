@@ -1,0 +1,88 @@
+"""How films lie: sides against what is given, and photos whose marks have no names."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from photogram import InputError, adjust
+from photogram.cli import app
+from photogram.errors import ContradictionError
+from photogram.film import interior_orientation
+from photogram.formats import read
+from shared_data import SHARED
+from test_film import project
+
+pytestmark = pytest.mark.skipif(not (SHARED / "film").is_dir(), reason="no golden data beside the repository")
+
+
+def rewritten(path: Path, change: dict[str, str]) -> None:
+    """Put words in the place of columns of a table."""
+    head, *rows = [line.split(",") for line in path.read_text().splitlines()]
+    for row in rows:
+        for column, word in change.items():
+            row[head.index(column)] = word
+    path.write_text("\n".join(",".join(each) for each in [head, *rows]) + "\n")
+
+
+def without_starts(folder: Path) -> None:
+    rewritten(folder / "photos.csv", {"mirrored": "", "start_t1": "", "start_t2": "", "start_theta": ""})
+
+
+def test_a_mirrored_photo_ends_with_both_readings_and_code_4(tmp_path: Path) -> None:
+    project(tmp_path)
+    text = (tmp_path / "photos.csv").read_text()
+    (tmp_path / "photos.csv").write_text(text.replace("scan1,true", "scan1,false"))
+    with pytest.raises(ContradictionError) as caught:
+        read(tmp_path)
+    assert caught.value.file == tmp_path / "photos.csv"
+    ended = CliRunner().invoke(app, ["adjust", str(tmp_path), "--out", str(tmp_path / "out")])
+    assert ended.exit_code == 4
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_interior_orientation_says_both_readings() -> None:
+    places = np.array([[-106.0, -106.0], [106.0, 106.0], [-106.0, 106.0], [106.0, -106.0]])
+    with pytest.raises(ContradictionError, match=r"1\d\d mm off as is given, and .* on the other side"):
+        interior_orientation(places, places * [-1.0, 1.0], mirrored=False)
+    with pytest.raises(ContradictionError, match=r"not mirrored: .*say mirrored = false"):
+        interior_orientation(places, places, mirrored=True)
+
+
+def test_poses_tell_how_films_lie_whose_marks_have_no_names(tmp_path: Path) -> None:
+    """Marks are symmetric to 0.01 mm: eight ways are alike, and images of known points choose."""
+    named = project(tmp_path)
+    without_starts(tmp_path)
+    rewritten(tmp_path / "fiducial_images.csv", {"fiducial": ""})
+    found = read(tmp_path)
+    scans = zip(named.block.passages, found.block.passages, strict=True)
+    for one, other in scans:
+        assert one.film.mirrored == other.film.mirrored  # type: ignore[attr-defined]
+        away = one.film.placement.position - other.film.placement.position  # type: ignore[attr-defined]
+        assert np.abs(away).max() < 0.03
+    wanted, own = adjust(named.block), adjust(found.block)
+    assert own.sum_and_freedom == pytest.approx(wanted.sum_and_freedom, rel=1e-7)
+    assert sum("its film lies turned by" in str(each) for each in found.messages) == 6
+
+
+def test_without_poses_names_are_asked_for(tmp_path: Path) -> None:
+    project(tmp_path)
+    without_starts(tmp_path)
+    rewritten(tmp_path / "fiducial_images.csv", {"fiducial": ""})
+    rewritten(tmp_path / "photos.csv", {"omega": "", "phi": "", "kappa": ""})
+    with pytest.raises(InputError, match=r"photo p\d: cannot be told from the marks.* give the names"):
+        read(tmp_path)
+
+
+@pytest.mark.parametrize("kept", [("ll", "ur"), ("ml", "mr")])
+def test_poses_tell_the_side_of_two_marks(tmp_path: Path, kept: tuple[str, str]) -> None:
+    project(tmp_path)
+    without_starts(tmp_path)
+    path = tmp_path / "fiducial_images.csv"
+    lines = path.read_text().splitlines()
+    path.write_text(
+        "\n".join(each for each in lines if not each.startswith("p6,") or each.split(",")[1] in kept)
+    )
+    found = read(tmp_path)
+    assert [each.film.mirrored for each in found.block.passages] == [False] * 5 + [True]  # type: ignore[attr-defined]

@@ -1,0 +1,76 @@
+"""Which marks are to be looked at first: of the certificate, of a photo, or one reading."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from photogram import InputError, Result, adjust
+from photogram.diagnosis.adjusted import diagnosed
+from photogram.diagnosis.film_marks import mark_hints
+from photogram.film import compare_steps
+from photogram.formats import read
+from shared_data import SHARED
+from test_film import project
+
+pytestmark = pytest.mark.skipif(not (SHARED / "film").is_dir(), reason="no golden data beside the repository")
+
+
+def adjusted(folder: Path, table: str, change: dict[tuple[str, str], dict[int, float]]) -> Result:
+    """Return the golden block adjusted, numbers of some rows changed by the columns of a table."""
+    project(folder)
+    lines = [line.split(",") for line in (folder / table).read_text().splitlines()]
+    for line in lines:
+        for column, by in change.get((line[0], line[1]), {}).items():
+            line[column] = repr(float(line[column]) + by)
+    (folder / table).write_text("\n".join(map(",".join, lines)) + "\n")
+    return adjust(read(folder).block)
+
+
+def test_two_steps_have_smaller_standard_deviations(tmp_path: Path) -> None:
+    inside = adjusted(tmp_path, "fiducials.csv", {})
+    with (tmp_path / "project.toml").open("a") as settings:
+        settings.write('\n[film]\ninterior = "before"\n')
+    before = adjust(read(tmp_path).block)
+    golden = json.loads((SHARED / "film" / "film.json").read_text())
+    sd = [
+        np.array([golden[which]["points"][name]["sd"] for name in golden["full"]["points"]])
+        for which in ("full", "two_steps")
+    ]
+    ratio = 100.0 * (np.median(sd[1] / sd[0], axis=0) - 1.0)
+    said = compare_steps(before, inside)
+    assert said.startswith(
+        f"standard deviations of points differ by {ratio[0]:+.1f} % in X, {ratio[1]:+.1f} % in Y"
+    )
+    assert ratio[1] < 0
+    with pytest.raises(InputError, match="different points"):
+        compare_steps(
+            before, adjust(before.block.replace(point_ids=[f"q{k}" for k in before.block.point_ids]))
+        )
+
+
+def test_good_marks_have_no_hint(tmp_path: Path) -> None:
+    assert mark_hints(adjusted(tmp_path, "fiducials.csv", {})) == []
+
+
+def test_a_mark_that_fails_on_all_photos_is_wrong_in_its_certificate(tmp_path: Path) -> None:
+    result = adjusted(tmp_path, "fiducials.csv", {("rc10", "ur"): {2: 0.1}})
+    (hint,) = map(str, mark_hints(result))
+    assert hint.startswith("rc10 ur (w = ")
+    assert "on 6 photos): where it fails on all photos its place in the certificate is wrong" in hint
+    assert hint in [str(each) for each in diagnosed(result).messages]
+
+
+def test_a_single_reading_is_of_the_wrong_place(tmp_path: Path) -> None:
+    (hint,) = map(str, mark_hints(adjusted(tmp_path, "fiducial_images.csv", {("p3", "mr"): {3: 6.0}})))
+    assert hint.startswith("rc10 mr on p3 (w = ")
+    assert hint.endswith("measured on the wrong place, or another mark?")
+
+
+def test_all_marks_of_a_photo_are_of_another_camera(tmp_path: Path) -> None:
+    """Corners farther out by 0.4 mm, and middles where they are: a cone of another camera."""
+    out = {"ll": (-20.0, 20.0), "ul": (-20.0, -20.0), "ur": (20.0, -20.0), "lr": (20.0, 20.0)}
+    change = {("p2", mark): {2: by[0], 3: by[1]} for mark, by in out.items()}
+    (hint,) = map(str, mark_hints(adjusted(tmp_path, "fiducial_images.csv", change)))
+    assert hint.startswith("nearly all fiducials of p2 fail their tests")

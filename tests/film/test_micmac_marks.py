@@ -1,0 +1,81 @@
+"""Marks of MicMac: written, read as they were, and the side of y found."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from photogram import InputError
+from photogram.formats.micmac import read_marks, write_marks
+from photogram.formats.project import Project
+from photogram.io.csv_text import csv_text
+from photogram.network.observations import Fiducial
+from shared_data import SHARED
+from test_film import project, project_again
+
+pytestmark = pytest.mark.skipif(not (SHARED / "film").is_dir(), reason="no golden data beside the repository")
+
+
+def written(own: Project, folder: Path) -> Path:
+    (folder / "Ori-InterneScan").mkdir(parents=True)
+    for name, content in write_marks(own).items():
+        (folder / name).write_bytes(content)
+    return folder
+
+
+def test_marks_are_read_as_they_were(tmp_path: Path) -> None:
+    own = project(tmp_path)
+    found = read_marks(written(own, tmp_path / "micmac"))
+    assert found.turned
+    assert "5 of 6 scans have it that are not mirrored; 1 are mirrored then" in found.remarks[0]
+    for each in own.block.observations:
+        if isinstance(each, Fiducial):
+            name = each.mark.name.split()[1]
+            np.testing.assert_array_equal(found.readings[each.photo][name], each.reading)
+            np.testing.assert_array_equal(found.places[name], each.mark.position[:2])
+
+
+def test_tables_of_a_project_come_of_them(tmp_path: Path) -> None:
+    own = project(tmp_path)
+    tables = read_marks(written(own, tmp_path / "micmac")).tables("rc10")
+    for name, columns in tables.items():
+        (tmp_path / f"{name}.csv").write_bytes(csv_text(columns))
+    with pytest.raises(InputError, match=r"give sd, or \[sd\] fiducial_images"):
+        project_again(tmp_path)
+    tables["fiducial_images"]["sd"] = [0.2] * len(tables["fiducial_images"]["photo"])
+    (tmp_path / "fiducial_images.csv").write_bytes(csv_text(tables["fiducial_images"]))
+    again = project_again(tmp_path)
+    assert len(again.block.observations) == len(own.block.observations)
+
+
+def test_y_of_a_camera_that_counts_up_is_left(tmp_path: Path) -> None:
+    folder = written(project(tmp_path), tmp_path / "micmac")
+    path = folder / "Ori-InterneScan" / "MeasuresCamera.xml"
+    lines = []
+    for line in path.read_text().splitlines():
+        if "<PtIm>" in line:
+            before, _, rest = line.partition("<PtIm>")
+            x, y = rest.partition("<")[0].split()
+            line = f"{before}<PtIm>{x} {-float(y)!r}</PtIm></OneMesureAF1I>"
+        lines.append(line)
+    path.write_text("\n".join(lines))
+    found = read_marks(folder)
+    assert not found.turned
+    np.testing.assert_array_equal(found.places["ur"], [105.9914, 105.9903])
+
+
+def test_files_at_fault_are_refused(tmp_path: Path) -> None:
+    folder = written(project(tmp_path), tmp_path / "micmac")
+    path = folder / "Ori-InterneScan" / "MeasuresIm-p2.xml"
+    text = path.read_text()
+    path.write_text(text.replace("<NamePt>ur<", "<NamePt>nn<"))
+    with pytest.raises(InputError, match=r"MeasuresIm-p2.xml: the camera has no mark nn"):
+        read_marks(folder)
+    path.write_text(text.replace("<NamePt>ur<", "<NamePt>ll<"))
+    with pytest.raises(InputError, match=r"the mark ll is there twice"):
+        read_marks(folder)
+    (folder / "Ori-InterneScan" / "MeasuresCamera.xml").unlink()
+    with pytest.raises(InputError, match=r"MeasuresCamera.xml"):
+        read_marks(folder)
+    with pytest.raises(InputError, match=r"has no MeasuresIm"):
+        read_marks(tmp_path)
