@@ -11,6 +11,7 @@ from photogram import formats
 from photogram.errors import InputError
 from photogram.formats.calibrations import adjusted_project, calibration_of
 from photogram.targets import Board, Calibration, Corners, read
+from photogram.targets.cross_validated import cross_validate
 from photogram.targets.knot_weights import with_knot_sd
 from photogram.targets.output.mrcal import mrcal_models
 from photogram.targets.output.rig import rig_of
@@ -92,6 +93,12 @@ def test_the_report_counts_knots_that_hang_on_their_priors():
     assert "no image touches" in told
     assert "knots" in beyond
     assert told in adjusted().report()
+
+
+def test_cross_validation_leaves_out_what_parts_have_from_their_priors():
+    (test,) = cross_validate(adjusted()).tests[0]
+    assert 100 < test.dof < 160
+    assert test.chi2 / test.dof == pytest.approx(1.0, abs=4 * np.sqrt(2 / test.dof))
 
 
 def test_a_narrow_spline_says_how_wide_it_should_be():

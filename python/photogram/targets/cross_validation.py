@@ -32,6 +32,9 @@ __all__ = ["CrossMap", "CrossValidation", "Into", "changes_between", "cross_map"
 Into = Literal["odd", "halves"] | int
 """How views are split."""
 
+FROM_PRIORS = 1e-6
+"""Of the cofactors of a change: those below are of what both parts take from their priors."""
+
 
 @dataclass(frozen=True, eq=False)
 class CrossMap:
@@ -104,9 +107,25 @@ def parts_agree(
         groups["all"] = slice(0, a.board.start)
     found = []
     for name, own in groups.items():
-        chi2 = float(change[own] @ np.linalg.solve(cofactors[own, own], change[own])) / variance
-        found.append(DifferenceTest.of(name, chi2, len(change[own]), freedom))
+        splined = any(each.knots is not None for each in a.cameras)
+        changed, known = change[own], cofactors[own, own]
+        if splined:
+            changed, known = _seen_by_both(changed, known, np.diag(a.cofactors + b.cofactors)[own])
+        chi2 = float(changed @ np.linalg.solve(known, changed)) / variance
+        found.append(DifferenceTest.of(name, chi2, len(changed), freedom))
     return found
+
+
+def _seen_by_both(change: Floats, cofactors: Floats, whole: Floats) -> tuple[Floats, Floats]:
+    """Return (r,) the combinations of changes that corners determine, and their (r, r) cofactors.
+
+    Combinations of knots that come from the prior that both parts share do not change. `whole` are the
+    cofactors (u,) of changes if each part had a prior of its own.
+    """
+    scale = 1 / np.sqrt(whole)
+    values, vectors = np.linalg.eigh(cofactors * scale[:, np.newaxis] * scale)
+    kept = values > FROM_PRIORS
+    return vectors[:, kept].T @ (scale * change), np.diag(values[kept])
 
 
 def cross_map(
