@@ -123,6 +123,23 @@ class Seen:
             show_default=False,
         ),
     ] = None
+    knots: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CxR",
+            help="With --model splined_stereographic: knots along columns and rows. Default: 30x20.",
+            show_default=False,
+        ),
+    ] = None
+    knot_sd: Annotated[
+        str | None,
+        typer.Option(
+            metavar="R,T",
+            help="Standard deviations with which knots are 0, radial and tangential, in units of the"
+            " stereographic image. Default: 1,0.1.",
+            show_default=False,
+        ),
+    ] = None
     sd: Deviations = None
     regularise: Annotated[
         PriorName | None,
@@ -149,6 +166,8 @@ class Seen:
             board=self._board(),
             unit=self.unit,
             model=self.model,
+            knots=None if self.knots is None else pair(self.knots, "--knots"),
+            knot_sd=None if self.knot_sd is None else _deviations(self.knot_sd),
             cameras=self.cameras or [],
             within=self.within,
             size=None if self.size is None else pair(self.size, "--size"),
@@ -196,6 +215,15 @@ class Seen:
 
 AS_FOUND = Seen()
 """As the files say."""
+
+
+def _deviations(text: str) -> tuple[float, float]:
+    """Return two standard deviations with a comma between them."""
+    try:
+        radial, tangential = map(float, text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"is two numbers, 1,0.1, not {text}", param_hint="--knot-sd") from None
+    return radial, tangential
 
 
 @with_job

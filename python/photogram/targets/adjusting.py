@@ -26,6 +26,8 @@ __all__ = ["adjusted_start", "snooped_start"]
 ROUNDS = 8
 """In which the standard deviation of corners is found, at the most, and the change that is none."""
 CHANGE = 0.01
+ROUGHLY, FINELY = 0.5, 1e-7
+"""Of a standard deviation: where the first and the last steps of a splined lens end."""
 
 
 def adjusted_start(
@@ -44,7 +46,7 @@ def adjusted_start(
         how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress, "verdict": True}
         # Knots that no image touches are determined by priors alone.
         free = None if _has_knots(start) else adjust(start.block(), **how)
-        result = adjust(_weighted(start), **how) if free is None else _with_priors(start, free, threads)
+        result = _knotted(start, how) if free is None else _with_priors(start, free, threads)
         worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
         if worse.any() and result.converged:
             start = start.without(worse)
@@ -67,6 +69,22 @@ def _sd_to_assume(start: Start, result: Result) -> float | None:
     found = deviation_of_corners(result)
     # Corners that fit to the last digit are made, not measured.
     return start.assumed * found if abs(found - 1) > CHANGE and start.assumed * found > 1e-6 else None
+
+
+def _knotted(start: Start, how: dict[str, Any]) -> Result:
+    """Return the adjustment of splined cameras.
+
+    An adjustment reckons with the knots near images where it begins: the last of it begins where corners stay
+    at theirs.
+    """
+    block = _weighted(start)
+    near = adjust(block, **how | {"verdict": False}, covariance=False, tolerance=ROUGHLY)
+    moved = near.block.replace(
+        photo_positions=near.photo_positions,
+        photo_attitudes=near.photo_attitudes,
+        cameras=[each.restarted() for each in near.cameras],
+    )
+    return adjust(moved, **how, tolerance=FINELY)
 
 
 def _has_knots(start: Start) -> bool:

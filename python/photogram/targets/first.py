@@ -15,6 +15,7 @@ from photogram.targets.board import Board
 from photogram.targets.corners import FEWEST, Corners
 from photogram.targets.first_camera import first_camera, picture_size
 from photogram.targets.homographies import frontal_tilts
+from photogram.targets.lens_fit import KNOTS
 from photogram.targets.orders import Pictures, rays_shown
 from photogram.targets.sensors import Rig, connected, mean_pose
 from photogram.targets.sightings import LISTED, Listings, Sightings
@@ -63,7 +64,9 @@ class FirstCalibration:
     remarks: list[Message]
 
 
-def first_values(board: Board, corners: Corners, model: str | None = None) -> FirstCalibration:
+def first_values(
+    board: Board, corners: Corners, model: str | None = None, knots: tuple[int, int] = KNOTS
+) -> FirstCalibration:
     """Find cameras, rig and poses from corners of a board alone.
 
     Parameters
@@ -77,6 +80,8 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
         `opencv_pinhole` with so many terms. None: `opencv5` below 90 degrees of horizontal field, `opencv8`
         above, `opencv_fisheye` where corners are seen beside the camera and behind it, or hardly determine
         that. Knots of `splined_stereographic` are fitted to what None gives.
+    knots
+        Along columns and rows, of a splined lens.
 
     Raises
     ------
@@ -88,7 +93,7 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
     without = {corners.pictures[row]: IN_A_PLANE for row in np.flatnonzero(seen.in_a_plane()).tolist()}
     without |= corners.poor(board.places)
     usable = np.array([name not in without for name in corners.pictures], dtype=bool)
-    cameras, remarks = _cameras(seen, corners, usable, without, model)
+    cameras, remarks = _cameras(seen, corners, usable, without, model, knots)
     hidden = usable & (rays_shown(seen, corners.cameras, cameras) < FEWEST)
     if (hidden == usable).all():
         raise InputError(
@@ -115,7 +120,12 @@ def first_values(board: Board, corners: Corners, model: str | None = None) -> Fi
 
 
 def _cameras(
-    seen: Sightings, corners: Corners, usable: Bools, without: dict[str, str], model: str | None
+    seen: Sightings,
+    corners: Corners,
+    usable: Bools,
+    without: dict[str, str],
+    model: str | None,
+    knots: tuple[int, int],
 ) -> tuple[list[Camera], list[Message]]:
     """Return the first values of each camera by its usable pictures, and remarks."""
     cameras, remarks = [], []
@@ -127,7 +137,7 @@ def _cameras(
         if corners.sizes[k] is None:
             said = f"taken for {size[0]} x {size[1]} px, about whose middle the corners lie"
             remarks.append(Message(f"camera {name}: the size of its pictures is not known: {said}"))
-        camera, told = first_camera(own, size, name, model)
+        camera, told = first_camera(own, size, name, model, knots)
         cameras.append(camera)
         remarks += told
     return cameras, remarks

@@ -14,7 +14,7 @@ from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
 from photogram.targets.families import POOR, Trial, adjusted_family, misfits, rays_of, trials
 from photogram.targets.homographies import poses, ray_homographies
-from photogram.targets.lens_fit import fitted, is_perspective, lens_of
+from photogram.targets.lens_fit import KNOTS, fitted, is_perspective, lens_of
 from photogram.targets.sightings import Sightings
 from photogram.targets.small_block import Adjusted, adjusted_views
 
@@ -44,7 +44,7 @@ def picture_size(seen: Sightings, given: tuple[int, int] | None) -> tuple[int, i
 
 
 def first_camera(
-    seen: Sightings, size: tuple[int, int], name: str, model: str | None
+    seen: Sightings, size: tuple[int, int], name: str, model: str | None, knots: tuple[int, int] = KNOTS
 ) -> tuple[Camera, list[Message]]:
     """Return a camera with the wanted model, free, and remarks.
 
@@ -57,6 +57,8 @@ def first_camera(
     model
         The wanted model; None for what is usual at its field of view. The knots of a splined one are fitted
         to the usual one: many of them are where no corner is.
+    knots
+        Along columns and rows, of a splined one.
 
     Raises
     ------
@@ -84,7 +86,7 @@ def first_camera(
         why = f"its corners alone hardly determine the terms of {wanted}"
         remarks.append(Message(f"camera {name}: {why}: priors, or another lens, would help"))
     found = camera if done is None else done.camera
-    return (fitted(found, KNOTTED, size) if splined else found), remarks
+    return (fitted(found, KNOTTED, size, knots=knots) if splined else found), remarks
 
 
 def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> Adjusted | None:

@@ -10,7 +10,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.network.cameras import Camera
 from photogram.targets.vision import FLIP, cross_matrices
 
-__all__ = ["Imaged", "imaged", "motion_partials", "rays", "unknown_of", "values_of"]
+__all__ = ["TURNED", "Imaged", "imaged", "motion_partials", "rays", "unknown_of", "values_of"]
 
 TURNED: Floats = np.diag(FLIP)
 """From axes of vision to those of a photo, x right, y up, z back, and the other way."""

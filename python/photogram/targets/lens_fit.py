@@ -23,6 +23,7 @@ __all__ = [
     "GRID",
     "KNOTS",
     "LENS_TERMS",
+    "field_of",
     "fitted",
     "fitted_in_stages",
     "free_names",
@@ -130,13 +131,17 @@ def _start(source: Camera, size: tuple[int, int], from_middle: bool) -> dict[str
 
 def _field(source: Camera, size: tuple[int, int], knots: tuple[int, int]) -> float:
     """Return the fov_x_deg (degrees) with which knots lie over all that a camera shows, and a tenth more."""
-    rays = source.rays(grid_of_pixels(size))
-    places = 2 * rays[:, :2] / (1 - rays[:, 2:])
-    inner = np.array(knots) - ORDER
-    if (inner < 1).any():
+    if min(knots) < ORDER + 1:
         raise InputError(f"knots: a spline of order {ORDER:g} has {ORDER + 1:g} or more along an axis")
+    return min(BEYOND * field_of(source.rays(grid_of_pixels(size)), knots), 359.0)
+
+
+def field_of(rays: Floats, knots: tuple[int, int], order: float = ORDER) -> float:
+    """Return the fov_x_deg (degrees) with which knots lie over (n, 3) rays in the axes of a photo."""
+    places = 2 * rays[:, :2] / (1 - rays[:, 2:])
+    inner = np.array(knots) - order
     reach = float(np.nanmax(np.nanmax(np.abs(places), axis=0) * inner[0] / inner))
-    return min(BEYOND * math.degrees(4 * math.atan(reach / 2)), 359.0)
+    return math.degrees(4 * math.atan(reach / 2))
 
 
 def _principal_point(source: Camera, from_middle: bool, size: tuple[int, int]) -> dict[str, float]:

@@ -16,6 +16,7 @@ from photogram.targets.calibrated import Calibrated
 from photogram.targets.prior_shift import prior_shift
 from photogram.targets.residual_drawing import draw_board_residuals, draw_poorest_views
 from photogram.targets.residual_groups import Groups, residual_groups
+from photogram.targets.splined import spline_lines
 from photogram.targets.tables import board_facts, views, worst_points
 from photogram.targets.worth_page import worth_facts, worth_section
 
@@ -44,6 +45,7 @@ def calibration_page(calibrated: Calibrated) -> Page:
         Section("board", "Board", board),
         Section("views", "Views", [page_table("Views", table)], intro),
         Section("corners", "Residuals of corners", _residuals(calibrated)),
+        Section("splines", "Splined lenses", [Remarks(told)] if (told := spline_lines(calibrated)) else []),
         Section("priors", "Priors of cameras", [page_table("What they have moved", moved)] if moved else []),
     ]
     highlights = [*([] if worth is None else worth_facts(worth)), *page.highlights]

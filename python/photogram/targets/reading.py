@@ -11,6 +11,7 @@ import numpy as np
 from photogram.errors import InputError
 from photogram.io.files import read_text, reading
 from photogram.messages import counted, listed
+from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board, Shape
 from photogram.targets.board_files import is_board, picture_size, read_board
 from photogram.targets.calibration import Calibration
@@ -24,6 +25,8 @@ from photogram.targets.corner_tables import (
 )
 from photogram.targets.detection import detected, is_picture
 from photogram.targets.first import first_values
+from photogram.targets.knot_weights import with_knot_sd
+from photogram.targets.lens_fit import KNOTS
 from photogram.targets.measured import Grouping, Measured, ViewBy, grouped
 from photogram.targets.mrcal_model import KEY, read_model
 from photogram.targets.opencv_corners import is_npz, is_storage, read_npz, read_storage
@@ -119,6 +122,8 @@ def read(
     shape: Shape | None = None,
     unit: str | None = None,
     model: str | None = None,
+    knots: tuple[int, int] | None = None,
+    knot_sd: tuple[float, float] | None = None,
     cameras: Sequence[str] = (),
     views: ViewBy = "name",
     within: float = 0.005,
@@ -143,6 +148,9 @@ def read(
         In the place of those of the board.
     model
         The lens, as of :func:`first_values`.
+    knots, knot_sd
+        Of a splined lens: how many along columns and rows (30, 20), and the standard deviations with which
+        they are zero, radial and tangential, in units of the stereographic image (1, 0.1).
     cameras, views, within, pixel_origin, size
         How images are grouped, and how pixels count: see docs/targets.md.
     sync
@@ -163,9 +171,12 @@ def read(
     described = [board] if isinstance(board, Path) else boards if board is None else []
     own = board if isinstance(board, Board) else _only_board(described)
     size = size or next(map(picture_size, described), None)
+    if knots is not None and (models or model != KNOTTED):
+        raise InputError(f"knots: the lens has a number of them where it is {KNOTTED}, and no file says it")
     if models:
         given = _given(path, models, corners, own)
-        given = given.replace(regularise=regularise or given.regularise, sd0=sd0)
+        prior = None if knot_sd and not regularise else regularise or given.regularise
+        given = given.replace(cameras=with_knot_sd(given.cameras, knot_sd, prior), regularise=prior, sd0=sd0)
         if sync == "none":
             raise InputError(
                 f"{models[0].name} says which pictures are of one view: --sync none goes without", file=path
@@ -189,12 +200,12 @@ def read(
     if unit is not None:
         own = own.replace(unit=unit)
     seen, told = grouped(found, how)
-    start = first_values(own, seen, model)
+    start = first_values(own, seen, model, knots or KNOTS)
     poses = start.picture_poses if sync == "none" else start.poses
     return Calibration(
         board=own,
         corners=start.corners,
-        cameras=start.cameras,
+        cameras=with_knot_sd(start.cameras, knot_sd, regularise),
         poses=poses,
         sensors=None if sync == "none" else start.sensors,
         references=None if sync == "none" else start.references,

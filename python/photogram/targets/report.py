@@ -11,6 +11,7 @@ from photogram.show.sections import Section, composed, headline
 from photogram.show.ways import report_of
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.prior_shift import moved_lines
+from photogram.targets.splined import spline_lines
 from photogram.targets.tables import board_facts, views, worst_points
 
 __all__ = ["calibration_summary", "report"]
@@ -35,6 +36,7 @@ def calibration_summary(calibrated: Calibrated) -> list[Section]:
         *summary(calibrated.result),
         *([] if calibrated.snooped is None else calibrated.snooped.sections()[ON_TOP:]),
         ("Board", [*fact_lines(board_facts(calibrated)), *worst_points(calibrated)]),
+        ("Splined lenses", spline_lines(calibrated)),
         ("What the priors of cameras have moved", moved_lines(calibrated)),
         ("Views", _views(views(calibrated))),
     ]

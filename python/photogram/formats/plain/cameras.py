@@ -13,6 +13,7 @@ from photogram.errors import InputError
 from photogram.formats.plain.certificates import certified, read_certificates
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
+from photogram.formats.plain.knots import with_knots
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
@@ -83,7 +84,7 @@ def read_cameras(tables: Tables) -> Cameras:
         found.weights_given.append(bool(weights[row]))
     return replace(
         found,
-        cameras=read_covariances(tables).cameras(found.cameras),
+        cameras=with_knots(tables, read_covariances(tables).cameras(found.cameras)),
         shutters=shutters(tables, table, found.cameras, found.sizes),
     )
 
@@ -200,7 +201,7 @@ def _camera(tables: Tables, table: ColumnTable, row: int, given: _Row, size: Siz
             values = {own["cx"]: size[0] / 2, own["cy"]: size[1] / 2} | values
     elif "cx" in own and image != "px":
         values = {own["cx"]: 0.0, own["cy"]: 0.0} | values
-    constants = Camera(model, dict.fromkeys(powers, 1.0), unit="mm").constants
+    constants = [*powers][len(powers) - _MODELS[model][2] :]
     return Camera(
         model,
         values,

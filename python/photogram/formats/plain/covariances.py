@@ -17,6 +17,7 @@ from photogram.io.delimited import ColumnTable
 from photogram.messages import listed, quoted
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.network.knots import Knot
 from photogram.network.observations import Observation, Prior
 from photogram.network.trajectories import GyroBias, RotationCoefficient
 from photogram.network.unknowns import Boresight, Drift, LeverArm, Sensor, Shift, Unknown
@@ -211,6 +212,8 @@ def covariance_tables(
             rows += _pairs(CAMERA, each.name, names, np.asarray(matrix) * signs * signs[:, np.newaxis])
     for prior in (each for each in block.observations if isinstance(each, Prior)):
         unknown = prior.unknown
+        if isinstance(unknown, Knot):
+            continue  # in the table of knots
         units = np.array(list(_units(unknown, DEGREE).values()))
         matrix = prior.precision * units * units[:, np.newaxis]
         rows += _pairs(unknown.KIND, _name(unknown, rigs), unknown.components, matrix)

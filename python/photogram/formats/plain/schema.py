@@ -486,6 +486,13 @@ TABLES: Mapping[str, Schema] = {
         " `spacing_y`, or `tag_size`, `tag_spacing`; `shape` (`held`, `bend`, `points`);"
         " of a `bend` the deflections `bend_x`, `bend_y` (0), `sd_bend_x`, `sd_bend_y` (`inf`)",
     ),
+    "knots": Schema(
+        ("camera", "i", "j", "dx", "dy"),
+        ("camera",),
+        ("i", "j", "dx", "dy", "sd_radial", "sd_tangential"),
+        "`camera`, a splined one; `i`, `j` of a knot along columns and rows, from 0; `dx`, `dy`, `sd_radial`,"
+        " `sd_tangential` (0: known): in units of its stereographic image, observed as 0 where weighted",
+    ),
     "bases": Schema(
         ("rig", *_ENDS, "distance"),
         ("rig", *_ENDS),

@@ -14,6 +14,7 @@ from photogram.formats.plain.boards import ASSUMED, boards_table, levels
 from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
 from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.image_axes import to_tables
+from photogram.formats.plain.knots import knots_table
 from photogram.formats.plain.moving import line_times_table, moving_columns
 from photogram.formats.plain.observed import observed_tables
 from photogram.formats.plain.rigs import Rigs
@@ -122,6 +123,7 @@ def write(project: Project) -> Mapping[str, bytes]:
         "line_times": line_times_table(block),
         **observed_tables(block, cameras, rigs, films),
         "boards": boards_table(project.boards, block),
+        "knots": knots_table(cameras),
         "lengths": lengths_table(project.statement.get("lengths", ())),
     }
     files = {f"{name}.csv": csv_text(columns) for name, columns in tables.items() if columns}
@@ -236,9 +238,6 @@ def _quoted(text: str) -> str:
 
 def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
     """Return the columns of the cameras of a project."""
-    for each in cameras:
-        if each.knots is not None:
-            raise InputError(f"the camera {each.title} has knots, which tables of cameras cannot hold")
     columns: dict[str, Any] = {
         "camera": [each.name for each in cameras],
         "model": [each.model for each in cameras],

@@ -151,4 +151,5 @@ def _observations(calibrated: Calibrated) -> tuple[Floats, Any]:
 def _freed(calibrated: Calibrated) -> tuple[bool, bool]:
     """Return whether focal lengths and centres, and whether lens terms were free."""
     free = {each.names[k] for each in calibrated.cameras for k in each.estimated}
-    return bool(free & CORE), bool(free - CORE)
+    knots = any(each.given.knot_unknowns for each in calibrated.cameras)
+    return bool(free & CORE), bool(free - CORE) or knots
