@@ -23,11 +23,11 @@ from photogram.targets.start import Start
 
 __all__ = ["adjusted_start", "snooped_start"]
 
-ROUGHLY, FINELY = 0.5, 1e-7
-"""Of a standard deviation: where the first and the last steps of a splined lens end."""
 ROUNDS = 8
 """In which the standard deviation of corners is found, at the most, and the change that is none."""
 CHANGE = 0.01
+ROUGHLY, FINELY = 0.5, 1e-7
+"""Of a standard deviation: where the first and the last steps of a splined lens end."""
 
 
 def adjusted_start(

@@ -13,7 +13,7 @@ from photogram.network.knots import KNOTTED
 __all__ = ["WEAK", "with_knot_sd"]
 
 WEAK = (1.0, 0.1)
-"""Radial and tangential, in units of the stereographic image: 1 is the middle to 53 degrees off the axis."""
+"""Along the radius and across, in units of the stereographic image: 1 is the middle to 53 degrees off the axis."""
 
 
 def with_knot_sd(
@@ -26,7 +26,7 @@ def with_knot_sd(
     cameras
         The cameras.
     knot_sd
-        Radial and tangential. None: `WEAK`, unless `regularise` says them.
+        Along the radius and across. None: `WEAK`, unless `regularise` says them.
     regularise
         Whose priors cameras have.
 
