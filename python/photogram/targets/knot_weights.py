@@ -13,7 +13,7 @@ from photogram.network.knots import KNOTTED
 __all__ = ["WEAK", "with_knot_sd"]
 
 WEAK = (1.0, 0.1)
-"""Along the radius and across, in units of the stereographic image: 1 is the middle to 53 degrees off the axis."""
+"""Along the radius and across, in units of the stereographic image: 1 is 53 degrees off the axis."""
 
 
 def with_knot_sd(
