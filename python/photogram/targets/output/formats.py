@@ -40,8 +40,8 @@ def camera_files(calibrated: Calibrated, to: str, need: float | None = None) -> 
         `opencv_yaml`, `ros_camera_info` (a file a camera), `kalibr_camchain` (one file), `mrcal` (a
         `.cameramodel` a camera, with the calibration where mrcal could have made it).
     need
-        Of `mrcal`: the largest standard deviation (pixels, of directions) inside the `valid_intrinsics_region`
-        of its cameras; None: there is no such region.
+        Of `mrcal`: the largest standard deviation (pixels, of directions) inside the
+        `valid_intrinsics_region` of its cameras; None: there is no such region.
 
     Returns
     -------
