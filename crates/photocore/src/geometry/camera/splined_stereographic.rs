@@ -245,8 +245,7 @@ impl CameraModel for SplinedStereographic {
         let (place, by_ray) = Self::seen(u);
         let ([a, b], by_place) = self.moved(place);
         let by = |row: usize, k: usize| by_place[row][0] * by_ray[0][k] + by_place[row][1] * by_ray[1][k];
-        let by_u =
-            [(0, fx), (1, fy)].map(|(row, f)| Vector3::new(by(row, 0), -by(row, 1), -by(row, 2)) * f);
+        let by_u = [(0, fx), (1, fy)].map(|(row, f)| Vector3::new(by(row, 0), -by(row, 1), -by(row, 2)) * f);
         let mut by_parameters = [[0.0; 8]; 2];
         (by_parameters[0][0], by_parameters[0][2]) = (a, 1.0);
         (by_parameters[1][1], by_parameters[1][3]) = (b, 1.0);

@@ -73,7 +73,8 @@ impl ObservationModel for Film {
     }
 
     fn check(&self) -> Result<(), Fault> {
-        let known = self.components.iter().all(|&own| own < 6) && self.observed.len() == self.components.len();
+        let known =
+            self.components.iter().all(|&own| own < 6) && self.observed.len() == self.components.len();
         if known && self.observed.iter().all(|own| own.is_finite()) { Ok(()) } else { Err(Fault::NotFinite) }
     }
 }
@@ -85,7 +86,8 @@ mod tests {
 
     #[test]
     fn partials_agree_with_differences() {
-        for (roll, components) in [(None, vec![3, 4, 5]), (Some(of_kind(CommonKind::Roll)), vec![0, 2, 3, 5])] {
+        for (roll, components) in [(None, vec![3, 4, 5]), (Some(of_kind(CommonKind::Roll)), vec![0, 2, 3, 5])]
+        {
             agrees(
                 &Film {
                     placement: of_kind(CommonKind::FilmPlacement),

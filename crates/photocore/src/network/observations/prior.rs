@@ -56,7 +56,8 @@ impl ObservationModel for Prior {
         let observed = |k: usize| self.observed.get(k).copied().unwrap_or_default();
         let mut row = 0;
         for (common, &count) in self.components.iter().enumerate() {
-            let missing = sites.common(common).unknowns().enumerate().map(|(k, value)| observed(row + k) - value);
+            let missing =
+                sites.common(common).unknowns().enumerate().map(|(k, value)| observed(row + k) - value);
             rows.residual(row, &missing.collect::<Vec<f64>>());
             rows.by_itself(row, common, count);
             row += count;
