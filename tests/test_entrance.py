@@ -14,7 +14,8 @@ from photogram.cli.job import Writes, roles
 
 PACKAGE = str(files("photogram").joinpath("examples"))
 ELSE = {"plan": ["--strips", "2", "--photos-per-strip", "4"], "new": ["made"], "simulate": ["made"]} | {
-    "stellar-camera places": ["stars.csv", "--utc", "1966-03-01T21:03:05"]
+    "convert-lens": ["camera.cameramodel", "--to", "opencv5"],
+    "stellar-camera places": ["stars.csv", "--utc", "1966-03-01T21:03:05"],
 }
 """Words of commands that need no input, or no example of it."""
 NEEDED = {"absolute-orientation relative": ["stations.csv"], "convert": ["made"]}
@@ -47,6 +48,9 @@ def with_inputs(run, name, where):
         run("absolute-orientation", "--example", "--json", "former.json", "--quiet")
         where["points.csv"] = Path(PACKAGE) / "absolute_orientation" / "points.csv"
         return ["out.csv"]
+    if name == "convert-lens":
+        run("calibrate", "--example", "--to", "mrcal", "--out", "made", "--quiet")
+        Path("camera.cameramodel").write_bytes(next(Path("made", "mrcal").iterdir()).read_bytes())
     if name == "metadata":
         Path("flight").mkdir()
         Path("flight/geo.txt").write_text("EPSG:4979\nDJI_0001.JPG 8.5 47.3 500\n")
@@ -110,7 +114,7 @@ def test_commands_with_a_directory_of_results_have_a_report():
     made = {name for name, command in COMMANDS.items() if roles(command).get("out") is Writes.DIRECTORY}
     assert set(PAGED) <= made
     # The report of `features` is that of `adjust`; the page of `statement` is its result.
-    assert made - set(PAGED) <= {"convert", "features", "new", "simulate", "statement"}
+    assert made - set(PAGED) <= {*("convert", "convert-lens", "features", "new", "simulate", "statement")}
 
 
 def test_help_of_parents_names_their_commands(run):

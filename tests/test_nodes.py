@@ -453,7 +453,7 @@ def test_a_block_without_datum_is_told_at_the_root():
     below = pieces[0].node.form(states[0], [], damping=0.0, threads=1)
     assert below.undetermined is None
     root = pieces[1].node.form(states[1], [below.contribution], damping=0.0, threads=1)
-    kind, _, combinations, _ = root.undetermined
+    kind, _, combinations, *_ = root.undetermined
     assert kind == "undetermined photos"
     assert len(combinations) == 7
 

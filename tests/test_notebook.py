@@ -113,6 +113,7 @@ def test_alike_goes_down_to_the_elements():
 RAISED = [
     errors.PhotogramError("plain"),
     errors.InputError("is wrong", file=Path("a.txt"), record=3, text="the record"),
+    errors.ContradictionError("is mirrored"),
     errors.AdjustmentError("cannot be"),
     errors.OutOfMemoryError("too large"),
     errors.RankError("undetermined", ["1", "2"], ["p"], ["lens"]),

@@ -9,6 +9,7 @@ import photogram
 from photogram import collection
 from photogram.absolute_orientation import Orientation
 from photogram.collection import AdjustedCollection
+from photogram.results.films import OnFilm
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.show.ways import Shown, axes_of, columns_of, report_of
@@ -139,7 +140,9 @@ def test_a_wrong_weighted_point_of_a_collection_is_named():
 
 
 def test_a_result_is_one_class():
-    assert Result.__bases__ == AdjustedCollection.__bases__ == (AdjustedNetwork,)
+    assert AdjustedCollection.__bases__ == (AdjustedNetwork,)
+    # What it says of films is a part of a block alone.
+    assert Result.__bases__ == (OnFilm, AdjustedNetwork)
     assert Shown in Orientation.__bases__
 
 

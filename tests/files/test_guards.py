@@ -50,6 +50,10 @@ RUNS = {
         ["former.json", "later.json"],
     ),
     "collection": (["collection", "ring.txt"], ["ring.txt"]),
+    "calibrate": (["calibrate", "corners.csv"], ["corners.csv"]),
+    "certificate": (["certificate", "rc10.toml"], ["rc10.toml"]),
+    "camera compare": (["camera", "compare", "rc10.toml", "later.toml"], ["rc10.toml", "later.toml"]),
+    "convert-lens": (["convert-lens", "project", "--to", "opencv5"], ["project/images.csv"]),
     "perspective-center": (["perspective-center", "grid.deck"], ["grid.deck"]),
     "stellar-camera plate": (["stellar-camera", "plate.toml"], ["plate.toml", "stars.csv", "images.csv"]),
     "stellar-camera exposures": (["stellar-camera", "exposures", "night.toml"], ["night.toml", "images.csv"]),
@@ -68,7 +72,13 @@ RUNS = {
     "simulate": (["simulate"], []),
     "statement": (["statement", "project", "--sd", "check=0.02"], ["project/images.csv"]),
 }
-FOLDERS = {"stellar-camera plate": "stellar", "stellar-camera exposures": "exposures"}
+FOLDERS = {
+    "stellar-camera plate": "stellar",
+    "stellar-camera exposures": "exposures",
+    "calibrate": "board",
+    "certificate": "certificate",
+    "camera compare": "certificate",
+}
 
 
 def registered(typer_app=app, before=""):
@@ -119,6 +129,7 @@ def place(tmp_path, request):
     (tmp_path / "flight" / "geo.txt").write_text("EPSG:4979\nDJI_0001.JPG 8.5 47.3 500\n")
     (tmp_path / "former.json").write_text("{}")
     (tmp_path / "later.json").write_text("{}")
+    (tmp_path / "later.toml").write_text("[certificate]\n")
     (tmp_path / "grid.csv").write_text("point,x_um,y_um\n1,0,0\n")
     (tmp_path / "catalogue.csv").write_text(
         "id,ra_deg,dec_deg,pm_ra_mas,pm_dec_mas,parallax_mas,magnitude\n1,10,20,0,0,0,1\n"

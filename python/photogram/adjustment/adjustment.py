@@ -407,7 +407,7 @@ def named(
     message: str,
     combinations: list[_photocore.CombinationRow],
     points: list[int],
-    seconds: list[float],
+    seconds: Sequence[float] = (),
     *,
     unknowns: Sequence[Unknown] | None = None,
 ) -> AdjustmentError:

@@ -220,9 +220,11 @@ def _unknowns(block: Block, details: list[dict[str, Any]]) -> list[Any]:
         each = [own for node in details for place, own in node["unknowns"] if place == row]
         # The last node that has it is the root.
         change, cofactors, redundancy = _of_home(
-            [(own[0], own[3], own[4]) for own in each], len(each) - 1, given.deviations, None
+            [(own[0], own[3], own[5]) for own in each], len(each) - 1, given.deviations, None
         )
-        found.append((change, *each[-1][1:3], cofactors, redundancy, sum(own[5] for own in each)))
+        _, position, attitude, _, with_former, *_ = each[-1]
+        observed = sum(own[6] for own in each)
+        found.append((change, position, attitude, cofactors, with_former, redundancy, observed))
     return found
 
 
