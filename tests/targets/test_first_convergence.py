@@ -120,4 +120,5 @@ def test_every_third_picture_of_it_is_enough():
     found = calibration(board, first_values(board, corners)).adjust()
     assert found.result.converged
     squares, freedom = found.result.sum_and_freedom
-    assert squares / freedom < 0.35
+    # Of residuals in pixels.
+    assert found.calibration.assumed**2 * squares / freedom < 0.35
