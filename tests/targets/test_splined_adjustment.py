@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from photogram import Block, Camera, Result, adjust
+from photogram import Block, Camera, InputError, Result, adjust, adjust_in_parts
+from photogram.distributed import Division
 from photogram.network.geometry import rotation_angles, rotation_matrix
 from photogram.network.passages import Bend, Figure
 from shared_data import SHARED
@@ -102,3 +103,8 @@ def test_a_start_far_away_ends_in_the_same_place() -> None:
     again = adjust(moved)
     assert again.converged
     assert again.sum_and_freedom[0] == pytest.approx(golden()["solution"]["cost"], rel=1e-9)
+
+
+def test_parts_refuse_unknown_knots() -> None:
+    with pytest.raises(InputError, match=r"blocks in parts: images of the block pass a knots"):
+        adjust_in_parts(board().replace(passages=[]), Division(parts=2))

@@ -21,6 +21,7 @@ from photogram.network.cameras import Camera, CameraRow, camera_rows
 from photogram.network.films import check_scans, reads_pixels
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
+from photogram.network.knots import Knots
 from photogram.network.observations import (
     Observation,
     Rate,
@@ -505,6 +506,12 @@ class Block(Valued, Brief):
         return all_trajectories(self.trajectories, self.observations)
 
     @property
+    def all_passages(self) -> list[Passage]:
+        """What images pass: `passages`, then the splines of cameras with unknown knots."""
+        splined = [(row, each.knot_unknowns) for row, each in enumerate(self.cameras) if each.knot_unknowns]
+        return [*self.passages, *(Knots(row, knots) for row, knots in splined)]
+
+    @property
     def unknowns(self) -> list[Unknown]:
         """What observations, and photos on frames or trajectories, have in common, in order."""
         of_observations = (each for own in self.observations for each in own.unknowns if each is not None)
@@ -513,8 +520,7 @@ class Block(Valued, Brief):
         of_times = [scalar for each in self.timed for scalar in each.scalars]
         coefficients = [each for own in self.trajectories for all_ in own.coefficients for each in all_]
         records = of_records(self.observations)
-        passed: list[Unknown] = [own for each in self.passages for own in each.unknowns]
-        passed += [knot for camera in self.cameras for knot in camera.knot_unknowns]
+        passed = [own for each in self.all_passages for own in each.unknowns]
         return different_unknowns([*sensors, *of_times, *coefficients, *records, *passed, *of_observations])
 
     @property
@@ -683,10 +689,8 @@ def refuse_passages(block: Block, what: str) -> None:
     InputError
         `what` does not take what is named.
     """
-    if block.passages:
-        raise InputError(
-            f"{what}: images of the block pass a {block.passages[0].KIND}, which is not taken there"
-        )
+    if passed := block.all_passages:
+        raise InputError(f"{what}: images of the block pass a {passed[0].KIND}, which is not taken there")
 
 
 def checked(block: Block) -> Block:

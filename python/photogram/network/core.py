@@ -13,7 +13,7 @@ from photogram.memory import available_memory
 from photogram.network.block import Block
 from photogram.network.flown import flown
 from photogram.network.observations import observation_rows
-from photogram.network.passages import PassageRow, passage_rows
+from photogram.network.passages import passage_rows
 from photogram.network.rigs import mount_rows
 from photogram.network.unknowns import Unknown
 from photogram.show.ways import Way
@@ -93,10 +93,7 @@ def block_network(
         trajectories=own.trajectories,
         timed=own.timed,
         image_times=own.image_times,
-        passages=[
-            *passage_rows(block.passages, block.point_ids, block.photo_ids, unknowns),
-            *_knots(block, unknowns),
-        ],
+        passages=passage_rows(block.all_passages, block.point_ids, block.photo_ids, unknowns),
         records=own.records,
         spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
         photo_to_ground=block.photo_to_ground,
@@ -112,16 +109,6 @@ def block_network(
         points_given=options.points_given,
         memory=None if fits_anywhere(block) else available_memory(),
     )
-
-
-def _knots(block: Block, unknowns: Sequence[Unknown]) -> list[PassageRow]:
-    """Return the unknown knots of each camera that has some, as the core takes them."""
-    rows = {id(each): row for row, each in enumerate(unknowns)} if block.cameras else {}
-    return [
-        ("knots", [rows[id(knot)] for knot in camera.knot_unknowns], [number], np.zeros(0))
-        for number, camera in enumerate(block.cameras)
-        if camera.knot_unknowns
-    ]
 
 
 def _and(photos: Floats, records: Floats) -> Floats:

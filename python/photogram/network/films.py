@@ -19,7 +19,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.network.passages import Passage
-from photogram.network.unknowns import Unknown
+from photogram.network.unknowns import Numbers, Unknown
 
 __all__ = [
     "Film",
@@ -44,23 +44,8 @@ PATTERNS = ("none", "w1 w2", "ebner", "grid")
 
 
 @dataclass(frozen=True, eq=False)
-class FilmNumbers(Unknown):
-    """Up to three numbers and their standard deviations.
-
-    Parameters
-    ----------
-    name
-        For reports.
-    value, sd
-        Of its unknowns, or one for all.
-    """
-
-    value: ArrayLike = 0.0
-    sd: ArrayLike = np.inf
-
-    def _position(self) -> Floats:
-        count = len(self.components)
-        return np.append(shaped(f"value of {self.title}", self.value, (count,)), np.zeros(3 - count))
+class FilmNumbers(Numbers):
+    """Those that readings of scanned films have in common."""
 
 
 @dataclass(frozen=True, eq=False)

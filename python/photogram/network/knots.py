@@ -12,11 +12,13 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import frozen, numbers, shaped
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.network.unknowns import Unknown
+from photogram.network.passages import Passage
+from photogram.network.unknowns import Numbers, Unknown
 
 __all__ = [
     "KNOTTED",
     "Knot",
+    "Knots",
     "beyond_knots",
     "checked_knot_sd",
     "checked_knots",
@@ -31,7 +33,7 @@ MOST = 10_000
 
 
 @dataclass(frozen=True, eq=False)
-class Knot(Unknown):
+class Knot(Numbers):
     """Displacements dx, dy at one knot of a camera, in units of the stereographic image.
 
     Parameters
@@ -48,12 +50,34 @@ class Knot(Unknown):
 
     KIND = "knot"
 
-    value: ArrayLike = 0.0
-    sd: ArrayLike = np.inf
     covariance: Floats | None = None
 
-    def _position(self) -> Floats:
-        return np.append(shaped(f"value of {self.title}", self.value, (2,)), 0.0)
+
+@dataclass(frozen=True, eq=False)
+class Knots(Passage):
+    """That images of a camera pass its spline.
+
+    Parameters
+    ----------
+    camera
+        The row of the camera in its block.
+    knots
+        Its knots, row by row.
+    """
+
+    KIND = "knots"
+
+    camera: int
+    knots: tuple[Knot, ...]
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """The knots."""
+        return self.knots
+
+    def of(self, points: Mapping[str, int], photos: Mapping[str, int]) -> list[int]:
+        """Return the row of its camera."""
+        return [self.camera]
 
 
 def knot_unknowns(camera: str, knots: Floats | None, sd: Floats | None) -> tuple[Knot, ...]:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import names, shaped, shown
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.network.unknowns import Unknown
+from photogram.network.unknowns import Numbers, Unknown
 
 __all__ = ["Bend", "Figure", "Passage", "PassageRow", "checked_passages", "passage_rows"]
 
@@ -21,26 +21,10 @@ PassageRow = tuple[str, list[int], list[int], Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class Bend(Unknown):
-    """The two numbers w of a figure: of a board, the deflections of its middle along x and along y.
-
-    Parameters
-    ----------
-    name
-        For reports.
-    value
-        (2,) in the linear unit.
-    sd
-        (2,) standard deviations of the same, or one for both.
-    """
+class Bend(Numbers):
+    """The two numbers w of a figure, lengths: of a board, how far its middle is bent along x and along y."""
 
     KIND = "bend"
-
-    value: ArrayLike = 0.0
-    sd: ArrayLike = np.inf
-
-    def _position(self) -> Floats:
-        return np.append(shaped(f"value of {self.title}", self.value, (2,)), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +126,8 @@ def passage_rows(
     passages: Sequence[Passage], points: Sequence[str], photos: Sequence[str], unknowns: Sequence[Unknown]
 ) -> list[PassageRow]:
     """Return what the core takes."""
+    if not passages:
+        return []
     rows = {id(each): row for row, each in enumerate(unknowns)}
     places = _places(passages, points, photos)
     return [

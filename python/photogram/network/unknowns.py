@@ -26,6 +26,7 @@ __all__ = [
     "Level",
     "LeverArm",
     "Line",
+    "Numbers",
     "Plane",
     "PlumbLine",
     "Sensor",
@@ -148,6 +149,26 @@ class Unknown:
     def row(self) -> UnknownRow:
         """Return what the core takes."""
         return self.KIND, self.position.tolist(), self.attitude.ravel().tolist(), self.deviations.tolist()
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers(Unknown):
+    """One to three numbers and their standard deviations.
+
+    Parameters
+    ----------
+    name
+        For reports.
+    value, sd
+        Of its unknowns, or one for all.
+    """
+
+    value: ArrayLike = 0.0
+    sd: ArrayLike = np.inf
+
+    def _position(self) -> Floats:
+        count = len(self.components)
+        return np.append(shaped(f"value of {self.title}", self.value, (count,)), np.zeros(3 - count))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,11 @@ from typing import Self
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
-from photogram.targets.imaging import TURNED, motion_partials
+from photogram.targets.imaging import TURNED, motion_partials, values_of
+from photogram.targets.vision import moved_by
 
 __all__ = ["HELD", "Moved", "Points"]
 
@@ -42,12 +42,11 @@ class Moved:
     @property
     def values(self) -> Floats:
         """(p,) their values."""
-        knots = self.camera.knots
-        return self.camera.values if knots is None else np.append(self.camera.values, knots)
+        return values_of(self.camera)
 
     def stepped(self, free: Sequence[int], moving: slice, step: Floats) -> Self:
-        """Return it after a step of free parameters and of the motion: R <- Exp(w) R, t <- t + dt."""
-        values = self.values
+        """Return it after a step of free parameters and of the motion."""
+        values = self.values.copy()
         values[free] += step[: len(free)]
         own = self.camera
         k = len(own.names)
@@ -57,10 +56,7 @@ class Moved:
         )
         six = np.zeros(6)
         six[moving] = step[len(free) :]
-        motion = self.motion.copy()
-        motion[:3, :3] = _photocore.vector_rotations(six[np.newaxis, 3:])[0] @ motion[:3, :3]
-        motion[:3, 3] += six[:3]
-        return type(self)(camera, motion)
+        return type(self)(camera, moved_by(self.motion, six))
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,12 +11,12 @@ from typing import Literal
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
 from photogram.targets.imaging import imaged, motion_partials, rays
+from photogram.targets.vision import moved_by
 
 __all__ = ["Criterion", "Fitted", "differences_at", "fitted_motion", "points_at"]
 
@@ -114,16 +114,10 @@ def fitted_motion(
             normal, right = _angle_step(moved, aims, weights**2, by_motion)
         step = np.zeros(6)
         step[free] = np.linalg.solve(normal, right)
-        motion[:3] = _stepped(motion, step)
+        motion = moved_by(motion, step)
         if np.abs(step[3:]).max() < CLOSE and np.abs(step[:3]).max() < CLOSE * np.min(distances):
             break
     return Fitted(motion, finite, count)
-
-
-def _stepped(motion: Floats, step: Floats) -> Floats:
-    turn = _photocore.vector_rotations(step[np.newaxis, 3:])[0]
-    moved = turn @ motion[:3, 3] + step[:3]
-    return np.column_stack([turn @ motion[:3, :3], moved])
 
 
 def _pixel_step(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.attitudes import Attitudes
 
@@ -16,6 +17,7 @@ __all__ = [
     "composed",
     "cross_matrices",
     "inverted",
+    "moved_by",
     "of_vectors",
     "photo_poses",
     "sensor_pose",
@@ -64,6 +66,12 @@ def sensor_pose(position: Floats, attitude: Floats) -> Floats:
     """
     rotation = FLIP @ attitude.T @ FLIP
     return composed(rotation, -rotation @ FLIP @ position)
+
+
+def moved_by(pose: Floats, step: Floats) -> Floats:
+    """Return (4, 4) a pose after a small motion (dt, w) of all that it leads to: p <- Exp(w) p + dt."""
+    turn = _photocore.vector_rotations(step[np.newaxis, 3:])[0]
+    return composed(turn @ pose[:3, :3], turn @ pose[:3, 3] + step[:3])
 
 
 def cross_matrices(vectors: Floats) -> Floats:

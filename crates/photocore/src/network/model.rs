@@ -409,12 +409,13 @@ impl Bundle {
         let bent = (!plain).then_some(Bent { refracted, mounted, films });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
         let local: &[[f64; 3]] = local.as_chunks().0;
-        let mut points = parallel::map_in_place(local.len(), 1024, &|point| place(&local[point]));
-        if !self.passages.is_empty() {
+        let mut points = if self.passages.have_figures() {
             let shift = |point| self.passages.shift(point, |common| commons[common].vector());
-            let shifted = (0..local.len()).map(|point| Vector3::from(local[point]) + shift(point));
-            points = shifted.map(|own| place(&own.into())).collect();
-        }
+            let shifted = |point| place(&(Vector3::from(local[point]) + shift(point)).into());
+            parallel::map_in_place(local.len(), 1024, &shifted)
+        } else {
+            parallel::map_in_place(local.len(), 1024, &|point| place(&local[point]))
+        };
         points.extend(tied.iter().map(place));
         Stations { photos: stations, points, tied, commons, bent }
     }

@@ -49,21 +49,20 @@ impl Bundle {
     /// The common unknowns that an image steps with by what it passes.
     fn passed_by(&self, image: usize) -> Own {
         let photo = self.images[image].photo;
-        self.passages.commons((image, photo, self.point_of(image)), columns(&self.cameras[photo]))
+        let columns = splined(&self.cameras[photo]).map_or(0, SplinedStereographic::columns);
+        self.passages.commons((image, photo, self.point_of(image)), columns)
     }
 
     /// Finds the knots that images may step with, from where points and photos stand at given values of the unknowns, and counts which common
     /// unknowns they step with by what they pass.
     pub(super) fn open_windows(&mut self, unknowns: &[f64]) {
-        if self.passages.is_empty() {
-            return;
-        }
         if !self.passages.lenses().is_empty() {
             let windows = self.of_seen(unknowns, |own, u| own.window(u, MARGIN));
             self.passages.open(windows);
         }
-        let all: Vec<Own> = (0..self.images.len()).map(|image| self.passed_by(image)).collect();
-        all.into_iter().flatten().for_each(|common| self.commons[common].uses += 1);
+        for image in 0..self.images.len() {
+            self.passed_by(image).into_iter().for_each(|common| self.commons[common].uses += 1);
+        }
     }
 
     /// Whether there are images of which the knots are others than those that they may step with.
@@ -91,12 +90,8 @@ impl Bundle {
             let of_image = |image: usize| {
                 let photo = self.images[image].photo;
                 self.passages.lens(photo)?;
-                match &stations.photos[photo].camera {
-                    Camera::SplinedStereographic(own) => {
-                        take(own, &self.sight_bent((&stations, bent), image, point))
-                    }
-                    _ => None,
-                }
+                let camera = splined(&stations.photos[photo].camera)?;
+                take(camera, &self.sight_bent((&stations, bent), image, point))
             };
             images.map(of_image).collect::<Vec<_>>()
         };
@@ -191,11 +186,8 @@ impl Bundle {
         columns: &mut Columns<'_, '_>,
     ) {
         let photo = self.images[group].photo;
-        let (Some(lens), Camera::SplinedStereographic(camera)) =
-            (self.passages.lens(photo), &stations.photos[photo].camera)
-        else {
-            return;
-        };
+        let (lens, camera) = (self.passages.lens(photo), splined(&stations.photos[photo].camera));
+        let (Some(lens), Some(camera)) = (lens, camera) else { return };
         let Some(patch) = camera.patch(&self.sight_bent((stations, bent), group, local)) else { return };
         let [fx, fy, ..] = camera.parameters();
         for (knot, weight) in patch.knots(camera.columns()) {
@@ -239,10 +231,10 @@ impl Bundle {
     }
 }
 
-/// How many knots a camera has in a row.
-fn columns(camera: &Camera) -> usize {
+/// A camera as one with a spline; None of all others.
+fn splined(camera: &Camera) -> Option<&SplinedStereographic> {
     match camera {
-        Camera::SplinedStereographic(own) => own.columns(),
-        _ => 0,
+        Camera::SplinedStereographic(own) => Some(own),
+        _ => None,
     }
 }

@@ -144,6 +144,11 @@ impl Passages {
         self.figures.is_empty() && self.lenses.is_empty() && self.scans.is_empty()
     }
 
+    /// Whether there are points that are shifted.
+    pub fn have_figures(&self) -> bool {
+        !self.figures.is_empty()
+    }
+
     /// The film of a photo.
     pub fn film(&self, photo: usize) -> Option<&FilmOf> {
         Some(&self.scans[(*self.scan_of.get(photo)?)?].film)
