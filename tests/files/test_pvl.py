@@ -4,7 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from photogram.errors import InputError
@@ -118,6 +118,8 @@ VALUES = st.one_of(
 )
 
 
+@example("{")
+@example(["("])
 @given(VALUES | st.lists(VALUES) | st.builds(Quantity, VALUES, st.just("km")))
 def test_values_come_back(value):
     label = Group("", "label", items=[("key", value)])

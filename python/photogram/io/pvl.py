@@ -192,7 +192,8 @@ def _close(reader: _Reader, open_groups: list[Group], kind: str, key: str, start
 
 def _value(reader: _Reader, key: str, depth: int = 0) -> Value:
     """Read a value, with its unit if it has one."""
-    value = _list(reader, key, depth) if reader.token.text in _OPENING else _scalar(reader, key)
+    opens = reader.token.kind == "sign" and reader.token.text in _OPENING
+    value = _list(reader, key, depth) if opens else _scalar(reader, key)
     return Quantity(value, reader.take().text.strip()) if reader.token.kind == "unit" else value
 
 
