@@ -4,7 +4,7 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
-from pkgutil import resolve_name
+from pkgutil import iter_modules, resolve_name
 
 import pytest
 
@@ -28,6 +28,17 @@ def test_every_way_to_import_works_in_a_new_process(statement, name):
     program = f"{statement}; print({name}.__name__)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == name.rpartition(".")[2]
+
+
+@pytest.mark.parametrize("package", ["photogram", "photogram.targets", "photogram.formats"])
+def test_no_name_that_is_loaded_when_asked_for_is_that_of_a_module(package):
+    """The import of such a module would stand in the place of what it has."""
+    home = import_module(package)
+    folder = Path(home.__file__).parent
+    taken = {
+        each.stem for each in folder.iterdir() if each.suffix == ".py" or (each / "__init__.py").exists()
+    }
+    assert {*home._HOMES} & taken == set()
 
 
 def test_other_names_are_not_found():

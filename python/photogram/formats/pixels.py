@@ -18,6 +18,7 @@ from photogram.formats.plain.writing import camera_table, known_cameras
 from photogram.formats.project import Project, assembled
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import ColumnTable, read_columns
+from photogram.io.files import read_beginning
 from photogram.messages import Message, quoted
 
 __all__ = ["FORMAT", "TITLE", "corner_of", "pixel_table"]
@@ -79,9 +80,8 @@ def _recognises(path: Path) -> bool:
     if not path.is_file() or path.suffix.lower() not in (".csv", ".tsv", ".txt"):
         return False
     try:
-        with path.open("rb") as file:
-            begin = file.read(4096).decode("latin-1")
-    except OSError:
+        begin = read_beginning(path)
+    except InputError:
         return False
     words = {_SYNONYMS.get(each, each) for each in _words(begin)}
     return set(_NEEDED) <= words

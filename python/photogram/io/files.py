@@ -10,7 +10,7 @@ from pathlib import Path
 from photogram.errors import InputError
 from photogram.io.sheets import sheet_text
 
-__all__ = ["read_bytes", "read_lines", "read_text", "reading"]
+__all__ = ["read_beginning", "read_bytes", "read_lines", "read_text", "reading"]
 
 HEAD = 4096
 """Bytes in which text of two bytes a character is told, where it has no mark."""
@@ -39,6 +39,19 @@ def read_bytes(path: Path) -> bytes:
         return path.read_bytes()
 
 
+def read_beginning(path: Path, size: int = HEAD) -> str:
+    """Read what a text file begins with, by which formats are told, as :func:`read_text` does: `size` bytes.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
+    with reading(path), path.open("rb") as file:
+        text = _decoded(file.read(size), whole=False)
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
 def read_text(path: Path) -> str:
     """Read a text file: UTF-8, UTF-16, else that of Windows; any line ends become line feeds.
 
@@ -56,10 +69,11 @@ def read_text(path: Path) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
-def _decoded(data: bytes) -> str:
+def _decoded(data: bytes, *, whole: bool = True) -> str:
+    """Decode the bytes of a file; where they are not the whole of it, its last character may be cut."""
     for encoding in (_wide(data) or "utf-8-sig", "cp1252"):
         try:
-            return data.decode(encoding)
+            return codecs.getincrementaldecoder(encoding)().decode(data, whole)
         except UnicodeDecodeError:
             continue
     return data.decode("latin-1")

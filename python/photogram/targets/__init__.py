@@ -1,32 +1,39 @@
 """Calibration with targets: boards, their corners in pictures, and what these say of cameras and rigs."""
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from photogram.arguments.annotations import check_arguments
-from photogram.targets.appraisal import appraise
-from photogram.targets.board import Board
-from photogram.targets.calibrated import Calibrated
-from photogram.targets.calibration import Calibration
-from photogram.targets.compared import CameraDifference
-from photogram.targets.conversion import Conversion, convert_lens
-from photogram.targets.corners import Corners
-from photogram.targets.cross_validated import cross_validate
-from photogram.targets.cross_validation import CrossValidation
-from photogram.targets.differences import difference
-from photogram.targets.first import FirstCalibration, first_values
-from photogram.targets.maps import UncertaintyCurve, UncertaintyMap
-from photogram.targets.new_views import Candidate, NewView, Suggestions
-from photogram.targets.output.formats import camera_files
-from photogram.targets.reading import read
-from photogram.targets.residual_groups import residual_groups
-from photogram.targets.simulation import simulate_corners
-from photogram.targets.stereo import distance_uncertainty, triangulate
-from photogram.targets.suggestions import suggest_views
-from photogram.targets.triangulation import Triangulated
-from photogram.targets.uncertainty import (
-    projection_uncertainty,
-    uncertainty_against_distance,
-    uncertainty_map,
-)
-from photogram.targets.worth import Worth, WorthOptions
+
+if TYPE_CHECKING:
+    from photogram.targets.appraisal import appraise
+    from photogram.targets.board import Board
+    from photogram.targets.calibrated import Calibrated
+    from photogram.targets.calibration import Calibration
+    from photogram.targets.compared import CameraDifference
+    from photogram.targets.conversion import Conversion, convert_lens
+    from photogram.targets.corners import Corners
+    from photogram.targets.cross_validated import cross_validate
+    from photogram.targets.cross_validation import CrossValidation
+    from photogram.targets.differences import difference
+    from photogram.targets.first import FirstCalibration, first_values
+    from photogram.targets.grouping import residual_groups
+    from photogram.targets.maps import UncertaintyCurve, UncertaintyMap
+    from photogram.targets.new_views import Candidate, NewView, Suggestions
+    from photogram.targets.output.formats import camera_files
+    from photogram.targets.reading import read
+    from photogram.targets.simulation import simulate_corners
+    from photogram.targets.stereo import distance_uncertainty, triangulate
+    from photogram.targets.suggestions import suggest_views
+    from photogram.targets.triangulation import Triangulated
+    from photogram.targets.uncertainty import (
+        projection_uncertainty,
+        uncertainty_against_distance,
+        uncertainty_map,
+    )
+    from photogram.targets.worth import Worth, WorthOptions
 
 __all__ = [
     "Board",
@@ -77,7 +84,40 @@ _MADE = {
 }
 """What functions make, and users do not."""
 
-check_arguments(globals(), set(__all__) - _MADE)
+_HOMES = {
+    "appraise": "appraisal",
+    "Board": "board",
+    "Calibrated": "calibrated",
+    "Calibration": "calibration",
+    "camera_files": "output.formats",
+    "CameraDifference": "compared",
+    "Candidate": "new_views",
+    "Conversion": "conversion",
+    "convert_lens": "conversion",
+    "Corners": "corners",
+    "cross_validate": "cross_validated",
+    "CrossValidation": "cross_validation",
+    "difference": "differences",
+    "distance_uncertainty": "stereo",
+    "first_values": "first",
+    "FirstCalibration": "first",
+    "NewView": "new_views",
+    "projection_uncertainty": "uncertainty",
+    "read": "reading",
+    "residual_groups": "grouping",
+    "simulate_corners": "simulation",
+    "suggest_views": "suggestions",
+    "Suggestions": "new_views",
+    "triangulate": "stereo",
+    "Triangulated": "triangulation",
+    "uncertainty_against_distance": "uncertainty",
+    "uncertainty_map": "uncertainty",
+    "UncertaintyCurve": "maps",
+    "UncertaintyMap": "maps",
+    "Worth": "worth",
+    "WorthOptions": "worth",
+}
+"""The module of each name, loaded when it is first asked for: most blocks are no boards."""
 
 WAYS = {
     "document_of": ("document",),
@@ -86,3 +126,16 @@ WAYS = {
     "report_of": ("report",),
 }
 """The files that show a result, by the names of the ways: see `photogram.show.ways`."""
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    if name not in _MADE:
+        check_arguments(globals(), [name])
+    return globals()[name]
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.io.delimited import read_columns
-from photogram.io.files import read_text
+from photogram.io.files import read_beginning
 from photogram.io.toml import TomlFile
 from photogram.io.tree import Tree
 from photogram.io.yaml_text import read_yaml_text
@@ -31,7 +31,7 @@ def is_board(path: Path) -> bool:
     """Return whether a file describes a board: by its name, or by the type of a target of Kalibr."""
     if path.name == BOARD_FILE:
         return True
-    return path.suffix.lower() in (".yaml", ".yml") and "target_type" in read_text(path)
+    return path.suffix.lower() in (".yaml", ".yml") and "target_type" in read_beginning(path)
 
 
 def read_board(path: Path) -> Board:

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.io.delimited import ColumnTable, read_columns, read_rows
-from photogram.io.files import read_lines
+from photogram.io.files import read_beginning
 from photogram.io.numbers import finite_number
 from photogram.targets.board import Board
 from photogram.targets.measured import Measured
@@ -44,7 +44,7 @@ def _spelled(names: Sequence[str]) -> list[str]:
 
 def _header(path: Path) -> list[str]:
     """Return the columns of the first line that has any."""
-    for line in read_lines(path)[:30]:
+    for line in read_beginning(path).splitlines():
         bare = line.strip()
         if bare and not bare.startswith("#"):
             return _spelled([cell.strip('" ').lower() for cell in bare.replace(";", ",").split(",")])
@@ -63,7 +63,9 @@ def is_headless(path: Path) -> bool:
     """Return whether a file has rows of a time, a corner, x and y, and no header."""
     if path.suffix.lower() not in (".csv", ".txt"):
         return False
-    first = next((line for line in read_lines(path)[:30] if line.strip() and line.strip()[0] != "#"), "")
+    first = next(
+        (line for line in read_beginning(path).splitlines() if line.strip() and line.strip()[0] != "#"), ""
+    )
     cells = first.replace(",", " ").split()
     try:
         return len(cells) == len(HEADLESS) and all(finite_number(cell) >= 0 for cell in cells[:2])
@@ -73,7 +75,7 @@ def is_headless(path: Path) -> bool:
 
 def is_vnl(path: Path) -> bool:
     """Return whether a file is the text of mrcal: a comment that names its columns."""
-    heads = [line[1:].split() for line in read_lines(path)[:30] if line.startswith("#")]
+    heads = [line[1:].split() for line in read_beginning(path).splitlines() if line.startswith("#")]
     return any(head[:3] == ["filename", "x", "y"] for head in heads)
 
 

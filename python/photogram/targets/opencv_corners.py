@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.files import read_bytes
+from photogram.io.files import read_beginning, read_bytes
 from photogram.io.tree import Tree, read_json
 from photogram.io.yaml_text import read_yaml_text
 from photogram.messages import Message
@@ -20,11 +20,11 @@ from photogram.targets.board import Board
 from photogram.targets.measured import Measured
 from photogram.targets.npz_arrays import read_arrays
 
-__all__ = ["is_npz", "is_storage", "read_npz", "read_storage"]
+__all__ = ["BEGIN", "is_npz", "is_storage", "read_npz", "read_storage"]
 
 POINTS = "image_points"
 BEGIN = 1 << 20
-"""Bytes in which the name of the points is looked for."""
+"""Bytes in which a name that tells a format is looked for."""
 NEAR = 1e-6
 """Of the spacing: what points may be off a grid to be those of one."""
 
@@ -33,8 +33,7 @@ def is_storage(path: Path) -> bool:
     """Return whether a file of OpenCV holds corners: by the name of their matrix."""
     if path.suffix.lower() not in (".yml", ".yaml", ".xml", ".json"):
         return False
-    with path.open("rb") as file:
-        return POINTS.encode() in file.read(BEGIN)
+    return POINTS in read_beginning(path, BEGIN)
 
 
 def is_npz(path: Path) -> bool:

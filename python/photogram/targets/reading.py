@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.io.files import read_text, reading
+from photogram.io.files import read_beginning, reading
 from photogram.messages import counted, listed
 from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board, Shape
@@ -29,7 +29,7 @@ from photogram.targets.knot_weights import with_knot_sd
 from photogram.targets.lens_fit import KNOTS
 from photogram.targets.measured import Grouping, Measured, ViewBy, grouped
 from photogram.targets.mrcal_model import KEY, read_model
-from photogram.targets.opencv_corners import is_npz, is_storage, read_npz, read_storage
+from photogram.targets.opencv_corners import BEGIN, is_npz, is_storage, read_npz, read_storage
 from photogram.targets.start import Regularisation, Synchronisation
 
 __all__ = ["holds_targets", "read"]
@@ -52,7 +52,7 @@ class _Form:
 
 
 def _of_model(path: Path) -> bool:
-    return path.suffix == MODEL or (path.suffix == ".txt" and KEY in read_text(path))
+    return path.suffix == MODEL or (path.suffix == ".txt" and KEY in read_beginning(path, BEGIN))
 
 
 _FORMS = (

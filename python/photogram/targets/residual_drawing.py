@@ -14,7 +14,7 @@ from photogram.plots.panels import Where, handed_out, panels, placed, scale_bars
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.targets.calibrated import Calibrated
-from photogram.targets.residual_groups import NOTABLE, mean_residuals
+from photogram.targets.grouping import NOTABLE, mean_residuals
 from photogram.targets.tables import view_rms
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from photogram.formats.cards import Card
 from photogram.formats.dbat.content import Content, Sensor, sensor_of
 from photogram.formats.format import Wishes
 from photogram.formats.project import Size
-from photogram.io.files import read_lines
+from photogram.io.files import read_beginning, read_lines
 from photogram.io.places import Place
 from photogram.messages import Message
 
@@ -35,9 +35,8 @@ _CAMERA = "c px py width height K1 K2 K3 P1 P2"
 def is_export(path: Path) -> bool:
     """Whether a file begins as an export does: a title, and four lines of so many numbers."""
     try:
-        with path.open("rb") as file:
-            lines = file.read(4096).decode("latin-1").splitlines()
-    except OSError:
+        lines = read_beginning(path).splitlines()
+    except InputError:
         return False
     if len(lines) < 5 or "," in "".join(lines[1:5]):
         return False

@@ -15,7 +15,7 @@ from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.xml_stream import root_of
-from photogram.io.files import read_lines
+from photogram.io.files import read_beginning, read_lines
 from photogram.io.places import Place
 from photogram.io.rows import cells
 from photogram.messages import Message
@@ -37,9 +37,8 @@ def is_folder(path: Path) -> bool:
 def is_measurements(path: Path) -> bool:
     """Whether a file is a table of measurements of PhotoModeler."""
     try:
-        with path.open("rb") as file:
-            begin = file.read(4096).decode("latin-1").lower()
-    except OSError:
+        begin = read_beginning(path).lower()
+    except InputError:
         return False
     return any(line.startswith(_HEADER) for line in begin.splitlines()[:_FREE])
 
