@@ -177,8 +177,7 @@ def adjust(
     KeyboardInterrupt
         Ctrl-C.
     """
-    if max_iterations is None:
-        max_iterations = 50 if loss is None else 200
+    max_iterations = most_iterations(max_iterations, loss)
     checked(block)
     truth_value("covariance", covariance)
     truth_value("fix_photos", fix_photos)
@@ -337,6 +336,13 @@ def teller(
         progress(Progress(phase, done, total, Iteration(*iteration) if iteration else None))
 
     return tell
+
+
+def most_iterations(given: int | None, loss: Loss | None) -> int:
+    """Return how many iterations there are at the most: reweighting takes more."""
+    if given is not None:
+        return given
+    return 50 if loss is None else 200
 
 
 def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> None:
