@@ -21,9 +21,8 @@ from photogram.distributed.parts import incidence_of, vertices_of
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, core_options, opened
-from photogram.network.block import Block, checked, refuse_passages
+from photogram.network.block import Block, checked, refuse_passages, refuse_trajectories
 from photogram.network.core import CoreOptions
-from photogram.network.motion import refuse_trajectories
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
 
