@@ -31,7 +31,9 @@ def test_every_way_to_import_works_in_a_new_process(statement, name):
     assert done.stdout.strip() == name.rpartition(".")[2]
 
 
-@pytest.mark.parametrize("package", ["photogram", "photogram.targets", "photogram.formats"])
+@pytest.mark.parametrize(
+    "package", ["photogram", "photogram.targets", "photogram.film", "photogram.formats", "photogram.giant"]
+)
 def test_no_name_that_is_loaded_when_asked_for_is_that_of_a_module(package):
     """The import of such a module would stand in the place of what it has."""
     home = import_module(package)
