@@ -409,7 +409,7 @@ def _call(datum: str | None, loss: Loss | None, division: Division | None) -> Ca
 
         held: dict[str | None, InnerConstraints | MinimumConstraints]
         held = {"inner": InnerConstraints(), "minimum": MinimumConstraints()}
-        return partial(adjust, datum=held.get(datum), loss=loss, verdict=True)
+        return partial(adjust, datum=held.get(datum), loss=loss, covariance="verdict")
     from photogram import InputError, adjust_in_parts
 
     if datum in ("inner", "minimum"):

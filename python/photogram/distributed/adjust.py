@@ -22,9 +22,8 @@ from photogram.distributed.parts import incidence_of, vertices_of
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, core_options, opened
-from photogram.network.block import Block, checked, refuse_passages
+from photogram.network.block import Block, checked, refuse_passages, refuse_trajectories
 from photogram.network.core import CoreOptions
-from photogram.network.motion import refuse_trajectories
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
 
@@ -43,7 +42,6 @@ def adjust_in_parts(
     tolerance: float = 1e-5,
     covariance: bool = True,
     loss: Loss | None = None,
-    scale: float | None = None,
     ordering: Ordering = "auto",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -60,7 +58,7 @@ def adjust_in_parts(
     division
         Into how many parts, on which cluster, within which memory, in which folder. A block that fits into
         the memory as a whole is adjusted as a whole, where neither parts nor a cluster are given.
-    unit_variance, max_iterations, tolerance, covariance, loss, scale, progress
+    unit_variance, max_iterations, tolerance, covariance, loss, progress
         As of :func:`photogram.adjust`; `redundancy` is no unit variance in parts.
     ordering
         As of :func:`photogram.adjust`, where the block fits as a whole: photos of parts have an order of
@@ -90,7 +88,6 @@ def adjust_in_parts(
         max_iterations=max_iterations,
         covariance=covariance,
         loss=loss,
-        scale=scale,
     )
     core_threads(threads)  # refused here, not by a worker
     block = _ready(block)
@@ -102,7 +99,6 @@ def adjust_in_parts(
             tolerance=tolerance,
             covariance=covariance,
             loss=loss,
-            scale=scale,
             ordering=ordering,
             threads=threads,
             progress=progress,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import Progress, UnitVariance, check_iteration, most_iterations
+from photogram.adjustment.adjustment import Progress, UnitVariance, check_iteration
 from photogram.adjustment.robust import Loss, loss_row
 from photogram.distributed.core import CoreEngine
 from photogram.distributed.counts import Counts
@@ -103,7 +103,6 @@ def core_options(
     max_iterations: int | None = None,
     covariance: bool = True,
     loss: Loss | None = None,
-    scale: float | None = None,
 ) -> CoreOptions:
     """Return how the core adjusts in parts: the options of :func:`photogram.adjust_in_parts`.
 
@@ -111,18 +110,19 @@ def core_options(
     ------
     InputError
         No iteration, a tolerance that is not positive or not finite, a unit variance based on redundancy
-        numbers, a scale that no loss has.
+        numbers, a loss that there is not.
     """
     if unit_variance == "redundancy":
         raise InputError(
             "in parts the unit variance is not based on redundancy numbers:"
             " --unit-variance constrained (or unity)"
         )
-    max_iterations = most_iterations(max_iterations, loss)
+    weighted = loss_row(loss)
+    if max_iterations is None:
+        max_iterations = 200 if weighted else 50
     check_iteration("auto", max_iterations, tolerance)
     if not math.isfinite(tolerance):  # which documents of a run have no way to write
         raise InputError("in parts the tolerance must be finite")
-    weighted = loss_row(loss, scale)
     return CoreOptions(
         "fraction", tolerance, max_iterations, covariance, weighted, "auto", unit_variance, None
     )
