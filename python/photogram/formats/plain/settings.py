@@ -13,8 +13,8 @@ from typing import Any, cast
 
 from photogram.arguments.arrays import shown
 from photogram.errors import InputError
-from photogram.formats.columns import Columns, columns_given
-from photogram.formats.format import PhotoFiles
+from photogram.formats.columns import PLAIN, Columns, columns_given
+from photogram.formats.format import PhotoFiles, Wishes
 from photogram.formats.plain.schema import TABLES
 from photogram.formats.plain.sections import Sections
 from photogram.formats.plain.statement_settings import KEYS, read_asked
@@ -153,8 +153,15 @@ class Settings:
         )
 
 
-def read_settings(path: Path) -> Settings:
+def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
     """Read a file of settings, and find the tables that it names or that lie beside it.
+
+    Parameters
+    ----------
+    path
+        The file.
+    wishes
+        What a user says in its place: keys, standard deviations, columns of control.
 
     Raises
     ------
@@ -162,7 +169,8 @@ def read_settings(path: Path) -> Settings:
         The file cannot be read or is no TOML; a section or key that there is not, with the nearest one; a
         value that cannot be; two files of one table.
     """
-    file = _File(path)
+    wishes = wishes or Wishes()
+    file = _File(path, wishes.settings)
     file.check_keys(_KEYS)
     version = file.value("project", "format")
     if isinstance(version, bool) or version != VERSION:
@@ -189,10 +197,11 @@ def read_settings(path: Path) -> Settings:
         photo=file.word("axes", "photo"),
         time_origin=file.time_origin(),
         time_scale=file.word("time", "scale"),
-        sd={name: file.deviations(name) for name in WITH_SD if file.has("sd", name)},
+        sd={name: file.deviations(name) for name in WITH_SD if file.has("sd", name)} | dict(wishes.sd),
         tables=_tables(file),
         crs={name: file.text(name, "crs") for name in WITH_CRS if file.has(name, "crs")},
-        columns={name: file.columns(name) for name in WITH_CRS if name in file.content},
+        columns={name: file.columns(name) for name in WITH_CRS if name in file.content}
+        | ({} if wishes.columns == PLAIN else {"control": wishes.columns}),
         features={name: file.feature(name) for name in file.content.get("features", {})},
         photo_files=file.photo_files(),
         statement=read_asked(file, file.word("units", "length")),
