@@ -303,7 +303,7 @@ class _Reader:
             error = self.table.error(
                 photo.row, f"photo {photo.name}: {mirror_message(given, side_residuals(q, true))}"
             )
-            raise ContradictionError(error.message, file=error.file, record=error.record, text=error.text)
+            raise ContradictionError.of(error)
         if found is None and given is None and len(q) > 1:
             chosen = self._by_images(photo, [Lying(q, False), Lying(q, True)])
             found = None if chosen is None else bool(chosen)

@@ -146,7 +146,7 @@ TABLES: Mapping[str, Schema] = {
         (
             *("photo", "camera", "group", "strip", "frame", "use"),
             *("trajectory", "rig", "sensor", "clock", "scan"),
-            *("film", "scanner", "mirrored", "certificate"),
+            *("film", "scanner", "mirrored", "certificate", "flown"),
         ),
         (
             *(*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ANGLES, *_SD_ROTATIONS, "time"),
@@ -163,7 +163,8 @@ TABLES: Mapping[str, Schema] = {
         " known), `scan` (a name that photos share; default: the photo's);"
         " of [film](film.md) `film` (its images are readings), `scanner` (if there are several), `mirrored`"
         " (default: as the marks tell), `certificate` (a file of a"
-        " [certificate](certificates.md): camera and marks), `start_t1`, `start_t2` (mm), `start_theta`"
+        " [certificate](certificates.md): camera and marks), `flown` (the day, as 1983-07-02; default:"
+        " `[film] flown`), `start_t1`, `start_t2` (mm), `start_theta`"
         " (rad; default: as marks have them)",
         deviations=(1, 3),
         has_system=True,

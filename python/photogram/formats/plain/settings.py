@@ -19,6 +19,7 @@ from photogram.formats.plain.schema import TABLES
 from photogram.formats.plain.sections import Sections
 from photogram.formats.plain.statement_settings import KEYS, read_asked
 from photogram.formats.project import DatumName, Frame, Options
+from photogram.io.toml import day_of
 from photogram.messages import Message, listed, nearest
 from photogram.results.features import KINDS, Definition
 
@@ -65,7 +66,7 @@ _KEYS: Mapping[str, tuple[str, ...] | None] = {
     "time": ("origin", "scale"),
     "sd": tuple(WITH_SD),
     "tables": tuple(TABLES),
-    "film": ("model", "interior", "certificate"),
+    "film": ("model", "interior", "certificate", "flown"),
     "adjust": ("datum", "loss", "unit_variance"),
     **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
     "photos": ("crs", "columns", "roles", "directory", "directory_crs", "mrk_antenna"),
@@ -110,8 +111,10 @@ class Settings:
     film, interior
         The model of films that say none; whether their interior orientation is unknown inside the adjustment,
         or fitted before it and errorless.
-    certificate
-        The file of the certificate of the camera of films; None without.
+    certificates
+        The files of the certificates of the cameras of films.
+    flown
+        The day of the flight; None where it is not said.
     """
 
     path: Path
@@ -137,7 +140,8 @@ class Settings:
     statement: Mapping[str, Any] = field(default_factory=dict)
     film: str = "affine"
     interior: str = "inside"
-    certificate: Path | None = None
+    certificates: tuple[Path, ...] = ()
+    flown: date | None = None
 
     def __post_init__(self) -> None:
         if not self.image_y:
@@ -207,7 +211,8 @@ def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
         statement=read_asked(file, file.word("units", "length")),
         film=file.word("film", "model"),
         interior=file.word("film", "interior"),
-        certificate=file.certificate(),
+        certificates=file.certificates(),
+        flown=file.flown(),
     )
 
 
@@ -240,14 +245,25 @@ class _File(Sections):
             self.fail("photos", "directory", f"there is no folder {directory}")
         return PhotoFiles(self.path.parent / directory, crs or None, antenna)
 
-    def certificate(self) -> Path | None:
-        """Return the file of the certificate of the camera of films."""
+    def certificates(self) -> tuple[Path, ...]:
+        """Return the files of the certificates of the cameras of films: one text, or a list."""
         if not self.has("film", "certificate"):
-            return None
-        path = self.path.parent / self.text("film", "certificate")
-        if not path.is_file():
-            self.fail("film", "certificate", f"there is no file {path.name}")
-        return path
+            return ()
+        one = isinstance(self.value("film", "certificate"), str)
+        words = [self.text("film", "certificate")] if one else self.texts("film", "certificate")
+        paths = tuple(self.path.parent / each for each in dict.fromkeys(words))
+        for path in paths:
+            if not path.is_file():
+                self.fail("film", "certificate", f"there is no file {path.name}")
+        return paths
+
+    def flown(self) -> date | None:
+        """Return the day of the flight."""
+        value = self.value("film", "flown")
+        try:
+            return None if value is None else day_of(value)
+        except ValueError:
+            self.fail("film", "flown", f"flown is a day, as 1983-07-02, not {shown(value)}")
 
     def feature(self, name: str) -> Definition:
         """Return the kind of a feature, and the points that it goes through."""
