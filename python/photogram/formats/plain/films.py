@@ -13,6 +13,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.film.interior import (
     FilmModel,
+    Interior,
     conformal,
     interior_orientation,
 )
@@ -28,8 +29,18 @@ from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import Tables
 from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera
-from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Mark, Readings, Scan, Scanner
-from photogram.network.observations import FILM, Fiducial, KnownFilm, Observation
+from photogram.network.films import (
+    Film,
+    FilmBend,
+    FilmPlacement,
+    FilmSize,
+    Mark,
+    Readings,
+    Reseau,
+    Scan,
+    Scanner,
+)
+from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
 
 __all__ = ["Scanned", "on_film", "read_scanned"]
 
@@ -160,6 +171,9 @@ class _Reader:
             if self.before:
                 continue
             found.observations.extend(self._known(photo, film))
+            if isinstance(film.pattern, Reseau):
+                own = film.pattern
+                found.observations.append(KnownTogether("reseau", own.weights, covariance=own.covariance))
             found.observations.extend(
                 Fiducial(photo.name, marks[photo.camera][name], film, reading, sd=sd)
                 for name, reading, sd in zip(photo.marks, photo.readings, photo.sd, strict=True)
@@ -223,13 +237,18 @@ class _Reader:
         kind, machine = self.kinds[photo.film], photo.machine
         placement = partial(FilmPlacement, photo.name, start)
         roll, bend, pattern = None, None, kind.pattern
+        if kind.reseau is not None and not self.before:
+            pattern = kind.reseau(photo.name)
         held = np.array(kind.sd_size) == 0
         size = [0.0, 0.0, 0.0]
         bend_sd = np.array(kind.sd_bend)
         bend_at: Floats = np.zeros(2)
         if self.before:
-            placement, size, bend_at = self._fitted(photo, mirrored)
-            held[:], bend_sd, pattern = True, np.zeros(2), None
+            fit = self._fitted(photo, mirrored)
+            placement = partial(FilmPlacement, photo.name, fit.film[:3], 0.0)
+            size, bend_at = fit.film[3:].tolist(), fit.bend
+            held[:], bend_sd = True, np.zeros(2)
+            pattern = None if kind.reseau is None else kind.reseau(photo.name, fit.shifts)
         elif held[0]:
             roll = kind.roll
         else:
@@ -252,17 +271,15 @@ class _Reader:
             mirrored=mirrored,
         )
 
-    def _fitted(
-        self, photo: ScannedPhoto, mirrored: bool
-    ) -> tuple[partial[FilmPlacement], list[float], Floats]:
-        """Return the film of a photo as its marks alone have it: errorless."""
-        q = self.marks.places_of(photo)
-        model: FilmModel = self.kinds[photo.film].model  # type: ignore[assignment]
-        fit = made(
+    def _fitted(self, photo: ScannedPhoto, mirrored: bool) -> Interior:
+        """Return the film of a photo as its marks alone have it."""
+        kind = self.kinds[photo.film]
+        model: FilmModel = kind.model  # type: ignore[assignment]
+        return made(
             self.table,
             photo.row,
             lambda: interior_orientation(
-                q,
+                self.marks.places_of(photo),
                 np.array(photo.readings).reshape(-1, 2),
                 model,
                 sd=np.array(photo.sd),
@@ -270,9 +287,9 @@ class _Reader:
                 scanner=photo.machine.scanner,
                 curves=photo.machine.curves,
                 mirrored=mirrored,
+                reseau=None if kind.reseau is None else kind.reseau(photo.name),
             ),
         )
-        return partial(FilmPlacement, photo.name, fit.film[:3], 0.0), fit.film[3:].tolist(), fit.bend
 
     def _known(self, photo: ScannedPhoto, film: Film) -> list[Observation]:
         """Return what is known of a film beforehand; nothing of one that is free."""

@@ -207,14 +207,14 @@ TABLES: Mapping[str, Schema] = {
         (
             *("m", "sd_m", "sd_photo_m", "sd_b1", "sd_b2", "sd_h1", "sd_h2", "sd_g1", "sd_g2"),
             *("half_format_mm", "grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows"),
-            *(f"sd_w{k}" for k in range(1, 11)),
+            *(*(f"sd_w{k}" for k in range(1, 11)), "sd_smooth"),
         ),
         "`film`; `model` (`affine`, `conformal`, `bilinear`, `projective`; default: `[film] model`), `m` of"
         " the roll (0), `sd_m` (0.0005), `sd_photo_m` of single photos about it (0.0001; 0: one size),"
         " `sd_b1`, `sd_b2` (0.0001), `sd_h1`, `sd_h2` (5e-7 a mm), `sd_g1`, `sd_g2` (2e-7 a mm),"
-        " `pattern` (`none`,"
-        " `w1 w2`, `ebner`, `grid`), `sd_w1` .. (mm), `half_format_mm`, of grids `grid_x`, `grid_y` of the"
-        " first node, `grid_dx`, `grid_dy` (mm), `grid_columns`, `grid_rows`",
+        " `pattern` (`none`, `w1 w2`, `ebner`, `grid`, `local`: a grid of each photo), `sd_w1` .. (mm),"
+        " `half_format_mm`, of grids `grid_x`, `grid_y` of the first node, `grid_dx`, `grid_dy` (mm),"
+        " `grid_columns`, `grid_rows`, of local ones `sd_smooth` (mm, of second differences; `inf`)",
     ),
     "scanners": Schema(
         ("scanner", "pitch_mm", "origin_column", "origin_row"),
