@@ -111,7 +111,7 @@ def test_tie_points_tell_the_side_of_two_marks(tmp_path: Path, posed: bool) -> N
 
 
 def test_tie_points_tell_how_a_film_lies_whose_marks_have_no_names(tmp_path: Path) -> None:
-    """With poses a quarter turn shows, too; one after the other, from the one photo whose marks have names."""
+    """With poses a quarter turn shows, too: one after the other, from the photo whose marks have names."""
     named = project(tmp_path)
     without_starts(tmp_path)
     (tmp_path / "points.csv").unlink()

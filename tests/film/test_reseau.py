@@ -33,9 +33,8 @@ def readings(places: np.ndarray, shifts: np.ndarray, *, mirrored: bool) -> np.nd
         pattern=Reseau("p", GRID, (0.01, 0.01), shifts=shifts),
         mirrored=mirrored,
     )
-    return _photocore.film_readings(
-        film.numbers(), np.array([each.position for each in film.unknowns]), places
-    )[0]
+    vectors = np.array([each.position for each in film.unknowns])
+    return _photocore.film_readings(film.numbers(), vectors, places)[0]
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -84,12 +83,8 @@ def test_the_covariance_is_that_of_shifts_and_second_differences() -> None:
 def test_a_reseau_that_cannot_be_is_refused() -> None:
     with pytest.raises(InputError, match=r"photo p has 121 nodes, 242 unknowns: 200 are the most"):
         Reseau("p", (0, 0, 1, 1, 11, 11), (0.01, 0.01))
-    for sd, smooth in (
-        ((0.0, 0.01), 1.0),
-        ((0.01, np.inf), 1.0),
-        ((0.01, 0.01), 0.0),
-        ((0.01, 0.01), np.nan),
-    ):
+    good = (0.01, 0.01)
+    for sd, smooth in (((0.0, 0.01), 1.0), ((0.01, np.inf), 1.0), (good, 0.0), (good, np.nan)):
         with pytest.raises(InputError, match="deviations of the reseau cannot be"):
             Reseau("p", GRID, sd, smooth)
 
@@ -128,12 +123,9 @@ def test_one_step_and_two_are_the_same_where_marks_alone_tell(tmp_path: Path) ->
     cells = WHOLE.replace("1e-4", "inf")
     text = (ARCHIVE / "rc10-2345.toml").read_text()
     said = ("sd.images=1e4", "film.certificate=sure.toml")
-    (tmp_path / "sure.toml").write_text(
-        text.replace("[certificate]\n", "[certificate]\nsd_fiducials = 1e-7\n", 1)
-    )
-    scanner = (ARCHIVE / "covariances.csv").read_text()
-    project = archive(tmp_path, cells, *said)
-    assert "scanner" in scanner
+    sure = text.replace("[certificate]\n", "[certificate]\nsd_fiducials = 1e-7\n", 1)
+    (tmp_path / "sure.toml").write_text(sure)
+    archive(tmp_path, cells, *said)
     (tmp_path / "covariances.csv").unlink()
     (tmp_path / "scanners.csv").write_text(
         "scanner,pitch_mm,origin_column,origin_row,Sx,Sy,alpha_rad\nscanner,0.02,6000,6000,1.00001,0.99998,2e-5\n"
