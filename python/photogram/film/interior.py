@@ -253,7 +253,10 @@ def mirror_message(given: bool, apart: tuple[float, float]) -> str:
         return f"{fits}: they are named wrongly, or those of another camera"
     if given:
         return f"the film is not mirrored: {fits}; say mirrored = false"
-    return f"the film is mirrored: {fits}: scanned from the other side, or a negative; say mirrored = true"
+    return (
+        f"the film is mirrored: {fits}: scanned from the other side, a negative, or rows that count up; say"
+        " mirrored = true"
+    )
 
 
 def side_residuals(places: Floats, true: Floats) -> tuple[float, float]:

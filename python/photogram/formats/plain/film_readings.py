@@ -118,7 +118,7 @@ class MarkReadings:
             found = which_mark(np.array(list(places.values())).reshape(-1, 2), photo.true)
         except InputError as error:
             raise table.head.error(f"photo {photo.name}: {error.message}") from None
-        given = self._given_side(photo)
+        given = self.given_side(photo)
         ways = [each for each in found.alike if given in (None, each.mirrored)]
         if len(ways) != 1:
             lying = [Lying(np.array([*places.values()])[way.marks], way.mirrored) for way in ways]
@@ -145,7 +145,7 @@ class MarkReadings:
         if len(photo.marks) < 2 or not all(photo.marks):
             return None
         q, true = self.places_of(photo), photo.true
-        side = self._given_side(photo)
+        side = self.given_side(photo)
         side = is_mirrored(q, true) if side is None else side
         if side is None:
             return None
@@ -155,7 +155,7 @@ class MarkReadings:
         """Return (n, 2) places in the camera's frame of the marks of a photo."""
         return np.array([self.places[photo.camera][name] for name in photo.marks]).reshape(-1, 2)
 
-    def _given_side(self, photo: ScannedPhoto) -> bool | None:
+    def given_side(self, photo: ScannedPhoto) -> bool | None:
         """Return whether a photo is said to be mirrored."""
         word = self.seen.photos.table.texts("mirrored")[photo.row].lower()
         if word and word not in TRUE | FALSE:
@@ -166,7 +166,7 @@ class MarkReadings:
 
     def side(self, photo: ScannedPhoto) -> bool:
         """Return whether a photo is mirrored: as is given, or as its marks tell, or images with its pose."""
-        given = self._given_side(photo)
+        given = self.given_side(photo)
         q = self.places_of(photo)
         true = photo.true if len(q) else q
         found = is_mirrored(q, true)

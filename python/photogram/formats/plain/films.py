@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.errors import InputError
+from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import (
     FilmModel,
     Interior,
@@ -20,6 +20,7 @@ from photogram.film.interior import (
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.fiducials import read_fiducials
+from photogram.formats.plain.film_mistakes import mark_remarks, scale_message
 from photogram.formats.plain.film_readings import MarkReadings, ScannedPhoto
 from photogram.formats.plain.film_sides import Seen
 from photogram.formats.plain.films_written import INSIDE
@@ -203,11 +204,20 @@ class _Reader:
         for photo in self.photos:
             row = photo.row
             mirrored = self.marks.side(photo)
+            if message := scale_message(photo, self.marks.places_of(photo), mirrored=mirrored):
+                raise ContradictionError.of(self.table.error(row, message))
             start: Floats | None = None if np.isnan(given[row]).any() else given[row]
             if start is None and len(photo.marks) > 1:
                 q = self.marks.places_of(photo)
                 start = np.array(conformal(q, photo.true, mirrored=mirrored)[:3])
             found.append((mirrored, start))
+        told = [
+            None if self.marks.given_side(photo) is not None else side
+            for photo, (side, _) in zip(self.photos, found, strict=True)
+        ]
+        self.tables.messages.extend(
+            Message(each, self.table.path) for each in mark_remarks(self.photos, self.places, told)
+        )
         return [
             (mirrored, self._neighbour(k, found) if start is None else start)
             for k, (mirrored, start) in enumerate(found)
