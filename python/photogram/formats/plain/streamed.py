@@ -93,8 +93,7 @@ class Streamed:
     """
 
     def __init__(self, path: Path, wishes: Wishes, folder: Path) -> None:
-        settings = read_settings(path / SETTINGS if path.is_dir() else path)
-        settings = replace(settings, sd={**settings.sd, **wishes.sd})
+        settings = read_settings(path / SETTINGS if path.is_dir() else path, wishes)
         if settings.features:
             raise InputError(
                 "[features] take joint covariances of points, which a block in parts does not keep: leave"
