@@ -14,6 +14,7 @@ import photogram
 from fuzz.kills import Trials, kinds
 from photogram.cli.job import Writes
 
+pytestmark = pytest.mark.usefixtures("sketched")
 SOURCES = Path(photogram.__file__).parent
 COMMAND = [sys.executable, "-m", "photogram.cli"]
 DOCS = Path(__file__).parents[2] / "docs" / "command-line.md"
