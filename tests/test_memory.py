@@ -186,7 +186,7 @@ def test_a_limit_of_addresses_is_divided_among_fewer_threads(machine, monkeypatc
 
 
 EXITING = 0x4
-"""A flag of the kernel: all work of a thread is done, but it may be listed for a moment after it was joined."""
+"""A flag of the kernel: all work of a thread is done; it may be listed for a moment after it was joined."""
 
 
 def alive():
