@@ -33,7 +33,7 @@ OF_OTHERS = (
     "urllib.request",
 )
 """Modules for blocks of other kinds, and for adjustments that fail."""
-MOST = 400
+MOST = 420
 """Modules of the package that the adjustment of a project loads, with its report and page."""
 
 
