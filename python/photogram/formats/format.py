@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -67,6 +67,8 @@ class Wishes:
         The list of cubes or ISDs of a control network.
     jigsaw
         How a control network is adjusted: settings by the names of jigsaw, or the path of a file with them.
+    settings
+        What the settings of a plain project say otherwise: `section.key=value`.
     """
 
     cameras: Path | None = None
@@ -78,6 +80,7 @@ class Wishes:
     photos: PhotoFiles | None = None
     cubes: Path | None = None
     jigsaw: str | None = None
+    settings: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

@@ -119,6 +119,8 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
     with turned(f"reading {path}"):
         try:
             wishes = wishes or Wishes()
+            if wishes.settings and chosen.name != "plain":
+                raise InputError(f"is no plain project but {chosen.title}, which has no settings: --set")
             project = chosen.read(path, wishes)
             if wishes.photos is not None or "settings" in project.details:
                 from photogram.formats.metadata.adding import with_wished_photos
