@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from photogram.targets.board import Board
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.calibration import Calibration
 from photogram.targets.corners import Corners
+from photogram.targets.motion import motion_of
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
 
@@ -57,13 +59,13 @@ def calibration_of(project: Project) -> Calibration:
     ------
     InputError
         A project without a board, points that are not those of the board, cameras that are not in pixels,
-        photos on trajectories.
+        photos on other trajectories than those of views.
     """
     block = project.block
     if not project.boards:
         raise InputError("has no board: a table of boards says what its control is", file=project.path)
-    if block.image_unit != "px" or block.photo_cameras is None or block.timed:
-        raise InputError("a calibration has images in pixels, and no trajectories", file=project.path)
+    if block.image_unit != "px" or block.photo_cameras is None:
+        raise InputError("a calibration has images in pixels", file=project.path)
     if (block.image_sd[:, 0] != block.image_sd[:, 1]).any():
         raise InputError("corners of a calibration are as good in x as in y", file=project.path)
     (board,) = project.boards.values()
@@ -74,6 +76,9 @@ def calibration_of(project: Project) -> Calibration:
     corners, seen = _corners(project, number, stands, sd0)
     attitudes = Attitudes.of("omega_phi_kappa", block.photo_attitudes[seen])
     rig = len(np.unique(references)) < len(references)
+    clocks = _in_motion(project, seen) if block.timed else None
+    if clocks is not None:
+        corners = corners.replace(times=clocks.pop("times")[np.unique(block.image_photos)])
     return Calibration(
         board=_with_places(board, block, number),
         corners=corners,
@@ -82,10 +87,32 @@ def calibration_of(project: Project) -> Calibration:
         sensors=sensors,
         references=references,
         sd0=None if assumed else sd0,
-        sync="known" if rig or len(references) == 1 else "none",
+        sync="offset" if block.timed else "known" if rig or len(references) == 1 else "none",
         bend=_bend(block),
         messages=project.messages,
+        **(clocks or {}),
     )
+
+
+def _in_motion(project: Project, seen: Indices) -> dict[str, Any]:
+    """Return what is told of clocks and of the board's motion: (P,) times, and fields of calibrations."""
+    block = project.block
+    assert block.photo_cameras is not None
+    places = {name: row for row, name in enumerate(block.photo_ids)}
+    times = np.full(len(places), np.nan)
+    offsets, sd = np.zeros(len(block.cameras)), np.full(len(block.cameras), np.inf)
+    motions: dict[int, Floats | None] = {}
+    for each in block.timed:
+        row = places[each.photo]
+        motions[row] = None if each.trajectory is None or each.readout else motion_of(each.trajectory)
+        times[row] = np.nan if each.time is None else each.time
+        if each.offset is not None:
+            camera = int(block.photo_cameras[row])
+            offsets[camera], sd[camera] = each.offset.value, each.offset.deviations[0]
+    motion = [motions.get(row) for row in seen.tolist()]
+    if np.isnan(times).any() or any(each is None for each in motion):
+        raise InputError("a calibration moves as its views tell, or not at all", file=project.path)
+    return {"times": times, "offsets": offsets, "sd_offsets": sd, "motion": np.array(motion)}
 
 
 def _bend(block: Block) -> tuple[float, float]:
@@ -135,11 +162,18 @@ def _tied(block: Block) -> tuple[Indices, Floats, Indices]:
     count = len(block.cameras)
     references, sensors = np.arange(count), np.tile(np.eye(4), (count, 1, 1))
     views = np.arange(len(block.photo_ids))
-    for each in block.mounts:
-        photo, frame = places[each.photo], places[each.frame]
+    flown = {id(each.trajectory): each.photo for each in block.timed if each.sensor is None}
+    tied = [(each.photo, each.frame, each.sensor) for each in block.mounts]
+    tied += [
+        (each.photo, flown.get(id(each.trajectory), each.photo), each.sensor)
+        for each in block.timed
+        if each.sensor is not None
+    ]
+    for name, stands, sensor in tied:
+        photo, frame = places[name], places[stands]
         camera, reference = int(block.photo_cameras[photo]), int(block.photo_cameras[frame])
         views[photo], references[camera] = frame, reference
-        sensors[camera] = sensor_pose(each.sensor.position, each.sensor.attitude)
+        sensors[camera] = sensor_pose(sensor.position, sensor.attitude)
     return references, sensors, views
 
 
@@ -176,11 +210,14 @@ def from_corner(block: Block) -> Block:
 def adjusted_project(calibrated: Calibrated) -> Project:
     """Return what was adjusted as a project: free values where the adjustment has ended."""
     own, bend = calibrated.calibration, calibrated.bend
+    found = calibrated.offsets
+    late = [found[each.name].values[0] if each.name in found else 0.0 for each in calibrated.cameras]
     return project_of(
         own.replace(
             cameras=[each.restarted() for each in calibrated.cameras],
             sensors=calibrated.sensors,
             poses=calibrated.poses,
+            offsets=np.where(np.isinf(np.asarray(own.sd_offsets)), late, own.offsets),
             bend=own.bend if bend is None else (float(bend.position[0]), float(bend.position[1])),
         )
     )

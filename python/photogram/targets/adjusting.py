@@ -16,10 +16,12 @@ from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.results.result import Result
 from photogram.targets.calibrated import Calibrated, deviation_of_corners, with_unknown_weight
+from photogram.targets.clocks import checked_clocks
 from photogram.targets.findings import judged
 from photogram.targets.outliers import marked_as_mrcal
 from photogram.targets.regularisation import regularised
 from photogram.targets.start import Start
+from photogram.targets.vision import photo_poses
 
 __all__ = ["adjusted_start", "snooped_start"]
 
@@ -50,16 +52,50 @@ def adjusted_start(
         worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
         if worse.any() and result.converged:
             start = start.without(worse)
-        elif (sd := _sd_to_assume(start, result)) is not None and rounds < ROUNDS:
-            start, rounds = start.replace(assumed=sd), rounds + 1
+        elif rounds < ROUNDS and (better := _better(start, result)) is not None:
+            start, rounds = better, rounds + 1
         else:
             break
-    told = replace(result, messages=[*start.messages, *result.messages])
+    messages = [*start.messages, *result.messages]
+    if start.sync == "offset":
+        messages += checked_clocks(Calibrated(calibration=start, result=result))
+    told = replace(result, messages=messages)
     if start.sd0 is None:
         told = with_unknown_weight(told)
     return judged(
         Calibrated(calibration=start, result=told, unregularised=free if start.regularise else None)
     )
+
+
+def _better(start: Start, result: Result) -> Start | None:
+    """Return what to adjust again, where the result says otherwise of what was held; None where it does not.
+
+    That are the standard deviation of corners, and the motion of the board.
+    """
+    found = start if start.sync != "offset" or not result.converged else _in_motion(start, result)
+    if (sd := _sd_to_assume(start, result)) is not None:
+        found = found.replace(assumed=sd)
+    return None if found is start else found
+
+
+def _in_motion(start: Start, result: Result) -> Start:
+    """Return a calibration whose board moves as its adjusted poses say; itself where this changes nothing."""
+    ended = Calibrated(calibration=start, result=result)
+    offsets = ended.offsets
+    late = np.array([offsets[each.name].values[0] if each.name in offsets else 0.0 for each in ended.cameras])
+    again = start.replace(
+        cameras=[each.restarted() for each in ended.cameras],
+        poses=ended.poses,
+        sensors=ended.sensors,
+        offsets=late,
+        motion=None,
+    )
+    pictures = slice(len(start.corners.pictures))
+    gaps = photo_poses(again.picture_poses())[0] - result.photo_positions[pictures]
+    if (np.abs(gaps) <= CHANGE * result.photo_sd[pictures, :3]).all():
+        return start
+    # What is given of a weighted offset is an observation.
+    return again.replace(offsets=np.where(np.isinf(np.asarray(start.sd_offsets)), late, start.offsets))
 
 
 def _sd_to_assume(start: Start, result: Result) -> float | None:
@@ -112,6 +148,8 @@ def snooped_start(start: Start, **options: Any) -> Calibrated:
     """Take gross errors out one after the other, and adjust what is left; see :meth:`Calibration.snoop`."""
     if start.regularise is not None and not _has_knots(start):
         raise InputError("gross errors are taken out without priors of cameras: regularise is None")
+    if start.sync == "offset":
+        start = adjusted_start(start).calibration
     found = snoop(_weighted(start), **options)
     result = found.judged
     assert isinstance(result, Result)

@@ -13,6 +13,7 @@ from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.network.attitudes import Attitudes
 from photogram.network.passages import Bend
+from photogram.network.trajectories import Clock
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
 from photogram.results.snooped import Snooped
@@ -21,7 +22,7 @@ from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
-from photogram.targets.start import Start
+from photogram.targets.start import CLOCK, Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 from photogram.targets.worth import Worth
 
@@ -121,6 +122,19 @@ class Calibrated(Brief, Shown):
         rows, result = self.photos, self.result
         attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes[rows])
         return vision_poses(result.photo_positions[rows], attitudes)
+
+    @cached_property
+    def picture_poses(self) -> Floats:
+        """(P, 4, 4) adjusted: board -> the camera of each picture, at its time."""
+        own, result = slice(len(self.calibration.corners.pictures)), self.result
+        attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes[own])
+        return vision_poses(result.photo_positions[own], attitudes)
+
+    @property
+    def offsets(self) -> dict[str, AdjustedUnknown]:
+        """The adjusted offsets between cameras, by the names of those that have one, in seconds."""
+        clocks = [each for each in self.result.unknowns if each.kind == Clock.KIND]
+        return {each.name.removeprefix(CLOCK): each for each in clocks}
 
     @property
     def points(self) -> Floats:

@@ -89,6 +89,7 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
     """Adjust some pictures by themselves, from the values of the whole and with its priors."""
     given, priors = whole.calibration, whole.result.block.cameras
     corners = given.corners.of_pictures(pictures)
+    views = np.unique(given.corners.views[pictures])
     part = given.replace(
         board=given.board.replace(shape=given.shape),
         corners=corners.replace(
@@ -98,8 +99,11 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
         ),
         cameras=[_freed(whole.cameras[each].camera) for each in cameras],
         sensors=whole.sensors[cameras],
-        poses=whole.poses[np.unique(given.corners.views[pictures])],
+        poses=whole.poses[views],
         references=None,
+        offsets=np.asarray(given.offsets)[cameras],
+        sd_offsets=np.asarray(given.sd_offsets)[cameras],
+        motion=None if given.motion is None else np.asarray(given.motion)[views],
         regularise=None,
     )
     loss, scale = whole.result.options.loss or (None, None)

@@ -120,6 +120,7 @@ def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> SeenCor
         points=block.image_points[used],
         xy=block.image_xy[used],
         sd=block.image_sd[used, 0] / np.sqrt(result.image_weights[used]),
+        poses=calibrated.picture_poses[photos],
     )
 
 

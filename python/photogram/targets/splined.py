@@ -53,7 +53,7 @@ def _touched(calibrated: Calibrated, number: int) -> int:
     """Return how many knots of a camera the image of a corner touches."""
     camera = calibrated.cameras[number].camera
     corners = calibrated.calibration.corners
-    poses = (calibrated.sensors[corners.cameras] @ calibrated.poses[corners.views])[corners.picture]
+    poses = calibrated.picture_poses[corners.picture]
     own = corners.use & (corners.cameras[corners.picture] == number)
     points = calibrated.points[corners.point[own]]
     seen = np.einsum("nij,nj->ni", poses[own, :3, :3], points) + poses[own, :3, 3]
