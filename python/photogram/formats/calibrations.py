@@ -16,6 +16,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.passages import Figure
+from photogram.network.unknowns import Sensor
 from photogram.targets.board import Board
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.calibration import Calibration
@@ -24,7 +25,7 @@ from photogram.targets.motion import motion_of
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
 
-__all__ = ["MIDDLE", "TITLE", "adjusted_project", "calibration_of", "project_of", "shifted"]
+__all__ = ["MIDDLE", "TITLE", "adjusted_project", "calibration_of", "project_of", "shifted", "tied_photos"]
 
 TITLE = "corners of a board"
 MIDDLE = 0.5
@@ -162,19 +163,22 @@ def _tied(block: Block) -> tuple[Indices, Floats, Indices]:
     count = len(block.cameras)
     references, sensors = np.arange(count), np.tile(np.eye(4), (count, 1, 1))
     views = np.arange(len(block.photo_ids))
-    flown = {id(each.trajectory): each.photo for each in block.timed if each.sensor is None}
-    tied = [(each.photo, each.frame, each.sensor) for each in block.mounts]
-    tied += [
-        (each.photo, flown.get(id(each.trajectory), each.photo), each.sensor)
-        for each in block.timed
-        if each.sensor is not None
-    ]
-    for name, stands, sensor in tied:
+    for name, stands, sensor in tied_photos(block):
         photo, frame = places[name], places[stands]
         camera, reference = int(block.photo_cameras[photo]), int(block.photo_cameras[frame])
         views[photo], references[camera] = frame, reference
         sensors[camera] = sensor_pose(sensor.position, sensor.attitude)
     return references, sensors, views
+
+
+def tied_photos(block: Block) -> list[tuple[str, str, Sensor]]:
+    """Return photos on sensors, with the photos that stand for their frames; itself where none does."""
+    flown = {id(each.trajectory): each.photo for each in block.timed if each.sensor is None}
+    return [(each.photo, each.frame, each.sensor) for each in block.mounts] + [
+        (each.photo, flown.get(id(each.trajectory), each.photo), each.sensor)
+        for each in block.timed
+        if each.sensor is not None
+    ]
 
 
 def _numbers_of(project: Project, board: Board) -> Indices:
