@@ -73,9 +73,10 @@ def calibration_of(project: Project) -> Calibration:
     number = _numbers_of(project, board)
     assumed = bool(project.details.get(ASSUMED))
     sd0 = 1.0 if assumed else float(block.image_sd.min())
-    references, sensors, stands = _tied(block)
+    references, sensors, sd_sensors, stands = _tied(block)
     corners, seen = _corners(project, number, stands, sd0)
     attitudes = Attitudes.of("omega_phi_kappa", block.photo_attitudes[seen])
+    bend, sd_bend = _bend(block)
     rig = len(np.unique(references)) < len(references)
     clocks = _in_motion(project, seen) if block.timed else None
     if clocks is not None:
@@ -89,7 +90,9 @@ def calibration_of(project: Project) -> Calibration:
         references=references,
         sd0=None if assumed else sd0,
         sync="offset" if block.timed else "known" if rig or len(references) == 1 else "none",
-        bend=_bend(block),
+        bend=bend,
+        sd_sensors=sd_sensors,
+        sd_bend=sd_bend,
         messages=project.messages,
         **(clocks or {}),
     )
@@ -116,10 +119,13 @@ def _in_motion(project: Project, seen: Indices) -> dict[str, Any]:
     return {"times": times, "offsets": offsets, "sd_offsets": sd, "motion": np.array(motion)}
 
 
-def _bend(block: Block) -> tuple[float, float]:
-    """Return the deflections that the board begins with."""
-    found = [each.bend.position for each in block.passages if isinstance(each, Figure)]
-    return (float(found[0][0]), float(found[0][1])) if found else (0.0, 0.0)
+def _bend(block: Block) -> tuple[tuple[float, float], Floats]:
+    """Return the deflections that the board begins with, and their standard deviations."""
+    found = [each.bend for each in block.passages if isinstance(each, Figure)]
+    if not found:
+        return (0.0, 0.0), np.full(2, np.inf)
+    along_x, along_y = found[0].position[:2].tolist()
+    return (along_x, along_y), found[0].deviations[:2]
 
 
 def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> tuple[Corners, Indices]:
@@ -156,19 +162,20 @@ def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> 
     return corners, seen
 
 
-def _tied(block: Block) -> tuple[Indices, Floats, Indices]:
-    """Return (K,) the references of cameras, (K, 4, 4) sensors, and (P,) the photo that stands for each."""
+def _tied(block: Block) -> tuple[Indices, Floats, Floats, Indices]:
+    """Return (K,) the references of cameras, (K, 4, 4) sensors, their sd, and (P,) the photo of each view."""
     assert block.photo_cameras is not None
     places = {name: row for row, name in enumerate(block.photo_ids)}
     count = len(block.cameras)
     references, sensors = np.arange(count), np.tile(np.eye(4), (count, 1, 1))
+    sd = np.full((count, 6), np.inf)
     views = np.arange(len(block.photo_ids))
     for name, stands, sensor in tied_photos(block):
         photo, frame = places[name], places[stands]
         camera, reference = int(block.photo_cameras[photo]), int(block.photo_cameras[frame])
         views[photo], references[camera] = frame, reference
-        sensors[camera] = sensor_pose(sensor.position, sensor.attitude)
-    return references, sensors, views
+        sensors[camera], sd[camera] = sensor_pose(sensor.position, sensor.attitude), sensor.deviations
+    return references, sensors, sd, views
 
 
 def tied_photos(block: Block) -> list[tuple[str, str, Sensor]]:
@@ -213,18 +220,7 @@ def from_corner(block: Block) -> Block:
 
 def adjusted_project(calibrated: Calibrated) -> Project:
     """Return what was adjusted as a project: free values where the adjustment has ended."""
-    own, bend = calibrated.calibration, calibrated.bend
-    found = calibrated.offsets
-    late = [found[each.name].values[0] if each.name in found else 0.0 for each in calibrated.cameras]
-    return project_of(
-        own.replace(
-            cameras=[each.restarted() for each in calibrated.cameras],
-            sensors=calibrated.sensors,
-            poses=calibrated.poses,
-            offsets=np.where(np.isinf(np.asarray(own.sd_offsets)), late, own.offsets),
-            bend=own.bend if bend is None else (float(bend.position[0]), float(bend.position[1])),
-        )
-    )
+    return project_of(calibrated.restarted())
 
 
 def shifted(camera: Camera, by: float = MIDDLE) -> Camera:

@@ -81,21 +81,15 @@ def _better(start: Start, result: Result) -> Start | None:
 def _in_motion(start: Start, result: Result) -> Start:
     """Return a calibration whose board moves as its adjusted poses say; itself where this changes nothing."""
     ended = Calibrated(calibration=start, result=result)
-    offsets = ended.offsets
-    late = np.array([offsets[each.name].values[0] if each.name in offsets else 0.0 for each in ended.cameras])
-    again = start.replace(
-        cameras=[each.restarted() for each in ended.cameras],
-        poses=ended.poses,
-        sensors=ended.sensors,
-        offsets=late,
-        motion=None,
-    )
+    again = ended.restarted().replace(motion=None)
+    # Where the new motion has pictures, with everything else as adjusted.
+    late = {name: each.values[0] for name, each in ended.offsets.items()}
+    there = again.replace(
+        sensors=ended.sensors, offsets=[late.get(each.name, 0.0) for each in ended.cameras]
+    ).picture_poses()
     pictures = slice(len(start.corners.pictures))
-    gaps = photo_poses(again.picture_poses())[0] - result.photo_positions[pictures]
-    if (np.abs(gaps) <= CHANGE * result.photo_sd[pictures, :3]).all():
-        return start
-    # What is given of a weighted offset is an observation.
-    return again.replace(offsets=np.where(np.isinf(np.asarray(start.sd_offsets)), late, start.offsets))
+    gaps = np.abs(photo_poses(there)[0] - result.photo_positions[pictures])
+    return start if (gaps <= CHANGE * result.photo_sd[pictures, :3]).all() else again
 
 
 def _sd_to_assume(start: Start, result: Result) -> float | None:
@@ -113,14 +107,9 @@ def _knotted(start: Start, how: dict[str, Any]) -> Result:
     An adjustment reckons with the knots near images where it begins: the last of it begins where corners stay
     at theirs.
     """
-    block = _weighted(start)
-    near = adjust(block, **how | {"verdict": False}, covariance=False, tolerance=ROUGHLY)
-    moved = near.block.replace(
-        photo_positions=near.photo_positions,
-        photo_attitudes=near.photo_attitudes,
-        cameras=[each.restarted() for each in near.cameras],
-    )
-    return adjust(moved, **how, tolerance=FINELY)
+    near = adjust(_weighted(start), **how | {"verdict": False}, covariance=False, tolerance=ROUGHLY)
+    moved = Calibrated(calibration=start, result=near).restarted()
+    return adjust(_weighted(moved), **how, tolerance=FINELY)
 
 
 def _has_knots(start: Start) -> bool:

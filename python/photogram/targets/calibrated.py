@@ -152,6 +152,20 @@ class Calibrated(Brief, Shown):
         """Return the cameras that have a sensor whose pose was adjusted."""
         return [self._numbers[each.name] for each in self.result.unknowns if each.kind == "sensor"]
 
+    def restarted(self) -> Start:
+        """Return the calibration with what is free where the adjustment has ended; the rest is as given."""
+        own, bend, found = self.calibration, self.bend, self.offsets
+        late = np.array([found[each.name].values[0] if each.name in found else 0.0 for each in self.cameras])
+        free = np.isinf(np.asarray(own.sd_sensors)).all(axis=1)[:, np.newaxis, np.newaxis]
+        bends = own.bend if bend is None else np.where(np.isinf(own.sd_bend), bend.position[:2], own.bend)
+        return own.replace(
+            cameras=[each.restarted() for each in self.cameras],
+            poses=self.poses,
+            sensors=np.where(free, self.sensors, own.sensors),
+            bend=(float(bends[0]), float(bends[1])),
+            offsets=np.where(np.isinf(np.asarray(own.sd_offsets)), late, own.offsets),
+        )
+
     def cofactors(self, parts: Sequence[Part] = ("cameras", "sensors")) -> tuple[list[str], Floats]:
         """Return the joint cofactors of some parts: covariances for a priori unit weight.
 

@@ -57,6 +57,10 @@ class Calibration(Start):
         (V, 4, 6) of `offset`: how photos of the reference move about the time of each view, as coefficients
         of powers 1 to 4 of time: positions in the axes of the board, rotation vectors about those of the
         photo. None: through the poses of the views before and after.
+    sd_sensors, sd_bend
+        (K, 6) and (2,) standard deviations with which `sensors` and `bend` are known, infinite: free. Of
+        sensors those of :class:`photogram.network.unknowns.Sensor`: its position in the axes of the
+        reference, rotations about its own axes in radians.
 
     Raises
     ------

@@ -57,6 +57,8 @@ class Start(Valued, Brief):
     offsets: ArrayLike = 0.0
     sd_offsets: ArrayLike = np.inf
     motion: ArrayLike | None = None
+    sd_sensors: ArrayLike = np.inf
+    sd_bend: ArrayLike = np.inf
 
     def __post_init__(self) -> None:
         one_of("sync", self.sync, get_args(Synchronisation))
@@ -88,6 +90,10 @@ class Start(Valued, Brief):
         self._leave_out(poses)
         for name in ("offsets", "sd_offsets"):
             self._set(name, shaped(name, getattr(self, name), (count,)))
+        for name, shape in (("sd_sensors", (count, 6)), ("sd_bend", (2,))):
+            self._set(name, shaped(name, getattr(self, name), shape))
+            if not (np.asarray(getattr(self, name)) > 0).all():
+                raise InputError(f"{name} are positive, or infinite where it is free: it is not held")
         if self.sync == "offset":
             self._set_motion()
 
@@ -232,7 +238,7 @@ class Start(Valued, Brief):
         """Return what the points of the board follow from, where it is bent by an unknown amount."""
         if self.shape != "bend":
             return []
-        return [Figure(Bend(BOARD, self.bend), self.board.names, self.board.shifts())]
+        return [Figure(Bend(BOARD, self.bend, self.sd_bend), self.board.names, self.board.shifts())]
 
     def _cameras_of_frames(self, photo: Indices) -> Indices:
         """Return the references of views that have no picture of them."""
@@ -246,9 +252,10 @@ class Start(Valued, Brief):
         return reference
 
     def _sensors(self) -> list[Sensor]:
+        names, sensors, sd = self.corners.camera_names, np.asarray(self.sensors), np.asarray(self.sd_sensors)
         return [
-            Sensor.from_colmap(name, pose[:3, :3], pose[:3, 3])
-            for name, pose in zip(self.corners.camera_names, np.asarray(self.sensors), strict=True)
+            Sensor.from_colmap(name, pose[:3, :3], pose[:3, 3], own)
+            for name, pose, own in zip(names, sensors, sd, strict=True)
         ]
 
     def _timed(self) -> list[Timed]:
