@@ -161,7 +161,7 @@ class Calibrated(Brief, Shown):
         return own.replace(
             cameras=[each.restarted() for each in self.cameras],
             poses=self.poses,
-            sensors=np.where(free, self.sensors, own.sensors),
+            sensors=np.where(free, self.sensors, np.asarray(own.sensors)),
             bend=(float(bends[0]), float(bends[1])),
             offsets=np.where(np.isinf(np.asarray(own.sd_offsets)), late, own.offsets),
         )
