@@ -10,10 +10,12 @@ from typer.testing import CliRunner
 
 from photogram import InputError, formats
 from photogram.cli import app
-from photogram.formats.calibrations import adjusted_project
-from photogram.formats.cameras_alone import FORMATS_OF_CAMERAS, rig_of_project
+from photogram.formats.cameras_alone import FORMATS_OF_CAMERAS
+from photogram.formats.targets.calibrations import adjusted_project
+from photogram.formats.targets.cameras import rig_of_project
 from photogram.network.cameras import Camera
 from photogram.targets import camera_files
+from photogram.targets.output.formats import CAMERA_FORMATS
 
 PROJECT = Path(str(files("photogram.examples") / "project"))
 
@@ -85,6 +87,7 @@ def test_the_command_writes_them_and_says_what_is_left_behind(found, tmp_path):
 
 
 def test_they_are_no_formats_of_projects():
+    assert set(FORMATS_OF_CAMERAS) == set(CAMERA_FORMATS)
     assert not set(FORMATS_OF_CAMERAS) & set(formats.FORMATS)
     with pytest.raises(InputError, match="format is one of"):
         formats.read(PROJECT, "mrcal")

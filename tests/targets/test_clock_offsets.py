@@ -7,7 +7,7 @@ import pytest
 from given_targets import rig_small
 
 from photogram import InputError, RankError, adjust, formats
-from photogram.formats.calibrations import adjusted_project, calibration_of
+from photogram.formats.targets.calibrations import adjusted_project, calibration_of
 from photogram.network.cameras import Camera
 from photogram.targets import Board, Calibrated, Calibration, Corners, cross_validate, simulate_corners
 from photogram.targets.motion import errors_of_speeds, moving

@@ -1,4 +1,4 @@
-"""Cameras of projects, and nothing else of them, as other programs take these: formats that are written."""
+"""Formats of cameras alone, which are written from any project, and not read."""
 
 from __future__ import annotations
 
@@ -7,80 +7,24 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
-import numpy as np
-
-from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.calibrations import MIDDLE, shifted, tied_photos
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import Project
-from photogram.messages import counted, listed
-from photogram.network.unknowns import Sensor
-from photogram.targets.output.formats import CAMERA_FORMATS, TITLES
-from photogram.targets.output.rig import Rig
-from photogram.targets.vision import sensor_pose
 
-__all__ = ["FORMATS_OF_CAMERAS", "rig_of_project"]
-
-
-def rig_of_project(project: Project) -> Rig:
-    """Return the cameras of a project whose images are pixels, and where those on frames are to camera 0.
-
-    Raises
-    ------
-    InputError
-        No cameras, but principal distances.
-    """
-    block = project.block
-    if not block.cameras:
-        raise InputError("has principal distances, and no cameras", file=project.path)
-    return Rig(
-        cameras=tuple(
-            shifted(each, -MIDDLE).replace(name=name)
-            for each, name in zip(block.cameras, block.camera_names, strict=True)
-        ),
-        sizes=tuple(project.sizes),
-        sensors=_sensors(project),
-    )
-
-
-def _sensors(project: Project) -> Floats:
-    """Return (K, 4, 4) camera 0 -> camera k; NaN where they are not one sensor on one frame."""
-    block = project.block
-    found = np.full((len(block.cameras), 4, 4), np.nan)
-    found[0] = np.eye(4)
-    own: dict[int, Sensor] = {}
-    torn = set[int]()
-    cameras = dict(zip(block.photo_ids, np.asarray(block.photo_cameras).tolist(), strict=True))
-    for photo, frame, sensor in tied_photos(block):
-        camera = cameras[photo]
-        if cameras[frame] != 0 or own.setdefault(camera, sensor) is not sensor:
-            torn.add(camera)
-    for camera in own.keys() - torn - {0}:
-        found[camera] = sensor_pose(own[camera].position, own[camera].attitude)
-    return found
+__all__ = ["FORMATS_OF_CAMERAS"]
 
 
 def _written(name: str, project: Project) -> Mapping[str, bytes]:
+    from photogram.formats.targets.cameras import rig_of_project
+    from photogram.targets.output.formats import CAMERA_FORMATS
+
     return CAMERA_FORMATS[name](rig_of_project(project))
 
 
 def _lost(project: Project) -> list[str]:
-    block = project.block
-    apart = [
-        each.title
-        for each, known in zip(block.cameras, np.isfinite(_sensors(project)), strict=True)
-        if not known.all()
-    ]
-    found = [
-        counted(len(block.photo_ids), "photo"),
-        counted(len(block.point_ids), "point"),
-        counted(len(block.image_xy), "image"),
-        "standard deviations and errors, which `photogram calibrate --to` writes of a board",
-    ]
-    if apart:
-        found.append(f"where these cameras are to the first, if anything says it: {listed(apart)}")
-    return found
+    from photogram.formats.targets.cameras import lost_beside_cameras
+
+    return lost_beside_cameras(project)
 
 
 def _unread(path: Path, wishes: Wishes) -> Project:
@@ -93,7 +37,7 @@ FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
     {
         name: Format(
             name=name,
-            title=TITLES[name],
+            title=title,
             recognises=lambda _: False,
             read=_unread,
             write=partial(_written, name),
@@ -101,7 +45,12 @@ FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
             pixels=True,
             geographic=True,
         )
-        for name in CAMERA_FORMATS
+        for name, title in (
+            ("opencv_yaml", "YAML of OpenCV"),
+            ("ros_camera_info", "camera_info of ROS"),
+            ("kalibr_camchain", "camchain.yaml of Kalibr"),
+            ("mrcal", "a .cameramodel of mrcal"),
+        )
     }
 )
-"""By name; they are written from any project, and not read."""
+"""By name, as `photogram.targets.camera_files` has them."""

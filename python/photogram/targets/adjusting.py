@@ -45,9 +45,9 @@ def adjusted_start(
         one_of("outliers", outliers, ("mrcal",))
     rounds = 0
     while True:
-        how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress, "verdict": True}
+        how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress}
         # Knots that no image touches are determined by priors alone.
-        free = None if _has_knots(start) else adjust(start.block(), **how)
+        free = None if _has_knots(start) else adjust(start.block(), covariance="verdict", **how)
         result = _knotted(start, how) if free is None else _with_priors(start, free, threads)
         worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
         if worse.any() and result.converged:
@@ -107,9 +107,9 @@ def _knotted(start: Start, how: dict[str, Any]) -> Result:
     An adjustment reckons with the knots near images where it begins: the last of it begins where corners stay
     at theirs.
     """
-    near = adjust(_weighted(start), **how | {"verdict": False}, covariance=False, tolerance=ROUGHLY)
+    near = adjust(_weighted(start), **how, covariance=False, tolerance=ROUGHLY)
     moved = Calibrated(calibration=start, result=near).restarted()
-    return adjust(_weighted(moved), **how, tolerance=FINELY)
+    return adjust(_weighted(moved), **how, covariance="verdict", tolerance=FINELY)
 
 
 def _has_knots(start: Start) -> bool:

@@ -22,9 +22,8 @@ from photogram.targets.markers import charuco_tags, grid_tags
 from photogram.targets.measured import Measured
 from photogram.targets.saddles import Picture, refined
 
-__all__ = ["detected", "is_picture"]
+__all__ = ["detected"]
 
-SUFFIXES = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".tif", ".tiff", ".webp"})
 Found = tuple[Indices, Floats]
 """Numbers of points of the board, and where they are: (n,), (n, 2)."""
 PART = 0.4
@@ -35,11 +34,6 @@ LEAST = (25.0, 8.0)
 """Square pixels of the smallest circles: large ones first, among which grain is none."""
 ROUND, FLAT = 0.5, 0.05
 """Of circles that are tilted by 75 degrees: 4 pi A / P^2, and the ratio of moments."""
-
-
-def is_picture(path: Path) -> bool:
-    """Return whether a file is a picture, by its name."""
-    return path.suffix.lower() in SUFFIXES
 
 
 def detected(

@@ -8,7 +8,6 @@ from types import MappingProxyType
 from photogram.arguments.arrays import one_of
 from photogram.errors import InputError
 from photogram.targets.calibrated import Calibrated
-from photogram.targets.output import kalibr, mrcal, opencv, ros
 from photogram.targets.output.kalibr import kalibr_camchain
 from photogram.targets.output.mrcal import mrcal_models
 from photogram.targets.output.opencv import opencv_yaml
@@ -17,7 +16,7 @@ from photogram.targets.output.ros import ros_camera_info
 from photogram.targets.output.valid import valid_region
 from photogram.targets.uncertainty import uncertainty_map
 
-__all__ = ["CAMERA_FORMATS", "TITLES", "camera_files"]
+__all__ = ["CAMERA_FORMATS", "camera_files"]
 
 CAMERA_FORMATS: Mapping[str, Callable[[Rig], dict[str, bytes]]] = MappingProxyType(
     {
@@ -28,15 +27,6 @@ CAMERA_FORMATS: Mapping[str, Callable[[Rig], dict[str, bytes]]] = MappingProxyTy
     }
 )
 """What makes the files of each, by their names."""
-TITLES: Mapping[str, str] = MappingProxyType(
-    {
-        "opencv_yaml": opencv.TITLE,
-        "ros_camera_info": ros.TITLE,
-        "kalibr_camchain": kalibr.TITLE,
-        "mrcal": mrcal.TITLE,
-    }
-)
-"""What people are told these are."""
 
 
 def camera_files(calibrated: Calibrated, to: str, need: float | None = None) -> dict[str, bytes]:
