@@ -1,5 +1,6 @@
 """Calibrations of splined lenses from end to end: priors, maps, projects, files of mrcal."""
 
+import json
 from functools import cache
 
 import numpy as np
@@ -93,6 +94,9 @@ def test_the_report_counts_knots_that_hang_on_their_priors():
     assert "no image touches" in told
     assert "knots" in beyond
     assert told in adjusted().report()
+    (own,) = json.loads(adjusted().to_json())["splines"]
+    assert told.startswith(f"{own['camera']}: {own['from_prior']} of {own['knots']} knots")
+    assert 0 <= own["untouched"] <= own["from_prior"]
 
 
 def test_cross_validation_leaves_out_what_parts_have_from_their_priors():

@@ -50,6 +50,7 @@ class SyncName(StrEnum):
 
     KNOWN = "known"
     NONE = "none"
+    OFFSET = "offset"
 
 
 class PriorName(StrEnum):
@@ -108,9 +109,13 @@ class Seen:
     within: Annotated[
         float, typer.Option(min=0.0, metavar="S", help="With --views time: seconds between them at most.")
     ] = 0.005
-    sync: Annotated[SyncName, typer.Option(help="Whether images of one view were taken at one time.")] = (
-        SyncName.KNOWN
-    )
+    sync: Annotated[
+        SyncName,
+        typer.Option(
+            help="Whether images of one view were taken at one time; offset: by clocks of their cameras,"
+            " whose offsets are unknown."
+        ),
+    ] = SyncName.KNOWN
     pixel_origin: Annotated[OriginName, typer.Option(help="Corner or center of the first pixel is 0, 0.")] = (
         OriginName.CENTER
     )

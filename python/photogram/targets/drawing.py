@@ -21,6 +21,7 @@ from photogram.targets.maps import UncertaintyMap, distance_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.text import Text
 
 __all__ = [
     "draw_cross_validation",
@@ -35,6 +36,8 @@ ARROWS = 24
 """Vectors along the longer side of a picture."""
 WIDTH = 7.6
 """Inches."""
+ROOM = 20.0
+"""Points from the middle of a label of a contour to that of the next one."""
 SHADES = 4
 """Of colour from one contour to the next."""
 
@@ -125,9 +128,9 @@ def steps_of_125(low: float, high: float) -> Floats:
 
 def _uncertainty(found: UncertaintyMap, ax: Where) -> Any:
     with panels(ax, 1, 1, WIDTH, _height(found.size)) as (axes,):
+        _frame(axes, found.size)
         _contours(axes, found.columns, found.rows, found.sd, "px")
         _seen(axes, found.corners, found.coverage)
-        _frame(axes, found.size)
         said = found.model.replace("; ", "\n")
         axes.set_title(f"{found.title}\n{said}", fontsize=9.0)
     return handed_out([axes])
@@ -176,6 +179,7 @@ class _Apart:
 
     def draw(self, axes: Axes, title: str) -> None:
         """Draw lengths as contours, and some of the vectors, the longest as long as they are apart."""
+        _frame(axes, self.size)
         _contours(axes, self.columns, self.rows, self.lengths, "px")
         step = max(1, round(len(self.columns) / ARROWS))
         every = (slice(None, None, step), slice(None, None, step))
@@ -185,13 +189,12 @@ class _Apart:
         known = np.hypot(*vectors.T) <= 2 * largest
         spacing = step * (self.columns[1] - self.columns[0])
         arrows(axes, places[known], vectors[known], scale=largest / spacing, color=BLUE, width=0.002)
-        _frame(axes, self.size)
         axes.set_title(title, fontsize=9.0)
 
     def beside(self, axes: Axes, chi2: Floats) -> None:
         """Draw what they are beside their covariances."""
-        _contours(axes, self.columns, self.rows, chi2, "", lowest=0.1)
         _frame(axes, self.size)
+        _contours(axes, self.columns, self.rows, chi2, "", lowest=0.1)
         axes.set_title("beside its covariance: d' Q⁻¹ d / 2, about 1 where that explains it", fontsize=9.0)
 
 
@@ -218,12 +221,26 @@ def _contours(
     filled = axes.contourf(columns, rows, shown, shades, cmap=ORDERED, norm=norm, extend="min")
     filled.set_edgecolor("face")  # no seams between colours
     lines = axes.contour(columns, rows, shown, levels, colors="white", linewidths=0.9)
-    for text in axes.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8.0):
+    for text in _apart(axes, axes.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8.0, inline=False)):
         text.set_color(INK)
         text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
     bar = axes.figure.colorbar(filled, ax=axes, shrink=0.85, ticks=levels, format="%g")
     bar.ax.minorticks_off()
     bar.set_label(unit)
+
+
+def _apart(axes: Axes, texts: Sequence[Text]) -> list[Text]:
+    """Return labels that do not lie on each other, those of the lowest contours; take the others away."""
+    kept: list[Text] = []
+    places: list[Floats] = []
+    for each in texts:
+        place = np.asarray(axes.transData.transform(each.get_position())) * 72 / axes.figure.dpi
+        if all(np.hypot(*(place - other)) > ROOM for other in places):
+            kept.append(each)
+            places.append(place)
+        else:
+            each.remove()
+    return kept
 
 
 def _seen(axes: Axes, corners: Floats, coverage: Floats) -> None:

@@ -68,7 +68,8 @@ def read(
     cameras, views, within, pixel_origin, size
         How images are grouped, and how pixels count: see docs/targets.md.
     sync
-        `known`: images of one view were taken at one time; `none`: each has a pose of its own.
+        `known`: images of one view were taken at one time; `none`: each has a pose of its own; `offset`: at
+        their times by the clock of their camera, whose offset is unknown.
     sd0, regularise
         As of :class:`Calibration`.
     progress
@@ -91,9 +92,9 @@ def read(
         given = _given(path, models, corners, own)
         prior = None if knot_sd and not regularise else regularise or given.regularise
         given = given.replace(cameras=with_knot_sd(given.cameras, knot_sd, prior), regularise=prior, sd0=sd0)
-        if sync == "none":
+        if sync != "known":
             raise InputError(
-                f"{models[0].name} says which pictures are of one view: --sync none goes without", file=path
+                f"{models[0].name} says which pictures are of one view: --sync {sync} goes without", file=path
             )
         return given if shape is None else given.replace(board=given.board.replace(shape=shape))
     how = Grouping(

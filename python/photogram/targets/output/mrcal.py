@@ -100,6 +100,7 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
         and calibration.shape in ("held", "bend")
         and board.pitch[0] == board.pitch[1]
         and len({name for name, _ in lenses}) == 1
+        and calibration.sync != "offset"
         and (count == 1 or all(rig.tied(row) for row in range(1, count)))
     )
     if not fits:
