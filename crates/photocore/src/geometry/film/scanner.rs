@@ -36,12 +36,7 @@ pub struct Scanned {
 impl Scanner {
     /// One of so many mm in a unit of readings; `down`: whether the second coordinate counts down. The correction is that of readings in mm,
     /// counted from the origin, y up; without polynomials unless it is `curved`.
-    pub fn new(
-        (correction, curved): (Correction, bool),
-        pitch: f64,
-        origin: [f64; 2],
-        down: bool,
-    ) -> Self {
+    pub fn new((correction, curved): (Correction, bool), pitch: f64, origin: [f64; 2], down: bool) -> Self {
         let units = [1.0 / pitch, if down { -1.0 } else { 1.0 } / pitch];
         Self { correction, linear: correction.linear(), curved, origin, units }
     }

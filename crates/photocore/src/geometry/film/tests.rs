@@ -127,7 +127,8 @@ fn partials_agree_with_differences() {
 #[test]
 fn a_place_comes_back_from_its_reading() {
     for scene in scenes() {
-        let back = scene.photo().place(scene.reading().xy, |q| scene.deformation(q), &scene.scanner()).unwrap();
+        let back =
+            scene.photo().place(scene.reading().xy, |q| scene.deformation(q), &scene.scanner()).unwrap();
         (0..2).for_each(|k| assert!((back[k] - scene.q[k]).abs() < 1e-11));
     }
 }
