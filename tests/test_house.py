@@ -37,6 +37,7 @@ FLOORS = (
     ("memory",),
     ("errors",),
     ("messages",),
+    ("on_demand",),
 )
 """From the top down, as CONTRIBUTING has them: a file knows its own folder and floors below."""
 

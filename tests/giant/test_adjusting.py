@@ -48,7 +48,10 @@ def changed(directory, new, column, digit):
 def solution(directory):
     """Adjust a project to the end."""
     read = read_project(directory)
-    return adjust(read.to_block(), unit_variance="unity", fix_photos=read.common.intersection_only)
+    block = read.to_block()
+    return adjust(
+        block.with_fixed_photos() if read.common.intersection_only else block, unit_variance="unity"
+    )
 
 
 def differences(one, other):

@@ -5,7 +5,7 @@ import pytest
 from given_targets import left_table, rig_small
 
 from photogram import InputError, formats
-from photogram.formats.calibrations import adjusted_project, calibration_of, project_of
+from photogram.formats.targets.calibrations import adjusted_project, calibration_of, project_of
 from photogram.targets import read
 
 

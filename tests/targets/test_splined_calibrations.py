@@ -9,7 +9,7 @@ from test_splined_adjustment import lens
 
 from photogram import formats
 from photogram.errors import InputError
-from photogram.formats.calibrations import adjusted_project, calibration_of
+from photogram.formats.targets.calibrations import adjusted_project, calibration_of
 from photogram.targets import Board, Calibration, Corners, read
 from photogram.targets.cross_validated import cross_validate
 from photogram.targets.knot_weights import with_knot_sd

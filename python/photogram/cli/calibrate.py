@@ -179,7 +179,7 @@ class Seen:
     def _of_project(self, path: Path) -> Calibration:
         """Return the calibration that a plain project is, with what a user says otherwise."""
         from photogram import formats
-        from photogram.formats.calibrations import calibration_of
+        from photogram.formats.targets.calibrations import calibration_of
 
         found = calibration_of(formats.read(path))
         if self != Seen(shape=self.shape, sd=self.sd, regularise=self.regularise):
@@ -328,7 +328,7 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     """Make everything that goes to the directory, before anything is written."""
     from photogram.formats import to_files
     from photogram.formats.adjusted import table_files
-    from photogram.formats.calibrations import adjusted_project
+    from photogram.formats.targets.calibrations import adjusted_project
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
     from photogram.targets.tables import views

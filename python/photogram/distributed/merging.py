@@ -12,6 +12,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import remarks_on
+from photogram.adjustment.robust import remark
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.core import read_outcome
 from photogram.distributed.driver import Outcome
@@ -118,8 +119,9 @@ def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InP
     rest = _rest(owners, block, outcome, orders, details) | {"datum": manifest.held}
     solution = cast("BlockSolution", SimpleNamespace(**found, **rest))
     datum = datum_of(block, solution)
-    messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
     options = manifest.options
+    messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
+    messages += remark(options.loss, solution.image_weights)
     freedom = outcome.degrees_of_freedom
     return InParts.from_solution(block, solution, options, datum, messages, freedom)
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from photogram.errors import InputError, PhotogramError
 from photogram.formats.block_contents import check_films
 from photogram.formats.format import Format, Wishes
-from photogram.formats.metadata.adding import with_wished_photos
 from photogram.formats.millimetres import in_pixels, nominal_pixels
 from photogram.formats.moving import check_held, lost_motions
 from photogram.formats.planes import plane_remarks
@@ -120,8 +119,13 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
     with turned(f"reading {path}"):
         try:
             wishes = wishes or Wishes()
+            if wishes.settings and chosen.name != "plain":
+                raise InputError(f"is no plain project but {chosen.title}, which has no settings: --set")
             project = chosen.read(path, wishes)
-            project = with_wished_photos(project, wishes)
+            if wishes.photos is not None or "settings" in project.details:
+                from photogram.formats.metadata.adding import with_wished_photos
+
+                project = with_wished_photos(project, wishes)
             return project.replace(
                 messages=(*project.messages, *plane_remarks(project.block, path, project.starts))
             )

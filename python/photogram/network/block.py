@@ -28,6 +28,7 @@ from photogram.network.observations import (
     Rate,
     Velocity,
     all_trajectories,
+    moments,
     observation_rows,
     of_records,
 )
@@ -643,6 +644,22 @@ class Block(Valued, Brief):
             values["point_check_sd"] = None
         return type(self)(**{**values, **changes})
 
+    def with_fixed_photos(self) -> Self:
+        """Return the block with positions and attitudes that stay as they are: every point by itself.
+
+        Raises
+        ------
+        InputError
+            Photos or observations on trajectories.
+        """
+        refuse_trajectories(self, "fixed photos", "whose pose is not its own")
+        return self.replace(
+            photo_position_sd=0.0,
+            photo_attitude_sd=0.0,
+            photo_positions_observed=None,
+            photo_attitudes_observed=None,
+        )
+
     def in_frame(self, frame: Frame) -> Self:
         """Return the block with another frame; the coordinates are the same."""
         own = copy.copy(self)
@@ -663,6 +680,14 @@ def _span(values: Floats) -> str:
     return f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"
 
 
+def flown_by(block: Block) -> str:
+    """Return what of a block is on a trajectory, by name; nothing where nothing is."""
+    if block.timed:
+        return f"the photo {block.timed[0].photo} is on a trajectory"
+    records = moments(block.observations)
+    return f"observations are of the trajectory {records[0].trajectory.name}" if records else ""
+
+
 def of_images_alone(block: Block, what: str) -> Block:
     """Return a block that has nothing but images; refuse others for what would leave the rest out.
 
@@ -671,15 +696,25 @@ def of_images_alone(block: Block, what: str) -> Block:
     InputError
         Observations beside images, photos on frames or trajectories.
     """
-    if block.timed:
-        photo = block.timed[0].photo
-        raise InputError(f"{what}: the photo {photo} is on a trajectory, which is not taken there")
+    refuse_trajectories(block, what)
     refuse_passages(block, what)
     if block.observations:
         raise InputError(f"{what}: the block has observations beside images, which are not taken there")
     if block.mounts:
         raise InputError(f"{what}: the block has photos on frames, which are not taken there")
     return block
+
+
+def refuse_trajectories(block: Block, what: str, why: str = "which is not taken there") -> None:
+    """Refuse a block with photos or observations on trajectories.
+
+    Raises
+    ------
+    InputError
+        `what` does not take the photo, or the trajectory, that is named.
+    """
+    if flown := flown_by(block):
+        raise InputError(f"{what}: {flown}, {why}")
 
 
 def refuse_passages(block: Block, what: str) -> None:

@@ -43,9 +43,9 @@ def adjusted_start(
         one_of("outliers", outliers, ("mrcal",))
     rounds = 0
     while True:
-        how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress, "verdict": True}
+        how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress}
         # Knots that no image touches are determined by priors alone.
-        free = None if _has_knots(start) else adjust(start.block(), **how)
+        free = None if _has_knots(start) else adjust(start.block(), covariance="verdict", **how)
         result = _knotted(start, how) if free is None else _with_priors(start, free, threads)
         worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
         if worse.any() and result.converged:
@@ -78,13 +78,13 @@ def _knotted(start: Start, how: dict[str, Any]) -> Result:
     at theirs.
     """
     block = _weighted(start)
-    near = adjust(block, **how | {"verdict": False}, covariance=False, tolerance=ROUGHLY)
+    near = adjust(block, **how, covariance=False, tolerance=ROUGHLY)
     moved = near.block.replace(
         photo_positions=near.photo_positions,
         photo_attitudes=near.photo_attitudes,
         cameras=[each.restarted() for each in near.cameras],
     )
-    return adjust(moved, **how, tolerance=FINELY)
+    return adjust(moved, **how, covariance="verdict", tolerance=FINELY)
 
 
 def _has_knots(start: Start) -> bool:

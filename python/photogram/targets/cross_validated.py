@@ -102,8 +102,7 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
         references=None,
         regularise=None,
     )
-    loss, scale = whole.result.options.loss or (None, None)
-    result = adjust(part.block(), loss=cast("Loss | None", loss), scale=scale)
+    result = adjust(part.block(), loss=cast("Loss | None", whole.result.options.loss))
     own = [priors[each] for each in cameras]
     if any(_is_weighted(each) for each in own):
         result = cast("Result", adjusted_again(part.block(own), result.options, result.state, threads=None))

@@ -21,18 +21,12 @@ from photogram.targets.markers import charuco_tags, grid_tags
 from photogram.targets.measured import Measured
 from photogram.targets.saddles import Picture, refined
 
-__all__ = ["detected", "is_picture"]
+__all__ = ["detected"]
 
-SUFFIXES = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".tif", ".tiff", ".webp"})
 Found = tuple[Indices, Floats]
 """Numbers of points of the board, and where they are: (n,), (n, 2)."""
 PART = 0.4
 """Half the side of the window of a corner, over the least distance to its neighbours."""
-
-
-def is_picture(path: Path) -> bool:
-    """Return whether a file is a picture, by its name."""
-    return path.suffix.lower() in SUFFIXES
 
 
 def detected(

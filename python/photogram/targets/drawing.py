@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +14,10 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
 from photogram.plots.panels import Where, handed_out, note, panels, placed
 from photogram.show.pictures import arrows, round_length
-from photogram.show.style import BLUE, COLOURS, FAINT, INK, ORDERED, VERMILION
+from photogram.show.style import BLUE, INK, ORDERED, VERMILION
 from photogram.targets.compared import CameraDifference
 from photogram.targets.cross_validation import CrossValidation
-from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
+from photogram.targets.maps import UncertaintyMap, distance_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +26,6 @@ __all__ = [
     "draw_cross_validation",
     "draw_difference",
     "draw_uncertainty",
-    "draw_uncertainty_against_distance",
     "steps_of_125",
 ]
 
@@ -117,30 +114,6 @@ def draw_cross_validation(
     return placed(partial(_cross_validation, cross, over), path, ax)
 
 
-def draw_uncertainty_against_distance(
-    curves: Sequence[UncertaintyCurve], path: Path | None = None, ax: Where = None
-) -> Any:
-    """Draw the uncertainty of projection against distance, a curve for each pixel, with its minimum.
-
-    Parameters
-    ----------
-    curves
-        The curves.
-    path, ax
-        As of :func:`draw_uncertainty`.
-
-    Returns
-    -------
-    The axes.
-
-    Raises
-    ------
-    InputError, ModuleNotFoundError
-        As of :func:`draw_uncertainty`.
-    """
-    return placed(partial(_against_distance, curves), path, ax)
-
-
 def steps_of_125(low: float, high: float) -> Floats:
     """Return values 1, 2, 5 times powers of ten that enclose what lies between two positive numbers."""
     start = round_length(low)
@@ -220,34 +193,6 @@ class _Apart:
         _contours(axes, self.columns, self.rows, chi2, "", lowest=0.1)
         _frame(axes, self.size)
         axes.set_title("beside its covariance: d' Q⁻¹ d / 2, about 1 where that explains it", fontsize=9.0)
-
-
-def _against_distance(curves: Sequence[UncertaintyCurve], ax: Where) -> Any:
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    with panels(ax, 1, 1, WIDTH, 4.2) as (axes,):
-        for each, colour in zip(curves, cycle(COLOURS), strict=False):
-            finite = np.isfinite(each.distances)
-            x, y = each.pixel
-            axes.plot(each.distances[finite], each.sd[finite], color=colour, label=f"pixel {x:g}, {y:g}")
-            for value in each.sd[~finite]:
-                axes.axhline(value, color=colour, linestyle=":", linewidth=0.8)
-            if np.isfinite(each.minimum[0]):
-                axes.plot(*each.minimum, marker="o", markersize=5, color=colour)
-        first = curves[0]
-        axes.set(xscale="log", yscale="log", xlabel=f"distance, {first.unit}", ylabel="sd, px")
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axis.set_major_formatter("{x:g}")
-            axis.set_minor_formatter(NullFormatter())
-        axes.grid(color=FAINT, alpha=0.25, linewidth=0.5)
-        axes.set_title(
-            f"{first.camera}: standard deviation of projection (datum {first.datum});"
-            " dots: smallest, dotted: at infinity",
-            fontsize=9.0,
-        )
-        axes.legend()
-    return handed_out([axes])
 
 
 def _height(size: tuple[int, int]) -> float:

@@ -12,8 +12,9 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.knots import KNOTTED
 from photogram.targets.calibrated import Calibrated
+from photogram.targets.corner_files import KEY
 from photogram.targets.mrcal_lenses import PREFIX
-from photogram.targets.mrcal_model import INDICES, KEY
+from photogram.targets.mrcal_model import INDICES
 from photogram.targets.output.rig import Rig
 from photogram.targets.output.terms import TERMS, terms_of
 

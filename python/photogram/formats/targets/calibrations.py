@@ -8,8 +8,10 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.format import Wishes
 from photogram.formats.plain.boards import ASSUMED
 from photogram.formats.project import Project
+from photogram.formats.targets import TITLE
 from photogram.messages import listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
@@ -19,16 +21,24 @@ from photogram.targets.board import Board
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.calibration import Calibration
 from photogram.targets.corners import Corners
+from photogram.targets.reading import read
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
 
-__all__ = ["MIDDLE", "TITLE", "adjusted_project", "calibration_of", "project_of", "shifted"]
+__all__ = ["MIDDLE", "adjusted_project", "calibration_of", "project_of", "read_project", "shifted"]
 
-TITLE = "corners of a board"
 MIDDLE = 0.5
 """Of the first pixel, from the upper-left corner: projects count from there."""
 NEAR = 1e-6
 """Of the spacing: what control may be off the points of a board."""
+
+
+def read_project(path: Path, wishes: Wishes) -> Project:
+    """Read corners, with first values: what is adjusted is the block of their calibration."""
+    sd = wishes.sd.get("images")
+    origin = wishes.pixel_origin or "center"
+    found = read(path, sd0=None if sd is None else sd[0], pixel_origin=origin)
+    return project_of(found, path)
 
 
 def project_of(calibration: Start, path: Path | None = None) -> Project:
