@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -515,7 +516,7 @@ class Block(Valued, Brief):
         splined = [(row, each.knot_unknowns) for row, each in enumerate(self.cameras) if each.knot_unknowns]
         return [*self.passages, *(Knots(row, knots) for row, knots in splined)]
 
-    @property
+    @cached_property
     def unknowns(self) -> list[Unknown]:
         """What observations, and photos on frames or trajectories, have in common, in order."""
         own: list[Unknown] = vars(self)["_unknowns"]
