@@ -32,6 +32,20 @@ PROCESSES: tuple[tuple[str, float | None, list[str]], ...] = (
 """What is run, its limit in seconds if it has one, and the command."""
 BLOCK_LIMIT = 0.010
 """Of five photos, seconds."""
+FIRST_LIMIT = 1.2
+"""Of the first call of a process: its processor time over that of later ones."""
+SIZES = ((1, 6), (20, 50), (50, 100))
+"""Blocks whose first call is measured: strips, and photos of each."""
+CALLS = """
+import sys, time
+from photogram import adjust, simulate
+
+block = simulate(strips=int(sys.argv[1]), photos_per_strip=int(sys.argv[2]), seed=1).block
+for _ in range(4):
+    began = time.process_time()
+    adjust(block)
+    print(time.process_time() - began)
+"""
 
 
 def of_processes(command: list[str], repetitions: int, environment: Mapping[str, str], folder: Path) -> float:
@@ -51,6 +65,16 @@ def of_five_photos(repetitions: int) -> float:
     """Return the median of the processor time of the adjustment of a block of five photos, seconds."""
     block = simulate(strips=1, photos_per_strip=5, points_per_photo=20, seed=1).block
     return of_calls(lambda: adjust(block), repetitions)
+
+
+def of_first_calls(size: tuple[int, int], repetitions: int) -> tuple[float, float]:
+    """Return medians of the processor time of first calls, and of the least of the next three calls."""
+    command = [sys.executable, "-c", CALLS, *map(str, size)]
+    runs = []
+    for _ in range(repetitions):
+        printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        runs.append([float(each) for each in printed.split()])
+    return statistics.median(run[0] for run in runs), statistics.median(min(run[1:]) for run in runs)
 
 
 def of_calls(call: Callable[[], object], repetitions: int) -> float:
@@ -79,6 +103,10 @@ def main() -> None:
             print(f"| {what} | {seconds:.2f} | {'' if limit is None else f'{limit:.2f}'} |", flush=True)
     seconds = of_five_photos(asked.repetitions)
     print(f"| `adjust` of a block of five photos | {seconds:.4f} | {BLOCK_LIMIT:.4f} |")
+    for size in SIZES:
+        first, later = of_first_calls(size, asked.repetitions)
+        what = f"first `adjust` of a process, {size[0] * size[1]:,} photos; later calls take {later:.4f}"
+        print(f"| {what} | {first:.4f} | {FIRST_LIMIT * later:.4f} |", flush=True)
 
 
 if __name__ == "__main__":

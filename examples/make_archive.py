@@ -49,6 +49,8 @@ image = "mm"                        # of cameras; images of photos with a film a
 [film]
 model = "affine"                    # conformal | affine | bilinear | projective
 interior = "inside"                 # or before: fitted photo by photo, then errorless
+certificate = "rc10-2345.toml"      # the camera and its marks; of a list, what is valid at the flight
+flown = 1983-07-02
 [sd]                                # standard deviations of tables that have no columns for them
 images = 0.25                       # pixels of the scan
 fiducial_images = 0.2
@@ -57,11 +59,9 @@ unit_variance = "unity"             # the standard deviations are taken as given
 """
 COMMENTS = {
     "cameras": [
-        "The camera as `photogram certificate rc10-2345.toml` has it: mm, in the frame of the marks.",
-        "The covariance of what the certificate determines is in covariances.csv.",
+        "Without values: the camera, its marks and their covariance are those of its certificate.",
     ],
-    "covariances": ["Of the camera and of the scanner, from their calibrations; what is not listed is zero."],
-    "fiducials": ["The marks of the camera by its certificate, mm, seen as the positive."],
+    "covariances": ["Of the scanner, from its calibration; what is not listed is zero."],
     "fiducial_images": ["Readings of the marks, pixels of the scan. A mark that is not there was lost."],
     "films": [
         "What films of a roll have in common: m, the change of size, and a pattern with weights in mm.",
@@ -204,24 +204,10 @@ def main(arguments: list[str]) -> None:
     camera, marks = certificate.camera("brown_forward"), certificate.fiducials()
     sd = np.sqrt(np.diag(marks.covariance)).reshape(-1, 2)
     true = random.normal(marks.xy, sd)
-    names, covariance = camera.covariance
-    # In files a principal distance is positive for the positive plane, in models negative.
-    signs = np.array([-1.0 if name == "c" else 1.0 for name in names])
-    rows = listed("camera", "rc10-2345", list(names), np.asarray(covariance) * np.outer(signs, signs))
-    rows += listed("scanner", "scanner", ["Sx", "Sy", "alpha"], np.diag(SCANNER_SD**2))
+    rows = listed("scanner", "scanner", ["Sx", "Sy", "alpha"], np.diag(SCANNER_SD**2))
     tables = {
-        "cameras": {
-            "camera": ["rc10-2345"],
-            "model": ["brown_forward"],
-            **{name: [sign * camera.parameters[name]] for name, sign in zip(names, signs, strict=True)},
-        },
+        "cameras": columns("camera model", [("rc10-2345", "brown_forward")]),
         "covariances": columns("kind name first second covariance", rows),
-        "fiducials": {
-            "camera": ["rc10-2345"] * len(marks.names),
-            "fiducial": list(marks.names),
-            **dict(zip("xy", marks.xy.T, strict=True)),
-            **dict(zip(("sd_x", "sd_y"), sd.T, strict=True)),
-        },
         "films": columns(
             "film m sd_m sd_photo_m sd_b1 sd_b2 pattern sd_w1 sd_w2 half_format_mm",
             [("roll-7", 0.0, ROLL_SD, *[SIZE_SD] * 3, "w1 w2", PATTERN_SD, PATTERN_SD, HALF)],

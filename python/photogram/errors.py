@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from photogram.messages import locate
 
@@ -56,6 +56,11 @@ class InputError(PhotogramError, ValueError):
 
 class ContradictionError(InputError):
     """Input that can be read and contradicts itself: what would be made of it could not be used."""
+
+    @classmethod
+    def of(cls, error: InputError) -> Self:
+        """Return it at the place of another error, with its words."""
+        return cls(error.message, file=error.file, record=error.record, text=error.text)
 
 
 class AdjustmentError(PhotogramError):

@@ -86,3 +86,53 @@ def test_poses_tell_the_side_of_two_marks(tmp_path: Path, kept: tuple[str, str])
     )
     found = read(tmp_path)
     assert [each.film.mirrored for each in found.block.passages] == [False] * 5 + [True]  # type: ignore[attr-defined]
+
+
+def keep_marks(folder: Path, photo: str, kept: tuple[str, ...]) -> None:
+    path = folder / "fiducial_images.csv"
+    lines = path.read_text().splitlines()
+    path.write_text(
+        "\n".join(each for each in lines if not each.startswith(f"{photo},") or each.split(",")[1] in kept)
+    )
+
+
+@pytest.mark.parametrize("posed", [True, False])
+def test_tie_points_tell_the_side_of_two_marks(tmp_path: Path, posed: bool) -> None:
+    """No point has coordinates: a neighbour whose marks tell shows how its images lie."""
+    project(tmp_path)
+    without_starts(tmp_path)
+    keep_marks(tmp_path, "p6", ("ml", "mr"))
+    (tmp_path / "points.csv").unlink()
+    (tmp_path / "control.csv").unlink()
+    if not posed:
+        rewritten(tmp_path / "photos.csv", {"omega": "", "phi": "", "kappa": ""})
+    found = read(tmp_path)
+    assert [each.film.mirrored for each in found.block.passages] == [False] * 5 + [True]  # type: ignore[attr-defined]
+
+
+def test_tie_points_tell_how_a_film_lies_whose_marks_have_no_names(tmp_path: Path) -> None:
+    """With poses a quarter turn shows, too: one after the other, from the photo whose marks have names."""
+    named = project(tmp_path)
+    without_starts(tmp_path)
+    (tmp_path / "points.csv").unlink()
+    (tmp_path / "control.csv").unlink()
+    path = tmp_path / "fiducial_images.csv"
+    head, *rows = path.read_text().splitlines()
+    rows = [each if each.startswith("p4,") else ",".join(["", *each.split(",")]) for each in rows]
+    rows = [
+        each if each[0] == "p" else ",".join([each.split(",")[1], "", *each.split(",")[3:]]) for each in rows
+    ]
+    path.write_text("\n".join([head, *rows]) + "\n")
+    found = read(tmp_path)
+    for one, other in zip(named.block.passages, found.block.passages, strict=True):
+        assert one.film.mirrored == other.film.mirrored  # type: ignore[attr-defined]
+        away = one.film.placement.position - other.film.placement.position  # type: ignore[attr-defined]
+        assert np.abs(away).max() < 0.03
+
+
+def test_a_photo_without_marks_is_told_to_be_taken_as_not_mirrored(tmp_path: Path) -> None:
+    project(tmp_path)
+    without_starts(tmp_path)
+    keep_marks(tmp_path, "p3", ())
+    found = read(tmp_path)
+    assert any("photo p3: its marks do not tell the side" in str(each) for each in found.messages)

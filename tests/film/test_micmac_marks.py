@@ -1,5 +1,6 @@
 """Marks of MicMac: written, read as they were, and the side of y found."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,52 @@ def test_y_of_a_camera_that_counts_up_is_left(tmp_path: Path) -> None:
     found = read_marks(folder)
     assert not found.turned
     np.testing.assert_array_equal(found.places["ur"], [105.9914, 105.9903])
+
+
+def test_places_that_count_from_a_corner_are_brought_amid_the_marks(tmp_path: Path) -> None:
+    folder = written(project(tmp_path), tmp_path / "micmac")
+    given = read_marks(folder)
+    path = folder / "Ori-InterneScan" / "MeasuresCamera.xml"
+
+    def moved(found: re.Match[str]) -> str:
+        x, y = found[1].split()
+        return f"<PtIm>{float(x) + 113.0!r} {float(y) + 113.0!r}</PtIm>"
+
+    path.write_text(re.sub("<PtIm>(.*)</PtIm>", moved, path.read_text()))
+    found = read_marks(folder)
+    assert any("count from a corner: they are taken from their mean, 11" in each for each in found.remarks)
+    middle = np.mean([*given.places.values()], axis=0)
+    assert np.abs(middle).max() < 0.01
+    for name, xy in given.places.items():
+        np.testing.assert_allclose(found.places[name], xy - middle, atol=1e-9)
+
+
+def test_a_list_of_names_is_that_of_the_camera(tmp_path: Path) -> None:
+    folder = written(project(tmp_path), tmp_path / "micmac")
+    path = folder / "id_fiducial.txt"
+    text = path.read_text()
+    assert sorted(text.split()) == sorted(read_marks(folder).places)
+    path.write_text(f"\n{text}\n")
+    assert len(read_marks(folder).remarks) == 1
+    for changed, message in (
+        (
+            text.replace("ll\n", "nn\n"),
+            r"id_fiducial.txt, record 1: the mark nn is no mark of MeasuresCamera",
+        ),
+        (f"{text}ll\n", r"record 9: the mark ll is there twice"),
+        (text.replace("ll\n", ""), r"has no ll, which MeasuresCamera.xml has"),
+    ):
+        path.write_text(changed)
+        with pytest.raises(InputError, match=message):
+            read_marks(folder)
+
+
+def test_marks_that_no_scan_shows_are_told(tmp_path: Path) -> None:
+    folder = written(project(tmp_path), tmp_path / "micmac")
+    for path in (folder / "Ori-InterneScan").glob("MeasuresIm-*.xml"):
+        lines = path.read_text().splitlines()
+        path.write_text("\n".join(each for each in lines if ">mr<" not in each))
+    assert read_marks(folder).remarks[1] == "no scan has the mark mr"
 
 
 def test_files_at_fault_are_refused(tmp_path: Path) -> None:

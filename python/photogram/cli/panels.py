@@ -10,7 +10,7 @@ __all__ = ["Command"]
 
 PANELS = {
     "Input": "example day name packaged file_format control control_crs columns roles images names camera sd"
-    " cubes jigsaw photos_dir photos_crs mrk_antenna pixel_origin model angles grid hand against"
+    " settings cubes jigsaw photos_dir photos_crs mrk_antenna pixel_origin model angles grid hand against"
     " against_spacing against_position_sd catalogue utc epoch faintest points point_sd decimals"
     " format zero_missing ground_unit model_unit restart start reject photos kind board spacing unit"
     " shape knots knot_sd cameras size views within sync",

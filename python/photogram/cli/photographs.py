@@ -32,5 +32,5 @@ PhotosCrs = Annotated[
 ]
 MrkAntenna = Annotated[
     bool,
-    typer.Option("--mrk-antenna", help="Positions in .MRK are those of antennas."),
+    typer.Option("--mrk-antenna", help=".MRK positions are of antennas."),
 ]

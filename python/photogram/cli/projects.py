@@ -70,9 +70,7 @@ Example = Annotated[
 ]
 FormatName = Annotated[
     str | None,
-    typer.Option(
-        "--format", metavar="NAME", help="The format of PATH. Default: found out.", show_default=False
-    ),
+    typer.Option("--format", metavar="NAME", help="Format of PATH. Default: found out.", show_default=False),
 ]
 ControlFile = Annotated[
     Path | None,
@@ -84,7 +82,7 @@ ControlCrs = Annotated[
     typer.Option(
         "--control-crs",
         metavar="CRS",
-        help="Coordinate reference system of --control (EPSG:25832 ...), where it is not that of PATH.",
+        help="CRS of --control (EPSG:25832 ...), where it is not that of PATH.",
         show_default=False,
     ),
 ]
@@ -138,6 +136,15 @@ Deviations = Annotated[
         show_default=False,
     ),
 ]
+ProjectSettings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="What project.toml is to say: film.model=affine, adjust.loss=huber.",
+        show_default=False,
+    ),
+]
 PixelOrigin = Annotated[
     OriginName | None,
     typer.Option(
@@ -180,6 +187,7 @@ class Additions:
     names: NamesFile = None
     camera: CamerasFile = None
     sd: Deviations = None
+    settings: ProjectSettings = None
     photos_dir: PhotosFolder = None
     photos_crs: PhotosCrs = None
     mrk_antenna: MrkAntenna = False
@@ -257,6 +265,7 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
         else PhotoFiles(added.photos_dir, added.photos_crs, added.mrk_antenna),
         cubes=added.cubes,
         jigsaw=added.jigsaw,
+        settings=added.settings or (),
     )
     project = with_sd(read(path, added.file_format, wishes), sd)
     job.reads(*project.details.get("further inputs", ()))

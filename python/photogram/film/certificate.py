@@ -51,6 +51,8 @@ SD_C = 0.003
 SD_PRINCIPAL_POINT = 0.003
 SD_UNKNOWN_POINT = 0.02
 """Of a principal point that nothing says, or that distances alone leave uncertain against the marks (mm)."""
+APART = 3.0
+"""Standard deviations of a point by which that of symmetry is away from that of autocollimation."""
 PRINTED = 2e-3
 """Millimetres by which printed coefficients may differ from the table of distortion."""
 
@@ -385,10 +387,11 @@ class Certificate(Shown, Brief):
                 said.append(f"distances leave the principal point against the marks uncertain: sd {sd:g} mm")
             if self.autocollimation is not None and self.symmetry is not None:
                 apart = math.dist(self.autocollimation, self.symmetry)
-                said.append(
-                    f"the point of symmetry is {1e3 * apart:.0f} um from that of autocollimation, about which"
-                    " distortion is taken"
-                )
+                if apart > APART * sd:
+                    said.append(
+                        f"the point of symmetry is {1e3 * apart:.0f} um from that of autocollimation, about"
+                        " which distortion is taken"
+                    )
         if self.places and (left := [m for m in self._of_distances() if m not in self.places]):
             said.append(
                 f"marks with distances alone beside others with coordinates are left out: {listed(left)}"

@@ -17,7 +17,7 @@ from photogram.film.decentring import SEMI_DIAGONALS, Tangential, of_profile, of
 from photogram.film.distances import Crossing, MarkDistance, RightAngle
 from photogram.film.lens_table import RadialTable
 from photogram.film.marks import DataStrip, by_side, turned, turned_name
-from photogram.io.toml import TomlFile
+from photogram.io.toml import TomlFile, day_of
 from photogram.io.toml_tables import Table, read_document
 from photogram.messages import quoted
 from photogram.show.page import significant
@@ -178,8 +178,8 @@ def _day(table: Table) -> date | None:
     if value is None:
         return None
     try:
-        return value if type(value) is date else date.fromisoformat(value)
-    except (TypeError, ValueError):
+        return day_of(value)
+    except ValueError:
         raise table.error("date", f"is {quoted(str(value))}, not a day such as 1983-05-11") from None
 
 

@@ -14,7 +14,16 @@ from photogram.arguments.arrays import frozen, numbers, one_of, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.network.film_form import Affine, affine_form
-from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Readings, Scanner, ScannerCurve
+from photogram.network.films import (
+    Film,
+    FilmBend,
+    FilmPlacement,
+    FilmSize,
+    Readings,
+    Reseau,
+    Scanner,
+    ScannerCurve,
+)
 
 __all__ = ["Affine", "FilmModel", "Interior", "conformal", "interior_orientation", "is_mirrored"]
 
@@ -62,6 +71,8 @@ class Interior:
         Whether the film was seen from the other side.
     affine
         The same as a form of six numbers, where the model is affine or conformal.
+    shifts
+        (nodes, 2) mm, of the reseau; none without.
     """
 
     model: FilmModel
@@ -75,6 +86,7 @@ class Interior:
     degrees_of_freedom: int
     mirrored: bool
     affine: Affine | None
+    shifts: Floats
 
     @property
     def sd(self) -> Floats:
@@ -135,6 +147,7 @@ def interior_orientation(
     scanner: Scanner | None = None,
     curves: Sequence[ScannerCurve] = (),
     mirrored: bool | None = None,
+    reseau: Reseau | None = None,
 ) -> Interior:
     """Fit the film of a photo to its fiducial marks, whose places are taken as they are.
 
@@ -160,6 +173,8 @@ def interior_orientation(
         The coefficients of its polynomials, six of three, x first; or none.
     mirrored
         Whether the film was seen from the other side; None: three marks at least tell.
+    reseau
+        A grid whose shifts are found with the film, observed as 0 with their covariance; None: without.
 
     Raises
     ------
@@ -181,8 +196,19 @@ def interior_orientation(
     own, machine = counted or Readings(), scanner or Scanner("scanner", sd=0.0)
     true = true_places(xy, own, machine, curves)
     side = _side(q, true, mirrored)
-    fit = _Fit(q, xy, weights, names, own, machine, curves, mirrored=side, projective=model == "projective")
-    values = np.zeros(8)
+    fit = _Fit(
+        q,
+        xy,
+        weights,
+        names,
+        own,
+        machine,
+        curves,
+        mirrored=side,
+        projective=model == "projective",
+        reseau=reseau,
+    )
+    values = np.zeros(8 if reseau is None else 8 + 2 * len(reseau.weights))
     values[:4] = conformal(q, true, mirrored=side)
     return fit.adjusted(model, values)
 
@@ -227,7 +253,10 @@ def mirror_message(given: bool, apart: tuple[float, float]) -> str:
         return f"{fits}: they are named wrongly, or those of another camera"
     if given:
         return f"the film is not mirrored: {fits}; say mirrored = false"
-    return f"the film is mirrored: {fits}: scanned from the other side, or a negative; say mirrored = true"
+    return (
+        f"the film is mirrored: {fits}: scanned from the other side, a negative, or rows that count up; say"
+        " mirrored = true"
+    )
 
 
 def side_residuals(places: Floats, true: Floats) -> tuple[float, float]:
@@ -254,30 +283,44 @@ class _Fit:
     curves: Sequence[ScannerCurve]
     mirrored: bool
     projective: bool
+    reseau: Reseau | None
 
     def film(self, values: Floats) -> Film:
+        own = self.reseau
         return Film(
             FilmPlacement("p", values[:3]),
             FilmSize("p", values[3:6]),
             self.scanner,
             self.counted,
-            bend=FilmBend("p", values[6:]) if len(self.names) > 6 else None,
+            bend=FilmBend("p", values[6:8]) if len(self.names) > 6 else None,
             projective=self.projective,
             curves=self.curves,
             mirrored=self.mirrored,
+            pattern=None if own is None else own.with_shifts(values[8:].reshape(-1, 2)),
         )
 
     def equations(self, values: Floats) -> tuple[Floats, Floats]:
-        """Return weighted residuals (2 n,) and partials (2 n, k)."""
+        """Return weighted residuals (2 n,) and partials (2 n, k); behind them those of a reseau."""
         film = self.film(values)
         computed, partials = _photocore.film_readings(film.numbers(), _vectors(film), self.places)
         columns = [2 + _place(name) for name in self.names]
-        own = partials[:, :, columns] * self.weights[:, :, np.newaxis]
-        return ((self.readings - computed) * self.weights).ravel(), own.reshape(-1, len(columns))
+        own = (partials[:, :, columns] * self.weights[:, :, np.newaxis]).reshape(-1, len(columns))
+        right = ((self.readings - computed) * self.weights).ravel()
+        if self.reseau is None:
+            return right, own
+        theta = values[2]
+        turn = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
+        by_shift = partials[:, :, 2:4] @ turn * [-1.0 if self.mirrored else 1.0, 1.0]
+        by_shift *= self.weights[:, :, np.newaxis]
+        nodes = np.einsum("nij,nk->nikj", by_shift, _parts(self.reseau, self.places)).reshape(len(right), -1)
+        root = np.linalg.inv(np.linalg.cholesky(self.reseau.covariance))
+        none = np.zeros((len(root), len(columns)))
+        return np.concatenate([right, -root @ values[8:]]), np.block([[own, nodes], [none, root]])
 
     def adjusted(self, model: FilmModel, values: Floats) -> Interior:
-        columns = [_place(name) for name in self.names]
-        size = np.abs(self.places).max()
+        known, shifts = [_place(name) for name in self.names], list(range(8, len(values)))
+        columns, size, rows = known + shifts, np.abs(self.places).max(), 2 * len(self.places)
+        moves = np.concatenate([_moves(size), np.ones(len(shifts))])[columns]
         for _ in range(_STEPS):
             right, matrix = self.equations(values)
             scale = np.linalg.norm(matrix, axis=0)
@@ -287,26 +330,27 @@ class _Fit:
                 )
             step = np.linalg.lstsq(matrix / scale, right, rcond=None)[0] / scale
             values[columns] += step
-            if np.abs(step * _moves(size)[columns]).max() < _ENDED * size:
+            if np.abs(step * moves).max() < _ENDED * size:
                 break
         else:
             raise InputError(f"the {model} film does not converge: marks and readings do not belong together")
         right, matrix = self.equations(values)
         basis, triangle = np.linalg.qr(matrix)
         inverse = np.linalg.inv(triangle)
-        cofactors = inverse @ inverse.T
+        cofactors = (inverse @ inverse.T)[: len(known), : len(known)]
         return Interior(
             model=model,
             film=frozen(values[:6]),
-            bend=frozen(values[6:]),
+            bend=frozen(values[6:8]),
             unknowns=tuple(self.names),
             cofactors=frozen(cofactors),
-            residuals=frozen(right.reshape(-1, 2) / self.weights),
-            redundancy=frozen(1.0 - (basis**2).sum(axis=1).reshape(-1, 2)),
+            residuals=frozen(right[:rows].reshape(-1, 2) / self.weights),
+            redundancy=frozen(1.0 - (basis[:rows] ** 2).sum(axis=1).reshape(-1, 2)),
             omega=float(right @ right),
             degrees_of_freedom=len(right) - len(columns),
             mirrored=self.mirrored,
             affine=self._affine(values, cofactors) if len(self.names) <= 6 else None,
+            shifts=frozen(values[8:].reshape(-1, 2)),
         )
 
     def _affine(self, values: Floats, cofactors: Floats) -> Affine:
@@ -316,6 +360,21 @@ class _Fit:
         of_film = np.zeros((6, 6))
         of_film[np.ix_(places, places)] = cofactors
         return affine_form(film, [*_vectors(film)], of_film)
+
+
+def _parts(reseau: Reseau, places: Floats) -> Floats:
+    """Return (n, nodes) what part of the shift of each node places (n, 2) have."""
+    still = Film(FilmPlacement("still"), FilmSize("still"), Scanner("still"), Readings(), pattern=reseau)
+    vectors = np.array([each.position for each in still.unknowns])
+    first = len(vectors) - len(reseau.weights)
+    vectors[first:] = 0.0
+    found = np.empty((len(places), len(reseau.weights)))
+    for k in range(found.shape[1]):
+        moved = vectors.copy()
+        moved[first + k, 0] = 1.0
+        readings, _ = _photocore.film_readings(still.numbers(), moved, places)
+        found[:, k] = (readings - places)[:, 0]
+    return found
 
 
 def _place(name: str) -> int:

@@ -59,6 +59,8 @@ class WhichMark:
         where readings are of no marks.
     decided
         Whether the runner-up is so much worse that the best is sure.
+    ways
+        (8,) all, in the same order; None where readings are of no marks.
     alike
         The best, and those that cannot be told from it.
     """
@@ -68,6 +70,7 @@ class WhichMark:
     mirrored: bool
     omega: Floats
     decided: bool
+    ways: tuple[FilmWay | None, ...]
     alike: tuple[FilmWay, ...]
 
     def __str__(self) -> str:
@@ -106,14 +109,16 @@ def which_mark(places: ArrayLike, true: ArrayLike, *, sd: float = 0.004) -> Whic
     best = int(np.argmin(omega))
     if not np.isfinite(omega[best]):
         raise InputError("the readings without names are of no marks of the camera, however the film lies")
+    every = [FilmWay(frozen(marks), k % 4, k >= 4) for k, (marks, _) in enumerate(ways)]
     alike = sorted(np.flatnonzero(omega - omega[best] <= DECIDED).tolist(), key=lambda k: k != best)
     return WhichMark(
-        marks=frozen(ways[best][0]),
+        marks=every[best].marks,
         quarter_turns=best % 4,
         mirrored=best >= 4,
         omega=frozen(omega),
         decided=len(alike) == 1,
-        alike=tuple(FilmWay(frozen(ways[k][0]), k % 4, k >= 4) for k in alike),
+        ways=tuple(each if np.isfinite(one) else None for each, one in zip(every, omega, strict=True)),
+        alike=tuple(every[k] for k in alike),
     )
 
 

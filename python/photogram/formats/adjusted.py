@@ -46,6 +46,8 @@ def table_files(result: Result) -> Mapping[str, bytes]:
         columns: dict[str, Any] = dict(columns_of(result, kind))
         if len(next(iter(columns.values()))):
             files[f"{file}.csv"] = csv_text(columns, _units(result, columns))
+    if result.films:
+        files["refined.csv"] = _refined(result)
     if np.isfinite(result.photo_cofactors).any():
         names = ("x", "y", "z", "omega", "phi", "kappa")
         files["photo_covariances.csv"] = _packed(
@@ -76,6 +78,24 @@ def _units(result: Result, columns: Mapping[str, Any]) -> list[str]:
     rest = [name for name in columns if name.split("_")[-1] in ("X", "Y", "Z", "height")]
     unit = result.block.linear_unit
     return [f"unit of {', '.join(rest)}: {unit}"] if rest else []
+
+
+def _refined(result: Result) -> bytes:
+    """Return images of films in the frame of their cameras, as programs take them that know no films."""
+    (xy, sd), block = result.refined, result.block
+    known = np.flatnonzero(np.isfinite(xy).all(axis=1))
+    return csv_text(
+        {
+            "photo": [block.photo_ids[row] for row in block.image_photos[known].tolist()],
+            "point": [block.point_ids[row] for row in block.image_points[known].tolist()],
+            **dict(zip(("x", "y"), xy[known].T, strict=True)),
+            **dict(zip(("sd_x", "sd_y"), sd[known].T, strict=True)),
+        },
+        [
+            "mm in the frame of the marks, x right and y up on the positive; the lens is not taken out",
+            "sd: of the readings; what images of a film, a scanner and a camera have in common is left out",
+        ],
+    )
 
 
 def _packed(

@@ -53,5 +53,5 @@ def check_films(block: Block, title: str) -> None:
     if scanned:
         raise InputError(
             f"{title}: the images of the photo {scanned[0]} are readings of a scanned film, which are not"
-            " written; what was read is as it was"
+            " written; `photogram adjust` writes refined.csv, images in mm in the frame of the camera"
         )

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.project import Project
 from photogram.results.result import Result
 
-__all__ = ["Format", "PhotoFiles", "Wishes"]
+__all__ = ["Format", "PhotoFiles", "Wishes", "later"]
+
+
+def later(module: str, name: str) -> Callable[..., Any]:
+    """Return a call of a function whose module is loaded when it is called: most projects have one format."""
+
+    def call(*arguments: Any) -> Any:
+        return getattr(import_module(module), name)(*arguments)
+
+    return call
 
 
 @dataclass(frozen=True)
@@ -56,6 +67,8 @@ class Wishes:
         The list of cubes or ISDs of a control network.
     jigsaw
         How a control network is adjusted: settings by the names of jigsaw, or the path of a file with them.
+    settings
+        What the settings of a plain project say otherwise: `section.key=value`.
     """
 
     cameras: Path | None = None
@@ -67,6 +80,7 @@ class Wishes:
     photos: PhotoFiles | None = None
     cubes: Path | None = None
     jigsaw: str | None = None
+    settings: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Fiducial marks of MicMac: `MeasuresCamera.xml` (mm), and `Ori-InterneScan/MeasuresIm-NAME.xml` (pixels)."""
+"""Fiducial marks of MicMac: `MeasuresCamera.xml` (mm), `MeasuresIm-NAME.xml` (pixels), `id_fiducial.txt`."""
 
 from __future__ import annotations
 
@@ -17,11 +17,15 @@ from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.writing import known_cameras
 from photogram.formats.project import Project
 from photogram.formats.xml_stream import Element, read_stream, root_of
+from photogram.io.files import read_lines
+from photogram.messages import listed
 
 __all__ = ["MicmacMarks", "read_marks", "write_marks"]
 
 SET, OF_IMAGE = "SetOfMesureAppuisFlottants", "MesureAppuiFlottant1Im"
-SCANS, CAMERA = "Ori-InterneScan", "MeasuresCamera.xml"
+SCANS, CAMERA, NAMES = "Ori-InterneScan", "MeasuresCamera.xml", "id_fiducial.txt"
+AMID = 0.1
+"""Marks whose mean is farther from the origin, in parts of the format, are counted from a corner."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +35,7 @@ class MicmacMarks:
     Attributes
     ----------
     places
-        By mark (x, y), mm, y up.
+        By mark (x, y), mm, y up, counted from amid the marks.
     readings
         By photo and mark (column, row).
     turned
@@ -71,6 +75,8 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
     """Read the marks of a folder of MicMac.
 
     Whether y of `MeasuresCamera.xml` counts up or down is not said there: it is taken as most scans have it.
+    Where it counts from a corner, as is usual, places are brought to the mean of the marks. `id_fiducial.txt`
+    has their names, where it is there; a mark that no scan shows is told.
 
     Parameters
     ----------
@@ -82,8 +88,8 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
     Raises
     ------
     InputError
-        Files that are missing, cannot be read, or are of something else; a mark that is there twice, or that
-        the camera has not.
+        Files that are missing, cannot be read, or are of something else; a mark that is there twice, that the
+        camera has not, or that `id_fiducial.txt` names and the camera has not, or the other way round.
     """
     scans = folder / SCANS if (folder / SCANS).is_dir() else folder
     files = sorted(scans.glob("MeasuresIm-*.xml"))
@@ -103,9 +109,47 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
             if photo in readings:
                 raise InputError(f"the photo {photo} is in two files", file=file)
             readings[photo] = own
+    remarks = _named(scans, folder, path, down, readings)
     turned, remark = _turned(down, readings)
+    middle = np.mean([*down.values()], axis=0)
+    if np.abs(middle).max() > AMID * np.ptp([*down.values()], axis=0).max():
+        remarks.append(
+            f"places of marks count from a corner: they are taken from their mean, {middle[0]:.3f},"
+            f" {middle[1]:.3f} mm there, and so is the principal point"
+        )
+    else:
+        middle = np.zeros(2)
     sign = np.array([1.0, -1.0 if turned else 1.0])
-    return MicmacMarks({mark: xy * sign for mark, xy in down.items()}, readings, turned, (remark,))
+    amid = {mark: (xy - middle) * sign for mark, xy in down.items()}
+    return MicmacMarks(amid, readings, turned, (remark, *remarks))
+
+
+def _named(
+    scans: Path,
+    folder: Path,
+    camera: Path,
+    places: Mapping[str, Floats],
+    readings: Mapping[str, Mapping[str, Floats]],
+) -> list[str]:
+    """Compare the list of names with the marks of the camera; say which of them no scan shows."""
+    read = {mark for own in readings.values() for mark in own}
+    missing = [mark for mark in places if mark not in read]
+    remarks = [f"no scan has the {'marks' if missing[1:] else 'mark'} {listed(missing)}"] if missing else []
+    path = next(
+        (each for each in (scans / NAMES, folder / NAMES, scans.parent / NAMES) if each.is_file()), None
+    )
+    if path is None:
+        return remarks
+    given: set[str] = set()
+    for record, line in enumerate(read_lines(path), 1):
+        name = line.strip()
+        if name and (name in given or name not in places):
+            what = "is there twice" if name in given else f"is no mark of {camera.name}"
+            raise InputError(f"the mark {name} {what}", file=path, record=record, text=line)
+        given.add(name)
+    if unnamed := [mark for mark in places if mark not in given]:
+        raise InputError(f"has no {listed(unnamed)}, which {camera.name} has", file=path)
+    return remarks
 
 
 def _turned(places: Mapping[str, Floats], readings: Mapping[str, Mapping[str, Floats]]) -> tuple[bool, str]:
@@ -161,7 +205,8 @@ def write_marks(project: Project) -> dict[str, bytes]:
     files = {
         f"{SCANS}/MeasuresIm-{photo}.xml": _document(photo, own, whole=True) for photo, own in photos.items()
     }
-    return {f"{SCANS}/{CAMERA}": _document("Glob", places, whole=False)} | files
+    names = "".join(f"{name}\n" for name in places).encode()
+    return {NAMES: names, f"{SCANS}/{CAMERA}": _document("Glob", places, whole=False)} | files
 
 
 def _document(image: str, marks: Mapping[str, Floats], *, whole: bool) -> bytes:

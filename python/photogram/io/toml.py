@@ -6,6 +6,7 @@ import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
 
-__all__ = ["TomlFile", "quoted_text"]
+__all__ = ["TomlFile", "day_of", "quoted_text"]
 
 MOST_DIGITS = 1000
 _ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")
@@ -84,6 +85,12 @@ class TomlFile:
                 below, inside = True, re.match(rf"\s*\[+{word}[\].]", line) is not None
             if inside or (not below and re.match(rf"{word}[=.]", line)):
                 yield record, line
+
+
+def day_of(value: object) -> date:
+    """Return a day of TOML, or of a text such as 1983-07-02; `ValueError` where it is none."""
+    # A time of a day is a date of Python's, too.
+    return value if type(value) is date else date.fromisoformat(value if isinstance(value, str) else "")
 
 
 def quoted_text(text: str) -> str:

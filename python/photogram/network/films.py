@@ -30,6 +30,7 @@ __all__ = [
     "Mark",
     "Pattern",
     "Readings",
+    "Reseau",
     "Roll",
     "Scan",
     "Scanner",
@@ -41,6 +42,8 @@ __all__ = [
 
 PATTERNS = ("none", "w1 w2", "ebner", "grid")
 """By the number under which the core knows each."""
+MOST_SHIFTS = 200
+"""Unknowns of the reseau of a photo."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +169,77 @@ class Pattern:
         needed = {"w1 w2": 1, "ebner": 5}.get(self.kind, int(np.prod(own[4:])))
         if len(self.weights) != needed or not all(isinstance(each, Weights) for each in self.weights):
             raise InputError(f"the pattern {self.kind} has {needed} Weights of two")
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Reseau(Pattern):
+    """The grid of a single photo: shifts of its nodes, observed as 0, and smooth.
+
+    Parameters
+    ----------
+    photo
+        Its name.
+    numbers
+        As of the pattern `grid`.
+    sd
+        (2,) standard deviations of a shift in x and in y, mm.
+    smooth
+        That of second differences along rows and columns, mm; infinite: shifts do not know each other.
+    shifts
+        (n, 2) of nodes, row by row; errorless where they are given.
+
+    Raises
+    ------
+    InputError
+        More unknowns than a photo should have, or deviations that are none.
+    """
+
+    photo: str
+    sd: ArrayLike
+    smooth: float
+
+    def __init__(
+        self,
+        photo: str,
+        numbers: ArrayLike,
+        sd: ArrayLike,
+        smooth: float = np.inf,
+        shifts: ArrayLike | None = None,
+    ) -> None:
+        own = shaped("numbers of the reseau", numbers, (6,))
+        nodes = int(np.prod(own[4:]))
+        if 2 * nodes > MOST_SHIFTS:
+            raise InputError(
+                f"the reseau of the photo {photo} has {nodes} nodes, {2 * nodes} unknowns: {MOST_SHIFTS} are"
+                " the most"
+            )
+        deviations = shaped("sd of the reseau", sd, (2,))
+        if not ((deviations > 0).all() and np.isfinite(deviations).all() and smooth > 0):
+            raise InputError(f"deviations of the reseau cannot be {deviations.tolist()} and {smooth}")
+        object.__setattr__(self, "photo", photo)
+        object.__setattr__(self, "sd", deviations)
+        object.__setattr__(self, "smooth", float(smooth))
+        given = np.zeros((nodes, 2)) if shifts is None else shaped("shifts of the reseau", shifts, (nodes, 2))
+        known = np.inf if shifts is None else 0.0
+        weights = [Weights(f"{photo} node {k}", shift, known) for k, shift in enumerate(given, 1)]
+        super().__init__("grid", own, weights)
+
+    def with_shifts(self, shifts: Floats) -> Reseau:
+        """Return it with known shifts."""
+        return Reseau(self.photo, self.numbers, self.sd, self.smooth, shifts)
+
+    @property
+    def covariance(self) -> Floats:
+        """(2 n, 2 n) of the shifts, x and y of a node behind each other: (I/sd^2 + D' D/smooth^2)^-1."""
+        columns, rows = np.asarray(self.numbers)[4:].astype(int).tolist()
+        along, across = (np.diff(np.eye(count), 2, axis=0) for count in (columns, rows))
+        second = np.concatenate([np.kron(np.eye(rows), along), np.kron(across, np.eye(columns))])
+        stiff = second.T @ second / self.smooth**2
+        found = np.zeros((2 * rows * columns,) * 2)
+        for k, sd in enumerate(np.asarray(self.sd).tolist()):
+            found[k::2, k::2] = np.linalg.inv(np.eye(rows * columns) / sd**2 + stiff)
+        symmetric: Floats = (found + found.T) / 2
+        return symmetric
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.arrays import frozen
 from photogram.arguments.types import Floats
 from photogram.network.block import Block
@@ -89,6 +90,24 @@ class OnFilm:
         kind = self.kinds.get(Fiducial.KIND)
         found: Floats = np.zeros((0, 2)) if kind is None else getattr(kind, what)
         return found
+
+    @property
+    def refined(self) -> tuple[Floats, Floats]:
+        """(m, 2) images in the frame of their cameras by the adjusted films, mm, and standard deviations.
+
+        The lens is in them. Standard deviations are those of readings alone: what images have in common by
+        their film, marks and scanner is not in them. NaN of photos that are no films.
+        """
+        block = self.block
+        places, sd = np.full(block.image_xy.shape, np.nan), np.full(block.image_xy.shape, np.nan)
+        for row, film in self.films:
+            own = block.image_photos == row
+            given = film.numbers(), np.array(numbers_of_film(self, film))
+            places[own] = _photocore.film_places(*given, block.image_xy[own])
+            _, partials = _photocore.film_readings(*given, places[own])
+            by_reading = np.linalg.inv(partials[:, :, :2])
+            sd[own] = np.sqrt(((by_reading * block.image_sd[own][:, np.newaxis]) ** 2).sum(axis=2))
+        return frozen(places), frozen(sd)
 
     @property
     def film_forms(self) -> dict[str, Affine]:

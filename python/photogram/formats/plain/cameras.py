@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast, get_args
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.errors import ContradictionError, InputError
 from photogram.formats.plain.certificates import certified, read_certificates
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
@@ -28,6 +28,8 @@ __all__ = ["Cameras", "read_cameras", "spread_over_photos"]
 
 _MODELS = dict(_photocore.camera_models())
 _EACH = ("all", "photo", "group")
+OTHER_LENS = 5.0
+"""Millimetres by which a principal distance that is given differs from a certificate of another lens cone."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,8 @@ def read_cameras(tables: Tables) -> Cameras:
     ------
     InputError
         There is none, a model that there is not, a parameter that is missing or that the model does not have.
+    ContradictionError
+        A principal distance that is far from that of the certificate.
     """
     table = tables.read("cameras")
     if table is None:
@@ -97,6 +101,10 @@ def _of_camera(
     if certificate is None or certificate.c is None:
         return None
     if own.values or own.deviations:
+        c = abs(own.values.get("c", certificate.c))
+        if abs(c - certificate.c) > OTHER_LENS:
+            message = f"the camera {own.name} has c {c:g} mm, and its certificate {certificate.c:g} mm"
+            raise ContradictionError.of(table.error(row, f"{message}: it is of another lens"))
         message = f"camera {own.name}: it is as the table has it; of its certificate marks alone are taken"
         tables.messages.append(Message(message, table.path))
         return None

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.errors import ContradictionError, InputError
 from photogram.film.datum import with_datum
+from photogram.film.validity import age_remark, changed_remark, valid_certificate
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable
-from photogram.messages import Message, listed
+from photogram.io.toml import day_of
+from photogram.messages import Message, listed, quoted
 from photogram.network.cameras import Camera
 
 if TYPE_CHECKING:
@@ -21,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["certificate_marks", "certified", "definite", "read_certificates"]
 
 _MODELS = ("brown_forward", "brown")
+_ITSELF = "a camera of another year is a camera by itself"
 
 
 def read_certificates(tables: Tables) -> dict[str, Certificate]:
@@ -29,11 +34,11 @@ def read_certificates(tables: Tables) -> dict[str, Certificate]:
     Raises
     ------
     InputError
-        A file that cannot be read, two certificates of one camera, one that is of no camera.
+        A file that cannot be read, certificates of one camera of which none can be chosen, one that is of no
+        camera.
     """
-    given = tables.settings.certificate
     table = tables.read("photos")
-    if table is None or (given is None and "certificate" not in table):
+    if table is None or (not tables.settings.certificates and "certificate" not in table):
         return {}
     cameras = _cameras_of_films(tables, table)
     texts = table.texts("certificate")
@@ -45,15 +50,17 @@ def read_certificates(tables: Tables) -> dict[str, Certificate]:
         if found.setdefault(camera, path) != path:
             raise table.error(
                 row,
-                f"column certificate: the camera {camera} has another certificate, {found[camera].name}: a"
-                " camera of another year is a camera by itself",
+                f"column certificate: the camera {camera} has another certificate, {found[camera].name}:"
+                f" {_ITSELF}",
             )
     certificates = {camera: _read(path, camera) for camera, path in found.items()}
-    if given is not None:
-        rest = [name for name in dict.fromkeys(cameras.values()) if name not in found]
-        certificates |= _of_settings(tables, given, rest)
+    rest = [name for name in dict.fromkeys(cameras.values()) if name not in found]
+    several = _of_settings(tables, rest)
+    flown = _flown(tables, table, cameras)
+    for camera, each in several.items():
+        certificates[camera] = _valid(table, camera, each, flown[camera])
     for camera, own in certificates.items():
-        _tell(tables, camera, own)
+        _tell(tables, camera, own, several.get(camera, [own]), sorted(filter(None, flown[camera])))
     return certificates
 
 
@@ -65,32 +72,89 @@ def _cameras_of_films(tables: Tables, table: ColumnTable) -> dict[int, str]:
     return {row: names[row] or only for row, film in enumerate(films) if film}
 
 
+def _flown(
+    tables: Tables, table: ColumnTable, cameras: Mapping[int, str]
+) -> dict[str, dict[date | None, int]]:
+    """Return the days on which each camera was flown, with the first row of each."""
+    texts = table.texts("flown")
+    found: dict[str, dict[date | None, int]] = {}
+    for row, camera in cameras.items():
+        try:
+            day = day_of(texts[row]) if texts[row] else tables.settings.flown
+        except ValueError:
+            raise table.error(row, f"column flown: {quoted(texts[row])} is no day, as 1983-07-02") from None
+        found.setdefault(camera, {}).setdefault(day, row)
+    return found
+
+
+def _valid(
+    table: ColumnTable, camera: str, several: Sequence[Certificate], flown: Mapping[date | None, int]
+) -> Certificate:
+    """Return the certificate of a camera that is valid on all days on which it was flown."""
+    found: Certificate | None = None
+    for day, row in flown.items():
+        try:
+            own = valid_certificate(several, day)
+        except ContradictionError:
+            raise
+        except InputError as error:
+            raise (
+                error if error.file else table.error(row, f"the camera {camera} {error.message}")
+            ) from None
+        if found is not None and own is not found:
+            raise table.error(
+                row,
+                f"the camera {camera} was flown before as its certificate of {found.day} has it, and"
+                f" then, {day}, as that of {own.day}: {_ITSELF}",
+            )
+        found = own
+    assert found is not None
+    return found
+
+
 def _read(path: Path, camera: str) -> Certificate:
     from photogram.film import Certificate
 
     return Certificate.read(path, None if path.suffix.lower() == ".toml" else camera)
 
 
-def _of_settings(tables: Tables, path: Path, cameras: list[str]) -> dict[str, Certificate]:
-    """Return the certificate of a project: of the only camera, or of that which has its name."""
-    if path.suffix.lower() != ".toml":
-        return {camera: _read(path, camera) for camera in cameras}
-    own = _read(path, "")
-    named = [camera for camera in cameras if camera == own.name]
-    if not named and len(cameras) != 1:
-        raise InputError(
-            f"[film] certificate is of the camera {own.name}, and those of films are"
-            f" {listed(cameras) or 'none'}: give the column certificate of photos",
-            file=tables.settings.path,
-        )
-    return dict.fromkeys(named or cameras, own)
+def _of_settings(tables: Tables, cameras: Sequence[str]) -> dict[str, list[Certificate]]:
+    """Return the certificates of a project by camera: of the only one, or of those that have their names."""
+    found: dict[str, list[Certificate]] = {}
+    for path in tables.settings.certificates:
+        if path.suffix.lower() != ".toml":
+            for camera in cameras:
+                found.setdefault(camera, []).append(_read(path, camera))
+            continue
+        own = _read(path, "")
+        if own.name not in cameras and len(cameras) != 1:
+            raise InputError(
+                f"[film] certificate is of the camera {own.name}, and those of films are"
+                f" {listed(list(cameras)) or 'none'}: give the column certificate of photos",
+                file=tables.settings.path,
+            )
+        found.setdefault(own.name if own.name in cameras else cameras[0], []).append(own)
+    for camera, several in found.items():
+        if len(names := {own.name for own in several}) > 1:
+            raise InputError(
+                f"[film] certificate: those of the camera {camera} are of {listed(sorted(names))}",
+                file=tables.settings.path,
+            )
+    return found
 
 
-def _tell(tables: Tables, camera: str, own: Certificate) -> None:
-    """Say what the certificate of a camera leaves to be known."""
-    day = "without a date" if own.day is None else f"of {own.day}"
-    said = [f"its certificate is {day}: {own.verdict.headline}", *own.told()]
-    tables.messages.extend(Message(f"camera {camera}: {each}", own.file) for each in said)
+def _tell(
+    tables: Tables, camera: str, own: Certificate, several: Sequence[Certificate], flown: Sequence[date]
+) -> None:
+    """Say what the certificate of a camera leaves to be known, and how near it is to the flight."""
+    said = list(own.told())
+    if not flown or len(several) > 1 or own.verdict.exit_code():
+        day = "without a date" if own.day is None else f"of {own.day}"
+        chosen = f", of {len(several)} that are given" if len(several) > 1 else ""
+        said.insert(0, f"its certificate is {day}{chosen}: {own.verdict.headline}")
+    for each in sorted({*flown[:1], *flown[-1:]}):
+        said += [age_remark(own, each), changed_remark(own, several, each)]
+    tables.messages.extend(Message(f"camera {camera}: {each}", own.file) for each in said if each)
 
 
 def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera:

@@ -1,9 +1,10 @@
-"""How films lie that their marks do not tell: where a photo has a pose, images of known points do."""
+"""How films lie that their marks do not tell: images of known points do, by the pose, and tie points."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -13,12 +14,14 @@ from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.images import Images
 from photogram.formats.plain.photos import Photos
 
-__all__ = ["Lying", "Seen", "way_by_images"]
+__all__ = ["Expected", "Laid", "Lying", "Seen", "way_by_images"]
 
 BETTER = 4.0
 """Times by which images must be farther from their places in every other way to lie."""
 NEAR = 0.1
 """How far they may be in the best, in parts of the format: poses and points are start values."""
+TIES = 4
+"""Points that two photos have in common at least."""
 
 
 @dataclass(frozen=True)
@@ -28,10 +31,58 @@ class Lying:
     places: Floats
     mirrored: bool
 
+    def back(self, true: Floats, images: Floats) -> Floats:
+        """Return (m,) complex places in the camera's frame of images, by true places (n, 2) of the marks."""
+        t1, t2, theta, m = conformal(self.places, true, mirrored=self.mirrored)
+        q = (images @ np.array([1.0, 1j]) - (t1 + 1j * t2)) / ((1.0 + m) * np.exp(1j * theta))
+        return np.asarray(-np.conj(q) if self.mirrored else q)
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A film of which it is known how it lies, and true places of its marks and images on the scanner."""
+
+    way: Lying
+    marks: Floats
+    images: Floats
+
+    def places(self) -> Floats:
+        """Return (m,) complex places of its images in the camera's frame."""
+        return self.way.back(self.marks, self.images)
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Where images of a photo should be in the camera's frame.
+
+    Attributes
+    ----------
+    rows
+        (m,) of the images of the photo.
+    places
+        (m,) complex, mm.
+    but
+        For what: nothing, a shift and scale, or a rotation with these.
+    """
+
+    rows: np.ndarray
+    places: Floats
+    but: Literal["nothing", "shift", "rotation"] = "nothing"
+
+    def apart(self, q: Floats) -> float:
+        """Return the root mean square of what images (m,) are away."""
+        left = q - self.places
+        if self.but != "nothing":
+            own, other = q - q.mean(), self.places - self.places.mean()
+            turned = np.vdot(other, own)
+            by = turned if self.but == "rotation" else np.linalg.norm(own) * np.linalg.norm(other)
+            left = own - by / np.vdot(other, other) * other
+        return float(np.sqrt(np.mean(np.abs(left) ** 2)))
+
 
 @dataclass(frozen=True)
 class Seen:
-    """Images of points whose coordinates are known at least nearly.
+    """Images, and points whose coordinates are known at least nearly.
 
     Attributes
     ----------
@@ -44,20 +95,62 @@ class Seen:
     photos: Photos
     cameras: Cameras
 
-    def of(self, photo: str) -> tuple[Floats, Floats]:
-        """Return (m, 2) readings of a photo, and (m, 2) where its pose has them in the camera's frame."""
+    def readings(self, photo: str) -> Floats:
+        """Return (m, 2) readings of a photo."""
+        found: Floats = self.images.xy[self._rows(photo)]
+        return found
+
+    def expected(self, photo: str, laid: Mapping[str, Laid]) -> Iterator[Expected]:
+        """Yield where images of a photo should be: by its pose, and by that of tie points on another photo.
+
+        Parameters
+        ----------
+        photo
+            Its name.
+        laid
+            Photos of which it is known how their films lie.
+        """
+        own = self.images.points[self._rows(photo)]
+        centre, axes, c = self._pose(photo)
+        places = _projected((self.points[own] - centre) @ axes, c)
+        known = np.flatnonzero(np.isfinite(places))
+        yield Expected(known, places[known])
+        common = {name: np.intersect1d(own, self.images.points[self._rows(name)]) for name in laid}
+        other = max(common, key=lambda name: len(common[name]), default=None)
+        if other is None or len(common[other]) < TIES:
+            return
+        rows, there = (
+            np.array([np.flatnonzero(each == point)[0] for point in common[other]])
+            for each in (own, self.images.points[self._rows(other)])
+        )
+        q = laid[other].places()[there]
+        _, turned, distance = self._pose(other)
+        rays = np.column_stack([q.real, q.imag, np.full(len(q), distance)])
+        places = _projected(rays @ turned.T @ axes, c)
+        if np.isfinite(places).all():
+            yield Expected(rows, places, "shift")
+        else:
+            yield Expected(rows, q, "rotation")
+
+    def _rows(self, photo: str) -> np.ndarray:
+        return np.flatnonzero(self.images.photos == self.photos.names.index(photo))
+
+    def _pose(self, photo: str) -> tuple[Floats, Floats, float]:
+        """Return centre, axes as columns, and principal distance of the positive; NaN where unknown."""
         row = self.photos.names.index(photo)
-        own = self.images.photos == row
         c = -abs(self.cameras.cameras[self.photos.cameras[row]].parameters.get("c", np.nan))
-        rays = (self.points[self.images.points[own]] - self.photos.centres[row]) @ self.photos.matrices[row]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            places = c * rays[:, :2] / rays[:, 2:]
-        known = np.isfinite(places).all(axis=1)
-        return self.images.xy[own][known], places[known]
+        centres, matrices = np.asarray(self.photos.centres), np.asarray(self.photos.matrices)
+        return centres[row], matrices[row], c
 
 
-def way_by_images(ways: Sequence[Lying], true: Floats, images: Floats, seen: Floats) -> int | None:
-    """Return which way to lie brings images where a pose has them; None where none does, or several do.
+def _projected(rays: Floats, c: float) -> Floats:
+    """Return (m,) complex places of rays (m, 3) in the camera's frame."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(c * (rays[:, 0] + 1j * rays[:, 1]) / rays[:, 2])
+
+
+def way_by_images(ways: Sequence[Lying], true: Floats, images: Floats, expected: Expected) -> int | None:
+    """Return which way to lie brings images where they should be; None where none does, or several do.
 
     Parameters
     ----------
@@ -65,17 +158,14 @@ def way_by_images(ways: Sequence[Lying], true: Floats, images: Floats, seen: Flo
         Ways to lie.
     true
         (n, 2) true places on the scanner of the marks.
-    images, seen
-        (m, 2) true places of images, and where they are in the camera's frame by the pose.
+    images
+        (m, 2) true places of all images of the photo.
+    expected
+        Where some of them should be.
     """
-    if len(images) < 2:
+    if len(expected.rows) < 2:
         return None
-    apart = []
-    for way in ways:
-        t1, t2, theta, m = conformal(way.places, true, mirrored=way.mirrored)
-        q = (images @ np.array([1.0, 1j]) - (t1 + 1j * t2)) / ((1.0 + m) * np.exp(1j * theta))
-        q = -np.conj(q) if way.mirrored else q
-        apart.append(float(np.sqrt(np.mean(np.abs(q - seen @ np.array([1.0, 1j])) ** 2))))
+    apart = [expected.apart(way.back(true, images[expected.rows])) for way in ways]
     order = np.argsort(apart)
     best = apart[order[0]]
     if best > NEAR * float(np.ptp(ways[0].places, axis=0).max()):

@@ -13,28 +13,35 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import (
     FilmModel,
+    Interior,
     conformal,
     interior_orientation,
-    is_mirrored,
-    mirror_message,
-    side_residuals,
-    true_places,
 )
-from photogram.film.which import which_mark
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.fiducials import read_fiducials
-from photogram.formats.plain.film_sides import Lying, Seen, way_by_images
+from photogram.formats.plain.film_mistakes import mark_remarks, scale_message
+from photogram.formats.plain.film_readings import MarkReadings, ScannedPhoto
+from photogram.formats.plain.film_sides import Seen
 from photogram.formats.plain.films_written import INSIDE
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine, read_films, read_scanners
 from photogram.formats.plain.shared import made
-from photogram.formats.plain.tables import Tables, indices_of
-from photogram.io.delimited import FALSE, TRUE, ColumnTable
+from photogram.formats.plain.tables import Tables
 from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera
-from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Mark, Readings, Scan, Scanner
-from photogram.network.observations import FILM, Fiducial, KnownFilm, Observation
+from photogram.network.films import (
+    Film,
+    FilmBend,
+    FilmPlacement,
+    FilmSize,
+    Mark,
+    Readings,
+    Reseau,
+    Scan,
+    Scanner,
+)
+from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
 
 __all__ = ["Scanned", "on_film", "read_scanned"]
 
@@ -65,20 +72,6 @@ class Scanned:
     def details(self) -> dict[str, object]:
         """Return what writing tables needs beside the block, for the details of a project."""
         return {INSIDE: self.inside[0]} if self.inside else {}
-
-
-@dataclass
-class _Photo:
-    """A photo on film: rows of the table of photos, and readings of its marks."""
-
-    name: str
-    row: int
-    camera: str
-    film: str
-    machine: Machine
-    marks: list[str] = field(default_factory=list)
-    readings: list[Floats] = field(default_factory=list)
-    sd: list[Floats] = field(default_factory=list)
 
 
 def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanned:
@@ -138,13 +131,14 @@ class _Reader:
         self.places = self.fiducials.places
         names = self.table.texts("scanner")
         self.photos = [
-            _Photo(name, row, camera, film, self._machine(row, names[row], machines))
+            ScannedPhoto(name, row, camera, film, self._machine(row, names[row], machines))
             for name, row, camera, film in zip(
                 photos.names, photos.rows.tolist(), photos.taken, films, strict=True
             )
             if film
         ]
-        self._read_marks(photos)
+        self.marks = MarkReadings(tables, seen, self.photos, self.places)
+        self.marks.read(photos)
 
     def _machine(self, row: int, name: str, machines: Mapping[str, Machine]) -> Machine:
         if not name and len(machines) == 1:
@@ -162,75 +156,6 @@ class _Reader:
         own: dict[int, Machine] = self.__dict__.setdefault("_held_machines", {})
         return own
 
-    def _read_marks(self, photos: Photos) -> None:
-        """Read the readings of marks."""
-        table = self.tables.read("fiducial_images")
-        if table is None:
-            return
-        names = ("column", "row") if "column" in table else ("x", "y")
-        xy = table.vectors(names)
-        table.check_given(xy, names)
-        own = ["sd_column", "sd_row"] if "column" in table else ["sd_x", "sd_y"]
-        sd = self.tables.deviations(table, "fiducial_images", own)
-        table.check_given(sd, own, "is empty: give sd, or [sd] fiducial_images")
-        known = {name: row for row, name in enumerate([*photos.names, *photos.unused])}
-        listed_photos = list(known)
-        of = indices_of(table, "photo", known, "photo").tolist()
-        by_name = {each.name: each for each in self.photos}
-        use, marks = table.flags("use"), table.texts("fiducial")
-        for row, place in enumerate(of):
-            name = listed_photos[place]
-            if not use[row] or name in photos.unused:
-                continue
-            if name not in by_name:
-                raise table.error(row, f"the photo {name} has no film (column film of photos)")
-            photo = by_name[name]
-            if marks[row] and marks[row] not in self.places.get(photo.camera, {}):
-                raise table.error(row, f"the camera {photo.camera} has no fiducial {quoted(marks[row])}")
-            if marks[row] and marks[row] in photo.marks:
-                raise table.error(row, f"the fiducial {marks[row]} of the photo {name} was read twice")
-            photo.marks.append(marks[row])
-            photo.readings.append(xy[row])
-            photo.sd.append(sd[row])
-        for photo in self.photos:
-            self._name_marks(table, photo)
-
-    def _name_marks(self, table: ColumnTable, photo: _Photo) -> None:
-        """Find which marks readings without names are of."""
-        if all(photo.marks):
-            return
-        if any(photo.marks):
-            raise table.head.error(f"some fiducials of the photo {photo.name} have names: give all or none")
-        places = self.places.get(photo.camera, {})
-        try:
-            found = which_mark(np.array(list(places.values())).reshape(-1, 2), self._true(photo))
-        except InputError as error:
-            raise table.head.error(f"photo {photo.name}: {error.message}") from None
-        given = self._given_side(photo)
-        ways = [each for each in found.alike if given in (None, each.mirrored)]
-        if len(ways) != 1:
-            lying = [Lying(np.array([*places.values()])[way.marks], way.mirrored) for way in ways]
-            chosen = self._by_images(photo, lying)
-            if chosen is None:
-                raise table.head.error(
-                    f"photo {photo.name}: {found}, nor from points that it shows; give the names of its"
-                    " fiducials"
-                )
-            ways = [ways[chosen]]
-        photo.marks[:] = [list(places)[k] for k in ways[0].marks.tolist()]
-        self.tables.messages.append(Message(f"photo {photo.name}: its film lies {ways[0]}", table.path))
-
-    def _by_images(self, photo: _Photo, ways: Sequence[Lying]) -> int | None:
-        """Return which way a film lies by its pose and images of points that are known."""
-        readings, seen = self.seen.of(photo.name)
-        own = photo.machine
-        images = true_places(readings, own.readings, own.scanner, own.curves)
-        return way_by_images(ways, self._true(photo), images, seen)
-
-    def _true(self, photo: _Photo) -> Floats:
-        own = photo.machine
-        return true_places(np.array(photo.readings), own.readings, own.scanner, own.curves)
-
     def read(self, found: Scanned) -> None:
         """Put the scans and observations of all photos in their place."""
         marks = {
@@ -247,6 +172,9 @@ class _Reader:
             if self.before:
                 continue
             found.observations.extend(self._known(photo, film))
+            if isinstance(film.pattern, Reseau):
+                own = film.pattern
+                found.observations.append(KnownTogether("reseau", own.weights, covariance=own.covariance))
             found.observations.extend(
                 Fiducial(photo.name, marks[photo.camera][name], film, reading, sd=sd)
                 for name, reading, sd in zip(photo.marks, photo.readings, photo.sd, strict=True)
@@ -258,7 +186,7 @@ class _Reader:
             machines = {id(each.machine): each.machine for each in self.photos}
             found.observations.extend(each.known for each in machines.values() if each.known is not None)
 
-    def _remark(self, photo: _Photo) -> None:
+    def _remark(self, photo: ScannedPhoto) -> None:
         """Say it where a film stands on what is known of it beforehand."""
         model = self.kinds[photo.film].model
         if len(photo.marks) < LEAST[model]:
@@ -275,43 +203,25 @@ class _Reader:
         found: list[tuple[bool, Floats | None]] = []
         for photo in self.photos:
             row = photo.row
-            mirrored = self._side(photo)
+            mirrored = self.marks.side(photo)
+            if message := scale_message(photo, self.marks.places_of(photo), mirrored=mirrored):
+                raise ContradictionError.of(self.table.error(row, message))
             start: Floats | None = None if np.isnan(given[row]).any() else given[row]
             if start is None and len(photo.marks) > 1:
-                q = np.array([self.places[photo.camera][name] for name in photo.marks])
-                start = np.array(conformal(q, self._true(photo), mirrored=mirrored)[:3])
+                q = self.marks.places_of(photo)
+                start = np.array(conformal(q, photo.true, mirrored=mirrored)[:3])
             found.append((mirrored, start))
+        told = [
+            None if self.marks.given_side(photo) is not None else side
+            for photo, (side, _) in zip(self.photos, found, strict=True)
+        ]
+        self.tables.messages.extend(
+            Message(each, self.table.path) for each in mark_remarks(self.photos, self.places, told)
+        )
         return [
             (mirrored, self._neighbour(k, found) if start is None else start)
             for k, (mirrored, start) in enumerate(found)
         ]
-
-    def _given_side(self, photo: _Photo) -> bool | None:
-        """Return whether a photo is said to be mirrored."""
-        word = self.table.texts("mirrored")[photo.row].lower()
-        if word and word not in TRUE | FALSE:
-            raise self.table.error(photo.row, f"column mirrored: {quoted(word)} is neither true nor false")
-        return None if not word else word in TRUE
-
-    def _side(self, photo: _Photo) -> bool:
-        """Return whether a photo is mirrored: as is given, or as its marks tell, or images with its pose."""
-        given = self._given_side(photo)
-        q = np.array([self.places[photo.camera][name] for name in photo.marks]).reshape(-1, 2)
-        true = self._true(photo) if len(q) else q
-        found = is_mirrored(q, true)
-        if given is not None and found is not None and found != given:
-            error = self.table.error(
-                photo.row, f"photo {photo.name}: {mirror_message(given, side_residuals(q, true))}"
-            )
-            raise ContradictionError(error.message, file=error.file, record=error.record, text=error.text)
-        if found is None and given is None and len(q) > 1:
-            chosen = self._by_images(photo, [Lying(q, False), Lying(q, True)])
-            found = None if chosen is None else bool(chosen)
-        if given is None and found is None and len(q):
-            self.tables.messages.append(
-                Message(f"photo {photo.name}: its marks do not tell the side; it is taken as not mirrored")
-            )
-        return bool(found if given is None else given)
 
     def _neighbour(self, k: int, found: Sequence[tuple[bool, Floats | None]]) -> Floats:
         """Return where a photo of the same film and scanner starts, of one that has no marks."""
@@ -333,17 +243,22 @@ class _Reader:
             f" give {', '.join(_START)}",
         )
 
-    def _film(self, photo: _Photo, mirrored: bool, start: Floats) -> Film:
+    def _film(self, photo: ScannedPhoto, mirrored: bool, start: Floats) -> Film:
         kind, machine = self.kinds[photo.film], photo.machine
         placement = partial(FilmPlacement, photo.name, start)
         roll, bend, pattern = None, None, kind.pattern
+        if kind.reseau is not None and not self.before:
+            pattern = kind.reseau(photo.name)
         held = np.array(kind.sd_size) == 0
         size = [0.0, 0.0, 0.0]
         bend_sd = np.array(kind.sd_bend)
         bend_at: Floats = np.zeros(2)
         if self.before:
-            placement, size, bend_at = self._fitted(photo, mirrored)
-            held[:], bend_sd, pattern = True, np.zeros(2), None
+            fit = self._fitted(photo, mirrored)
+            placement = partial(FilmPlacement, photo.name, fit.film[:3], 0.0)
+            size, bend_at = fit.film[3:].tolist(), fit.bend
+            held[:], bend_sd = True, np.zeros(2)
+            pattern = None if kind.reseau is None else kind.reseau(photo.name, fit.shifts)
         elif held[0]:
             roll = kind.roll
         else:
@@ -366,15 +281,15 @@ class _Reader:
             mirrored=mirrored,
         )
 
-    def _fitted(self, photo: _Photo, mirrored: bool) -> tuple[partial[FilmPlacement], list[float], Floats]:
-        """Return the film of a photo as its marks alone have it: errorless."""
-        q = np.array([self.places[photo.camera][name] for name in photo.marks]).reshape(-1, 2)
-        model: FilmModel = self.kinds[photo.film].model  # type: ignore[assignment]
-        fit = made(
+    def _fitted(self, photo: ScannedPhoto, mirrored: bool) -> Interior:
+        """Return the film of a photo as its marks alone have it."""
+        kind = self.kinds[photo.film]
+        model: FilmModel = kind.model  # type: ignore[assignment]
+        return made(
             self.table,
             photo.row,
             lambda: interior_orientation(
-                q,
+                self.marks.places_of(photo),
                 np.array(photo.readings).reshape(-1, 2),
                 model,
                 sd=np.array(photo.sd),
@@ -382,11 +297,11 @@ class _Reader:
                 scanner=photo.machine.scanner,
                 curves=photo.machine.curves,
                 mirrored=mirrored,
+                reseau=None if kind.reseau is None else kind.reseau(photo.name),
             ),
         )
-        return partial(FilmPlacement, photo.name, fit.film[:3], 0.0), fit.film[3:].tolist(), fit.bend
 
-    def _known(self, photo: _Photo, film: Film) -> list[Observation]:
+    def _known(self, photo: ScannedPhoto, film: Film) -> list[Observation]:
         """Return what is known of a film beforehand; nothing of one that is free."""
         kind = self.kinds[photo.film]
         roll = None if film.roll is not None else kind.roll

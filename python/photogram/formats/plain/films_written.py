@@ -10,9 +10,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.plain.scanners import BENDS, CURVES, GRID, Machine
+from photogram.formats.plain.scanners import BENDS, CURVES, GRID, LOCAL, Machine
 from photogram.formats.project import Project
-from photogram.network.films import Film, Mark, Scan
+from photogram.network.films import Film, Mark, Reseau, Scan
 from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
 from photogram.network.unknowns import Unknown
 
@@ -315,6 +315,9 @@ def _pattern_cells(film: Film) -> dict[str, Any]:
     if pattern is None:
         return {"pattern": "none"}
     columns = GRID if pattern.kind == "grid" else ("half_format_mm",)
+    if isinstance(pattern, Reseau):
+        cells = dict(zip((*columns, "sd_w1", "sd_w2"), [*pattern.numbers, *pattern.sd], strict=True))  # type: ignore[misc]
+        return {"pattern": LOCAL, **cells, "sd_smooth": pattern.smooth}
     sd = [each.deviations for each in pattern.weights]
     if any(each.position.any() for each in pattern.weights):
         raise InputError(f"the pattern {pattern.kind} has weights that are not 0, as those of tables are")

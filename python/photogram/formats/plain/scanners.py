@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -16,11 +16,11 @@ from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable
 from photogram.messages import Message, nearest, quoted
-from photogram.network.films import PATTERNS, Pattern, Readings, Roll, Scanner, ScannerCurve, Weights
+from photogram.network.films import PATTERNS, Pattern, Readings, Reseau, Roll, Scanner, ScannerCurve, Weights
 from photogram.network.observations import KnownTogether
 from photogram.network.unknowns import Unknown
 
-__all__ = ["BENDS", "CURVES", "DEVICE", "GRID", "FilmKind", "Machine", "read_films", "read_scanners"]
+__all__ = ["BENDS", "CURVES", "DEVICE", "GRID", "LOCAL", "FilmKind", "Machine", "read_films", "read_scanners"]
 
 DEVICE = ("sx", "sy", "alpha_rad")
 """Columns of scales and obliqueness of a scanner."""
@@ -36,6 +36,8 @@ UM = 1e-3
 """In millimetres."""
 KNOWN = 1e-6
 """Deviation of what a singular covariance of a scanner has as known (mm, a ratio, radians)."""
+LOCAL = "local"
+"""The pattern of films each of whose photos has a grid of its own."""
 MODELS = ("affine", "conformal", "bilinear", "projective")
 
 
@@ -67,6 +69,8 @@ class FilmKind:
     sd_size: tuple[float, float, float]
     sd_bend: tuple[float, float]
     pattern: Pattern | None
+    reseau: Callable[..., Reseau] | None = None
+    """Makes that of a photo, by its name and shifts that are known."""
 
 
 def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine]:
@@ -236,12 +240,14 @@ def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[st
         own = tuple(
             float(table.numbers(each, bends[k], infinite=True)[row]) for k, each in enumerate(columns)
         )
+        local = table.texts("pattern")[row] == LOCAL
         found[name] = FilmKind(
             made(table, row, partial(Roll, name, float(means[row]), float(sd_means[row]))),
             models[row],
             (float(size[row, 0]), float(size[row, 1]), float(size[row, 2])),
             (own[0], own[1]) if own else bends,
-            _pattern(table, row, name),
+            None if local else _pattern(table, row, name),
+            _reseau(table, row) if local else None,
         )
     return found
 
@@ -255,24 +261,43 @@ def _pattern(table: ColumnTable, row: int, film: str) -> Pattern | None:
     """Return the pattern of a film; None where it has none."""
     kind = table.texts("pattern", "none")[row]
     if kind not in PATTERNS:
-        raise table.error(row, f"column pattern: there is no {quoted(kind)}{nearest(kind, PATTERNS)}")
+        known = (*PATTERNS, LOCAL)
+        raise table.error(row, f"column pattern: there is no {quoted(kind)}{nearest(kind, known)}")
     if kind == "none":
         return None
-    columns = GRID if kind == "grid" else ("half_format_mm",)
-    values = table.vectors(columns)[row]
-    missing = [name for name, value in zip(columns, values, strict=True) if math.isnan(value)]
-    if missing:
-        raise table.error(row, f"column {missing[0]}: is empty, and the pattern {kind} needs it")
     count = {"w1 w2": 2, "ebner": 10}.get(kind, 2)
-    sd = table.vectors(_deviations(count), infinite=True)[row]
-    if np.isnan(sd).any():
-        raise table.error(row, f"columns {', '.join(_deviations(count))}: the pattern {kind} needs them (mm)")
+    values, sd = _needed(table, row, kind, GRID if kind == "grid" else ("half_format_mm",), count)
     if kind == "grid":
         nodes = int(values[4]) * int(values[5])
         own = [Weights(f"{film} node {k}", 0.0, sd) for k in range(1, nodes + 1)]
     else:
         own = [Weights(film if count == 2 else f"{film} {k}", 0.0, sd[k : k + 2]) for k in range(0, count, 2)]
     return made(table, row, partial(Pattern, kind, values, own))
+
+
+def _reseau(table: ColumnTable, row: int) -> Callable[..., Reseau]:
+    """Return what makes the reseau of a photo."""
+    values, sd = _needed(table, row, LOCAL, GRID, 2)
+    smooth = float(table.numbers("sd_smooth", np.inf, infinite=True)[row])
+
+    def own(photo: str, shifts: Floats | None = None) -> Reseau:
+        return made(table, row, partial(Reseau, photo, values, sd, smooth, shifts))
+
+    return own
+
+
+def _needed(
+    table: ColumnTable, row: int, kind: str, columns: Sequence[str], count: int
+) -> tuple[Floats, Floats]:
+    """Return numbers of a pattern and deviations of its weights."""
+    values = table.vectors(columns)[row]
+    missing = [name for name, value in zip(columns, values, strict=True) if math.isnan(value)]
+    if missing:
+        raise table.error(row, f"column {missing[0]}: is empty, and the pattern {kind} needs it")
+    sd = table.vectors(_deviations(count), infinite=True)[row]
+    if np.isnan(sd).any():
+        raise table.error(row, f"columns {', '.join(_deviations(count))}: the pattern {kind} needs them (mm)")
+    return values, sd
 
 
 def _deviations(count: int) -> tuple[str, ...]:

@@ -146,7 +146,7 @@ TABLES: Mapping[str, Schema] = {
         (
             *("photo", "camera", "group", "strip", "frame", "use"),
             *("trajectory", "rig", "sensor", "clock", "scan"),
-            *("film", "scanner", "mirrored", "certificate"),
+            *("film", "scanner", "mirrored", "certificate", "flown"),
         ),
         (
             *(*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ANGLES, *_SD_ROTATIONS, "time"),
@@ -163,7 +163,8 @@ TABLES: Mapping[str, Schema] = {
         " known), `scan` (a name that photos share; default: the photo's);"
         " of [film](film.md) `film` (its images are readings), `scanner` (if there are several), `mirrored`"
         " (default: as the marks tell), `certificate` (a file of a"
-        " [certificate](certificates.md): camera and marks), `start_t1`, `start_t2` (mm), `start_theta`"
+        " [certificate](certificates.md): camera and marks), `flown` (the day, as 1983-07-02; default:"
+        " `[film] flown`), `start_t1`, `start_t2` (mm), `start_theta`"
         " (rad; default: as marks have them)",
         deviations=(1, 3),
         has_system=True,
@@ -206,14 +207,14 @@ TABLES: Mapping[str, Schema] = {
         (
             *("m", "sd_m", "sd_photo_m", "sd_b1", "sd_b2", "sd_h1", "sd_h2", "sd_g1", "sd_g2"),
             *("half_format_mm", "grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows"),
-            *(f"sd_w{k}" for k in range(1, 11)),
+            *(*(f"sd_w{k}" for k in range(1, 11)), "sd_smooth"),
         ),
         "`film`; `model` (`affine`, `conformal`, `bilinear`, `projective`; default: `[film] model`), `m` of"
         " the roll (0), `sd_m` (0.0005), `sd_photo_m` of single photos about it (0.0001; 0: one size),"
         " `sd_b1`, `sd_b2` (0.0001), `sd_h1`, `sd_h2` (5e-7 a mm), `sd_g1`, `sd_g2` (2e-7 a mm),"
-        " `pattern` (`none`,"
-        " `w1 w2`, `ebner`, `grid`), `sd_w1` .. (mm), `half_format_mm`, of grids `grid_x`, `grid_y` of the"
-        " first node, `grid_dx`, `grid_dy` (mm), `grid_columns`, `grid_rows`",
+        " `pattern` (`none`, `w1 w2`, `ebner`, `grid`, `local`: a grid of each photo), `sd_w1` .. (mm),"
+        " `half_format_mm`, of grids `grid_x`, `grid_y` of the first node, `grid_dx`, `grid_dy` (mm),"
+        " `grid_columns`, `grid_rows`, of local ones `sd_smooth` (mm, of second differences; `inf`)",
     ),
     "scanners": Schema(
         ("scanner", "pitch_mm", "origin_column", "origin_row"),

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+import tomllib
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 from photogram.arguments.arrays import shown
+from photogram.errors import InputError
 from photogram.io.toml import TomlFile
 from photogram.messages import nearest
 
@@ -14,10 +17,43 @@ __all__ = ["Sections"]
 
 
 class Sections(TomlFile):
-    """A file of sections with keys; all errors are :class:`photogram.InputError` with file, line and text."""
+    """A file of sections with keys; all errors are :class:`photogram.InputError` with file, line and text.
+
+    Parameters
+    ----------
+    path
+        The file.
+    said
+        What a user says of keys in the place of the file: `section.key=value`, the value as in the file; a
+        text may go without its quotation marks.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is no TOML; words of another form.
+    """
+
+    def __init__(self, path: Path, said: Sequence[str] = ()) -> None:
+        super().__init__(path)
+        self._said: dict[tuple[str, str], str] = {}
+        content = dict(self.content)
+        for each in said:
+            name, equals, value = each.partition("=")
+            section, point, key = name.strip().partition(".")
+            if not (equals and point and section and key):
+                raise InputError(f"--set {each}: SECTION.KEY=VALUE, as film.model=affine")
+            if not isinstance(content.get(section, {}), dict):
+                self.fail("", section, f"{section} is no section")
+            content[section] = {**content.get(section, {}), key: _value(value.strip())}
+            self._said[section, key] = each
+        self.content = content
 
     def fail(self, section: str, key: str, message: str) -> NoReturn:
         """Raise an error at the first line of a section that has the key; without a section, of the file."""
+        given = [each for (own, name), each in self._said.items() if (own, name) == (section, key)]
+        given += [each for (own, _), each in self._said.items() if (section, key) == ("", own)]
+        if given:
+            raise InputError(f"--set {given[0]}: {message}", file=self.path)
         raise self.error(key, message, section)
 
     def check_keys(self, known: Mapping[str, Collection[str] | None]) -> None:
@@ -69,6 +105,15 @@ class Sections(TomlFile):
         if not good or len(listed) not in counts:
             self.fail(section, key, f"{key} is {' or '.join(map(str, counts))} numbers, not {shown(value)}")
         return tuple(_number(each) for each in listed)
+
+
+def _value(text: str) -> Any:
+    """Return what a value is as TOML has it, or as a text."""
+    try:
+        (value,) = tomllib.loads(f"value = {text}").values()
+    except ValueError:  # TOMLDecodeError, endless numbers, and a line that says more than one value
+        return text
+    return value
 
 
 def _number(value: float) -> float:

@@ -13,12 +13,13 @@ from typing import Any, cast
 
 from photogram.arguments.arrays import shown
 from photogram.errors import InputError
-from photogram.formats.columns import Columns, columns_given
-from photogram.formats.format import PhotoFiles
+from photogram.formats.columns import PLAIN, Columns, columns_given
+from photogram.formats.format import PhotoFiles, Wishes
 from photogram.formats.plain.schema import TABLES
 from photogram.formats.plain.sections import Sections
 from photogram.formats.plain.statement_settings import KEYS, read_asked
 from photogram.formats.project import DatumName, Frame, Options
+from photogram.io.toml import day_of
 from photogram.messages import Message, listed, nearest
 from photogram.results.features import KINDS, Definition
 
@@ -65,7 +66,7 @@ _KEYS: Mapping[str, tuple[str, ...] | None] = {
     "time": ("origin", "scale"),
     "sd": tuple(WITH_SD),
     "tables": tuple(TABLES),
-    "film": ("model", "interior", "certificate"),
+    "film": ("model", "interior", "certificate", "flown"),
     "adjust": ("datum", "loss", "unit_variance"),
     **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
     "photos": ("crs", "columns", "roles", "directory", "directory_crs", "mrk_antenna"),
@@ -110,8 +111,10 @@ class Settings:
     film, interior
         The model of films that say none; whether their interior orientation is unknown inside the adjustment,
         or fitted before it and errorless.
-    certificate
-        The file of the certificate of the camera of films; None without.
+    certificates
+        The files of the certificates of the cameras of films.
+    flown
+        The day of the flight; None where it is not said.
     """
 
     path: Path
@@ -137,7 +140,8 @@ class Settings:
     statement: Mapping[str, Any] = field(default_factory=dict)
     film: str = "affine"
     interior: str = "inside"
-    certificate: Path | None = None
+    certificates: tuple[Path, ...] = ()
+    flown: date | None = None
 
     def __post_init__(self) -> None:
         if not self.image_y:
@@ -153,8 +157,15 @@ class Settings:
         )
 
 
-def read_settings(path: Path) -> Settings:
+def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
     """Read a file of settings, and find the tables that it names or that lie beside it.
+
+    Parameters
+    ----------
+    path
+        The file.
+    wishes
+        What a user says in its place: keys, standard deviations, columns of control.
 
     Raises
     ------
@@ -162,7 +173,8 @@ def read_settings(path: Path) -> Settings:
         The file cannot be read or is no TOML; a section or key that there is not, with the nearest one; a
         value that cannot be; two files of one table.
     """
-    file = _File(path)
+    wishes = wishes or Wishes()
+    file = _File(path, wishes.settings)
     file.check_keys(_KEYS)
     version = file.value("project", "format")
     if isinstance(version, bool) or version != VERSION:
@@ -189,16 +201,18 @@ def read_settings(path: Path) -> Settings:
         photo=file.word("axes", "photo"),
         time_origin=file.time_origin(),
         time_scale=file.word("time", "scale"),
-        sd={name: file.deviations(name) for name in WITH_SD if file.has("sd", name)},
+        sd={name: file.deviations(name) for name in WITH_SD if file.has("sd", name)} | dict(wishes.sd),
         tables=_tables(file),
         crs={name: file.text(name, "crs") for name in WITH_CRS if file.has(name, "crs")},
-        columns={name: file.columns(name) for name in WITH_CRS if name in file.content},
+        columns={name: file.columns(name) for name in WITH_CRS if name in file.content}
+        | ({} if wishes.columns == PLAIN else {"control": wishes.columns}),
         features={name: file.feature(name) for name in file.content.get("features", {})},
         photo_files=file.photo_files(),
         statement=read_asked(file, file.word("units", "length")),
         film=file.word("film", "model"),
         interior=file.word("film", "interior"),
-        certificate=file.certificate(),
+        certificates=file.certificates(),
+        flown=file.flown(),
     )
 
 
@@ -231,14 +245,25 @@ class _File(Sections):
             self.fail("photos", "directory", f"there is no folder {directory}")
         return PhotoFiles(self.path.parent / directory, crs or None, antenna)
 
-    def certificate(self) -> Path | None:
-        """Return the file of the certificate of the camera of films."""
+    def certificates(self) -> tuple[Path, ...]:
+        """Return the files of the certificates of the cameras of films: one text, or a list."""
         if not self.has("film", "certificate"):
-            return None
-        path = self.path.parent / self.text("film", "certificate")
-        if not path.is_file():
-            self.fail("film", "certificate", f"there is no file {path.name}")
-        return path
+            return ()
+        one = isinstance(self.value("film", "certificate"), str)
+        words = [self.text("film", "certificate")] if one else self.texts("film", "certificate")
+        paths = tuple(self.path.parent / each for each in dict.fromkeys(words))
+        for path in paths:
+            if not path.is_file():
+                self.fail("film", "certificate", f"there is no file {path.name}")
+        return paths
+
+    def flown(self) -> date | None:
+        """Return the day of the flight."""
+        value = self.value("film", "flown")
+        try:
+            return None if value is None else day_of(value)
+        except ValueError:
+            self.fail("film", "flown", f"flown is a day, as 1983-07-02, not {shown(value)}")
 
     def feature(self, name: str) -> Definition:
         """Return the kind of a feature, and the points that it goes through."""

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, shaped, shown
 from photogram.errors import InputError
+from photogram.messages import listed
 from photogram.network.films import Film, FilmPlacement, FilmSize, Mark, Roll
 from photogram.network.observations.observation import Observation
 from photogram.network.unknowns import Unknown
@@ -198,7 +199,7 @@ class KnownTogether(Observation):
     @property
     def name(self) -> str:
         """Its title and the unknowns."""
-        return f"{self.title} {', '.join(self.of)}"
+        return f"{self.title} {listed(list(self.of))}"
 
     @property
     def label(self) -> str:

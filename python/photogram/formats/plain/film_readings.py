@@ -1,0 +1,185 @@
+"""Readings of fiducial marks: of which marks they are, and from which side a film was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import ContradictionError, InputError
+from photogram.film.interior import is_mirrored, mirror_message, side_residuals, true_places
+from photogram.film.which import which_mark
+from photogram.formats.plain.film_sides import Laid, Lying, Seen, way_by_images
+from photogram.formats.plain.photos import Photos
+from photogram.formats.plain.scanners import Machine
+from photogram.formats.plain.tables import Tables, indices_of
+from photogram.io.delimited import FALSE, TRUE, ColumnTable
+from photogram.messages import Message, quoted
+
+__all__ = ["MarkReadings", "ScannedPhoto"]
+
+
+@dataclass
+class ScannedPhoto:
+    """A photo on film: rows of the table of photos, and readings of its marks."""
+
+    name: str
+    row: int
+    camera: str
+    film: str
+    machine: Machine
+    marks: list[str] = field(default_factory=list)
+    readings: list[Floats] = field(default_factory=list)
+    sd: list[Floats] = field(default_factory=list)
+
+    @property
+    def true(self) -> Floats:
+        """(n, 2) true places on the scanner of its marks."""
+        return self.true_places(np.array(self.readings))
+
+    def true_places(self, readings: Floats) -> Floats:
+        """Return (m, 2) true places on the scanner of readings."""
+        own = self.machine
+        return true_places(readings.reshape(-1, 2), own.readings, own.scanner, own.curves)
+
+
+@dataclass(frozen=True)
+class MarkReadings:
+    """The readings of the marks of scanned photos.
+
+    Attributes
+    ----------
+    seen
+        The images of all photos.
+    photos
+        Those that are scanned, which get their readings.
+    places
+        (2,) of marks in the frames of their cameras, by the names of both.
+    """
+
+    tables: Tables
+    seen: Seen
+    photos: Sequence[ScannedPhoto]
+    places: Mapping[str, Mapping[str, Floats]]
+
+    def read(self, photos: Photos) -> None:
+        """Read the readings of marks."""
+        table = self.tables.read("fiducial_images")
+        if table is None:
+            return
+        names = ("column", "row") if "column" in table else ("x", "y")
+        xy = table.vectors(names)
+        table.check_given(xy, names)
+        own = ["sd_column", "sd_row"] if "column" in table else ["sd_x", "sd_y"]
+        sd = self.tables.deviations(table, "fiducial_images", own)
+        table.check_given(sd, own, "is empty: give sd, or [sd] fiducial_images")
+        known = {name: row for row, name in enumerate([*photos.names, *photos.unused])}
+        listed_photos = list(known)
+        of = indices_of(table, "photo", known, "photo").tolist()
+        by_name = {each.name: each for each in self.photos}
+        use, marks = table.flags("use"), table.texts("fiducial")
+        for row, place in enumerate(of):
+            name = listed_photos[place]
+            if not use[row] or name in photos.unused:
+                continue
+            if name not in by_name:
+                raise table.error(row, f"the photo {name} has no film (column film of photos)")
+            photo = by_name[name]
+            if marks[row] and marks[row] not in self.places.get(photo.camera, {}):
+                raise table.error(row, f"the camera {photo.camera} has no fiducial {quoted(marks[row])}")
+            if marks[row] and marks[row] in photo.marks:
+                raise table.error(row, f"the fiducial {marks[row]} of the photo {name} was read twice")
+            photo.marks.append(marks[row])
+            photo.readings.append(xy[row])
+            photo.sd.append(sd[row])
+        self._name_marks(table)
+
+    def _name_marks(self, table: ColumnTable) -> None:
+        """Find which marks readings without names are of: photos that others decide come after these."""
+        waiting = [photo for photo in self.photos if not all(photo.marks)]
+        for photo in waiting:
+            if any(photo.marks):
+                raise table.head.error(
+                    f"some fiducials of the photo {photo.name} have names: give all or none"
+                )
+        while waiting:
+            errors = [(photo, self._named(table, photo)) for photo in waiting]
+            left = [photo for photo, error in errors if error is not None]
+            if len(left) == len(waiting) and errors[0][1] is not None:
+                raise errors[0][1]
+            waiting = left
+
+    def _named(self, table: ColumnTable, photo: ScannedPhoto) -> InputError | None:
+        """Find which marks the readings of a photo are of; return the error where it cannot be told."""
+        places = self.places.get(photo.camera, {})
+        try:
+            found = which_mark(np.array(list(places.values())).reshape(-1, 2), photo.true)
+        except InputError as error:
+            raise table.head.error(f"photo {photo.name}: {error.message}") from None
+        given = self.given_side(photo)
+        ways = [each for each in found.alike if given in (None, each.mirrored)]
+        if len(ways) != 1:
+            lying = [Lying(np.array([*places.values()])[way.marks], way.mirrored) for way in ways]
+            chosen = self._by_images(photo, lying)
+            if chosen is None:
+                return table.head.error(
+                    f"photo {photo.name}: {found}, nor from points that it shows; give the names of its"
+                    " fiducials"
+                )
+            ways = [ways[chosen]]
+        photo.marks[:] = [list(places)[k] for k in ways[0].marks.tolist()]
+        self.tables.messages.append(Message(f"photo {photo.name}: its film lies {ways[0]}", table.path))
+        return None
+
+    def _by_images(self, photo: ScannedPhoto, ways: Sequence[Lying]) -> int | None:
+        """Return which way a film lies by images: of points that are known, or of tie points."""
+        images, true = photo.true_places(self.seen.readings(photo.name)), photo.true
+        others = {each.name: laid for each in self.photos if each is not photo and (laid := self._laid(each))}
+        found = (way_by_images(ways, true, images, each) for each in self.seen.expected(photo.name, others))
+        return next((each for each in found if each is not None), None)
+
+    def _laid(self, photo: ScannedPhoto) -> Laid | None:
+        """Return how the film of a photo lies where its marks, or what is given, say it alone."""
+        if len(photo.marks) < 2 or not all(photo.marks):
+            return None
+        q, true = self.places_of(photo), photo.true
+        side = self.given_side(photo)
+        side = is_mirrored(q, true) if side is None else side
+        if side is None:
+            return None
+        return Laid(Lying(q, side), true, photo.true_places(self.seen.readings(photo.name)))
+
+    def places_of(self, photo: ScannedPhoto) -> Floats:
+        """Return (n, 2) places in the camera's frame of the marks of a photo."""
+        return np.array([self.places[photo.camera][name] for name in photo.marks]).reshape(-1, 2)
+
+    def given_side(self, photo: ScannedPhoto) -> bool | None:
+        """Return whether a photo is said to be mirrored."""
+        word = self.seen.photos.table.texts("mirrored")[photo.row].lower()
+        if word and word not in TRUE | FALSE:
+            raise self.seen.photos.table.error(
+                photo.row, f"column mirrored: {quoted(word)} is neither true nor false"
+            )
+        return None if not word else word in TRUE
+
+    def side(self, photo: ScannedPhoto) -> bool:
+        """Return whether a photo is mirrored: as is given, or as its marks tell, or images with its pose."""
+        given = self.given_side(photo)
+        q = self.places_of(photo)
+        true = photo.true if len(q) else q
+        found = is_mirrored(q, true)
+        if given is not None and found is not None and found != given:
+            error = self.seen.photos.table.error(
+                photo.row, f"photo {photo.name}: {mirror_message(given, side_residuals(q, true))}"
+            )
+            raise ContradictionError.of(error)
+        if found is None and given is None and len(q) > 1:
+            chosen = self._by_images(photo, [Lying(q, False), Lying(q, True)])
+            found = None if chosen is None else bool(chosen)
+        if given is None and found is None:
+            self.tables.messages.append(
+                Message(f"photo {photo.name}: its marks do not tell the side; it is taken as not mirrored")
+            )
+        return bool(found if given is None else given)

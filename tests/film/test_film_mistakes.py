@@ -1,0 +1,85 @@
+"""Mistakes that the marks of films show before anything is adjusted."""
+
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from photogram.cli import app
+from photogram.errors import ContradictionError
+from photogram.formats import read
+
+ARCHIVE = files("photogram") / "examples" / "archive"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for each in ARCHIVE.iterdir():
+        (tmp_path / each.name).write_bytes(each.read_bytes())
+    return tmp_path
+
+
+def changed(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def said(folder: Path) -> list[str]:
+    return [str(each) for each in read(folder).messages]
+
+
+def test_a_good_project_is_told_nothing(folder: Path) -> None:
+    assert said(folder) == []
+
+
+@pytest.mark.parametrize(("pitch", "dpi"), [("0.0211667", 1270), ("0.02117", 1270), ("0.0254", 1270)])
+def test_a_pitch_that_is_another_is_refused(folder: Path, pitch: str, dpi: int) -> None:
+    changed(folder / "scanners.csv", "scanner,0.02,", f"scanner,{pitch},")
+    with pytest.raises(ContradictionError, match=rf"pitch_mm would be 0.0200\d+ \(about {dpi} dpi\), not"):
+        read(folder)
+    done = CliRunner().invoke(app, ["adjust", str(folder), "--out", str(folder / "out")])
+    assert done.exit_code == 4
+
+
+def test_rows_that_count_the_other_way_are_told(folder: Path) -> None:
+    changed(folder / "scanners.csv", "scanner,pitch_mm", "scanner,rows_down,pitch_mm")
+    changed(folder / "scanners.csv", "scanner,0.02", "scanner,false,0.02")
+    with pytest.raises(ContradictionError, match=r"a negative, or rows that count up; say mirrored = true"):
+        read(folder)
+    for word in ("true", "false"):
+        changed(folder / "photos.csv", f"scanner,{word}", "scanner,")
+    [told] = said(folder)
+    assert "5 of 6 photos are mirrored, and nobody has said so" in told
+
+
+def test_a_strip_on_top_is_told(folder: Path) -> None:
+    """Films lie in other directions on the scanner, and one is mirrored: names tell alike on all."""
+    changed(folder / "rc10-2345.toml", 'data_strip = "left"', 'data_strip = "top"')
+    [told] = said(folder)
+    assert "fit far better if those of all photos are named 90 degrees round" in told
+
+
+def test_the_other_way_round_is_told_alike(folder: Path) -> None:
+    rounds = {"ll": "lr", "lr": "ur", "ur": "ul", "ul": "ll", "ml": "mb", "mb": "mr", "mr": "mt", "mt": "ml"}
+    path = folder / "fiducial_images.csv"
+    lines = [each.split(",") for each in path.read_text().splitlines()]
+    path.write_text("\n".join(",".join([each[0], rounds.get(each[1], each[1]), *each[2:]]) for each in lines))
+    assert any("fit far better" in each for each in said(folder))
+
+
+def test_resampled_scans_are_told(folder: Path) -> None:
+    path = folder / "fiducial_images.csv"
+    head, names, *rows = path.read_text().splitlines()
+    first = {each.split(",")[1]: each.split(",")[2:] for each in rows if each.startswith("83-1")}
+    rng = np.random.default_rng(1)
+    lines = []
+    for row in rows:
+        photo, mark, *_ = row.split(",")
+        column, line = (float(each) + rng.uniform(-0.1, 0.1) for each in first[mark])
+        lines.append(f"{photo},{mark},{column:.2f},{line:.2f}")
+    path.write_text("\n".join([head, names, *lines]) + "\n")
+    changed(folder / "photos.csv", "scanner,true", "scanner,false")
+    assert any("marks lie at the same pixels on all photos" in each for each in said(folder))
