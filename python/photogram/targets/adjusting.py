@@ -28,8 +28,8 @@ __all__ = ["adjusted_start", "snooped_start"]
 ROUNDS = 8
 """In which the standard deviation of corners is found, at the most, and the change that is none."""
 CHANGE = 0.01
-ROUGHLY, FINELY = 0.5, 1e-7
-"""Of a standard deviation: where the first and the last steps of a splined lens end."""
+FINELY = 1e-6
+"""Of a standard deviation: where the steps of a splined lens end."""
 
 
 def adjusted_start(
@@ -48,7 +48,10 @@ def adjusted_start(
         how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress}
         # Knots that no image touches are determined by priors alone.
         free = None if _has_knots(start) else adjust(start.block(), covariance="verdict", **how)
-        result = _knotted(start, how) if free is None else _with_priors(start, free, threads)
+        if free is None:
+            result = adjust(_weighted(start), **how, covariance="verdict", tolerance=FINELY)
+        else:
+            result = _with_priors(start, free, threads)
         worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
         if worse.any() and result.converged:
             start = start.without(worse)
@@ -99,17 +102,6 @@ def _sd_to_assume(start: Start, result: Result) -> float | None:
     found = deviation_of_corners(result)
     # Corners that fit to the last digit are made, not measured.
     return start.assumed * found if abs(found - 1) > CHANGE and start.assumed * found > 1e-6 else None
-
-
-def _knotted(start: Start, how: dict[str, Any]) -> Result:
-    """Return the adjustment of splined cameras.
-
-    An adjustment reckons with the knots near images where it begins: the last of it begins where corners stay
-    at theirs.
-    """
-    near = adjust(_weighted(start), **how, covariance=False, tolerance=ROUGHLY)
-    moved = Calibrated(calibration=start, result=near).restarted()
-    return adjust(_weighted(moved), **how, covariance="verdict", tolerance=FINELY)
 
 
 def _has_knots(start: Start) -> bool:

@@ -111,6 +111,9 @@ impl<'a> Run<'a, '_> {
             && state.linearized.damping() <= MOST_DAMPING
         {
             match self.step_from(state, &mut control)? {
+                ControlFlow::Continue(next) if self.is_outgrown(&next) => {
+                    return Ok(End::at(Status::NotConverged, next.recycle()));
+                }
                 ControlFlow::Continue(next) => state = next,
                 ControlFlow::Break(end) => return Ok(end),
             }
@@ -122,6 +125,12 @@ impl<'a> Run<'a, '_> {
             self.weak = moved;
         }
         self.stay(state, status)
+    }
+
+    /// Whether full steps have led to where groups touch other blocks than the layout has.
+    fn is_outgrown(&self, state: &State<'a>) -> bool {
+        state.linearized.damping() == 0.0
+            && self.threads.install(|| self.problem.model.has_outgrown(state.values()))
     }
 
     /// Solves, and takes the step or ends with it.
@@ -157,6 +166,11 @@ impl<'a> Run<'a, '_> {
         step: &[f64],
         control: &mut Control,
     ) -> Next<'a> {
+        let corrected = self.corrected(&state, step, &iteration);
+        let (given, (step, iteration)) = match &corrected {
+            Some((own, iteration)) => (step, (&own[..], *iteration)),
+            None => (step, (step, iteration)),
+        };
         let Iteration { damping, largest_change: change, .. } = iteration;
         let trial = self.stepped(&state, step, &iteration)?;
         let moved = if damping == 0.0 { state.moved(step) } else { vec![] };
@@ -195,13 +209,17 @@ impl<'a> Run<'a, '_> {
         }
         let decrease = std::mem::replace(&mut control.best, sum) - sum;
         self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, next.reached())?;
-        // What harms all others makes full steps fail.
-        if damping > 0.0 && self.has_collapsed(&unknowns, next.equations.at()) {
-            return Ok(ControlFlow::Break(End::at(Status::NotConverged, next.recycle())));
+        if damping > 0.0 {
+            // What harms all others makes full steps fail.
+            return Ok(match self.has_collapsed(&unknowns, next.equations.at()) {
+                true => ControlFlow::Break(End::at(Status::NotConverged, next.recycle())),
+                false => ControlFlow::Continue(next),
+            });
         }
-        if damping == 0.0 && control.stop.at_decrease(decrease, sum) {
+        if control.stop.at_decrease(decrease, sum) {
             return self.stay(next, Status::Converged).map(ControlFlow::Break);
         }
+        self.secants.remember(given.to_vec(), unknowns);
         Ok(ControlFlow::Continue(next))
     }
 
@@ -320,7 +338,10 @@ impl<'a> Run<'a, '_> {
         let before = self.iterations.last().filter(|iteration| iteration.damping == 0.0);
         let rate = before.map_or(1.0, |before| change / self.chord.unwrap_or(before.largest_change));
         let unknowns = self.problem.layout().unknowns();
-        leaves_cofactors(change, unknowns) && rate < 1.0 && rate / (1.0 - rate) * change <= limit
+        !self.secants.correct()
+            && leaves_cofactors(change, unknowns)
+            && rate < 1.0
+            && rate / (1.0 - rate) * change <= limit
     }
 
     /// Whether full steps are negligible and have long been as long as this one: what still moves, the observations do not determine

@@ -84,6 +84,7 @@ mod published;
 mod resistance;
 mod result;
 mod run;
+mod secants;
 mod statistics;
 mod term;
 mod terms;

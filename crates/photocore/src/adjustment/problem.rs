@@ -32,9 +32,21 @@ pub trait Model: Sync {
         false
     }
 
+    /// Whether groups touch other blocks at given values than the layout has, or would but for a small step: what is not there is left out of
+    /// their equations. Iterations end where it is so, and whoever made the layout makes another.
+    fn has_outgrown(&self, _unknowns: &[f64]) -> bool {
+        false
+    }
+
     /// Whether the last steps fall by a constant factor only, because second derivatives times residuals count where unknowns are determined
     /// weakly: a chord then pays (see [`super::Method::Damped`]).
     fn ends_slowly(&self) -> bool {
+        false
+    }
+
+    /// Whether combinations of unknowns are held by so little that full steps may swing across the solution, or creep: they are then corrected
+    /// by those before, and shortened where they lead higher.
+    fn steps_swing(&self) -> bool {
         false
     }
 

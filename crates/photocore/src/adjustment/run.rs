@@ -11,6 +11,7 @@ use super::method::{FIRST_DAMPING, Method, leaves_cofactors};
 use super::options::{Event, Iteration, Options, Phase, Status};
 use super::problem::{AnyProblem, Evaluated, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
+use super::secants::Secants;
 use crate::normals::{FactorOptions, InvertOptions, SolveOptions};
 use crate::{Stopped, Threads};
 
@@ -104,6 +105,7 @@ fn adjusted(
         last_local_corrections: vec![0.0; problem.layout().all_locals().len()],
         datum: vec![],
         chord: None,
+        secants: Secants::default(),
         curved: false,
         weak: vec![],
         collapsed: vec![],
@@ -213,6 +215,8 @@ pub(super) struct Run<'a, 'w> {
     pub datum: Vec<usize>,
     /// The length of the chord that followed the last step, where one did.
     pub chord: Option<f64>,
+    /// What full steps have shown where they fall slowly.
+    pub secants: Secants,
     /// Whether to take in the second-order term of the loss from now on: once the steps are short.
     pub curved: bool,
     /// Unknowns that a combination moves which full steps cannot follow (see [`Adjustment::weak`]).

@@ -4,7 +4,7 @@ use super::problem::{Assembled, Reached};
 use super::screens::{Begin, Ended, Screening};
 use super::{Converged, InnerConstraints, Network, NetworkDatum, NetworkError, Options, Solution, State};
 use crate::Threads;
-use crate::adjustment::{self, AdjustError, Adjustment, Event, Method, Status, Watch};
+use crate::adjustment::{self, AdjustError, Adjustment, Event, Method, Watch};
 
 /// An adjustment of a network to be run: from where, on which threads, watched by whom, and into which datum.
 ///
@@ -133,9 +133,9 @@ impl Network {
             goal.datum.map_or(Ok(()), |inner| self.check_carriers(inner, &assembled))?;
             let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
             let ended = iterated(&assembled, options, goal, done, threads, watch);
-            let begin = screening
-                .look(&Ended { adjusted: &ended, assembled: &assembled, options })
-                .or_else(|| reopened(&assembled, ended.as_ref().ok()?));
+            let reopened = ended.as_ref().ok().and_then(|ended| reopened(&assembled, ended));
+            let look = || screening.look(&Ended { adjusted: &ended, assembled: &assembled, options });
+            let begin = reopened.or_else(look);
             match (begin, ended) {
                 (Some(Begin::FromStart), _) => before = None,
                 (Some(Begin::AsBefore), _) => {}
@@ -194,9 +194,7 @@ impl Network {
 
 /// Where an adjustment has moved images beyond the knots that they were to step with, it goes on with others.
 fn reopened(assembled: &Assembled, ended: &Adjustment) -> Option<Begin> {
-    let model = &assembled.problem.model;
-    let converged = ended.status == Status::Converged;
-    (converged && model.is_beyond_windows(&ended.unknowns)).then_some(Begin::FromHere)
+    assembled.problem.model.is_beyond_windows(&ended.unknowns).then_some(Begin::FromHere)
 }
 
 /// Iterates, after so many iterations that were done before.

@@ -100,6 +100,15 @@ impl Model for Bundle {
         !self.blocks.shared.is_empty()
     }
 
+    /// Knots do what a turn of all photos does.
+    fn steps_swing(&self) -> bool {
+        !self.passages.lenses().is_empty()
+    }
+
+    fn has_outgrown(&self, unknowns: &[f64]) -> bool {
+        self.is_beyond_windows(unknowns)
+    }
+
     /// Straight rays turn and stretch with everything else; what a frame carries may have known lengths.
     fn groups_leave_open(&self) -> bool {
         self.refraction.is_none() && self.mounts.is_empty()
