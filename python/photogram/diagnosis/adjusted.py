@@ -11,6 +11,7 @@ from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.clocks import known_offsets
 from photogram.diagnosis.conventions import hints
 from photogram.diagnosis.film_marks import mark_hints
+from photogram.diagnosis.film_scans import seam_hints
 from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section
 from photogram.diagnosis.flown_hints import flown_hints
 from photogram.diagnosis.names import with_exchanges
@@ -71,7 +72,9 @@ def remarks(result: Result) -> list[Message]:
     """Name what fits and is hardly what was meant: directions of readouts, offsets of clocks, marks."""
     if not result.converged:
         return []
-    return [*backward_readouts(result), *known_offsets(result), *mark_hints(result)]
+    # A film in two pieces makes marks fail, too.
+    films = seam_hints(result) or mark_hints(result)
+    return [*backward_readouts(result), *known_offsets(result), *films]
 
 
 def _of_block(block: Block) -> list[Message]:
