@@ -68,7 +68,7 @@ def of_five_photos(repetitions: int) -> float:
 
 
 def of_first_calls(size: tuple[int, int], repetitions: int) -> tuple[float, float]:
-    """Return medians of the processor time of the first call of processes, and of the least of the next three."""
+    """Return medians of the processor time of first calls, and of the least of the next three calls."""
     command = [sys.executable, "-c", CALLS, *map(str, size)]
     runs = []
     for _ in range(repetitions):

@@ -208,10 +208,10 @@ def test_tables_that_cannot_be(tables):
             "ordering is one of auto, input, rcm, amd, dissection, graph-dissection, not 'random'",
         ),
         ({"max_iterations": 0}, "one iteration at least"),
-        ({"as_published": AsPublished(5.0, 0)}, "one iteration at least"),
+        ({"tolerance": AsPublished(5.0), "max_iterations": 0}, "one iteration at least"),
         ({"tolerance": 0.0}, "must be positive"),
         ({"tolerance": math.nan}, "must be positive"),
-        ({"as_published": AsPublished(-1.0, 4)}, "must be positive"),
+        ({"tolerance": AsPublished(-1.0)}, "must be positive"),
         ({"threads": 0}, "threads must be positive, not 0"),
     ],
 )
@@ -263,8 +263,8 @@ def test_photo_with_two_images(small_block):
 def test_no_control_and_no_weights(small_block):
     free = small_block.replace(point_sd=np.array(np.inf))
     controlled = adjust(small_block)
-    for as_published in (None, AsPublished()):
-        result = adjust(free, as_published=as_published)
+    for tolerance in (1e-5, AsPublished()):
+        result = adjust(free, tolerance=tolerance)
         assert result.converged
         # The middle photo of the first strip sees most; that of the other strip at the other end is farthest.
         assert "there is no control, and nothing else gives a datum: held at" in str(result.messages[0])
@@ -312,7 +312,7 @@ def test_parallel_rays():
         photo_positions=block.photo_positions[same], photo_attitudes=block.photo_attitudes[same], image_xy=xy
     )
     with pytest.raises(RankError) as caught:
-        adjust(block, fix_photos=True)
+        adjust(block.with_fixed_photos())
     assert caught.value.points
     assert all(name in str(caught.value) for name in caught.value.points[:12])
     with pytest.raises(RankError, match="point"):

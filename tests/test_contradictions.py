@@ -168,13 +168,16 @@ def test_blocks(block, state):
         ("too optimistic", {"unit_variance": "unity"}, None),
         ("too pessimistic", {"unit_variance": "unity"}, None),
         ("gross error", {"max_iterations": 1}, "not-converged"),
-        ("good", {"fix_photos": True}, None),
-        ("far too optimistic", {"fix_photos": True}, None),
     ],
 )
 def test_adjustments_of_other_kinds(block, state, options, code):
     verdict = see(adjust(BLOCKS[state][0](block), **options))
     assert code is None or verdict.code == code
+
+
+@pytest.mark.parametrize("state", ["good", "far too optimistic"])
+def test_fixed_photos(block, state):
+    see(adjust(BLOCKS[state][0](block).with_fixed_photos()))
 
 
 @pytest.mark.parametrize("state", sorted(BLOCKS.keys() - {"few", "many gross errors"}))

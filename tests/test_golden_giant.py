@@ -43,7 +43,7 @@ def one_point(case: dict[str, Any], position: Any, sd: Any) -> Result:
         spheroid=Spheroid.clarke_1866(),
         photo_to_ground=True,
     )
-    result = adjust(block, fix_photos=True)
+    result = adjust(block.with_fixed_photos())
     assert result.converged
     np.testing.assert_array_equal(result.photo_positions, block.photo_positions)
     np.testing.assert_array_equal(result.photo_attitudes, block.photo_attitudes)

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -37,6 +38,7 @@ FLOORS = (
     ("memory",),
     ("errors",),
     ("messages",),
+    ("on_demand",),
 )
 """From the top down, as CONTRIBUTING has them: a file knows its own folder and floors below."""
 
@@ -51,6 +53,7 @@ def modules():
     return found
 
 
+@cache
 def imports():
     """Return what each file imports of the package: within functions, by a string, for types only, too."""
     found = modules()

@@ -3,8 +3,9 @@
 import subprocess
 import sys
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
-from pkgutil import iter_modules, resolve_name
+from pkgutil import resolve_name
 
 import pytest
 
@@ -30,7 +31,9 @@ def test_every_way_to_import_works_in_a_new_process(statement, name):
     assert done.stdout.strip() == name.rpartition(".")[2]
 
 
-@pytest.mark.parametrize("package", ["photogram", "photogram.targets", "photogram.formats"])
+@pytest.mark.parametrize(
+    "package", ["photogram", "photogram.targets", "photogram.film", "photogram.formats", "photogram.giant"]
+)
 def test_no_name_that_is_loaded_when_asked_for_is_that_of_a_module(package):
     """The import of such a module would stand in the place of what it has."""
     home = import_module(package)
@@ -60,6 +63,19 @@ def test_the_reference_says_names_that_there_are():
 def test_the_top_has_no_more_names_than_can_be_read():
     assert len(photogram.__all__) <= 60
     assert {"Distance", "Position", "LeverArm"} <= set(photogram.__all__)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        photogram.adjust,
+        photogram.adjust_in_parts,
+        photogram.collection.adjust,
+        photogram.targets.Calibration.adjust,
+    ],
+)
+def test_what_adjusts_has_no_more_parameters_than_can_be_read(call):
+    assert len(signature(call).parameters) <= 10
 
 
 PARTS = """

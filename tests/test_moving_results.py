@@ -214,8 +214,8 @@ def test_a_datum_of_trajectories_is_that_of_the_observations(block):
     ):
         with pytest.raises(InputError, match=f"the photo {first} is on a trajectory, and the datum"):
             ask()
-    with pytest.raises(InputError, match=f"fix_photos: the photo {first} is on a trajectory"):
-        adjust(block, fix_photos=True)
+    with pytest.raises(InputError, match=f"fixed photos: the photo {first} is on a trajectory"):
+        block.with_fixed_photos()
 
 
 def test_restarted(scan, drone):

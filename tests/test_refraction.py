@@ -226,10 +226,10 @@ def test_section_12_without_refraction_heights_are_wrong_by_the_lift(space, air,
     fixed = truth.replace(
         point_sd=np.array(np.inf), point_positions=np.full_like(truth.point_positions, np.nan)
     )
-    options = {"fix_photos": True, "unit_variance": "unity"}
-    right = adjust(fixed, **options).point_positions
+    fixed = fixed.with_fixed_photos()
+    right = adjust(fixed, unit_variance="unity").point_positions
     np.testing.assert_allclose(right[:, 2], truth.point_positions[:, 2], rtol=0, atol=1e-6)
-    error = adjust(fixed.replace(refraction=None), **options).point_positions[:, 2] - right[:, 2]
+    error = adjust(fixed.replace(refraction=None), unit_variance="unity").point_positions[:, 2] - right[:, 2]
 
     points, photos = truth.image_points, truth.image_photos
     shift = geometry.refraction_shift(

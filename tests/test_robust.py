@@ -54,7 +54,7 @@ def test_redundancy_numbers_still_sum_to_the_degrees_of_freedom(simulation):
 
 
 def test_a_loss_that_never_sets_in_changes_nothing(simulation):
-    plain, robust = adjust(simulation.block), adjust(simulation.block, loss="huber", scale=1e6)
+    plain, robust = adjust(simulation.block), adjust(simulation.block, loss=("huber", 1e6))
     np.testing.assert_allclose(plain.point_positions, robust.point_positions, rtol=1e-12)
     assert (robust.image_weights[robust.used_images] == 1).all()
 
@@ -66,7 +66,7 @@ def test_without_a_loss_all_weights_stand(simulation):
 
 
 def test_options_that_cannot_be_are_refused(simulation):
-    published = {"loss": "huber", "as_published": AsPublished()}
-    for options in ({"loss": "l1"}, {"scale": 1.0}, {"loss": "huber", "scale": 0.0}, published):
+    published = {"loss": "huber", "tolerance": AsPublished()}
+    for options in ({"loss": "l1"}, {"loss": ("huber",)}, {"loss": ("huber", 0.0)}, published):
         with pytest.raises(InputError):
             adjust(simulation.block, **options)

@@ -154,7 +154,7 @@ def test_orientations_of_dbat(dbat_result, dbat):
 
 @pytest.mark.parametrize("percent", [5.0, 1.0, 1e-6])
 def test_as_published_stops_by_the_percent_criterion(block, result, percent):
-    published = adjust(block, unit_variance="free", as_published=AsPublished(percent, 9))
+    published = adjust(block, unit_variance="free", tolerance=AsPublished(percent), max_iterations=9)
     assert published.status == "converged"
     sums = np.array([iteration.weighted_sum_of_squares for iteration in published.iterations])
     change = 100 * np.abs(np.diff(sums)) / sums[:-1]
@@ -167,7 +167,7 @@ def test_as_published_stops_by_the_percent_criterion(block, result, percent):
 
 
 def test_as_published_stops_at_the_limit(block):
-    published = adjust(block, as_published=AsPublished(1e-12, 2))
+    published = adjust(block, tolerance=AsPublished(1e-12), max_iterations=2)
     assert (published.status, len(published.iterations)) == ("not converged", 2)
 
 
@@ -180,7 +180,7 @@ def turned(block: Block, angle: int) -> Block:
 
 @pytest.mark.parametrize("angle", [0, 2], ids=["omega", "kappa"])
 def test_as_published_knows_divergence(block, angle):
-    published = adjust(turned(block, angle), as_published=AsPublished(5.0, 9))
+    published = adjust(turned(block, angle), tolerance=AsPublished(5.0), max_iterations=9)
     assert published.status == "diverged"
     sums = [iteration.weighted_sum_of_squares for iteration in published.iterations]
     assert sums[-1] > sums[-2] * 1.05

@@ -40,18 +40,18 @@ def own_formation(result):
 def test_random_networks(number):
     """Control, observed stations, observations beside images, cameras, rigs, spheroids; free ones too."""
     block = random_network(SEED, number).block
-    result = adjust(block, tolerance=1e-9, verdict=True)
+    result = adjust(block, tolerance=1e-9, covariance="verdict")
     assert_alike(result.reliability(), own_formation(result).reliability(), 1e-6)
 
 
 def test_the_same_words_and_numbers():
     block = photogram.simulate(strips=3, photos_per_strip=6, points_per_photo=60, seed=4, blunders=2).block
-    result = adjust(block, verdict=True)
+    result = adjust(block, covariance="verdict")
     copied = own_formation(result)
     assert_alike(result.reliability(), copied.reliability(), 1e-7)
     # What was kept is taken once: what is asked later forms its own.
     assert_alike(result.reliability(), copied.reliability(), 1e-14)
-    again = adjust(block, verdict=True)
+    again = adjust(block, covariance="verdict")
     assert again.verdict.headline == copied.verdict.headline
     assert again.report() == copied.report()
 
@@ -60,12 +60,12 @@ def test_the_same_words_and_numbers():
 def test_what_is_not_kept(options):
     """Of a loss, of iterations that have not ended, and where the last step was long: all is as without."""
     block = photogram.simulate(strips=2, photos_per_strip=4, points_per_photo=40, seed=7).block
-    result = adjust(block, verdict=True, **options)
+    result = adjust(block, covariance="verdict", **options)
     assert_alike(result.reliability(), own_formation(result).reliability(), 1e-14)
 
 
 def test_the_adjustment_is_the_same_to_the_last_bit():
     block = photogram.simulate(strips=2, photos_per_strip=4, points_per_photo=40, seed=7).block
-    plain, kept = adjust(block), adjust(block, verdict=True)
+    plain, kept = adjust(block), adjust(block, covariance="verdict")
     for name in ("photo_cofactors", "point_cofactors", "redundancy", "standardized", "photo_positions"):
         np.testing.assert_array_equal(getattr(plain, name), getattr(kept, name))

@@ -196,7 +196,7 @@ def test_a_prediction_is_made_at_the_given_positions():
 
 
 def test_photos_that_stay_do_not_mind_observations(weighted):
-    result = adjust(weighted, fix_photos=True)
+    result = adjust(weighted.with_fixed_photos())
     np.testing.assert_array_equal(result.photo_positions, weighted.photo_positions)
 
 

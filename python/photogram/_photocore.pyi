@@ -906,6 +906,9 @@ class BlockNetwork:
             As :meth:`adjust`, before its first iteration.
         """
 
+def step_rules() -> dict[str, float]:
+    """Return the constants of the rules of steps of one process, by name; see `adjustment/damped.rs`."""
+
 @final
 class Node:
     """A node of the elimination tree of a block that is adjusted in parts (Helmert 1880; Wolf 1978).
@@ -965,10 +968,11 @@ class Node:
     def relocate(self, state: _Floats, *, threads: int) -> _Floats:
         """Return the state with the points that only images touch where the rays of their photos meet."""
 
-    def objective(self, state: _Floats, *, threads: int) -> tuple[float, float, float, float]:
-        """Return weighted sums of squares: camera, ground, plates, observations beside images.
+    def objective(self, state: _Floats, *, threads: int) -> tuple[float, float, float, float, float]:
+        """Return weighted sums of squares (camera, ground, plates, observations), and what is minimised.
 
-        Those at home here; they add up over all nodes to those of :attr:`BlockSolution.sums_of_squares`.
+        Those at home here; they add up over all nodes to those of :attr:`BlockSolution.sums_of_squares`. What
+        is minimised is their sum, or that of losses.
         """
 
     def form(
@@ -977,6 +981,7 @@ class Node:
         contributions: list[ContributionRow],
         *,
         damping: float,
+        curved: bool,
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> FormedNode:
@@ -991,8 +996,9 @@ class Node:
             this order.
         damping
             Added to the diagonal of the normal equations as a fraction of it; 0 for a full step. The same in
-            all
-            nodes.
+            all nodes.
+        curved
+            Whether the second-order term of a loss is taken in. The same in all nodes.
         """
 
     def solution(self, state: _Floats, before: _Floats, *, threads: int) -> BlockSolution:

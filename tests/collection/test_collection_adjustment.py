@@ -144,7 +144,7 @@ def test_robust_losses_recover_the_truth_among_outliers(loss):
 @pytest.mark.parametrize("loss", ["huber", "cauchy"])
 def test_a_robust_adjustment_ends_where_the_gradient_of_the_loss_vanishes(loss):
     made = simulate(photos=6, points=30, outlier_share=0.1, seed=5)
-    result = adjust(made.collection, loss=loss, scale=2.0, tolerance=1e-14, max_iterations=500)
+    result = adjust(made.collection, loss=(loss, 2.0), tolerance=1e-14, max_iterations=500)
     residuals = (result.residuals / made.collection.image_sd).ravel()
     weights = np.repeat(result.image_weights, 2)
     rows = jacobian(result.adjusted())
@@ -162,7 +162,7 @@ def test_a_robust_adjustment_ends_where_the_gradient_of_the_loss_vanishes(loss):
 
 def test_a_loss_that_never_sets_in_changes_nothing():
     made = simulate(seed=3)
-    plain, robust = adjust(made.collection), adjust(made.collection, loss="huber", scale=1e6, tolerance=1e-8)
+    plain, robust = adjust(made.collection), adjust(made.collection, loss=("huber", 1e6), tolerance=1e-8)
     np.testing.assert_array_equal(plain.photo_parameters, robust.photo_parameters)
     assert (robust.image_weights == 1).all()
 
@@ -253,8 +253,8 @@ def test_a_start_in_the_plane_of_the_projection_centre_is_an_error():
         ({"tolerance": float("nan")}, "must be positive"),
         ({"threads": 0}, "threads must be positive"),
         ({"loss": "tukey"}, "loss is one of huber, cauchy"),
-        ({"loss": "huber", "scale": -1.0}, "scale must be positive"),
-        ({"scale": 2.0}, "give loss too"),
+        ({"loss": ("huber", -1.0)}, "scale of the loss must be positive"),
+        ({"loss": ("huber", float("inf"))}, "positive and finite"),
     ],
 )
 def test_options_that_cannot_be_are_refused(options, message):

@@ -8,6 +8,8 @@ import pytest
 
 from photogram.collection import read, simulate, to_bytes
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 
 def test_the_example_converges_and_everything_is_written(run, tmp_path):
     done = run(
@@ -70,3 +72,6 @@ def test_faults_of_the_input_are_named(run, tmp_path):
     assert "problem.txt, record 3: 2 is no photo" in done.output
     assert run("collection").exit_code == 2
     assert run("collection", "--example", "--sd", "-1").exit_code == 1
+    done = run("collection", "--example", "--snoop", "--scale", "2")
+    assert done.exit_code == 2
+    assert "give --loss too" in done.output

@@ -69,6 +69,27 @@ def test_parts_give_what_one_process_gives(block, whole, parts):
     assert sorted(found.photo_order.tolist()) == list(range(len(block.photo_ids)))
 
 
+def gross():
+    """Return a block with GNSS positions and gross errors in its images."""
+    made = photogram.simulate(strips=4, photos_per_strip=12, points_per_photo=40, seed=3)
+    block = with_gnss(made, sd=0.05, seed=2).block
+    xy = block.image_xy.copy()
+    xy[::97] += 0.2 * np.sign(np.random.default_rng(5).standard_normal(xy[::97].shape))
+    return block.replace(image_xy=xy)
+
+
+@pytest.mark.parametrize(("make", "loss"), [(tied_block, "huber"), (gross, "cauchy")])
+def test_losses_weight_in_parts_what_they_do_in_one_process(make, loss):
+    block = make()
+    whole = adjust(block, loss=loss)
+    found = adjust_in_parts(block, Division(parts=4), loss=loss)
+    agrees(found, whole, 1e-6, tied=make is tied_block)
+    np.testing.assert_allclose(found.image_weights, whole.image_weights, rtol=0, atol=1e-7)
+    assert (whole.image_weights < 0.5).sum() > 2
+    assert "loss of scale" in " ".join(map(str, whole.messages))
+    assert found.messages == whole.messages
+
+
 def test_cameras_ties_and_common_unknowns_cross_cuts():
     block = tied_block()
     block = block.replace(
@@ -198,7 +219,9 @@ def test_a_plan_is_what_is_needed(block, tmp_path):
     engine, contributions = CoreEngine(), {}
     for node, children in enumerate(read_manifest(tmp_path).tree.children):
         own = engine.node(tmp_path, node)
-        formed = own.form(own.initial, [contributions.pop(c) for c in children], damping=0.0, threads=1)
+        formed = own.form(
+            own.initial, [contributions.pop(c) for c in children], damping=0.0, curved=False, threads=1
+        )
         contributions[node] = formed.contribution
         sent = sum(each.nbytes for each in contributions[node])
         assert sent == plan.predictions[node]["contribution_bytes"]

@@ -19,6 +19,8 @@ from photogram.cli.projects import Additions
 from photogram.distributed import Division
 from photogram.formats import read
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):
@@ -41,10 +43,19 @@ def test_the_example_in_parts_has_the_report_of_one_process(tmp_path):
     assert len(re.findall(pattern, one)) > 4
 
 
-@pytest.mark.parametrize("chosen", [("--loss", "huber"), ("--datum", "inner")])
-def test_neither_loss_nor_datum_are_chosen_in_parts(tmp_path, chosen):
-    said = called("--example", "--parts", 2, *chosen, "--out", tmp_path / "out", code=1)
-    assert "in parts there is no loss and no datum to choose" in said
+def test_no_datum_is_chosen_in_parts(tmp_path):
+    said = called("--example", "--parts", 2, "--datum", "inner", "--out", tmp_path / "out", code=1)
+    assert "in parts there is no datum to choose" in said
+
+
+def test_a_loss_is_that_of_one_process(tmp_path):
+    """Where it weights something, the report says of how many images, the same in both ways."""
+    for name, parts in (("parts", ["--parts", 2]), ("whole", [])):
+        called("--example", *parts, "--loss", "cauchy", "--out", tmp_path / name)
+    one, other = ((tmp_path / each / "report.txt").read_text() for each in ("parts", "whole"))
+    pattern = r"Cauchy loss of scale .*|sigma0 .*|degrees of freedom .*"
+    assert re.findall(pattern, one) == re.findall(pattern, other)
+    assert "Cauchy loss" in one
 
 
 def test_a_plan_adjusts_nothing(tmp_path, project):
@@ -126,13 +137,17 @@ def test_what_is_not_done_of_a_project_on_disk_is_refused(tmp_path, project, opt
     assert not (tmp_path / "out" / "report.txt").exists()
 
 
-def test_a_project_on_disk_that_chooses_a_loss_is_refused(tmp_path):
+def test_a_project_on_disk_that_chooses_a_loss_is_adjusted_with_it(tmp_path):
     given = project_of(tied_block(), tmp_path / "robust")
     settings = given / "project.toml"
     settings.write_text(settings.read_text().replace('loss = "none"', 'loss = "huber"'))
     assert read(given).options.loss == "huber"
-    said = called(given, "--parts", 3, "--out", tmp_path / "out", code=1)
-    assert "in parts there is no loss and no datum to choose" in said
+    called(given, "--parts", 3, "--keep-all", "--out", tmp_path / "out")
+    nodes = [read_result(each) for each in sorted((tmp_path / "out" / "run" / "results").iterdir())]
+    whole = adjust(read(given).block, loss="huber")
+    weights = np.sort(np.concatenate([each.image_weights for each in nodes]))
+    np.testing.assert_allclose(weights, np.sort(whole.image_weights), rtol=0, atol=1e-6)
+    assert (weights < 1).any()
 
 
 @pytest.mark.parametrize("chosen", ["unity", "constrained"])

@@ -148,15 +148,15 @@ class ToyNode:
         return state.copy()
 
     def objective(self, state, *, threads):
-        """Return the sums of squares."""
+        """Return the sums of squares, and their sum."""
         b = self.equations(state)[1]
         split = 2 * len(self.images)
-        return float(b[split:] @ b[split:]), 0.0, float(b[:split] @ b[:split]), 0.0
+        return float(b[split:] @ b[split:]), 0.0, float(b[:split] @ b[:split]), 0.0, float(b @ b)
 
     def reached(self, phase):
         """Nothing, unless an engine wants to know."""
 
-    def form(self, state, contributions, *, damping, threads):
+    def form(self, state, contributions, *, damping, curved, threads):
         """Form and eliminate."""
         self.reached("form")
         return FormedToy(self, state, contributions, damping)

@@ -12,6 +12,7 @@ from photogram.cli import app
 from photogram.giant import Common, Frame, Project, read_project, write_project
 from photogram.network.geometry import geographic_to_geocentric, project, rotation_angles, rotation_matrix
 
+pytestmark = pytest.mark.usefixtures("sketched")
 SIZE = {"strips": 2, "photos_per_strip": 4, "points_per_photo": 25, "check_points": 4}
 GEOGRAPHIC = {
     "spheroid": Spheroid.clarke_1866(),
@@ -48,7 +49,10 @@ def changed(directory, new, column, digit):
 def solution(directory):
     """Adjust a project to the end."""
     read = read_project(directory)
-    return adjust(read.to_block(), unit_variance="unity", fix_photos=read.common.intersection_only)
+    block = read.to_block()
+    return adjust(
+        block.with_fixed_photos() if read.common.intersection_only else block, unit_variance="unity"
+    )
 
 
 def differences(one, other):

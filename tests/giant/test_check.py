@@ -23,6 +23,7 @@ from photogram.network.geometry import Spheroid
 from photogram.network.rays import Rays
 from photogram.network.strips import strips_of
 
+pytestmark = pytest.mark.usefixtures("sketched")
 GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}
 
 
@@ -95,11 +96,11 @@ def test_section_13_the_first_run_of_appendix_h_accuses_nobody_on_the_clean_samp
 
     with as_file(files("photogram") / "examples" / "galveston") as directory:
         sample = read_project(directory).to_block()
-    clean = adjust(sample, fix_photos=True).verdict
+    clean = adjust(sample.with_fixed_photos()).verdict
     assert (clean.code, clean.exit, clean.warning) == ("intersection", 0, True)
     assert "none stands out" in clean.headline
     row = image(sample, "SH9960", least_rays=3)
-    spoilt = adjust(changed(sample, "image_xy", row, 1, 0.5), fix_photos=True).verdict
+    spoilt = adjust(changed(sample, "image_xy", row, 1, 0.5).with_fixed_photos()).verdict
     assert (spoilt.code, spoilt.exit) == ("gross-errors", 4)
     assert f"1) image of point {sample.point_ids[sample.image_points[row]]} on photo" in spoilt.headline
     assert "held" not in spoilt.headline

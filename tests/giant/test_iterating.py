@@ -12,6 +12,7 @@ from photogram import AsPublished, adjust, simulate
 from photogram.giant import Common, ImageFrame, Project, read_project, write_project
 from photogram.network import geometry
 
+pytestmark = pytest.mark.usefixtures("sketched")
 SPACES = pytest.mark.parametrize("space", [{}, GEOGRAPHIC], ids=["rectangular", "geographic"])
 
 
@@ -64,7 +65,9 @@ def test_section_6_limit_of_iterations(directory, tmp_path, limit):
     assert heading.split()[:5] == ["number", "weighted", "sum", "of", "squares"]
     assert [int(row.split()[0]) for row in rows] == list(range(limit + 1))
     values = [float(row.split()[1]) for row in rows]
-    result = adjust(read_project(short).to_block(), unit_variance="free", as_published=AsPublished(5, limit))
+    result = adjust(
+        read_project(short).to_block(), unit_variance="free", tolerance=AsPublished(5), max_iterations=limit
+    )
     assert values == pytest.approx(sums(result), abs=1e-6)
 
 
@@ -72,7 +75,7 @@ def test_section_6_limit_of_iterations(directory, tmp_path, limit):
 @pytest.mark.giant("14", "3 E blank or 0: 5; nothing to compare in iteration 1")
 @pytest.mark.parametrize("percent", [1, 5, 99])
 def test_section_6_convergence_by_percent(block, percent):
-    result = adjust(block, as_published=AsPublished(percent, 9))
+    result = adjust(block, tolerance=AsPublished(percent), max_iterations=9)
     assert result.converged
     of_iterations = sums(result)[1:]  # S of iteration 1 has no predecessor
     changes = [abs(new - old) < percent / 100 * old for old, new in pairwise(of_iterations)]
@@ -86,7 +89,7 @@ def test_section_6_convergence_by_percent(block, percent):
 def test_section_14_rises_up_to_the_criterion_converge(percent, status):
     start = {"attitude_error": math.radians(20), "position_error": 200.0}
     block = simulate(strips=2, photos_per_strip=4, points_per_photo=30, **start, seed=5).block
-    result = adjust(block, as_published=AsPublished(percent, 9))
+    result = adjust(block, tolerance=AsPublished(percent), max_iterations=9)
     *_, before, last = sums(result)
     assert 1.05 < last / before < 1.2
     assert result.status == status
@@ -102,7 +105,7 @@ def test_section_6_divergence_writes_unit_20_only(tmp_path):
     start = {"attitude_error": math.radians(20), "position_error": 200.0}
     block = simulate(strips=2, photos_per_strip=4, points_per_photo=30, **start, seed=5).block
     write_project(Project.from_block(block, Common(max_iterations=9)), tmp_path / "in")
-    result = adjust(read_project(tmp_path / "in").to_block(), as_published=AsPublished(5, 9))
+    result = adjust(read_project(tmp_path / "in").to_block(), tolerance=AsPublished(5), max_iterations=9)
     assert result.status == "diverged"
     assert sums(result)[-1] > sums(result)[-2]
     printed = run(tmp_path / "in", "--as-published", "--out", tmp_path / "out", code=3)
@@ -116,7 +119,7 @@ def test_section_6_points_start_from_their_rays():
     unknown = truth.replace(
         point_positions=np.full_like(truth.point_positions, np.nan), point_sd=np.array(np.inf)
     )
-    result = adjust(unknown, fix_photos=True)
+    result = adjust(unknown.with_fixed_photos())
     # Without errors the rays meet in the points.
     assert result.initial_weighted_sum_of_squares == pytest.approx(0, abs=1e-12)
     used = result.used_points
@@ -129,7 +132,7 @@ def test_section_6_control_starts_from_its_held_components():
     point = int(np.bincount(truth.image_points).argmax())
     positions, sd = np.full_like(truth.point_positions, np.nan), np.full_like(truth.point_positions, np.inf)
     positions[point], sd[point] = truth.point_positions[point] + [0, 0, 1], [np.inf, np.inf, 0.01]
-    result = adjust(truth.replace(point_positions=positions, point_sd=sd), fix_photos=True)
+    result = adjust(truth.replace(point_positions=positions, point_sd=sd).with_fixed_photos())
     # The point starts a metre too high where its control is: no residual there, but in the photographs.
     rows = truth.image_points == point
     assert result.initial_weighted_sum_of_squares > 10
@@ -154,7 +157,7 @@ def test_section_6_intersection_is_point_by_point(directory, tmp_path):
         )
         for each in read.images
     ]
-    alone = adjust(read.to_block(), fix_photos=True, unit_variance="unity")
+    alone = adjust(read.to_block().with_fixed_photos(), unit_variance="unity")
     rows = [everything.block.point_ids.index(name) for name in alone.block.point_ids]
     differences = (alone.point_positions - everything.point_positions[rows]) / alone.point_sd
     assert np.nanmax(np.abs(differences)) < 1e-4
@@ -205,7 +208,7 @@ def test_section_13_clean_up_without_control_then_fit_the_control(directory, tmp
 def test_section_7_intersection(directory, tmp_path, digit):
     only = changed(changed(directory, tmp_path / "a", 10, "1"), tmp_path / "b", 12, digit)
     read = read_project(only)
-    result = adjust(read.to_block(), fix_photos=True, unit_variance=read.common.unit_variance)
+    result = adjust(read.to_block().with_fixed_photos(), unit_variance=read.common.unit_variance)
     held = np.isfinite(result.block.point_sd)[result.used_points].sum()
     assert result.degrees_of_freedom == 2 * result.used_images.sum() + held - 3 * result.used_points.sum()
     total = result.sums_of_squares.plates + result.sums_of_squares.ground

@@ -16,17 +16,17 @@ import pytest
 
 from photogram import AsPublished, Block, Refraction, Result, adjust, simulate
 from photogram.giant import Common, ErrorWarning, GroundPoint, ImageFrame, Project, listing, read_project
-from photogram.giant.listing.control import control_pages
-from photogram.giant.listing.corrections import correction_pages
-from photogram.giant.listing.formats import Space, attitude, dms, exponential, fixed
-from photogram.giant.listing.frames import Station, frame_pages
-from photogram.giant.listing.iterations import iteration_pages
-from photogram.giant.listing.options import options_page
-from photogram.giant.listing.pages import paginate
-from photogram.giant.listing.points import propagated_point_pages
-from photogram.giant.listing.residuals import PointResiduals, residual_pages, statistics
-from photogram.giant.listing.stations import station_pages
-from photogram.giant.listing.warnings import warning_pages
+from photogram.giant.printout.control import control_pages
+from photogram.giant.printout.corrections import correction_pages
+from photogram.giant.printout.formats import Space, attitude, dms, exponential, fixed
+from photogram.giant.printout.frames import Station, frame_pages
+from photogram.giant.printout.iterations import iteration_pages
+from photogram.giant.printout.options import options_page
+from photogram.giant.printout.pages import paginate
+from photogram.giant.printout.points import propagated_point_pages
+from photogram.giant.printout.residuals import PointResiduals, residual_pages, statistics
+from photogram.giant.printout.stations import station_pages
+from photogram.giant.printout.warnings import warning_pages
 
 DATA = Path(__file__).parents[1] / "data" / "giant"
 SNAPSHOT = DATA / "listing_galveston.txt"
@@ -580,7 +580,7 @@ def test_section_10_jobs_in_feet_print_feet(example, adjusted):
 def test_section_6_intersection_only_lists_residuals_and_points(example):
     project = changed(example, intersection_only=True)
     block = project.to_block()
-    result = adjust(block, fix_photos=True, unit_variance="free")
+    result = adjust(block.with_fixed_photos(), unit_variance="free")
     text = listing(project, block, result)
     assert kinds(text) == ["frames", "control", "warnings", "residuals", "points", "corrections"]
     # The stations are listed with the weights that they were given, though they take no part.
@@ -591,7 +591,7 @@ def test_section_6_intersection_only_lists_residuals_and_points(example):
 
 def test_what_there_is_of_an_adjustment_that_failed_is_printed_and_says_so(example):
     block = example.to_block()
-    result = adjust(block, as_published=AsPublished(max_iterations=1))
+    result = adjust(block, tolerance=AsPublished(), max_iterations=1)
     assert result.status == "not converged"
     published = listing(example, block, result, as_published=True)
     text = listing(example, block, result)
@@ -640,21 +640,17 @@ def test_as_published_no_line_of_the_listing_is_ours(example, adjusted, propagat
 # What the core keeps
 
 
-@pytest.mark.parametrize("as_published", [None, AsPublished(max_iterations=9)])
-def test_corrections_lead_from_the_initial_to_the_adjusted_values(rectangular, as_published):
+@pytest.mark.parametrize("options", [{}, {"tolerance": AsPublished(), "max_iterations": 9}])
+def test_corrections_lead_from_the_initial_to_the_adjusted_values(rectangular, options):
     _, block, _ = rectangular
-    result = adjust(block, as_published=as_published)
+    result = adjust(block, **options)
     assert result.photo_corrections.shape == (len(result.iterations), len(block.photo_ids), 6)
     total = result.photo_corrections.sum(axis=0)
     np.testing.assert_allclose(block.photo_positions + total[:, :3], result.photo_positions, rtol=1e-12)
     np.testing.assert_allclose(block.photo_attitudes + total[:, 3:], result.photo_attitudes, atol=1e-12)
     assert np.isnan(result.point_last_corrections[~result.used_points]).all()
     fewer = len(result.iterations) - 1
-    before = (
-        adjust(block, as_published=AsPublished(max_iterations=fewer))
-        if as_published
-        else adjust(block, max_iterations=fewer)
-    )
+    before = adjust(block, **options | {"max_iterations": fewer})
     np.testing.assert_allclose(
         before.point_positions + result.point_last_corrections, result.point_positions, rtol=0, atol=1e-8
     )

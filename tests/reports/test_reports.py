@@ -278,7 +278,7 @@ UNUSUAL = {
     "gross errors": lambda: adjust(simulate(**SMALL, seed=1, blunders=8, blunder_size=2.0).block),
     "snooped": lambda: snoop(simulate(**SMALL, seed=1, blunders=3).block),
     "unit variance one": lambda: adjust(simulate(**SMALL, seed=1).block, unit_variance="unity"),
-    "fixed photos": lambda: adjust(simulate(**SMALL, seed=1).block, fix_photos=True),
+    "fixed photos": lambda: adjust(simulate(**SMALL, seed=1).block.with_fixed_photos()),
 }
 
 

@@ -5,7 +5,7 @@ import pytest
 from given_targets import left_table, rig_small
 
 from photogram import InputError, formats
-from photogram.formats.calibrations import adjusted_project, calibration_of, project_of
+from photogram.formats.targets.calibrations import adjusted_project, calibration_of, project_of
 from photogram.targets import read
 
 
@@ -103,3 +103,13 @@ def test_a_project_without_a_board_is_no_calibration():
     project = project_of(rig_small())
     with pytest.raises(InputError, match="has no board"):
         calibration_of(project.replace(boards={}))
+
+
+def test_what_is_known_of_sensors_and_of_the_bend_stays_known(tmp_path):
+    sd = np.array([np.full(6, np.inf), [1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3]])
+    given = rig_small("bend").replace(sd_sensors=sd, sd_bend=[1e-4, np.inf])
+    found = calibration_of(again(project_of(given), tmp_path))
+    assert found.sd_sensors == pytest.approx(sd, rel=1e-12)
+    assert found.sd_bend == pytest.approx([1e-4, np.inf])
+    with pytest.raises(InputError, match="sd_sensors are positive"):
+        given.replace(sd_sensors=0.0)

@@ -8,11 +8,12 @@ from given_targets import DATA, rig_small
 
 from photogram import Camera, InputError
 from photogram.targets import Board
+from photogram.targets.corner_files import holds_targets, sorted_files
 from photogram.targets.corner_tables import read_table, read_vnl
 from photogram.targets.measured import Grouping, grouped
 from photogram.targets.mrcal_model import read_model
 from photogram.targets.opencv_corners import read_npz, read_storage
-from photogram.targets.reading import _measured, _sorted, holds_targets, read
+from photogram.targets.reading import _measured, read
 
 SMALL = Board(columns=3, rows=2, spacing=0.1)
 XY = np.array([[10.5, 20.25], [30.0, 21.0], [50.0, 22.0], [11.0, 40.0], [31.0, 41.0], [51.0, 42.0]])
@@ -146,7 +147,7 @@ def test_views_by_time_in_files_of_kalibr(tmp_path):
             for k, (x, y) in enumerate(XY.tolist())
         ]
         written(tmp_path / f"{camera}.txt", *lines)
-    _, _, corners = _sorted(tmp_path)
+    _, _, corners = sorted_files(tmp_path)
     found = _measured(tmp_path, corners, SMALL)
     by_time, _ = grouped(found, Grouping(views="time", within=0.005))
     assert by_time.camera_names == ("cam0", "cam1")

@@ -1,5 +1,6 @@
 """Calibrations of splined lenses from end to end: priors, maps, projects, files of mrcal."""
 
+import json
 from functools import cache
 
 import numpy as np
@@ -9,7 +10,7 @@ from test_splined_adjustment import lens
 
 from photogram import formats
 from photogram.errors import InputError
-from photogram.formats.calibrations import adjusted_project, calibration_of
+from photogram.formats.targets.calibrations import adjusted_project, calibration_of
 from photogram.targets import Board, Calibration, Corners, read
 from photogram.targets.cross_validated import cross_validate
 from photogram.targets.knot_weights import with_knot_sd
@@ -93,6 +94,9 @@ def test_the_report_counts_knots_that_hang_on_their_priors():
     assert "no image touches" in told
     assert "knots" in beyond
     assert told in adjusted().report()
+    (own,) = json.loads(adjusted().to_json())["splines"]
+    assert told.startswith(f"{own['camera']}: {own['from_prior']} of {own['knots']} knots")
+    assert 0 <= own["untouched"] <= own["from_prior"]
 
 
 def test_cross_validation_leaves_out_what_parts_have_from_their_priors():

@@ -18,10 +18,9 @@ from photogram.adjustment.adjustment import adjust
 from photogram.adjustment.first_values import first_values
 from photogram.arguments.types import Floats
 from photogram.errors import InputError, RankError
-from photogram.network.block import Block
+from photogram.network.block import Block, refuse_trajectories
 from photogram.network.chosen import kept_images, of_photos
 from photogram.network.datum import MinimumConstraints
-from photogram.network.motion import refuse_trajectories
 from photogram.results.result import Result
 
 __all__ = ["Model", "Strip", "relative_model", "strip_of"]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photogram.on_demand import on_demand
+
 if TYPE_CHECKING:
     from photogram.adjustment.adjustment import AsPublished, Ordering, Progress, UnitVariance, adjust
 
@@ -12,11 +14,4 @@ __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
 WAYS = {"findings_of": ("findings",)}
 """The files that show a result, by the names of the ways: see `photogram.show.ways`."""
 
-
-def __getattr__(name: str) -> object:
-    """Load the adjustment of blocks when it is asked for: a single photo does without."""
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from photogram.adjustment import adjustment
-
-    return getattr(adjustment, name)
+__getattr__, __dir__ = on_demand(__name__, dict.fromkeys(__all__, "adjustment"))

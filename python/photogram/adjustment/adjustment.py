@@ -16,7 +16,7 @@ from photogram.adjustment.ends import behind, folded, harmful, rounded, too_coar
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.started import started
 from photogram.adjustment.undetermined import one_place, undetermined_combinations
-from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
+from photogram.arguments.arrays import number, one_of, shown, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import threads_that_fit, turned
 from photogram.messages import Message, listed
@@ -29,7 +29,7 @@ from photogram.network.datum import (
     datum_row,
     minimum_row,
 )
-from photogram.network.motion import refuse_datum, refuse_trajectories
+from photogram.network.motion import refuse_datum
 from photogram.network.refracted import check_cameras, remarks
 from photogram.network.unknowns import Unknown
 from photogram.results.datum import datum_messages, datum_of, refused
@@ -56,12 +56,9 @@ class AsPublished:
     ----------
     percent
         Converged when the weighted sum of squares changes by less than this from one iteration to the next.
-    max_iterations
-        Limit of iterations.
     """
 
     percent: float = 5.0
-    max_iterations: int = 4
 
 
 @dataclass(frozen=True)
@@ -87,61 +84,56 @@ class Progress:
 def adjust(
     block: Block,
     *,
-    unit_variance: UnitVariance = "constrained",
-    max_iterations: int | None = None,
-    tolerance: float = 1e-5,
-    as_published: AsPublished | None = None,
-    covariance: bool = True,
-    loss: Loss | None = None,
-    scale: float | None = None,
-    fix_photos: bool = False,
     datum: InnerConstraints | MinimumConstraints | None = None,
+    unit_variance: UnitVariance = "constrained",
+    loss: Loss | None = None,
+    covariance: bool | Literal["verdict"] = True,
+    tolerance: float | AsPublished = 1e-5,
+    max_iterations: int | None = None,
     ordering: Ordering = "auto",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
-    verdict: bool = False,
 ) -> Result:
     """Adjust a block by least squares.
 
     Every unknown is a weighted parameter, from free to fixed. Points that their image points cannot determine
     are left out (the result's `messages` and `dropped` say which); the others start from the intersection of
     their rays. Refraction, where the block has it, is applied in every iteration. A block that is too large
-    for one process, or too slow in it, is for :func:`photogram.adjust_in_parts`.
+    for one process, or too slow in it, is for :func:`photogram.adjust_in_parts`; one whose photos keep their
+    poses is `block.with_fixed_photos()`.
 
     Parameters
     ----------
     block
         The block.
+    datum
+        Of a block that is free: what is held (minimum constraints), or chosen points and photos that stay as
+        near as they come to their given places (inner constraints); see docs/datum.md. None: minimum
+        constraints, chosen where nothing else gives a datum.
     unit_variance
         What the variance of unit weight is based on: every weighted quantity as the observation that it is
         (`constrained`), 1 (`unity`), or the redundancy numbers of image coordinates, control and observations
         beside images (`redundancy`, docs/weights.md). `free`, the default of the 1987 program (GIANT guide,
         Appendix E), counts image coordinates and ground control only, and is too large where photos or
         cameras are weighted. Covariances are scaled by it.
-    max_iterations
-        Iterations at the most. When None, 50 without a loss, and 200 with one: reweighting takes more of
-        them.
+    loss
+        Robust loss in place of the squares of image coordinates: `huber` or `cauchy`, of both coordinates
+        of an image point together; None for least squares. `("huber", 2.0)` also says where it sets in, in
+        standard deviations a priori, which is at 1.50 for `huber` and 2.55 for `cauchy` otherwise. Variance,
+        covariances and redundancy numbers hold for the weights as the loss has modified them
+        (`image_weights`).
+    covariance
+        Whether to compute covariances, redundancy numbers and standardized residuals. `verdict`: the verdict,
+        or a report, will be asked for too; the adjustment takes about a twentieth longer, and keeps what the
+        tests need until then, where there is memory, so that they form nothing again. It does so without a
+        loss and inner constraints, and where it converges.
     tolerance
         Iterate until no unknown changes by more than this fraction of its standard deviation (a priori unit
         weight), or until the rate of convergence shows that none would by more than a tenth of it. A step
-        that raises the sum of squares is damped (Levenberg-Marquardt).
-    as_published
-        Iterate as the 1987 program did instead.
-    covariance
-        Whether to compute covariances, redundancy numbers and standardized residuals.
-    loss
-        Robust loss in place of the squares of image coordinates: `huber` or `cauchy`, of both coordinates
-        of an image point together; None for least squares. Variance, covariances and redundancy numbers
-        hold for the weights as the loss has modified them (`image_weights`).
-    scale
-        Where the loss sets in, in standard deviations a priori; 1.50 for `huber` and 2.55 for `cauchy` when
-        None.
-    fix_photos
-        Keep positions and attitudes as they are: every point by itself.
-    datum
-        Of a block that is free: what is held (minimum constraints), or chosen points and photos that stay as
-        near as they come to their given places (inner constraints); see docs/datum.md. None: minimum
-        constraints, chosen where nothing else gives a datum.
+        that raises the sum of squares is damped (Levenberg-Marquardt). Or as the 1987 program did.
+    max_iterations
+        Iterations at the most. When None, 50; 200 with a loss, as reweighting takes more of them; 4 as the
+        1987 program did.
     ordering
         How photos are ordered for elimination: in input order, in a narrow band (reverse Cuthill-McKee), by
         approximate minimum degree, by nested dissection across their positions, or across their ties alone.
@@ -152,10 +144,6 @@ def adjust(
         processors. The result does not depend on it, to the last bit.
     progress
         Called now and then with what is going on; an exception it raises stops the adjustment.
-    verdict
-        Whether the verdict, or a report, will be asked for: the adjustment takes about a twentieth longer,
-        and keeps what the tests need until then, where there is memory, so that they form nothing again. It
-        does so without a loss and inner constraints, and where it converges.
 
     Returns
     -------
@@ -173,56 +161,44 @@ def adjust(
         The adjustment would take more memory than there is.
     InputError
         An option that cannot be, a datum of points and photos that do not carry it, a photo that is not above
-        the water of the block; a datum or fixed poses of photos on trajectories.
+        the water of the block; a datum of photos on trajectories.
     KeyboardInterrupt
         Ctrl-C.
     """
-    if max_iterations is None:
-        max_iterations = 50 if loss is None else 200
     checked(block)
-    truth_value("covariance", covariance)
-    truth_value("fix_photos", fix_photos)
-    truth_value("verdict", verdict)
+    keep = isinstance(covariance, str) and covariance == "verdict"
+    if not (keep or isinstance(covariance, bool | np.bool_)):
+        raise InputError(f"covariance is True, False or 'verdict', not {shown(covariance)}")
     if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
         raise InputError(f"datum is InnerConstraints, MinimumConstraints or None, not {shown(datum)}")
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
-    if as_published is not None and not isinstance(as_published, AsPublished):
-        raise InputError(f"as_published is an AsPublished or None, not {shown(as_published)}")
-    check_iteration(
-        ordering,
-        as_published.max_iterations if as_published else max_iterations,
-        as_published.percent if as_published else tolerance,
-    )
+    row = loss_row(loss)
+    as_published = isinstance(tolerance, AsPublished)
+    limit = tolerance.percent if isinstance(tolerance, AsPublished) else tolerance
+    if max_iterations is None:
+        max_iterations = 4 if as_published else 200 if row else 50
+    check_iteration(ordering, max_iterations, limit)
     processors = core_threads(threads)
-    row = loss_row(loss, scale)
     if unit_variance == "redundancy" and not covariance:
         raise InputError("unit_variance='redundancy' needs redundancy numbers: covariance=True")
     if row and as_published:
-        raise InputError("the 1987 program has no robust loss: as_published or loss")
+        raise InputError("the 1987 program has no robust loss: AsPublished or loss")
     check_cameras(block)
-    if fix_photos:
-        refuse_trajectories(block, "fix_photos", "whose pose is not its own")
-        block = block.replace(
-            photo_position_sd=0.0,
-            photo_attitude_sd=0.0,
-            photo_positions_observed=None,
-            photo_attitudes_observed=None,
-        )
     if datum is not None:
         refuse_datum(block, "datum")
     block = started(block)
     inner = datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
     options = CoreOptions(
         criterion="percent" if as_published else "fraction",
-        limit=as_published.percent if as_published else tolerance,
-        max_iterations=as_published.max_iterations if as_published else max_iterations,
-        covariance=covariance,
+        limit=limit,
+        max_iterations=max_iterations,
+        covariance=bool(covariance),
         loss=row,
         ordering=ordering,
         unit_variance=unit_variance,
         minimum=minimum_row(block, datum) if isinstance(datum, MinimumConstraints) else None,
     )
-    return _adjusted(block, options, processors, progress, inner, as_published, keep=verdict)
+    return _adjusted(block, options, processors, progress, inner, keep=keep)
 
 
 def adjusted_from(
@@ -251,7 +227,6 @@ def _adjusted(
     processors: int,
     progress: Callable[[Progress], None] | None,
     inner: DatumRow | None = None,
-    as_published: AsPublished | None = None,
     *,
     keep: bool = False,
 ) -> Result:
@@ -265,7 +240,7 @@ def _adjusted(
         raise named(block, *error.args) from None
     with turned("the adjusted block"):
         freedom = _freedom(solution, options)
-        return _result(block, solution, options, freedom, inner, as_published)
+        return _result(block, solution, options, freedom, inner)
 
 
 @Way
@@ -310,12 +285,11 @@ def _result(
     options: CoreOptions,
     freedom: float,
     inner: DatumRow | None = None,
-    as_published: AsPublished | None = None,
 ) -> Result:
     datum = datum_of(block, solution, inner)
     messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
     messages += remark(options.loss, solution.image_weights)
-    if as_published:
+    if options.criterion == "percent":
         messages += _rises([Iteration(*row) for row in solution.iterations])
     return Result.from_solution(block, solution, options, datum, messages, freedom)
 

@@ -173,6 +173,8 @@ def rounded(excess: float | None) -> list[Message]:
 def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     """Remark on image points whose point stands behind the camera."""
     images = solution.images_behind
+    if not len(images):
+        return []
     points = [block.point_ids[point] for point in np.unique(block.image_points[images])]
     photos = [block.photo_ids[photo] for photo in np.unique(block.image_photos[images])]
     return hidden(len(images), points, photos)

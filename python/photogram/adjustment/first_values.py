@@ -19,10 +19,10 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, counted, listed
 from photogram.network.attitudes import Attitudes
-from photogram.network.block import Block
+from photogram.network.block import Block, flown_by
 from photogram.network.chosen import kept_images, of_photos
 from photogram.network.directions import direction_deviations, image_directions
-from photogram.network.motion import at_rest, flown_by, timed_photos
+from photogram.network.motion import at_rest, timed_photos
 from photogram.network.observations import Distance
 from photogram.network.refined import as_seen, is_scanned
 from photogram.show.brief import Brief

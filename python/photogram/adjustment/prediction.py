@@ -17,9 +17,9 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, listed
 from photogram.network import geometry
-from photogram.network.block import Block, checked, of_images_alone
+from photogram.network.block import Block, checked, of_images_alone, refuse_trajectories
 from photogram.network.cameras import images_of
-from photogram.network.motion import on_shared, refuse_trajectories, timed_photos
+from photogram.network.motion import on_shared, timed_photos
 from photogram.network.observations import Attitude, Position, Rate, Smoothness, Velocity
 from photogram.network.projecting import projected_images
 from photogram.results.result import Result

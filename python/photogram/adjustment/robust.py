@@ -11,9 +11,11 @@ from photogram.arguments.arrays import number, one_of
 from photogram.errors import InputError
 from photogram.messages import Message
 
-__all__ = ["SCALES", "Loss", "loss_row", "remark"]
+__all__ = ["SCALES", "Loss", "LossName", "loss_row", "remark"]
 
-Loss = Literal["huber", "cauchy"]
+LossName = Literal["huber", "cauchy"]
+Loss = LossName | tuple[LossName, float]
+"""A robust loss, perhaps with its scale: where it sets in, in standard deviations a priori."""
 
 SCALES = {"huber": 1.50, "cauchy": 2.55}
 """Scales with which 95 percent of the accuracy of least squares is kept where errors are normal, for the two
@@ -23,23 +25,24 @@ NOTABLE = 0.5
 """Image points whose weight falls below this fraction are counted as modified strongly."""
 
 
-def loss_row(loss: Loss | None, scale: float | None) -> tuple[str, float] | None:
+def loss_row(loss: Loss | None) -> tuple[str, float] | None:
     """Return a loss and its scale as the core takes them.
 
     Raises
     ------
     InputError
-        A loss that there is not, a scale that is not positive, or a scale without a loss.
+        A loss that there is not, a scale that is not positive.
     """
     if loss is None:
-        if scale is not None:
-            raise InputError("scale is that of a loss: give loss too")
         return None
-    one_of("loss", loss, get_args(Loss))
-    chosen = SCALES[loss] if scale is None else number("scale", scale)
-    if not 0 < chosen < np.inf:
-        raise InputError(f"scale must be positive and finite, not {chosen:g}")
-    return (loss, chosen)
+    if isinstance(loss, tuple) and len(loss) == 2:
+        name, scale = loss[0], number("the scale of the loss", loss[1])
+        if not 0 < scale < np.inf:
+            raise InputError(f"the scale of the loss must be positive and finite, not {scale:g}")
+        one_of("loss", name, get_args(LossName))
+        return (name, scale)
+    one_of("loss", loss, get_args(LossName))
+    return (loss, SCALES[loss])
 
 
 def remark(row: tuple[str, float] | None, weights: NDArray[np.float64]) -> list[Message]:

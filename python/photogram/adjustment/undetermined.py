@@ -11,9 +11,9 @@ import numpy as np
 from photogram.adjustment.coefficients import named_unknowns, of_motion
 from photogram.errors import RankError
 from photogram.messages import listed
-from photogram.network.block import Block
+from photogram.network.block import Block, flown_by
 from photogram.network.geometry import rotation_matrix, viewing_directions
-from photogram.network.motion import flown_by, on_shared, scanners
+from photogram.network.motion import on_shared, scanners
 from photogram.network.unknowns import Unknown
 
 if TYPE_CHECKING:

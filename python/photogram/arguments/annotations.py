@@ -23,7 +23,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
+from photogram.arguments.arrays import is_masked, number, one_of, shown, truth_value, whole_number
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 
@@ -289,7 +289,7 @@ def _array(name: str, value: Any) -> Any:
             raise _refused(name, value, "an array of numbers") from None
     if array.dtype.kind not in "biuf":
         raise _refused(name, value, "an array of numbers")
-    if isinstance(value, np.ma.MaskedArray) and np.ma.getmaskarray(value).any():
+    if is_masked(value):
         raise InputError(f"{name} has masked values")
     return value
 

@@ -7,6 +7,7 @@ change nothing. An array that is such a copy already is shared.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from numbers import Integral, Real
@@ -24,6 +25,7 @@ __all__ = [
     "frozen",
     "indices",
     "is_covariance",
+    "is_masked",
     "length",
     "names",
     "number",
@@ -97,7 +99,7 @@ def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np
             found: NDArray[np.float64] = array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name} is not an array of numbers: {error}") from None
-    if _masked(value):
+    if is_masked(value):
         if not missing:
             raise InputError(f"{name} has masked values")
         found = np.where(np.ma.getmaskarray(np.ma.asarray(value)), math.nan, found)
@@ -109,12 +111,16 @@ def _is_real(value: object) -> bool:
     return value is None or (isinstance(value, Real) and not isinstance(value, bool))
 
 
-def _masked(value: object) -> bool:
-    # What is an array and no more is not masked: numpy.ma, which takes long to import, is not asked.
+def is_masked(value: object) -> bool:
+    """Return whether a value is an array with masked elements.
+
+    Who has one has loaded numpy.ma, which takes long.
+    """
+    masked = sys.modules.get("numpy.ma")
     return (
-        type(value) is not np.ndarray
-        and isinstance(value, np.ma.MaskedArray)
-        and bool(np.ma.getmaskarray(value).any())
+        masked is not None
+        and isinstance(value, masked.MaskedArray)
+        and bool(masked.getmaskarray(value).any())
     )
 
 
@@ -171,7 +177,7 @@ def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.
     array = _plain(name, value, f"{length} whole numbers")
     if array.shape != (length,) or (length and array.dtype.kind not in "iu"):
         raise InputError(f"{name} is not an array of {length} whole numbers")
-    if _masked(value):
+    if is_masked(value):
         raise InputError(f"{name} has masked values")
     bad = np.flatnonzero((array < 0) | (array >= count))
     if bad.size:

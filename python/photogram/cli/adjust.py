@@ -403,18 +403,18 @@ def adjusted_block(
 
 
 def _call(datum: str | None, loss: Loss | None, division: Division | None) -> Callable[..., Result]:
-    """Return the call that adjusts: in one process, or in parts, where neither datum nor loss are chosen."""
+    """Return the call that adjusts: in one process, or in parts, where no datum is chosen."""
     if division is None:
         from photogram import InnerConstraints, MinimumConstraints, adjust
 
         held: dict[str | None, InnerConstraints | MinimumConstraints]
         held = {"inner": InnerConstraints(), "minimum": MinimumConstraints()}
-        return partial(adjust, datum=held.get(datum), loss=loss, verdict=True)
+        return partial(adjust, datum=held.get(datum), loss=loss, covariance="verdict")
     from photogram import InputError, adjust_in_parts
 
-    if datum in ("inner", "minimum") or loss is not None:
-        raise InputError("in parts there is no loss and no datum to choose")
-    return partial(adjust_in_parts, division=division)
+    if datum in ("inner", "minimum"):
+        raise InputError("in parts there is no datum to choose")
+    return partial(adjust_in_parts, division=division, loss=loss)
 
 
 def _files(

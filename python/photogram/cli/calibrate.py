@@ -50,6 +50,7 @@ class SyncName(StrEnum):
 
     KNOWN = "known"
     NONE = "none"
+    OFFSET = "offset"
 
 
 class PriorName(StrEnum):
@@ -108,9 +109,13 @@ class Seen:
     within: Annotated[
         float, typer.Option(min=0.0, metavar="S", help="With --views time: seconds between them at most.")
     ] = 0.005
-    sync: Annotated[SyncName, typer.Option(help="Whether images of one view were taken at one time.")] = (
-        SyncName.KNOWN
-    )
+    sync: Annotated[
+        SyncName,
+        typer.Option(
+            help="Whether images of one view were taken at one time; offset: by clocks of their cameras,"
+            " whose offsets are unknown."
+        ),
+    ] = SyncName.KNOWN
     pixel_origin: Annotated[OriginName, typer.Option(help="Corner or center of the first pixel is 0, 0.")] = (
         OriginName.CENTER
     )
@@ -179,7 +184,7 @@ class Seen:
     def _of_project(self, path: Path) -> Calibration:
         """Return the calibration that a plain project is, with what a user says otherwise."""
         from photogram import formats
-        from photogram.formats.calibrations import calibration_of
+        from photogram.formats.targets.calibrations import calibration_of
 
         found = calibration_of(formats.read(path))
         if self != Seen(shape=self.shape, sd=self.sd, regularise=self.regularise):
@@ -328,7 +333,7 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     """Make everything that goes to the directory, before anything is written."""
     from photogram.formats import to_files
     from photogram.formats.adjusted import table_files
-    from photogram.formats.calibrations import adjusted_project
+    from photogram.formats.targets.calibrations import adjusted_project
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
     from photogram.targets.tables import views

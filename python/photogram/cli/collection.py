@@ -47,7 +47,7 @@ class Loss(StrEnum):
     CAUCHY = "cauchy"
 
 
-_LOSSES: dict[Loss, robust.Loss | None] = {Loss.SQUARES: None, Loss.HUBER: "huber", Loss.CAUCHY: "cauchy"}
+_LOSSES: dict[Loss, robust.LossName] = {Loss.HUBER: "huber", Loss.CAUCHY: "cauchy"}
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,16 @@ class Fit:
     covariance: Annotated[
         bool, typer.Option("--covariance/--no-covariance", help="Compute covariances and redundancy numbers.")
     ] = True
+
+    @property
+    def robust(self) -> robust.Loss | None:
+        """The loss with its scale; None for squares."""
+        if self.loss is not Loss.SQUARES:
+            name = _LOSSES[self.loss]
+            return name if self.scale is None else (name, self.scale)
+        if self.scale is not None:
+            raise typer.BadParameter("is that of a loss: give --loss too", param_hint="--scale")
+        return None
 
 
 SQUARES = Fit()
@@ -146,7 +156,7 @@ def collection(
         job.writes(*names, *([place] if place else []))
         pictures = documents.pictures(job, out)
         photos = photos.replace(image_sd=fit.sd)
-        if snooping.snoop and fit.loss is not Loss.SQUARES:
+        if snooping.snoop and fit.robust is not None:
             raise typer.BadParameter("not with a robust loss", param_hint="--snoop")
         # Nothing vouches for --sd: the default is not that of blocks.
         snooping = replace(snooping, unit_weight=unit_weight)
@@ -194,16 +204,8 @@ def _adjusted(
             "progress": shown(status, "cost", 0.5) if status is not None else None,
         }
         if not snooping.snoop:
-            loss = _LOSSES[fit.loss]
             return Found(
-                adjust(
-                    photos,
-                    loss=loss,
-                    scale=fit.scale,
-                    covariance=fit.covariance,
-                    threads=threads,
-                    **options,
-                )
+                adjust(photos, loss=fit.robust, covariance=fit.covariance, threads=threads, **options)
             )
         options |= snooping.options
         made = cleaned(photos, components, threads, options) if components else None

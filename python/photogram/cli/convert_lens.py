@@ -147,7 +147,7 @@ def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, 
     """Read a camera whose pixels count from the centre of the first, and the size of its pictures."""
     from photogram.errors import InputError
     from photogram.formats import read
-    from photogram.formats.calibrations import MIDDLE, shifted
+    from photogram.formats.targets.calibrations import MIDDLE, shifted
     from photogram.targets.mrcal_model import read_lens
 
     if path.suffix == ".cameramodel":

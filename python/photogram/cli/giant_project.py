@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -161,15 +161,17 @@ def _adjusted(
     from photogram.diagnosis.adjusted import diagnosed
 
     common = project.common
-    rules = AsPublished(common.convergence_percent, common.max_iterations) if how.as_published else None
+    rules: dict[str, Any] = {}
+    if how.as_published:
+        rules["tolerance"] = AsPublished(common.convergence_percent)
+        rules["max_iterations"] = common.max_iterations
     result = adjust(
-        block,
+        block.with_fixed_photos() if common.intersection_only else block,
         unit_variance=_basis(common, how),
         ordering=how.ordering.value,
-        as_published=rules,
-        fix_photos=common.intersection_only,
         progress=progress,
         threads=threads,
-        verdict=True,
+        covariance="verdict",
+        **rules,
     )
     return Found(diagnosed(result))

@@ -157,8 +157,9 @@ def _adjusted(projects: list[Path]) -> dict[str, Block]:
         block = project.to_block()
         for message in project.messages:
             print_remark(message)
-        fixed = project.common.intersection_only
-        patterns[name] = at_adjusted(adjust(block, covariance=False, fix_photos=fixed))
+        if project.common.intersection_only:
+            block = block.with_fixed_photos()
+        patterns[name] = at_adjusted(adjust(block, covariance=False))
     return patterns
 
 

@@ -37,7 +37,6 @@ def adjust(
     tolerance: float | None = None,
     max_iterations: int = 200,
     loss: Loss | None = None,
-    scale: float | None = None,
     covariance: bool = True,
     ordering: Ordering = "auto",
     threads: int | None = None,
@@ -66,10 +65,8 @@ def adjust(
         Iterations (accepted steps) at the most.
     loss
         Robust loss in place of the squares: `huber` or `cauchy`, of both coordinates of an image point
-        together; None for least squares.
-    scale
-        Where the loss sets in, in standard deviations a priori; 1.50 for `huber` and 2.55 for `cauchy` when
-        None.
+        together; None for least squares. `("huber", 2.0)` also says where it sets in; see
+        :func:`photogram.adjust`.
     covariance
         Whether to compute covariances, redundancy numbers and standardized residuals.
     ordering
@@ -100,7 +97,7 @@ def adjust(
         tolerance = 1e-8 if loss is None else 1e-6
     check_iteration(ordering, max_iterations, tolerance)
     options = options_of(
-        tolerance, max_iterations, covariance=covariance, loss=loss_row(loss, scale), ordering=ordering
+        tolerance, max_iterations, covariance=covariance, loss=loss_row(loss), ordering=ordering
     )
     return adjusted(collection, options, threads=threads, progress=progress)
 

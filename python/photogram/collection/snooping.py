@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, core_threads
-from photogram.adjustment.robust import Loss, loss_row
+from photogram.adjustment.robust import LossName, loss_row
 from photogram.adjustment.snooping import finished, gone, snooped_network, used_images
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
@@ -32,7 +32,7 @@ from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 
 __all__: list[str] = []
 
-LOSSES: tuple[Loss, ...] = ("huber", "cauchy")
+LOSSES: tuple[LossName, ...] = ("huber", "cauchy")
 FAR = 5.0
 """Robust standard deviations from which on an image is out at first, after a robust adjustment."""
 BY_LOSSES = "a robust adjustment of the given values (Huber, then Cauchy)"
@@ -111,7 +111,7 @@ def started_robustly(
     state: _photocore.BlockState | None = None
     sizes: Floats = np.zeros(0)
     for loss in LOSSES:
-        own = dataclasses.replace(options, covariance=False, loss=loss_row(loss, None))
+        own = dataclasses.replace(options, covariance=False, loss=loss_row(loss))
         try:
             found = adjusted(collection, own, threads=threads, start=state)
         except AdjustmentError:

@@ -1,28 +1,26 @@
-"""What is wrong where an adjustment has failed or fits badly: looked for when somebody asks."""
+"""What is wrong where an adjustment has failed or fits badly: looked for when somebody asks.
+
+Most adjustments fit: what explains the others is loaded for them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from photogram.adjustment.first_values import FirstValues
-from photogram.diagnosis.adjusting import Adjuster
-from photogram.diagnosis.clocks import known_offsets
-from photogram.diagnosis.conventions import hints
-from photogram.diagnosis.film_marks import mark_hints
-from photogram.diagnosis.film_scans import seam_hints
-from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section
-from photogram.diagnosis.flown_hints import flown_hints
 from photogram.diagnosis.names import with_exchanges
-from photogram.diagnosis.rolling import rolling_hints
-from photogram.diagnosis.shutters import backward_readouts, shutter_hints
-from photogram.diagnosis.weights import weight_hints
 from photogram.errors import AdjustmentError, OutOfMemoryError
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.refined import as_seen
+from photogram.results.held import is_suspected
 from photogram.results.result import Result
+
+if TYPE_CHECKING:
+    from photogram.adjustment.first_values import FirstValues
+    from photogram.diagnosis.findings import Diagnosis
 
 __all__ = ["diagnosed", "diagnosis_of", "errors_explained", "explained", "remarks"]
 
@@ -38,7 +36,10 @@ def errors_explained(block: Block | FirstValues) -> Iterator[None]:
     except OutOfMemoryError:
         raise
     except AdjustmentError as error:
-        block = block.usable() if isinstance(block, FirstValues) else block
+        from photogram.diagnosis.adjusting import Adjuster
+        from photogram.diagnosis.shutters import shutter_hints
+
+        block = block if isinstance(block, Block) else block.usable()
         found = _of_block(block) or shutter_hints(block, None, Adjuster({}))
         error.args = (
             "\n".join([str(error), *(f"  hint: {hint}" for hint in found)]),
@@ -62,16 +63,24 @@ def explained(result: Result) -> list[Message]:
     if result.loss is not None:
         return []
     found = _of_block(result.block) if _bad(result) else []
-    if result.WHOLE:
-        found = found or shutter_hints(result.block, result, Adjuster({}))
-        found = found or rolling_hints(result)
+    if result.WHOLE and not found and (not result.converged or is_suspected(result)):
+        from photogram.diagnosis.adjusting import Adjuster
+        from photogram.diagnosis.rolling import rolling_hints
+        from photogram.diagnosis.shutters import shutter_hints
+
+        found = shutter_hints(result.block, result, Adjuster({})) or rolling_hints(result)
     return found
 
 
 def remarks(result: Result) -> list[Message]:
     """Name what fits and is hardly what was meant: directions of readouts, offsets of clocks, marks."""
-    if not result.converged:
+    if not (result.converged and (result.unknowns or result.block.observations)):
         return []
+    from photogram.diagnosis.clocks import known_offsets
+    from photogram.diagnosis.film_marks import mark_hints
+    from photogram.diagnosis.film_scans import seam_hints
+    from photogram.diagnosis.shutters import backward_readouts
+
     # A film in two pieces makes marks fail, too.
     films = seam_hints(result) or mark_hints(result)
     return [*backward_readouts(result), *known_offsets(result), *films]
@@ -79,6 +88,9 @@ def remarks(result: Result) -> list[Message]:
 
 def _of_block(block: Block) -> list[Message]:
     """Try conventions of photos at rest, and of those on trajectories."""
+    from photogram.diagnosis.conventions import hints
+    from photogram.diagnosis.flown_hints import flown_hints
+
     return [*hints(as_seen(block)), *flown_hints(block)]
 
 
@@ -90,6 +102,8 @@ def _bad(result: Result) -> bool:
 def _with_hints(result: Result) -> Result:
     found, said = explained(result), remarks(result)
     if not found and result.converged and result.loss is None and _bad(result):
+        from photogram.diagnosis.weights import weight_hints
+
         said = [*weight_hints(result), *said]
     if not (found or said):
         return result
@@ -98,6 +112,9 @@ def _with_hints(result: Result) -> Result:
 
 def diagnosis_of(result: Result) -> Diagnosis:
     """Return what explains an adjustment that has failed or fits badly; its verdict is the judgement."""
+    from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section
+    from photogram.diagnosis.weights import weight_hints
+
     found = diagnosed(result)
     section = Section("Adjustment", "One mistake in the data makes every observation look wrong.")
     section.findings += [Finding("convention", "grave", hint) for hint in found.hints]

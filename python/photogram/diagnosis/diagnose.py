@@ -37,9 +37,8 @@ from photogram.diagnosis.stations import stations
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.views import View
 from photogram.errors import AdjustmentError, InputError
-from photogram.network.block import Block
+from photogram.network.block import Block, flown_by
 from photogram.network.chosen import kept_images, of_photos
-from photogram.network.motion import flown_by
 from photogram.network.observations import Position
 from photogram.network.rays import Rays
 from photogram.network.refined import as_seen
@@ -288,7 +287,7 @@ def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) 
     met = Rays.of(view.seen).intersect()
     ratio = met.sizes / view.seen.image_sd.mean(axis=1)
     if np.isfinite(ratio).any() and np.nanmedian(ratio) < FINAL_STATIONS:
-        return edit(view.block, suspects, adjusted.otherwise(fix_photos=True))
+        return edit(view.block.with_fixed_photos(), suspects, adjusted)
     reason = f"{manner.intersect_only}, and the stations are not adjusted ones"
     return Edited(None, None, reason, math.nan, blunder_section(), asked=False)
 

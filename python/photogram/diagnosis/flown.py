@@ -21,8 +21,8 @@ from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.weights import weight_hints
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import counted
-from photogram.network.block import Block
-from photogram.network.motion import flown_by, timed_photos
+from photogram.network.block import Block, flown_by
+from photogram.network.motion import timed_photos
 from photogram.results.result import Result
 from photogram.results.snooped import Snooped
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram.adjustment.adjustment import Ordering, Progress, UnitVariance, adjust, core_threads
+from photogram.adjustment.robust import Loss
 from photogram.adjustment.started import started
 from photogram.arguments.annotations import check_arguments
 from photogram.distributed.counts import Counts, counted_work
@@ -21,9 +22,8 @@ from photogram.distributed.parts import incidence_of, vertices_of
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, core_options, opened
-from photogram.network.block import Block, checked, refuse_passages
+from photogram.network.block import Block, checked, refuse_passages, refuse_trajectories
 from photogram.network.core import CoreOptions
-from photogram.network.motion import refuse_trajectories
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
 
@@ -38,9 +38,10 @@ def adjust_in_parts(
     division: Division,
     *,
     unit_variance: UnitVariance = "constrained",
-    max_iterations: int = 50,
+    max_iterations: int | None = None,
     tolerance: float = 1e-5,
     covariance: bool = True,
+    loss: Loss | None = None,
     ordering: Ordering = "auto",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -57,7 +58,7 @@ def adjust_in_parts(
     division
         Into how many parts, on which cluster, within which memory, in which folder. A block that fits into
         the memory as a whole is adjusted as a whole, where neither parts nor a cluster are given.
-    unit_variance, max_iterations, tolerance, covariance, progress
+    unit_variance, max_iterations, tolerance, covariance, loss, progress
         As of :func:`photogram.adjust`; `redundancy` is no unit variance in parts.
     ordering
         As of :func:`photogram.adjust`, where the block fits as a whole: photos of parts have an order of
@@ -82,7 +83,11 @@ def adjust_in_parts(
         A cluster is asked for, and dask.distributed is not installed (extra `distributed`).
     """
     options = core_options(
-        unit_variance, tolerance=tolerance, max_iterations=max_iterations, covariance=covariance
+        unit_variance,
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+        covariance=covariance,
+        loss=loss,
     )
     core_threads(threads)  # refused here, not by a worker
     block = _ready(block)
@@ -93,6 +98,7 @@ def adjust_in_parts(
             max_iterations=max_iterations,
             tolerance=tolerance,
             covariance=covariance,
+            loss=loss,
             ordering=ordering,
             threads=threads,
             progress=progress,

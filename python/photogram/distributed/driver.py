@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.arguments.types import Floats
 from photogram.distributed.cut import Tree
@@ -41,20 +42,9 @@ from photogram.results.iteration import Iteration
 
 __all__ = ["Driver", "Outcome", "Stop"]
 
-ROUNDING = 1e-12
-"""A step is accepted when the sum of squares does not rise by more than this fraction of it."""
-NEGLIGIBLE = 1e-3
-"""A full step that changes no unknown by more than this multiple of its standard deviation is accepted."""
-IN_THE_MEAN = 1e-5
-"""Nor does one that changes them by no more than this in the mean bring about other cofactors."""
-FAR = 30.0
-"""Beyond so many standard deviations in the mean points are intersected anew."""
-STILL = 1e-4
-"""The sum of squares stands still where three damped steps lower it by less than this multiple of the
-variance of unit weight."""
-ALIKE, FALLING = 5, 0.9
-"""So many full steps, the last of which is longer than this part of the first, do not fall any more."""
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-5, 1e9
+RULES = _photocore.step_rules()
+"""The constants of the rules of steps, which are those of one process."""
+ALIKE = round(RULES["alike"])
 ATTEMPTS = 20
 """So often is a node formed again that a worker has taken with it."""
 PROGRESS = "progress.json"
@@ -68,6 +58,8 @@ class Stop:
     max_iterations: int = 50
     covariance: bool = True
     unit_variance: str = "constrained"
+    reweighted: bool = False
+    """Whether a loss weights the observations."""
 
 
 @dataclass(frozen=True)
@@ -108,12 +100,15 @@ class Outcome:
 class _Course:
     """How far the iterations have come: what a run that died goes on from.
 
+    `curved`: whether the second-order term of a loss is taken in at the state; `near`: whether from there on.
     `ending`, when they are over: the status, the state whose equations give cofactors, and the state reached.
     """
 
     state: str = "0"
     before: str = "0"
     damping: float = 0.0
+    curved: bool = False
+    near: bool = False
     best: float = math.nan
     initial: float = math.nan
     refused: float | None = None
@@ -209,19 +204,20 @@ class Driver:
         self._unknowns = self._counts()
         if course.ending is not None:
             return self._finish(self._up(Point(course.ending[1])))
-        up = self._up(Point(course.state, course.damping))
+        up = self._up(Point(course.state, course.damping, course.curved))
         if not math.isfinite(up.sum_of_squares):
             raise AdjustmentError("the initial values give no finite image coordinates")
         if not course.iterations:
             course.initial = course.best = up.sum_of_squares
-        while len(course.iterations) < self.stop.max_iterations and up.at.damping <= MOST_DAMPING:
+        while len(course.iterations) < self.stop.max_iterations and up.at.damping <= RULES["most_damping"]:
             change = math.sqrt(max(up.decrease, 0.0))
             if up.at.damping == 0.0 and (self._is_last(change) or self._falls_no_more(change)):
                 return self._end("converged", up, change)
             up, still = self._take(up, change)
             if still:
                 return self._end("converged", up, None)
-        return self._end("diverged" if up.at.damping > MOST_DAMPING else "not converged", up, None)
+        lost = up.at.damping > RULES["most_damping"]
+        return self._end("diverged" if lost else "not converged", up, None)
 
     def _is_last(self, change: float) -> bool:
         """Whether a full step is the last one, by its length or by those that would follow (Hairer, IV.8)."""
@@ -229,15 +225,18 @@ class Driver:
             return True
         before = self._course.iterations[-1] if self._course.iterations else None
         rate = change / before.largest_change if before is not None and before.damping == 0.0 else 1.0
-        leaves_cofactors = change <= max(NEGLIGIBLE, IN_THE_MEAN * math.sqrt(self._unknowns[4]))
+        leaves_cofactors = change <= max(
+            RULES["negligible"], RULES["in_the_mean"] * math.sqrt(self._unknowns[4])
+        )
         return leaves_cofactors and rate < 1.0 and rate / (1.0 - rate) * change <= self.stop.tolerance
 
     def _falls_no_more(self, change: float) -> bool:
         """Whether full steps are negligible and have long been as long as this one: rounding, no more."""
         last = self._course.iterations[-ALIKE:]
-        negligible = all(each.damping == 0.0 and each.largest_change <= NEGLIGIBLE for each in last)
-        alike = len(last) == ALIKE and change > FALLING * last[0].largest_change
-        return change <= NEGLIGIBLE and negligible and alike
+        least = RULES["negligible"]
+        negligible = all(each.damping == 0.0 and each.largest_change <= least for each in last)
+        alike = len(last) == ALIKE and change > RULES["falling"] * last[0].largest_change
+        return change <= least and negligible and alike
 
     def _take(self, up: _Up, change: float) -> tuple[_Up, bool]:
         """Take a step, or take it back and go on with more damping.
@@ -248,23 +247,23 @@ class Driver:
         """
         course, damping = self._course, up.at.damping
         after = self._step(up)
-        if change > FAR * math.sqrt(self._unknowns[4]):
+        if change > RULES["far"] * math.sqrt(self._unknowns[4]):
             after = self._relocated(after)
         self._forget(up)
-        relaxed = damping / 10.0 if damping / 10.0 >= LEAST_DAMPING else 0.0
-        negligible = damping == 0.0 and change <= NEGLIGIBLE
+        relaxed = damping / 10.0 if damping / 10.0 >= RULES["least_damping"] else 0.0
+        negligible = damping == 0.0 and change <= RULES["negligible"]
         try:
-            following = self._up(Point(after, relaxed))
+            following = self._up(Point(after, relaxed, course.near))
         except RankError:
             # A step that leaves something undetermined has failed.
             return self._refuse(damping)
-        if not (negligible or following.sum_of_squares <= course.best * (1.0 + ROUNDING)):
+        if not (negligible or following.sum_of_squares <= course.best * (1.0 + RULES["rounding"])):
             self._forget(following)
             self._remove(after)
             return self._refuse(damping)
         course.best = following.sum_of_squares
         iteration = Iteration(len(course.iterations) + 1, following.sum_of_squares, change, damping)
-        self._accept(iteration, after, relaxed)
+        self._accept(iteration, following.at)
         return following, False
 
     def _refuse(self, damping: float) -> tuple[_Up, bool]:
@@ -272,17 +271,18 @@ class Driver:
         course, still = self._course, False
         if damping == 0.0:
             freedom = max(self._unknowns[0] + self._unknowns[1] - self._unknowns[2], 1)
-            least = STILL * max(course.best / freedom, 1.0)
+            least = RULES["still"] * max(course.best / freedom, 1.0)
             before, course.refused = course.refused, course.best
             still = before is not None and before - course.best <= least
-        harder = 0.0 if still else max(10.0 * damping, FIRST_DAMPING)
-        return self._up(Point(course.state, harder)), still
+        harder = 0.0 if still else max(10.0 * damping, RULES["first_damping"])
+        return self._up(Point(course.state, harder, course.near)), still
 
-    def _accept(self, iteration: Iteration, state: str, damping: float) -> None:
+    def _accept(self, iteration: Iteration, at: Point) -> None:
         """Keep an iteration that stands; the states before it are needed no longer."""
         course = self._course
-        old, course.before, course.state = course.before, course.state, state
-        course.damping = damping
+        old, course.before, course.state = course.before, course.state, at.state
+        course.damping, course.curved = at.damping, at.curved
+        course.near = self.stop.reweighted and iteration.largest_change <= RULES["near"]
         course.iterations.append(iteration)
         _write_course(self.job, course)
         if old not in (course.before, course.state):
@@ -293,20 +293,22 @@ class Driver:
         """Take the last step, where there is one, and finish.
 
         Where the iterations end without a step the cofactors are those of the equations at the values
-        reached; else of those that have given the last step.
+        reached; else of those that have given the last step, unless these have a loss's second-order term.
         """
         course = self._course
-        if change is None:
-            if up.at.damping > 0.0:
-                self._forget(up)
-                up = self._up(Point(course.state))
-            course.ending = status, course.state, course.state
-            _write_course(self.job, course)
-            return self._finish(up)
-        after = self._step(up)
-        total = sum(self._evaluated(after))
-        course.ending = status, course.state, after
-        self._accept(Iteration(len(course.iterations) + 1, total, change, 0.0), after, 0.0)
+        if change is not None:
+            after = self._step(up)
+            last = Iteration(len(course.iterations) + 1, self._evaluated(after)[-1], change, 0.0)
+            if not up.at.curved:
+                course.ending = status, course.state, after
+                self._accept(last, Point(after))
+                return self._finish(up)
+            self._accept(last, Point(after))
+        if up.at != Point(course.state):
+            self._forget(up)
+            up = self._up(Point(course.state))
+        course.ending = status, course.state, course.state
+        _write_course(self.job, course)
         return self._finish(up)
 
     def _finish(self, up: _Up) -> Outcome:
@@ -314,7 +316,7 @@ class Driver:
         course = self._course
         assert course.ending is not None
         status, _, after = course.ending
-        sums = self._evaluated(after)
+        sums = self._evaluated(after)[:4]
         freedom, variance = self._variance(sums)
         if self.stop.covariance:
             self._invert(up, after, variance)
@@ -334,12 +336,12 @@ class Driver:
             course.formations,
         )
 
-    def _evaluated(self, state: str) -> tuple[float, float, float, float]:
-        """Return weighted sums of squares of all nodes, by kinds."""
+    def _evaluated(self, state: str) -> tuple[float, float, float, float, float]:
+        """Return weighted sums of squares of all nodes, by kinds, and what is minimised."""
         found = np.array(self._sums([self._do(evaluated, n, state) for n in self._nodes], "solve"))
         # One after the other: NumPy's own order depends on how many there are.
-        camera, ground, plates, others = (sum(column) for column in found.T.tolist())
-        return camera, ground, plates, others
+        camera, ground, plates, others, minimised = (sum(column) for column in found.T.tolist())
+        return camera, ground, plates, others, minimised
 
     def _variance(self, sums: tuple[float, float, float, float]) -> tuple[int, float | None]:
         """Return degrees of freedom and variance of unit weight (GIANT guide, Appendix E)."""

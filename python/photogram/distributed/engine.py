@@ -70,10 +70,16 @@ class Node(Protocol):
         """Return the state with points where their rays meet."""
 
     def objective(self, state: Floats, *, threads: int) -> Sequence[float]:
-        """Return weighted sums of squares by kinds."""
+        """Return weighted sums of squares by kinds, then what is minimised: their sum, or losses."""
 
     def form(
-        self, state: Floats, contributions: list[ContributionRow], *, damping: float, threads: int
+        self,
+        state: Floats,
+        contributions: list[ContributionRow],
+        *,
+        damping: float,
+        curved: bool,
+        threads: int,
     ) -> FormedNode:
         """Form the normal equations at a state, and eliminate what is at home here."""
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import remarks_on
+from photogram.adjustment.robust import remark
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.core import read_outcome
 from photogram.distributed.driver import Outcome
@@ -19,7 +20,6 @@ from photogram.distributed.parts import shared_cameras
 from photogram.distributed.run import Manifest, read_node, result_folder
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
-from photogram.network.observations import observation_rows
 from photogram.results.datum import datum_messages, datum_of
 from photogram.results.result import Result
 from photogram.results.saved import read_summary
@@ -118,8 +118,9 @@ def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InP
     rest = _rest(owners, block, outcome, orders, details) | {"datum": manifest.held}
     solution = cast("BlockSolution", SimpleNamespace(**found, **rest))
     datum = datum_of(block, solution)
-    messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
     options = manifest.options
+    messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
+    messages += remark(options.loss, solution.image_weights)
     freedom = outcome.degrees_of_freedom
     return InParts.from_solution(block, solution, options, datum, messages, freedom)
 
@@ -186,8 +187,7 @@ def _added(tables: Iterable[dict[str, float]]) -> dict[str, float]:
 def _observed(block: Block, details: list[dict[str, Any]]) -> list[Any]:
     """Return what has become of observations, in the order of the groups of the whole block."""
     by_row = dict(_all(details, "observed"))
-    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
-    return [by_row[row] for rows, _ in groups for row in rows]
+    return [by_row[row] for rows, _ in block.observation_groups for row in rows]
 
 
 def _cameras(block: Block, owners: Indices, details: list[dict[str, Any]]) -> list[Any]:

@@ -192,7 +192,7 @@ def measured_rates(part: Node, bandwidth: float = 1e9) -> Rates:
     prediction = part.prediction
     size = len(part.outer)
     start = time.perf_counter()
-    formed = part.form(part.initial, [], damping=0.0, threads=0)
+    formed = part.form(part.initial, [], damping=0.0, curved=False, threads=0)
     forming = time.perf_counter() - start
     start = time.perf_counter()
     formed.invert(np.zeros(size * (size + 1) // 2), part.initial, threads=0)

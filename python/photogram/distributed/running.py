@@ -10,6 +10,7 @@ from pathlib import Path
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, UnitVariance, check_iteration
+from photogram.adjustment.robust import Loss, loss_row
 from photogram.distributed.core import CoreEngine
 from photogram.distributed.counts import Counts
 from photogram.distributed.division import Division
@@ -85,7 +86,13 @@ class Run:
         """
         self.plan(measured=False).check()
         options = self.manifest.options
-        stop = Stop(options.limit, options.max_iterations, options.covariance, options.unit_variance)
+        stop = Stop(
+            options.limit,
+            options.max_iterations,
+            options.covariance,
+            options.unit_variance,
+            options.loss is not None,
+        )
         return Driver(self.job, self.manifest.tree, self.executor, stop, progress).run(resume=True)
 
 
@@ -93,8 +100,9 @@ def core_options(
     unit_variance: UnitVariance,
     *,
     tolerance: float = 1e-5,
-    max_iterations: int = 50,
+    max_iterations: int | None = None,
     covariance: bool = True,
+    loss: Loss | None = None,
 ) -> CoreOptions:
     """Return how the core adjusts in parts: the options of :func:`photogram.adjust_in_parts`.
 
@@ -102,17 +110,22 @@ def core_options(
     ------
     InputError
         No iteration, a tolerance that is not positive or not finite, a unit variance based on redundancy
-        numbers.
+        numbers, a loss that there is not.
     """
     if unit_variance == "redundancy":
         raise InputError(
             "in parts the unit variance is not based on redundancy numbers:"
             " --unit-variance constrained (or unity)"
         )
+    weighted = loss_row(loss)
+    if max_iterations is None:
+        max_iterations = 200 if weighted else 50
     check_iteration("auto", max_iterations, tolerance)
     if not math.isfinite(tolerance):  # which documents of a run have no way to write
         raise InputError("in parts the tolerance must be finite")
-    return CoreOptions("fraction", tolerance, max_iterations, covariance, None, "auto", unit_variance, None)
+    return CoreOptions(
+        "fraction", tolerance, max_iterations, covariance, weighted, "auto", unit_variance, None
+    )
 
 
 @contextmanager

@@ -96,10 +96,11 @@ class Job:
 
 @dataclass(frozen=True)
 class Point:
-    """Where normal equations are formed: a state of all nodes and the damping."""
+    """Where normal equations are formed: a state of all nodes, the damping, a loss's second order."""
 
     state: str
     damping: float = 0.0
+    curved: bool = False
 
 
 @dataclass(frozen=True)
@@ -238,6 +239,7 @@ def formed(job: Job, number: int, at: Point, contributions: Sequence[Contributio
             _state(job, node, number, at.state),
             [(_plain(each.row[0]), _plain(each.row[1]), _plain(each.row[2])) for each in contributions],
             damping=at.damping,
+            curved=at.curved,
             threads=job.threads,
         )
         row = found.contribution
@@ -272,18 +274,18 @@ def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[
 
 
 def relocated(job: Job, number: int, state: str, after: str) -> tuple[float, float]:
-    """Write the state with points where their rays meet; return the sums of squares of both."""
+    """Write the state with points where their rays meet; return what is minimised at both."""
     with shelf.lock:
         node = _node(job, number)
         before = _state(job, node, number, state)
         moved = node.relocate(before, threads=job.threads)
         _write_state(job, number, after, moved)
-        one, other = (sum(node.objective(each, threads=job.threads)) for each in (before, moved))
+        one, other = (node.objective(each, threads=job.threads)[-1] for each in (before, moved))
         return one, other
 
 
 def evaluated(job: Job, number: int, state: str) -> tuple[float, ...]:
-    """Return the weighted sums of squares of a node at a state, by kinds."""
+    """Return the weighted sums of squares of a node at a state, by kinds, and what is minimised there."""
     with shelf.lock:
         node = _node(job, number)
         return tuple(node.objective(_state(job, node, number, state), threads=job.threads))

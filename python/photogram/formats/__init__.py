@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from photogram.on_demand import on_demand
 
 if TYPE_CHECKING:
     from photogram.formats.format import Format, PhotoFiles, Wishes
@@ -56,20 +57,14 @@ _HOMES = {
     "Frame": "project",
     "Options": "project",
     "Project": "project",
+    **dict.fromkeys(
+        ("FORMATS", "adjusting", "cannot_hold", "read", "recognised", "target", "to_files"), "registry"
+    ),
 }
-"""The module of each name, loaded when it is first asked for; the other names are those of the registry.
+"""The module of each name, loaded when it is first asked for.
 
 Who needs one file of this folder, as the commands of GIANT do, does not wait for the readers of all formats.
 """
 
 
-def __getattr__(name: str) -> object:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOMES.get(name, 'registry')}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = on_demand(__name__, _HOMES)

@@ -4,13 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.project import Project
 from photogram.results.result import Result
 
-__all__ = ["Format", "PhotoFiles", "Wishes"]
+__all__ = ["Format", "PhotoFiles", "Wishes", "later"]
+
+
+def later(module: str, name: str) -> Callable[..., Any]:
+    """Return a call of a function whose module is loaded when it is called: most projects have one format."""
+
+    def call(*arguments: Any) -> Any:
+        return getattr(import_module(module), name)(*arguments)
+
+    return call
 
 
 @dataclass(frozen=True)

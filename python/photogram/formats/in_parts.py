@@ -129,7 +129,8 @@ def _run(
         stack.enter_context(alone(folder))
         streamed = Streamed(path, wishes, folder)
         stack.callback(streamed.close)
-        options = core_options(unit_variance or streamed.project.options.unit_variance)
+        given = streamed.project.options
+        options = core_options(unit_variance or given.unit_variance, loss=given.loss)
         source = streamed.source(options)
         with opened(
             folder,

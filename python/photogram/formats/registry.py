@@ -9,8 +9,8 @@ from pathlib import Path
 
 from photogram.errors import InputError, PhotogramError
 from photogram.formats.block_contents import check_films
+from photogram.formats.cameras_alone import FORMATS_OF_CAMERAS
 from photogram.formats.format import Format, Wishes
-from photogram.formats.metadata.adding import with_wished_photos
 from photogram.formats.millimetres import in_pixels, nominal_pixels
 from photogram.formats.moving import check_held, lost_motions
 from photogram.formats.planes import plane_remarks
@@ -47,6 +47,7 @@ FORMATS: dict[str, Format] = {
     )
 }
 """By name, in the order in which help lists them."""
+_TO_WRITE = {**FORMATS, **FORMATS_OF_CAMERAS}
 MOST = 200
 """Files of a folder that are looked at where the folder itself has no format."""
 
@@ -123,7 +124,10 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
             if wishes.settings and chosen.name != "plain":
                 raise InputError(f"is no plain project but {chosen.title}, which has no settings: --set")
             project = chosen.read(path, wishes)
-            project = with_wished_photos(project, wishes)
+            if wishes.photos is not None or "settings" in project.details:
+                from photogram.formats.metadata.adding import with_wished_photos
+
+                project = with_wished_photos(project, wishes)
             return project.replace(
                 messages=(*project.messages, *plane_remarks(project.block, path, project.starts))
             )
@@ -145,9 +149,9 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
     InputError
         There is no such format, it is only read, or it has no way to say what the project is.
     """
-    chosen = _named(file_format)
+    chosen = _named(file_format, _TO_WRITE)
     if chosen.write is None:
-        writable = ", ".join(name for name, each in FORMATS.items() if each.write)
+        writable = ", ".join(name for name, each in _TO_WRITE.items() if each.write)
         raise InputError(f"{chosen.title} is only read; what can be written: {writable}")
     if chosen.name != "plain":
         check_films(project.block, chosen.title)
@@ -221,7 +225,7 @@ def target(path: Path, file_format: str | None = None) -> Target:
         A name that several formats have.
     """
     path = Path(path)
-    among = list(FORMATS.values()) if file_format is None else [_named(file_format)]
+    among = list(FORMATS.values()) if file_format is None else [_named(file_format, _TO_WRITE)]
     if not path.is_dir():
         exact = [each for each in among if each.files[:1] == (path.name,)]
         found = exact or [each for each in among if any(path.match(pattern) for pattern in each.files)]
@@ -250,7 +254,7 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
     InputError
         Line scanners, which other formats than the plain project would take for photos.
     """
-    chosen = _named(file_format)
+    chosen = _named(file_format, _TO_WRITE)
     if chosen.name != "plain":
         check_films(project.block, chosen.title)
         check_held(project.block, chosen.title)
@@ -282,7 +286,7 @@ def adjusting(project: Project, adjust: Callable[..., Result]) -> Callable[..., 
     return adjust if own is None or own.adjusting is None else own.adjusting(project, adjust)
 
 
-def _named(file_format: str) -> Format:
-    if file_format not in FORMATS:
-        raise InputError(f"format is one of {', '.join(FORMATS)}, not {file_format!r}")
-    return FORMATS[file_format]
+def _named(file_format: str, among: Mapping[str, Format] = FORMATS) -> Format:
+    if file_format not in among:
+        raise InputError(f"format is one of {', '.join(among)}, not {file_format!r}")
+    return among[file_format]

@@ -11,7 +11,7 @@ from photogram.formats.intersection import intersected
 from photogram.formats.plain.writing import attitude_matrices
 from photogram.formats.project import Frame, Project
 from photogram.network.attitudes import Attitudes
-from photogram.network.block import Block, refuse_passages
+from photogram.network.block import Block, refuse_passages, refuse_trajectories
 from photogram.network.geometry import (
     Spheroid,
     geocentric_to_geographic,
@@ -19,7 +19,6 @@ from photogram.network.geometry import (
     lengths_of_units,
     local_frames,
 )
-from photogram.network.motion import refuse_trajectories
 
 __all__ = ["in_topocentric", "topocentric_remarks"]
 

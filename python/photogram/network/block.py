@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -27,10 +28,12 @@ from photogram.network.observations import (
     Rate,
     Velocity,
     all_trajectories,
+    moments,
     observation_rows,
     of_records,
 )
 from photogram.network.observations.knots import with_knots
+from photogram.network.observations.observation import Group
 from photogram.network.observations.smoothness import with_smoothness
 from photogram.network.passages import Figure, Passage, checked_passages
 from photogram.network.photo_cameras import checked_cameras, photo_indices
@@ -431,7 +434,9 @@ class Block(Valued, Brief):
         self._set("passages", checked_passages(self.passages, self.point_ids, self.photo_ids))
         self._set("observations", with_smoothness(self.observations, self.trajectories))
         self._set("observations", with_knots(self.observations, self.cameras))
-        observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
+        self._set("_unknowns", self._different_unknowns())
+        groups = observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
+        self._set("_observation_groups", groups)
         self._check_figures()
         of_photos = self.photo_cameras if self.cameras else None
         check_scans(self.passages, self.photo_ids, self.cameras, of_photos, self.image_photos)
@@ -511,9 +516,19 @@ class Block(Valued, Brief):
         splined = [(row, each.knot_unknowns) for row, each in enumerate(self.cameras) if each.knot_unknowns]
         return [*self.passages, *(Knots(row, knots) for row, knots in splined)]
 
-    @property
+    @cached_property
     def unknowns(self) -> list[Unknown]:
         """What observations, and photos on frames or trajectories, have in common, in order."""
+        own: list[Unknown] = vars(self)["_unknowns"]
+        return own
+
+    @property
+    def observation_groups(self) -> list[tuple[list[int], Group]]:
+        """The observations kind by kind: their rows, and what the core takes."""
+        own: list[tuple[list[int], Group]] = vars(self)["_observation_groups"]
+        return own
+
+    def _different_unknowns(self) -> list[Unknown]:
         of_observations = (each for own in self.observations for each in own.unknowns if each is not None)
         sensors = [mount.sensor for mount in self.mounts]
         sensors += [each.sensor for each in self.timed if each.sensor is not None]
@@ -642,6 +657,22 @@ class Block(Valued, Brief):
             values["point_check_sd"] = None
         return type(self)(**{**values, **changes})
 
+    def with_fixed_photos(self) -> Self:
+        """Return the block with positions and attitudes that stay as they are: every point by itself.
+
+        Raises
+        ------
+        InputError
+            Photos or observations on trajectories.
+        """
+        refuse_trajectories(self, "fixed photos", "whose pose is not its own")
+        return self.replace(
+            photo_position_sd=0.0,
+            photo_attitude_sd=0.0,
+            photo_positions_observed=None,
+            photo_attitudes_observed=None,
+        )
+
     def in_frame(self, frame: Frame) -> Self:
         """Return the block with another frame; the coordinates are the same."""
         own = copy.copy(self)
@@ -662,6 +693,14 @@ def _span(values: Floats) -> str:
     return f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"
 
 
+def flown_by(block: Block) -> str:
+    """Return what of a block is on a trajectory, by name; nothing where nothing is."""
+    if block.timed:
+        return f"the photo {block.timed[0].photo} is on a trajectory"
+    records = moments(block.observations)
+    return f"observations are of the trajectory {records[0].trajectory.name}" if records else ""
+
+
 def of_images_alone(block: Block, what: str) -> Block:
     """Return a block that has nothing but images; refuse others for what would leave the rest out.
 
@@ -670,15 +709,25 @@ def of_images_alone(block: Block, what: str) -> Block:
     InputError
         Observations beside images, photos on frames or trajectories.
     """
-    if block.timed:
-        photo = block.timed[0].photo
-        raise InputError(f"{what}: the photo {photo} is on a trajectory, which is not taken there")
+    refuse_trajectories(block, what)
     refuse_passages(block, what)
     if block.observations:
         raise InputError(f"{what}: the block has observations beside images, which are not taken there")
     if block.mounts:
         raise InputError(f"{what}: the block has photos on frames, which are not taken there")
     return block
+
+
+def refuse_trajectories(block: Block, what: str, why: str = "which is not taken there") -> None:
+    """Refuse a block with photos or observations on trajectories.
+
+    Raises
+    ------
+    InputError
+        `what` does not take the photo, or the trajectory, that is named.
+    """
+    if flown := flown_by(block):
+        raise InputError(f"{what}: {flown}, {why}")
 
 
 def refuse_passages(block: Block, what: str) -> None:

@@ -10,45 +10,22 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.errors import InputError
-from photogram.network.block import Block
+from photogram.network.block import Block, flown_by, refuse_trajectories
 from photogram.network.chosen import kept_images, of_photos
 from photogram.network.flown import timed_images
 from photogram.network.given import Given
-from photogram.network.observations import Smoothness, moments
+from photogram.network.observations import Smoothness
 from photogram.network.refined import camera_images
 
 __all__ = [
     "at_rest",
-    "flown_by",
     "focal_images",
     "of_pictures",
     "on_shared",
     "refuse_datum",
-    "refuse_trajectories",
     "scanners",
     "timed_photos",
 ]
-
-
-def flown_by(block: Block) -> str:
-    """Return what of a block is on a trajectory, by name; nothing where nothing is."""
-    if block.timed:
-        return f"the photo {block.timed[0].photo} is on a trajectory"
-    records = moments(block.observations)
-    return f"observations are of the trajectory {records[0].trajectory.name}" if records else ""
-
-
-def refuse_trajectories(block: Block, what: str, why: str = "which is not taken there") -> None:
-    """Refuse a block with photos or observations on trajectories.
-
-    Raises
-    ------
-    InputError
-        `what` does not take the photo, or the trajectory, that is named.
-    """
-    if flown := flown_by(block):
-        raise InputError(f"{what}: {flown}, {why}")
 
 
 def refuse_datum(block: Block, what: str) -> None:

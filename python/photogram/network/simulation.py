@@ -30,7 +30,6 @@ from photogram.network.simulated_layout import (
     point_ids,
 )
 from photogram.network.simulated_motion import LineScanner, RollingShutter, rolled
-from photogram.network.simulated_scanner import Flown, scanned
 
 __all__ = ["Blunders", "Simulation", "simulate"]
 
@@ -236,6 +235,8 @@ def simulate(
     terrain = ground_points(plan, relief, footprint, terrain_random)
     ground, _ = into_object_space(terrain, None, origin, spheroid, photo_to_ground)
     if isinstance(motion, LineScanner):
+        from photogram.network.simulated_scanner import Flown, scanned
+
         flown = Flown(
             scanner=motion,
             principal_distance=principal_distance,

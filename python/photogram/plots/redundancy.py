@@ -142,5 +142,6 @@ def _mesh(axes: Axes, grid: Cells, values: Floats, what: str) -> str:
         cmap=ORDERED,
         vmin=0.0,
         vmax=1.0,
+        rasterized=True,
     )
     return f"means of cells with {grid.counts[grid.counts > 0].min():,} to {grid.counts.max():,} {what}"

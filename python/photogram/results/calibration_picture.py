@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.plots.distortion import draw_curves, rows_of
-from photogram.plots.panels import Where, figure_of, handed_out, panels, placed
+from photogram.plots.panels import Where, handed_out, panels, placed
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.lens_field import LensField, lens_field
@@ -21,9 +21,8 @@ from photogram.show.style import BLUE, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-__all__ = ["draw_distortion", "draw_lens_field", "figure_of_distortion", "figure_of_lens_field"]
+__all__ = ["draw_distortion", "draw_lens_field"]
 
 
 def draw_distortion(
@@ -86,16 +85,6 @@ def draw_lens_field(
     if field is None:
         raise ValueError(f"{camera.name} has no terms beside the radial ones to draw")
     return placed(partial(_lens_field, camera, field), path, ax)
-
-
-def figure_of_lens_field(camera: AdjustedCamera, field: LensField) -> Figure:
-    """Return vectors on a grid of the image with their standard ellipses, all enlarged alike."""
-    return figure_of(partial(_lens_field, camera, field))
-
-
-def figure_of_distortion(camera: AdjustedCamera, curve: DistortionCurve) -> Figure:
-    """Return the curve and its balanced form, one standard deviation on either side, dashed beyond images."""
-    return figure_of(partial(_distortion, camera, curve))
 
 
 def _lens_field(camera: AdjustedCamera, field: LensField, ax: Where) -> Axes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -173,8 +172,3 @@ def _knots(block: Block, solution: _photocore.BlockSolution) -> dict[int, Floats
 def units(camera: Camera) -> list[str]:
     """Return the unit of each parameter: `mm`, `mm^-2`, ... or nothing for plain numbers."""
     return [camera.unit_of(name) for name in camera.names]
-
-
-def parameters_named(cameras: Sequence[AdjustedCamera], unknowns: Sequence[tuple[int, int]]) -> list[str]:
-    """Name cameras and parameters given by their numbers."""
-    return [f"{cameras[camera].names[k]} of {cameras[camera].name}" for camera, k in unknowns]

@@ -23,20 +23,19 @@ from photogram.network.core import CoreOptions, core_network
 from photogram.network.given import Given
 from photogram.results.covariance import Covariances, Failure, Propagated
 from photogram.results.iteration import Iteration
-from photogram.results.reliability import Reliability, reliability_of
-from photogram.results.reliability_summary import ReliabilitySummary, reliability_summary
 from photogram.results.selection import Adjusted, Selection
 from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown, files_of
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
-from photogram.statistics.snooping.suspects import LostSupportError
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from photogram.plots import Plots
     from photogram.results.network_trial import NetworkTrial
+    from photogram.results.reliability import Reliability
+    from photogram.results.reliability_summary import ReliabilitySummary
 
 __all__ = ["AdjustedNetwork", "Observed"]
 
@@ -249,6 +248,8 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
+        from photogram.results.reliability import reliability_of
+
         return reliability_of(
             self._trial(), self.covariances, level=level, power=power, unit_weight=unit_weight
         )
@@ -262,6 +263,9 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         computed = bool(finite_rows(self.redundancy)[self.used_images].all())
         if not (computed and self.converged and self.loss is None and self.degrees_of_freedom > 0):
             return None
+        from photogram.results.reliability_summary import reliability_summary
+        from photogram.statistics.snooping.suspects import LostSupportError
+
         try:
             found = self.reliability(unit_weight="known" if self.KNOWN else "unknown")
         except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):

@@ -34,7 +34,6 @@ from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.restarted import restarted_motion
 from photogram.results.selection import Adjusted, Things, photo_components, point_components
-from photogram.results.suspects import network_trial
 from photogram.results.trajectories import AdjustedTrajectory, adjusted_trajectories, project
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.show.ways import statement_of
@@ -223,6 +222,8 @@ class Result(OnFilm, AdjustedNetwork):
         return refused(self.block, block_network(self.block, self.options), self.state, error)
 
     def _trial(self) -> NetworkTrial:
+        from photogram.results.suspects import network_trial
+
         core = block_network(self.block, self.options).trial(self.state, threads=0, kept=True)
         return network_trial(self.block, core)
 

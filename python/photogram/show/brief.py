@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Mapping, Sequence, Sized
 from dataclasses import fields
 from textwrap import wrap
@@ -51,13 +50,15 @@ class Brief:
 
     def _repr_html_(self) -> str:
         """Return what notebooks show."""
+        from html import escape
+
         title, rows = self._lines()
         cells = "".join(
-            f'<tr><th style="text-align: left">{html.escape(name)}</th>'
-            f'<td style="text-align: left">{html.escape(told)}</td></tr>'
+            f'<tr><th style="text-align: left">{escape(name)}</th>'
+            f'<td style="text-align: left">{escape(told)}</td></tr>'
             for name, told in rows
         )
-        return f"<div><p><strong>{html.escape(title)}</strong></p><table><tbody>{cells}</tbody></table></div>"
+        return f"<div><p><strong>{escape(title)}</strong></p><table><tbody>{cells}</tbody></table></div>"
 
 
 def _cut(line: str) -> str:

@@ -90,7 +90,7 @@ def _numbers(
     plain = values.tolist()
     patterns = {form: f"{gap}%{width}{form}" for form in set(forms)}
     texts = [patterns[form] % value for form, value in zip(forms, plain, strict=True)]
-    if width and any(len(text) > width + len(gap) for text in texts):
+    if width and max(map(len, texts), default=0) > width + len(gap):
         short = f"{gap}%{width}.{max(width - 8, 1)}g"
         texts = [
             text if len(text) <= width + len(gap) else short % value

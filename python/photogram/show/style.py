@@ -34,7 +34,6 @@ __all__ = [
 P = ParamSpec("P")
 T = TypeVar("T")
 
-BLACK = "#000000"
 BLUE = "#0072b2"
 VERMILION = "#d55e00"
 GREEN = "#009e73"

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 from photogram.arguments.annotations import check_arguments
+from photogram.on_demand import on_demand
 
 if TYPE_CHECKING:
     from photogram.targets.appraisal import appraise
@@ -128,14 +128,4 @@ WAYS = {
 """The files that show a result, by the names of the ways: see `photogram.show.ways`."""
 
 
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    if name not in _MADE:
-        check_arguments(globals(), [name])
-    return globals()[name]
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = on_demand(__name__, _HOMES, check_arguments, unchecked=_MADE)

@@ -16,10 +16,12 @@ from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.results.result import Result
 from photogram.targets.calibrated import Calibrated, deviation_of_corners, with_unknown_weight
+from photogram.targets.clocks import checked_clocks
 from photogram.targets.findings import judged
 from photogram.targets.outliers import marked_as_mrcal
 from photogram.targets.regularisation import regularised
 from photogram.targets.start import Start
+from photogram.targets.vision import photo_poses
 
 __all__ = ["adjusted_start", "snooped_start"]
 
@@ -43,23 +45,51 @@ def adjusted_start(
         one_of("outliers", outliers, ("mrcal",))
     rounds = 0
     while True:
-        how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress, "verdict": True}
+        how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress}
         # Knots that no image touches are determined by priors alone.
-        free = None if _has_knots(start) else adjust(start.block(), **how)
+        free = None if _has_knots(start) else adjust(start.block(), covariance="verdict", **how)
         result = _knotted(start, how) if free is None else _with_priors(start, free, threads)
         worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
         if worse.any() and result.converged:
             start = start.without(worse)
-        elif (sd := _sd_to_assume(start, result)) is not None and rounds < ROUNDS:
-            start, rounds = start.replace(assumed=sd), rounds + 1
+        elif rounds < ROUNDS and (better := _better(start, result)) is not None:
+            start, rounds = better, rounds + 1
         else:
             break
-    told = replace(result, messages=[*start.messages, *result.messages])
+    messages = [*start.messages, *result.messages]
+    if start.sync == "offset":
+        messages += checked_clocks(Calibrated(calibration=start, result=result))
+    told = replace(result, messages=messages)
     if start.sd0 is None:
         told = with_unknown_weight(told)
     return judged(
         Calibrated(calibration=start, result=told, unregularised=free if start.regularise else None)
     )
+
+
+def _better(start: Start, result: Result) -> Start | None:
+    """Return what to adjust again, where the result says otherwise of what was held; None where it does not.
+
+    That are the standard deviation of corners, and the motion of the board.
+    """
+    found = start if start.sync != "offset" or not result.converged else _in_motion(start, result)
+    if (sd := _sd_to_assume(start, result)) is not None:
+        found = found.replace(assumed=sd)
+    return None if found is start else found
+
+
+def _in_motion(start: Start, result: Result) -> Start:
+    """Return a calibration whose board moves as its adjusted poses say; itself where this changes nothing."""
+    ended = Calibrated(calibration=start, result=result)
+    again = ended.restarted().replace(motion=None)
+    # Where the new motion has pictures, with everything else as adjusted.
+    late = {name: each.values[0] for name, each in ended.offsets.items()}
+    there = again.replace(
+        sensors=ended.sensors, offsets=[late.get(each.name, 0.0) for each in ended.cameras]
+    ).picture_poses()
+    pictures = slice(len(start.corners.pictures))
+    gaps = np.abs(photo_poses(there)[0] - result.photo_positions[pictures])
+    return start if (gaps <= CHANGE * result.photo_sd[pictures, :3]).all() else again
 
 
 def _sd_to_assume(start: Start, result: Result) -> float | None:
@@ -77,14 +107,9 @@ def _knotted(start: Start, how: dict[str, Any]) -> Result:
     An adjustment reckons with the knots near images where it begins: the last of it begins where corners stay
     at theirs.
     """
-    block = _weighted(start)
-    near = adjust(block, **how | {"verdict": False}, covariance=False, tolerance=ROUGHLY)
-    moved = near.block.replace(
-        photo_positions=near.photo_positions,
-        photo_attitudes=near.photo_attitudes,
-        cameras=[each.restarted() for each in near.cameras],
-    )
-    return adjust(moved, **how, tolerance=FINELY)
+    near = adjust(_weighted(start), **how, covariance=False, tolerance=ROUGHLY)
+    moved = Calibrated(calibration=start, result=near).restarted()
+    return adjust(_weighted(moved), **how, covariance="verdict", tolerance=FINELY)
 
 
 def _has_knots(start: Start) -> bool:
@@ -112,6 +137,8 @@ def snooped_start(start: Start, **options: Any) -> Calibrated:
     """Take gross errors out one after the other, and adjust what is left; see :meth:`Calibration.snoop`."""
     if start.regularise is not None and not _has_knots(start):
         raise InputError("gross errors are taken out without priors of cameras: regularise is None")
+    if start.sync == "offset":
+        start = adjusted_start(start).calibration
     found = snoop(_weighted(start), **options)
     result = found.judged
     assert isinstance(result, Result)

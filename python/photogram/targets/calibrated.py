@@ -13,6 +13,7 @@ from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.network.attitudes import Attitudes
 from photogram.network.passages import Bend
+from photogram.network.trajectories import Clock
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
 from photogram.results.snooped import Snooped
@@ -21,7 +22,7 @@ from photogram.show.brief import Brief, Rows
 from photogram.show.ways import Shown
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
-from photogram.targets.start import Start
+from photogram.targets.start import CLOCK, Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 from photogram.targets.worth import Worth
 
@@ -122,6 +123,19 @@ class Calibrated(Brief, Shown):
         attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes[rows])
         return vision_poses(result.photo_positions[rows], attitudes)
 
+    @cached_property
+    def picture_poses(self) -> Floats:
+        """(P, 4, 4) adjusted: board -> the camera of each picture, at its time."""
+        own, result = slice(len(self.calibration.corners.pictures)), self.result
+        attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes[own])
+        return vision_poses(result.photo_positions[own], attitudes)
+
+    @property
+    def offsets(self) -> dict[str, AdjustedUnknown]:
+        """The adjusted offsets between cameras, by the names of those that have one, in seconds."""
+        clocks = [each for each in self.result.unknowns if each.kind == Clock.KIND]
+        return {each.name.removeprefix(CLOCK): each for each in clocks}
+
     @property
     def points(self) -> Floats:
         """(n, 3) adjusted points of the board; nominal where no picture shows them."""
@@ -137,6 +151,20 @@ class Calibrated(Brief, Shown):
     def sensors_adjusted(self) -> list[int]:
         """Return the cameras that have a sensor whose pose was adjusted."""
         return [self._numbers[each.name] for each in self.result.unknowns if each.kind == "sensor"]
+
+    def restarted(self) -> Start:
+        """Return the calibration with what is free where the adjustment has ended; the rest is as given."""
+        own, bend, found = self.calibration, self.bend, self.offsets
+        late = np.array([found[each.name].values[0] if each.name in found else 0.0 for each in self.cameras])
+        free = np.isinf(np.asarray(own.sd_sensors)).all(axis=1)[:, np.newaxis, np.newaxis]
+        bends = own.bend if bend is None else np.where(np.isinf(own.sd_bend), bend.position[:2], own.bend)
+        return own.replace(
+            cameras=[each.restarted() for each in self.cameras],
+            poses=self.poses,
+            sensors=np.where(free, self.sensors, np.asarray(own.sensors)),
+            bend=(float(bends[0]), float(bends[1])),
+            offsets=np.where(np.isinf(np.asarray(own.sd_offsets)), late, own.offsets),
+        )
 
     def cofactors(self, parts: Sequence[Part] = ("cameras", "sensors")) -> tuple[list[str], Floats]:
         """Return the joint cofactors of some parts: covariances for a priori unit weight.

@@ -39,6 +39,8 @@ class Calibration(Start):
         and nothing tests it.
     sync
         `known`: pictures of one view were taken at one time. `none`: every picture has a pose of its own.
+        `offset`: corners have times, by the clock of each camera; a picture of camera k that is dated t shows
+        the board where it is at t + tau_k by the clock of its reference (docs/targets.md).
     regularise
         `mrcal`: the weak priors that mrcal 2.2 gives lens terms and centres. None: no priors.
     bend
@@ -49,12 +51,23 @@ class Calibration(Start):
     assumed
         Where `sd0` is None: the standard deviation of a corner, pixels, that weighted points of the board are
         weighed against; the adjustment finds it.
+    offsets, sd_offsets
+        (K,) of `offset`: what is given of tau_k, and its standard deviations, seconds; infinite: free.
+    motion
+        (V, 4, 6) of `offset`: how photos of the reference move about the time of each view, as coefficients
+        of powers 1 to 4 of time: positions in the axes of the board, rotation vectors about those of the
+        photo. None: through the poses of the views before and after.
+    sd_sensors, sd_bend
+        (K, 6) and (2,) standard deviations with which `sensors` and `bend` are known, infinite: free. Of
+        sensors those of :class:`photogram.network.unknowns.Sensor`: its position in the axes of the
+        reference, rotations about its own axes in radians.
 
     Raises
     ------
     InputError
         Arrays of other shapes, points that the board does not have, pictures without corners that count,
-        several cameras that are synchronised without sensors.
+        several cameras on a rig without sensors; of `offset`, pictures without times, no view between others
+        within 0.2 s.
     """
 
     def adjust(
@@ -77,7 +90,7 @@ class Calibration(Start):
         Raises
         ------
         RankError
-            The corners do not determine all unknowns: names them.
+            The corners do not determine all unknowns: names them. Of offsets: the board hardly moves.
         AdjustmentError, OutOfMemoryError, KeyboardInterrupt
             As of :func:`photogram.adjust`.
         InputError

@@ -87,8 +87,9 @@ def cross_validate(
 
 def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibrated:
     """Adjust some pictures by themselves, from the values of the whole and with its priors."""
-    given, priors = whole.calibration, whole.result.block.cameras
+    given, restarted, priors = whole.calibration, whole.restarted(), whole.result.block.cameras
     corners = given.corners.of_pictures(pictures)
+    views = np.unique(given.corners.views[pictures])
     part = given.replace(
         board=given.board.replace(shape=given.shape),
         corners=corners.replace(
@@ -97,13 +98,17 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
             sizes=[given.corners.sizes[each] for each in cameras],
         ),
         cameras=[_freed(whole.cameras[each].camera) for each in cameras],
-        sensors=whole.sensors[cameras],
-        poses=whole.poses[np.unique(given.corners.views[pictures])],
+        sensors=np.asarray(restarted.sensors)[cameras],
+        poses=whole.poses[views],
         references=None,
+        bend=restarted.bend,
+        sd_sensors=np.asarray(given.sd_sensors)[cameras],
+        offsets=np.asarray(given.offsets)[cameras],
+        sd_offsets=np.asarray(given.sd_offsets)[cameras],
+        motion=None if given.motion is None else np.asarray(given.motion)[views],
         regularise=None,
     )
-    loss, scale = whole.result.options.loss or (None, None)
-    result = adjust(part.block(), loss=cast("Loss | None", loss), scale=scale)
+    result = adjust(part.block(), loss=cast("Loss | None", whole.result.options.loss))
     own = [priors[each] for each in cameras]
     if any(_is_weighted(each) for each in own):
         result = cast("Result", adjusted_again(part.block(own), result.options, result.state, threads=None))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from photogram.show.ways import document_of
 from photogram.targets.board_fit import STRETCHES, board_fit
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.prior_shift import prior_shift
+from photogram.targets.splined import splines
 from photogram.targets.tables import views
 from photogram.targets.worth_files import worth_members
 
@@ -39,6 +41,7 @@ def calibration_document(calibrated: Calibrated) -> dict[str, Any]:
         **({"sensors": sensors} if sensors else {}),
         **({} if calibrated.snooped is None else {"snooping": calibrated.snooped.document()}),
         **({"moved_by_priors": records(moved)} if moved else {}),
+        **({"splines": [asdict(each) for each in told]} if (told := splines(calibrated)) else {}),
         **({} if calibrated.worth is None else worth_members(calibrated.worth)),
     }
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,19 +14,19 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
 from photogram.plots.panels import Where, handed_out, note, panels, placed
 from photogram.show.pictures import arrows, round_length
-from photogram.show.style import BLUE, COLOURS, FAINT, INK, ORDERED, VERMILION
+from photogram.show.style import BLUE, INK, ORDERED, VERMILION
 from photogram.targets.compared import CameraDifference
 from photogram.targets.cross_validation import CrossValidation
-from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
+from photogram.targets.maps import UncertaintyMap, distance_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.text import Text
 
 __all__ = [
     "draw_cross_validation",
     "draw_difference",
     "draw_uncertainty",
-    "draw_uncertainty_against_distance",
     "steps_of_125",
 ]
 
@@ -38,6 +36,8 @@ ARROWS = 24
 """Vectors along the longer side of a picture."""
 WIDTH = 7.6
 """Inches."""
+ROOM = 20.0
+"""Points from the middle of a label of a contour to that of the next one."""
 SHADES = 4
 """Of colour from one contour to the next."""
 
@@ -117,30 +117,6 @@ def draw_cross_validation(
     return placed(partial(_cross_validation, cross, over), path, ax)
 
 
-def draw_uncertainty_against_distance(
-    curves: Sequence[UncertaintyCurve], path: Path | None = None, ax: Where = None
-) -> Any:
-    """Draw the uncertainty of projection against distance, a curve for each pixel, with its minimum.
-
-    Parameters
-    ----------
-    curves
-        The curves.
-    path, ax
-        As of :func:`draw_uncertainty`.
-
-    Returns
-    -------
-    The axes.
-
-    Raises
-    ------
-    InputError, ModuleNotFoundError
-        As of :func:`draw_uncertainty`.
-    """
-    return placed(partial(_against_distance, curves), path, ax)
-
-
 def steps_of_125(low: float, high: float) -> Floats:
     """Return values 1, 2, 5 times powers of ten that enclose what lies between two positive numbers."""
     start = round_length(low)
@@ -152,9 +128,9 @@ def steps_of_125(low: float, high: float) -> Floats:
 
 def _uncertainty(found: UncertaintyMap, ax: Where) -> Any:
     with panels(ax, 1, 1, WIDTH, _height(found.size)) as (axes,):
+        _frame(axes, found.size)
         _contours(axes, found.columns, found.rows, found.sd, "px")
         _seen(axes, found.corners, found.coverage)
-        _frame(axes, found.size)
         said = found.model.replace("; ", "\n")
         axes.set_title(f"{found.title}\n{said}", fontsize=9.0)
     return handed_out([axes])
@@ -203,6 +179,7 @@ class _Apart:
 
     def draw(self, axes: Axes, title: str) -> None:
         """Draw lengths as contours, and some of the vectors, the longest as long as they are apart."""
+        _frame(axes, self.size)
         _contours(axes, self.columns, self.rows, self.lengths, "px")
         step = max(1, round(len(self.columns) / ARROWS))
         every = (slice(None, None, step), slice(None, None, step))
@@ -212,42 +189,13 @@ class _Apart:
         known = np.hypot(*vectors.T) <= 2 * largest
         spacing = step * (self.columns[1] - self.columns[0])
         arrows(axes, places[known], vectors[known], scale=largest / spacing, color=BLUE, width=0.002)
-        _frame(axes, self.size)
         axes.set_title(title, fontsize=9.0)
 
     def beside(self, axes: Axes, chi2: Floats) -> None:
         """Draw what they are beside their covariances."""
-        _contours(axes, self.columns, self.rows, chi2, "", lowest=0.1)
         _frame(axes, self.size)
+        _contours(axes, self.columns, self.rows, chi2, "", lowest=0.1)
         axes.set_title("beside its covariance: d' Q⁻¹ d / 2, about 1 where that explains it", fontsize=9.0)
-
-
-def _against_distance(curves: Sequence[UncertaintyCurve], ax: Where) -> Any:
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    with panels(ax, 1, 1, WIDTH, 4.2) as (axes,):
-        for each, colour in zip(curves, cycle(COLOURS), strict=False):
-            finite = np.isfinite(each.distances)
-            x, y = each.pixel
-            axes.plot(each.distances[finite], each.sd[finite], color=colour, label=f"pixel {x:g}, {y:g}")
-            for value in each.sd[~finite]:
-                axes.axhline(value, color=colour, linestyle=":", linewidth=0.8)
-            if np.isfinite(each.minimum[0]):
-                axes.plot(*each.minimum, marker="o", markersize=5, color=colour)
-        first = curves[0]
-        axes.set(xscale="log", yscale="log", xlabel=f"distance, {first.unit}", ylabel="sd, px")
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axis.set_major_formatter("{x:g}")
-            axis.set_minor_formatter(NullFormatter())
-        axes.grid(color=FAINT, alpha=0.25, linewidth=0.5)
-        axes.set_title(
-            f"{first.camera}: standard deviation of projection (datum {first.datum});"
-            " dots: smallest, dotted: at infinity",
-            fontsize=9.0,
-        )
-        axes.legend()
-    return handed_out([axes])
 
 
 def _height(size: tuple[int, int]) -> float:
@@ -273,12 +221,26 @@ def _contours(
     filled = axes.contourf(columns, rows, shown, shades, cmap=ORDERED, norm=norm, extend="min")
     filled.set_edgecolor("face")  # no seams between colours
     lines = axes.contour(columns, rows, shown, levels, colors="white", linewidths=0.9)
-    for text in axes.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8.0):
+    for text in _apart(axes, axes.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8.0, inline=False)):
         text.set_color(INK)
         text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
     bar = axes.figure.colorbar(filled, ax=axes, shrink=0.85, ticks=levels, format="%g")
     bar.ax.minorticks_off()
     bar.set_label(unit)
+
+
+def _apart(axes: Axes, texts: Sequence[Text]) -> list[Text]:
+    """Return labels that do not lie on each other, those of the lowest contours; take the others away."""
+    kept: list[Text] = []
+    places: list[Floats] = []
+    for each in texts:
+        place = np.asarray(axes.transData.transform(each.get_position())) * 72 / axes.figure.dpi
+        if all(np.hypot(*(place - other)) > ROOM for other in places):
+            kept.append(each)
+            places.append(place)
+        else:
+            each.remove()
+    return kept
 
 
 def _seen(axes: Axes, corners: Floats, coverage: Floats) -> None:

@@ -31,6 +31,8 @@ class SeenCorners:
         (m, 2) where, pixels.
     sd
         (m,) their standard deviations a priori, pixels.
+    poses
+        (m, 4, 4) board -> camera, at the time of each. None: the pose of the view, by all cameras.
     """
 
     cameras: Indices
@@ -38,11 +40,13 @@ class SeenCorners:
     points: Indices
     xy: Floats
     sd: Floats
+    poses: Floats | None = None
 
     def __getitem__(self, which: Bools) -> SeenCorners:
         """Return some of them."""
+        poses = None if self.poses is None else self.poses[which]
         return SeenCorners(
-            self.cameras[which], self.views[which], self.points[which], self.xy[which], self.sd[which]
+            self.cameras[which], self.views[which], self.points[which], self.xy[which], self.sd[which], poses
         )
 
 
@@ -121,8 +125,8 @@ class Housing:
     def places(self, camera: int) -> tuple[Floats, Floats]:
         """Return (m, 3) where the corners that a camera saw were in its axes, and (m,) their sd in pixels."""
         seen = self.seen[self.seen.cameras == camera]
-        to_camera = self.sensors[camera] @ self.poses
-        return transformed(to_camera[seen.views], self.points[seen.points]), seen.sd
+        poses = (self.sensors[camera] @ self.poses)[seen.views] if seen.poses is None else seen.poses
+        return transformed(poses, self.points[seen.points]), seen.sd
 
 
 def transformed(poses: Floats, points: Floats) -> Floats:

@@ -13,6 +13,7 @@ from photogram.network.knots import Knot
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.housing import Housing, SeenCorners, mean_motion
 from photogram.targets.imaging import unknown_of
+from photogram.targets.vision import sensor_steps
 
 __all__ = ["camera_number", "housed_with", "housing_of", "size_of"]
 
@@ -120,6 +121,7 @@ def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> SeenCor
         points=block.image_points[used],
         xy=block.image_xy[used],
         sd=block.image_sd[used, 0] / np.sqrt(result.image_weights[used]),
+        poses=calibrated.picture_poses[photos],
     )
 
 
@@ -147,8 +149,16 @@ def _weight_of(knot: Knot) -> Floats:
     return np.zeros((2, 2)) if knot.covariance is None else np.asarray(np.linalg.inv(knot.covariance))
 
 
+def _weight_of_sensor(calibrated: Calibrated, camera: int) -> Floats:
+    """Return (6, 6) of the observation of a sensor, by its steps dt, w."""
+    back = np.linalg.inv(sensor_steps(calibrated.sensors[camera]))
+    sd = np.asarray(calibrated.calibration.sd_sensors)[camera]
+    found: Floats = back.T @ np.diag(1 / sd**2) @ back
+    return found
+
+
 def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
-    """Return the inverse covariances of what was known before: priors of cameras, nominal points."""
+    """Return the inverse covariances of what was known before: of cameras, sensors, points and the bend."""
     block, rows = calibrated.result.block, _board_rows(calibrated)
     blocks = []
     for each in cameras:
@@ -160,9 +170,10 @@ def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
             own[np.ix_(weighted, weighted)] = np.linalg.inv(covariance)
         knots = [knot for knot in block.cameras[each].knot_unknowns if np.any(knot.sd)]
         blocks += [own, *(_weight_of(knot) for knot in knots)]
-    blocks += [np.zeros((6, 6))] * (len(cameras) - 1)
+    blocks += [_weight_of_sensor(calibrated, each) for each in cameras[1:]]
     points = np.diag(1 / block.point_sd[rows].ravel() ** 2)
-    blocks.append(points if calibrated.bend is None else np.zeros((2, 2)))
+    bend = np.diag(1 / np.asarray(calibrated.calibration.sd_bend) ** 2)
+    blocks.append(points if calibrated.bend is None else bend)
     found = np.zeros((sum(map(len, blocks)),) * 2)
     start = 0
     for own in blocks:

@@ -20,14 +20,14 @@ from photogram.io.files import read_text
 from photogram.network.cameras import Camera
 from photogram.targets.board import Board
 from photogram.targets.calibration import Calibration
+from photogram.targets.corner_files import KEY
 from photogram.targets.corners import Corners
 from photogram.targets.mrcal_lenses import freed, lens_of_mrcal
 from photogram.targets.npz_arrays import Arrays, read_arrays
 from photogram.targets.vision import inverted, of_vectors
 
-__all__ = ["KEY", "read_lens", "read_model"]
+__all__ = ["read_lens", "read_model"]
 
-KEY = "optimization_inputs"
 INDICES = "indices_frame_camintrinsics_camextrinsics"
 
 

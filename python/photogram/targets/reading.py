@@ -3,116 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.io.files import read_beginning, reading
 from photogram.messages import counted, listed
 from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board, Shape
-from photogram.targets.board_files import is_board, picture_size, read_board
+from photogram.targets.board_files import picture_size, read_board
 from photogram.targets.calibration import Calibration
-from photogram.targets.corner_tables import (
-    is_headless,
-    is_table,
-    is_vnl,
-    read_headless,
-    read_table,
-    read_vnl,
-)
-from photogram.targets.detection import detected, is_picture
+from photogram.targets.corner_files import Form, files_at, is_picture, sorted_files
+from photogram.targets.detection import detected
 from photogram.targets.first import first_values
 from photogram.targets.knot_weights import with_knot_sd
 from photogram.targets.lens_fit import KNOTS
 from photogram.targets.measured import Grouping, Measured, ViewBy, grouped
-from photogram.targets.mrcal_model import KEY, read_model
-from photogram.targets.opencv_corners import BEGIN, is_npz, is_storage, read_npz, read_storage
+from photogram.targets.mrcal_model import read_model
+from photogram.targets.opencv_corners import read_npz
 from photogram.targets.start import Regularisation, Synchronisation
 
-__all__ = ["holds_targets", "read"]
+__all__ = ["read"]
 
 NO_BOARD_SEEN = "pictures, but no board: write board.toml or give --board 9x6 --spacing 0.025"
 NO_BOARD = "corners, but no board: write board.toml or give --board 10x10 --spacing 0.077"
-MODEL = ".cameramodel"
-MOST = 2000
-"""Files of a folder that are looked at."""
-
-
-@dataclass(frozen=True)
-class _Form:
-    """A format of corners: how its files are known, and read; `clear` where nothing else looks like it."""
-
-    title: str
-    knows: Callable[[Path], bool]
-    read: Callable[[Path, Board | None], Measured]
-    clear: bool = True
-
-
-def _of_model(path: Path) -> bool:
-    return path.suffix == MODEL or (path.suffix == ".txt" and KEY in read_beginning(path, BEGIN))
-
-
-_FORMS = (
-    _Form("corners of mrcal", is_vnl, read_vnl),
-    _Form("storage of OpenCV", is_storage, read_storage),
-    _Form("table of corners", is_table, read_table, clear=False),
-    _Form("rows of corners", is_headless, read_headless, clear=False),
-    _Form("arrays of OpenCV", is_npz, read_npz, clear=False),
-)
-
-
-def _files(path: Path) -> list[Path]:
-    """Return the files at a path: itself, or those of a folder and of the folders in it."""
-    with reading(path):
-        if not path.is_dir():
-            path.stat()
-            return [path]
-        inside = sorted(path.iterdir())[:MOST]
-        below = [file for each in inside if each.is_dir() for file in sorted(each.iterdir())[:MOST]]
-        return [each for each in [*inside, *below] if each.is_file()]
-
-
-def _sorted(path: Path) -> tuple[list[Path], list[Path], dict[_Form, list[Path]]]:
-    """Return models of mrcal, descriptions of boards, and files of corners by their formats."""
-    models, boards = [], []
-    corners: dict[_Form, list[Path]] = {}
-    for each in _files(path):
-        if each.suffix.lower() not in (
-            ".vnl",
-            ".csv",
-            ".tsv",
-            ".txt",
-            ".yml",
-            ".yaml",
-            ".xml",
-            ".json",
-            ".npz",
-            ".toml",
-            MODEL,
-        ):
-            continue
-        if is_board(each):
-            boards.append(each)
-        elif _of_model(each):
-            models.append(each)
-        elif (form := next((own for own in _FORMS if own.knows(each)), None)) is not None:
-            corners.setdefault(form, []).append(each)
-    return models, boards, corners
-
-
-def holds_targets(path: Path) -> bool:
-    """Return whether corners of a board lie at a path, beside a board or in a format that only they have."""
-    with reading(path):
-        if path.is_dir() and (path / "project.toml").exists():
-            return False
-        models, boards, corners = _sorted(path)
-    if boards and not path.is_dir():
-        return False
-    seen = corners or (boards and any(map(is_picture, _files(path))))
-    return bool(models or (boards and seen) or any(form.clear for form in corners))
 
 
 def read(
@@ -154,7 +68,8 @@ def read(
     cameras, views, within, pixel_origin, size
         How images are grouped, and how pixels count: see docs/targets.md.
     sync
-        `known`: images of one view were taken at one time; `none`: each has a pose of its own.
+        `known`: images of one view were taken at one time; `none`: each has a pose of its own; `offset`: at
+        their times by the clock of their camera, whose offset is unknown.
     sd0, regularise
         As of :class:`Calibration`.
     progress
@@ -167,7 +82,7 @@ def read(
         names the file and the record.
     """
     path = Path(path)
-    models, boards, corners = _sorted(path)
+    models, boards, corners = sorted_files(path)
     described = [board] if isinstance(board, Path) else boards if board is None else []
     own = board if isinstance(board, Board) else _only_board(described)
     size = size or next(map(picture_size, described), None)
@@ -177,15 +92,15 @@ def read(
         given = _given(path, models, corners, own)
         prior = None if knot_sd and not regularise else regularise or given.regularise
         given = given.replace(cameras=with_knot_sd(given.cameras, knot_sd, prior), regularise=prior, sd0=sd0)
-        if sync == "none":
+        if sync != "known":
             raise InputError(
-                f"{models[0].name} says which pictures are of one view: --sync none goes without", file=path
+                f"{models[0].name} says which pictures are of one view: --sync {sync} goes without", file=path
             )
         return given if shape is None else given.replace(board=given.board.replace(shape=shape))
     how = Grouping(
         cameras, views, within, sync == "none", size, "corner" if pixel_origin == "corner" else "center"
     )
-    pictures = [] if corners else [each for each in _files(path) if is_picture(each)]
+    pictures = [] if corners else [each for each in files_at(path) if is_picture(each)]
     if pictures and own is None:
         raise InputError(NO_BOARD_SEEN, file=path)
     if pictures and own is not None:
@@ -228,7 +143,7 @@ def _only_board(boards: Sequence[Path]) -> Board | None:
 
 
 def _given(
-    path: Path, models: Sequence[Path], corners: dict[_Form, list[Path]], board: Board | None
+    path: Path, models: Sequence[Path], corners: dict[Form, list[Path]], board: Board | None
 ) -> Calibration:
     """Return the calibration of the one model of mrcal that lies there; those of one solution are alike."""
     if corners or board is not None:
@@ -245,7 +160,7 @@ def _given(
     return found
 
 
-def _measured(path: Path, corners: dict[_Form, list[Path]], board: Board | None) -> Measured:
+def _measured(path: Path, corners: dict[Form, list[Path]], board: Board | None) -> Measured:
     """Return the corners of all files of the one format that lies there."""
     if not corners:
         raise InputError(

@@ -24,8 +24,8 @@ __all__ = ["draw_board_residuals", "draw_poorest_views"]
 
 POOREST = 3
 """Views that are drawn."""
-LONGEST = 1.5
-"""Spacings of the points, of the longest vector."""
+LONGEST, OUTLIER = 1.5, 3.0
+"""Spacings of the points, of the longest vector; what one that is far longer takes of these."""
 
 
 def draw_board_residuals(calibrated: Calibrated, path: Path | None = None, ax: Where = None) -> Any:
@@ -87,7 +87,7 @@ def _board(calibrated: Calibrated, ax: Where) -> Any:
         room = LONGEST * float(np.sqrt(extent[0] * extent[1] / seen.sum()))
         axes.set(xlim=(low[0] - room, high[0] + room), ylim=(high[1] + room, low[1] - room), aspect="equal")
         axes.set(xlabel=f"x of the board, {unit}", ylabel=f"y of the board, {unit}")
-        title = "Mean residual of each point of the board; coloured: hardly by chance"
+        title = "Mean residual of each point of the board; red: hardly by chance"
         _with_scale(axes, places[seen, :2], mean[seen], marked[seen], room, title)
     return handed_out([axes])
 
@@ -104,8 +104,10 @@ def _poorest(calibrated: Calibrated, ax: Where) -> Any:
             size = corners.sizes[corners.cameras[each]] or tuple((xy.max(axis=0) + 1).tolist())
             axes.plot(*xy.T, ".", color=FAINT, markersize=3.0)
             axes.set(xlim=(-0.5, size[0] - 0.5), ylim=(size[1] - 0.5, -0.5), aspect="equal")
+            axes.set(xlabel="column, px", ylabel="row, px")
             room = LONGEST * float(np.sqrt(np.prod(np.ptp(xy, axis=0)) / len(xy)))
-            large = (np.abs(np.nan_to_num(result.standardized[own])) > NOTABLE).any(axis=1)
+            tests = np.nan_to_num(result.standardized[own]) / np.sqrt(result.covariance_scale)
+            large = (np.abs(tests) > NOTABLE).any(axis=1)
             title = f"{corners.pictures[each]}, rms {rms[each]:.2g} px"
             _with_scale(axes, xy, residuals, large, room, title)
     return handed_out(found)
@@ -114,7 +116,9 @@ def _poorest(calibrated: Calibrated, ax: Where) -> Any:
 def _with_scale(axes: Axes, places: Floats, vectors: Floats, marked: Bools, room: float, title: str) -> None:
     """Draw vectors whose longest takes some room, those that are marked in colour, and their scale."""
     limits = axes.get_xlim(), axes.get_ylim()
-    longest = float(np.hypot(*vectors.T).max()) or 1.0
+    lengths = np.hypot(*vectors.T)
+    # One that is far longer than the others is not to hide them.
+    longest = float(max(lengths.max() / OUTLIER, min(lengths.max(), 4 * np.quantile(lengths, 0.9)))) or 1.0
     scale = longest / room
     for which, colour in ((~marked, BLUE), (marked, VERMILION)):
         if which.any():

@@ -18,19 +18,24 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
 from photogram.network.passages import Bend, Figure
 from photogram.network.rigs import Mount
+from photogram.network.timed import Timed
+from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 from photogram.show.brief import Brief, Rows, few
 from photogram.targets.board import Board, Shape
 from photogram.targets.corners import Corners
+from photogram.targets.motion import NEAR, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.vision import FLIP, photo_poses
 
-__all__ = ["BOARD", "Regularisation", "Start", "Synchronisation"]
+__all__ = ["BOARD", "CLOCK", "Regularisation", "Start", "Synchronisation"]
 
-Synchronisation = Literal["known", "none"]
+Synchronisation = Literal["known", "none", "offset"]
 Regularisation = Literal["mrcal"]
 
 BOARD = "board"
 """What the bend of the board is called among the common unknowns."""
+CLOCK = "of "
+"""What the offset of a camera is called there, with the name of the camera behind it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -49,6 +54,11 @@ class Start(Valued, Brief):
     bend: tuple[float, float] = (0.0, 0.0)
     messages: Sequence[Message] = field(default=())
     assumed: float = 1.0
+    offsets: ArrayLike = 0.0
+    sd_offsets: ArrayLike = np.inf
+    motion: ArrayLike | None = None
+    sd_sensors: ArrayLike = np.inf
+    sd_bend: ArrayLike = np.inf
 
     def __post_init__(self) -> None:
         one_of("sync", self.sync, get_args(Synchronisation))
@@ -62,7 +72,7 @@ class Start(Valued, Brief):
             raise InputError(f"cameras are {count} cameras in pixels, not {shown(self.cameras)}")
         named = [each.replace(name=name) for each, name in zip(given, self.corners.camera_names, strict=True)]
         self._set("cameras", tuple(named))
-        if self.sensors is None and count > 1 and self.sync == "known":
+        if self.sensors is None and count > 1 and self.sync != "none":
             raise InputError("several cameras that are synchronised have sensors: camera 0 -> camera k")
         sensors = np.tile(np.eye(4), (count, 1, 1)) if self.sensors is None else self.sensors
         self._set("sensors", shaped("sensors", sensors, (count, 4, 4)))
@@ -78,9 +88,46 @@ class Start(Valued, Brief):
                 f"{self.corners.title(int(over[0]))}: the board has {len(self.board.places)} points, from 0"
             )
         self._leave_out(poses)
+        for name in ("offsets", "sd_offsets"):
+            self._set(name, shaped(name, getattr(self, name), (count,)))
+        for name, shape in (("sd_sensors", (count, 6)), ("sd_bend", (2,))):
+            self._set(name, shaped(name, getattr(self, name), shape))
+            if not (np.asarray(getattr(self, name)) > 0).all():
+                raise InputError(f"{name} are positive, or infinite where it is free: it is not held")
+        if self.sync == "offset":
+            self._set_motion()
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
+
+    def _set_motion(self) -> None:
+        """Find how the board moves about each view; leave out pictures of others where nothing tells."""
+        corners, tied = self.corners, self.tied[self.corners.cameras]
+        times = dated(corners, self.tied)
+        if self.motion is None:
+            found = moving(np.asarray(self.poses), times, self.references_of_views())
+        else:
+            found = shaped("motion", self.motion, (corners.view_count, POWERS, 6), missing=True)
+        self._set("motion", found)
+        lost = tied & ~(np.isfinite(found).all(axis=(1, 2)) & np.isfinite(times))[corners.views]
+        if not (tied & ~lost).any():
+            raise InputError(
+                "no picture tells an offset between cameras: views need a picture by the reference camera,"
+                f" and others of it within {NEAR:g} s before and after"
+            )
+        if lost.any():
+            names = [corners.pictures[row] for row in np.flatnonzero(lost).tolist()]
+            told = Message(f"left out, nothing tells how the board moved about them: {listed(names)}")
+            self._keep(~lost)
+            self._set("messages", (*self.messages, told))
+
+    def _keep(self, pictures: Bools) -> None:
+        """Keep some pictures (P,) alone, and their views."""
+        views = np.unique(self.corners.views[pictures])
+        for name in ("poses", "motion"):
+            if (own := getattr(self, name)) is not None:
+                self._set(name, np.asarray(own)[views])
+        self._set("corners", self.corners.of_pictures(pictures))
 
     def _leave_out(self, poses: Floats) -> None:
         """Leave out pictures that say nothing, or whose pose nobody knows, and name them."""
@@ -95,8 +142,7 @@ class Start(Valued, Brief):
         if not keep.any():
             raise InputError("; ".join(["no picture is left", *map(str, found)]))
         if not keep.all():
-            self._set("poses", poses[np.unique(self.corners.views[keep])])
-            self._set("corners", self.corners.of_pictures(keep))
+            self._keep(keep)
         self._set("messages", (*self.messages, *found))
 
     def brief(self) -> tuple[str, Rows]:
@@ -121,8 +167,14 @@ class Start(Valued, Brief):
 
     def picture_poses(self) -> Floats:
         """Return (P, 4, 4) the pose of each picture: board -> its camera."""
-        sensors, poses = np.asarray(self.sensors), np.asarray(self.poses)
-        found: Floats = sensors[self.corners.cameras] @ poses[self.corners.views]
+        corners, sensors = self.corners, np.asarray(self.sensors)
+        poses = np.asarray(self.poses)[corners.views]
+        if self.sync == "offset" and corners.times is not None:
+            late = np.asarray(self.offsets)[corners.cameras]
+            steps = corners.times + late - dated(corners, self.tied)[corners.views]
+            steps = np.where(self.tied[corners.cameras], steps, 0.0)
+            poses = moved(poses, np.nan_to_num(np.asarray(self.motion))[corners.views], steps)
+        found: Floats = sensors[corners.cameras] @ poses
         return found
 
     @property
@@ -176,7 +228,8 @@ class Start(Valued, Brief):
             image_points=corners.point[use],
             image_xy=corners.xy[use],
             image_sd=np.repeat(corners.sd[use, np.newaxis] * (self.sd0 or self.assumed), 2, axis=1),
-            mounts=self._mounts(names, photo),
+            mounts=self._mounts(names, photo) if self.sync == "known" else [],
+            timed=self._timed() if self.sync == "offset" else [],
             linear_unit=self.board.unit,
             passages=self._passages(),
         )
@@ -185,21 +238,40 @@ class Start(Valued, Brief):
         """Return what the points of the board follow from, where it is bent by an unknown amount."""
         if self.shape != "bend":
             return []
-        return [Figure(Bend(BOARD, self.bend), self.board.names, self.board.shifts())]
+        return [Figure(Bend(BOARD, self.bend, self.sd_bend), self.board.names, self.board.shifts())]
 
     def _cameras_of_frames(self, photo: Indices) -> Indices:
         """Return the references of views that have no picture of them."""
+        return self.references_of_views()[photo >= len(self.corners.pictures)]
+
+    def references_of_views(self) -> Indices:
+        """Return (V,) the camera that the pose of each view is of."""
         corners = self.corners
         reference = np.empty(corners.view_count, dtype=np.int64)
         reference[corners.views] = np.asarray(self.references)[corners.cameras]
-        return reference[photo >= len(corners.pictures)]
+        return reference
+
+    def _sensors(self) -> list[Sensor]:
+        names, sensors, sd = self.corners.camera_names, np.asarray(self.sensors), np.asarray(self.sd_sensors)
+        return [
+            Sensor.from_colmap(name, pose[:3, :3], pose[:3, 3], own)
+            for name, pose, own in zip(names, sensors, sd, strict=True)
+        ]
+
+    def _timed(self) -> list[Timed]:
+        """Return the pictures of moving views, with a clock for each camera that is tied."""
+        offsets, sd = np.asarray(self.offsets).tolist(), np.asarray(self.sd_offsets).tolist()
+        clocks = [
+            Clock(CLOCK + name, offsets[k], sd[k]) if tied else None
+            for k, (name, tied) in enumerate(zip(self.corners.camera_names, self.tied.tolist(), strict=True))
+        ]
+        times, poses = dated(self.corners, self.tied), np.asarray(self.poses)
+        return pictures_in_motion(
+            self.corners, poses, np.asarray(self.motion), times, self._sensors(), clocks
+        )
 
     def _mounts(self, names: Sequence[str], photo: Indices) -> list[Mount]:
-        corners = self.corners
-        sensors = [
-            Sensor.from_colmap(name, pose[:3, :3], pose[:3, 3])
-            for name, pose in zip(corners.camera_names, np.asarray(self.sensors), strict=True)
-        ]
+        corners, sensors = self.corners, self._sensors()
         return [
             Mount(names[row], names[photo[corners.views[row]]], sensors[corners.cameras[row]])
             for row in np.flatnonzero(self.tied[corners.cameras]).tolist()

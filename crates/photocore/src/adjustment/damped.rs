@@ -2,10 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use super::method::{self, NEGLIGIBLE, Stop, leaves_cofactors};
+use super::method::{self, IN_THE_MEAN, NEGLIGIBLE, Stop, leaves_cofactors};
 use super::options::{Iteration, Status};
 use super::result::AdjustError;
-use super::run::{End, Run, State};
+use super::run::{End, NEAR, Run, State};
 
 /// A step is accepted when the sum of squares does not rise by more than its own rounding error.
 const ROUNDING: f64 = 1e-12;
@@ -46,6 +46,23 @@ const GAIN: f64 = 0.5;
 const MOST_FAILURES: usize = 4;
 /// A full step from where a trust region has ended that changes no unknown by more than this multiple of its standard deviation.
 const SHORT: f64 = 1e-2;
+
+/// The constants of these rules by name, for whoever controls the steps of a problem in parts (see [`super::Linearized::of_part`]).
+pub fn step_rules() -> [(&'static str, f64); 11] {
+    [
+        ("rounding", ROUNDING),
+        ("negligible", NEGLIGIBLE),
+        ("in_the_mean", IN_THE_MEAN),
+        ("far", FAR),
+        ("still", STILL),
+        ("alike", ALIKE as f64),
+        ("falling", FALLING),
+        ("first_damping", FIRST_DAMPING),
+        ("least_damping", LEAST_DAMPING),
+        ("most_damping", MOST_DAMPING),
+        ("near", NEAR),
+    ]
+}
 
 /// What the control of the steps remembers from one to the next.
 struct Control {
@@ -115,19 +132,19 @@ impl<'a> Run<'a, '_> {
         };
         let (number, largest_change) = (self.iterations.len() + 1, state.linearized.change());
         let iteration = Iteration { number, sum_of_squares: control.best, largest_change, damping };
-        if damping == 0.0
-            && (self.is_last(control.stop, largest_change) || self.is_foreseen(control, &state, &step))
-        {
+        let is_last = damping == 0.0
+            && (self.is_last(control.stop, largest_change) || self.is_foreseen(control, &state, &step));
+        let rests = damping == 0.0 && !is_last && self.falls_no_more(largest_change);
+        if rests {
+            self.weak = state.moved(&step);
+        }
+        if is_last || rests {
             let end = if state.linearized.is_curved() {
                 self.stay_after(iteration, &state.recycle(), &step)?
             } else {
                 End::after(Status::Converged, state, step, iteration)
             };
             return Ok(ControlFlow::Break(end));
-        }
-        if damping == 0.0 && self.falls_no_more(largest_change) {
-            self.weak = state.moved(&step);
-            return Ok(ControlFlow::Break(End::after(Status::Converged, state, step, iteration)));
         }
         self.take(iteration, state, &step, control)
     }

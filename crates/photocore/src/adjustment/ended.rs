@@ -52,8 +52,11 @@ impl Adjustment {
     }
 
     /// After the last step, without cofactors.
+    ///
+    /// * `loss`: what weights the observations.
     pub fn between(
         problem: &AnyProblem<'_>,
+        loss: Option<Loss>,
         held: &[usize],
         before: &[f64],
         reached: Vec<f64>,
@@ -61,7 +64,7 @@ impl Adjustment {
     ) -> Self {
         let locals = problem.layout().all_locals();
         let corrections = before[locals.clone()].iter().zip(&reached).map(|(from, to)| to - from).collect();
-        let after = Self::at(problem, None, reached, threads);
+        let after = Self::at(problem, loss, reached, threads);
         let history = [vec![before[locals.end..].to_vec()], after.history].concat();
         let (counts, datum) = (problem.counts(held), held.to_vec());
         Self { history, last_local_corrections: corrections, counts, datum, ..after }

@@ -22,7 +22,7 @@ use crate::normals::{
 pub struct Linearized {
     pub(super) values: Vec<f64>,
     pub(super) held: Vec<usize>,
-    reweighting: Option<Reweighting>,
+    pub(super) reweighting: Option<Reweighting>,
     pub(super) prior: Prior,
     pub(super) factor: Factor,
     pub(super) sum_of_squares: f64,
@@ -323,14 +323,14 @@ impl Linearized {
         Ok(())
     }
 
-    /// The observation equations again: it takes a pass over unknowns, and they are not kept.
+    /// The observation equations again, as a loss has weighted them: it takes a pass over unknowns, and they are not kept.
     pub(super) fn equations<'a>(
         &self,
         problem: &'a AnyProblem<'a>,
         threads: &Threads,
     ) -> ObservationEquations<'a> {
-        let loss = self.reweighting.map(|reweighting| reweighting.loss);
-        ObservationEquations::new(problem, loss, &self.values, &self.held, threads)
+        let at = || problem.model.at(&self.values);
+        threads.install(|| ObservationEquations::evaluated(problem, at(), &self.held, self.reweighting))
     }
 
     /// Gives its memory back for the next ones; its values.

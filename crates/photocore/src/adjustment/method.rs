@@ -84,7 +84,7 @@ pub enum Published {
 pub(super) const NEGLIGIBLE: f64 = 1e-3;
 /// Nor does one that changes them by no more than this in the mean bring about other cofactors: the bound on the change of any one unknown
 /// grows with the root of their number.
-const IN_THE_MEAN: f64 = 1e-5;
+pub(super) const IN_THE_MEAN: f64 = 1e-5;
 
 /// Whether cofactors before a step that changes so many unknowns by `change` standard deviations together are those after it.
 pub(super) fn leaves_cofactors(change: f64, unknowns: usize) -> bool {

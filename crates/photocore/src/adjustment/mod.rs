@@ -92,6 +92,7 @@ mod transformation;
 mod trust_region;
 mod walk;
 
+pub use damped::step_rules;
 pub use datum::{Adjusted, Datum, DatumError};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, normal, student,
@@ -107,7 +108,7 @@ pub use noncentral::{
 };
 pub use observation_rows::ObservationRows;
 pub use options::{Event, Iteration, Options, Phase, Status};
-pub use part::PartError;
+pub use part::{PartError, PartOptions};
 pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem};
 pub use resistance::Classes;
 pub(crate) use result::gib;

@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use super::equations::ObservationEquations;
 use super::linearized::Linearized;
+use super::loss::{Loss, Reweighting};
 use super::options::Phase;
 use super::problem::AnyProblem;
 use super::result::{AdjustError, Adjustment};
@@ -27,21 +28,31 @@ pub enum PartError {
     Adjust(#[from] AdjustError),
 }
 
+/// How a part is formed.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PartOptions {
+    /// Unknowns held for the datum of the whole, outer ones among them.
+    pub held: Vec<usize>,
+    /// A fraction of the diagonal of the normal equations that is added to it.
+    pub damping: f64,
+    /// What weights the observations.
+    pub loss: Option<Loss>,
+    /// Whether its second-order term is taken in, as close to the end it may be; cofactors are had without.
+    pub curved: bool,
+}
+
 impl Linearized {
     /// Forms the normal equations of a part at given values and eliminates what is at home here.
     ///
-    /// * `held`: unknowns held for the datum of the whole, outer ones among them;
-    /// * `contributions`: what the parts below leave, in the order of the layout: they are added in this order;
-    /// * `damping`: a fraction of the diagonal of the normal equations that is added to it.
+    /// * `contributions`: what the parts below leave, in the order of the layout: they are added in this order.
     ///
     /// # Errors
     /// Contributions of other unknowns, an interruption, no memory.
     pub fn of_part(
         problem: &AnyProblem<'_>,
         values: Vec<f64>,
-        held: Vec<usize>,
         contributions: &[Contribution<'_>],
-        damping: f64,
+        options: PartOptions,
         threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Self, PartError> {
@@ -53,11 +64,18 @@ impl Linearized {
         if contributions.len() != blocks.len() || !contributions.iter().zip(blocks).all(fit) {
             return Err(PartError::Foreign);
         }
-        let equations = ObservationEquations::new(problem, None, &values, &held, threads)
+        let PartOptions { held, damping, loss, curved } = options;
+        let reweighting = loss.map(|loss| Reweighting { loss, curved });
+        let at = threads.install(|| problem.model.at(&values));
+        let equations = ObservationEquations::evaluated(problem, at, &held, reweighting)
             .with_contributions(contributions);
         let options = FactorOptions { damping, ..FactorOptions::default() };
         let mut between = between(watch, Phase::Form, layout.locals());
-        let formed = Self::of(&equations, values, held, &options, threads, &mut between)?;
+        let mut formed = Self::of(&equations, values, held, &options, threads, &mut between)?;
+        if loss.is_some() {
+            let residuals = problem.residuals_at(threads, equations.at());
+            formed.sum_of_squares = problem.objective(&formed.values, &residuals, loss);
+        }
         // The factor waits for the way down, perhaps with those of many others.
         problem.system.release();
         Ok(formed)
@@ -103,9 +121,11 @@ impl Linearized {
         watch: Watch<'_>,
     ) -> Result<(Adjustment, Vec<Vec<f64>>), PartError> {
         let (layout, part) = (problem.layout(), self.determined()?);
-        if outer.len() != packed(problem.system.symbolic().outer_unknowns()) || part.damping() != 0.0 {
+        let outer_cofactors = packed(problem.system.symbolic().outer_unknowns());
+        if outer.len() != outer_cofactors || part.damping() != 0.0 || part.is_curved() {
             return Err(PartError::Foreign);
         }
+        let loss = part.reweighting.map(|reweighting| reweighting.loss);
         let inverted = {
             let equations = part.equations(problem, threads);
             let mut between = between(watch, Phase::Invert, layout.locals());
@@ -115,7 +135,8 @@ impl Linearized {
         problem.system.release();
         let below = layout.contributions().iter().map(|blocks| inverted.selected.triangle(layout, blocks));
         let below = below.collect();
-        let mut adjustment = Adjustment::between(problem, &inverted.held, &inverted.values, reached, threads);
+        let mut adjustment =
+            Adjustment::between(problem, loss, &inverted.held, &inverted.values, reached, threads);
         adjustment.put(problem, inverted);
         Ok((adjustment, below))
     }

@@ -130,7 +130,7 @@ fn adjusted(
 
 /// A step that changes the unknowns by less than this multiple of their standard deviations leads to where the second-order term of
 /// a loss does no harm.
-const SHORT: f64 = 1.0;
+pub(super) const NEAR: f64 = 1.0;
 
 /// Where the iterations are.
 pub(super) struct State<'a> {
@@ -266,16 +266,7 @@ impl<'a> Run<'a, '_> {
 
     /// The same of a model that is evaluated already.
     pub(super) fn objective_at(&self, unknowns: &[f64], at: &dyn Evaluated) -> f64 {
-        let residuals = self.problem.residuals_at(self.threads, at);
-        self.observed_sum(&residuals) + self.problem.terms(unknowns).sum_of_squares(0..unknowns.len())
-    }
-
-    /// The observations' part of it.
-    fn observed_sum(&self, residuals: &[f64]) -> f64 {
-        match self.options.loss {
-            None => self.problem.sum_of_squares(residuals),
-            Some(loss) => self.problem.group_squares(residuals).map(|square| loss.value(square)).sum(),
-        }
+        self.problem.objective(unknowns, &self.problem.residuals_at(self.threads, at), self.options.loss)
     }
 
     pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<State<'a>, AdjustError> {
@@ -347,8 +338,7 @@ impl<'a> Run<'a, '_> {
         let mut adjustment = Adjustment::at(problem, options.loss, unknowns, self.threads);
         if let Some((last, _)) = end.last {
             let reached = &adjustment.unknowns;
-            let sum_of_squares = self.observed_sum(&adjustment.residuals)
-                + problem.terms(reached).sum_of_squares(0..reached.len());
+            let sum_of_squares = problem.objective(reached, &adjustment.residuals, options.loss);
             self.accept(Iteration { sum_of_squares, ..last }, &end.unknowns, reached)?;
         }
         drop(end.unknowns);
@@ -404,7 +394,7 @@ impl<'a> Run<'a, '_> {
         let corrections =
             before[locals.clone()].iter().zip(&after[locals.clone()]).map(|(from, to)| to - from);
         self.last_local_corrections = corrections.collect();
-        self.curved = self.options.loss.is_some() && iteration.largest_change <= SHORT;
+        self.curved = self.options.loss.is_some() && iteration.largest_change <= NEAR;
         let corrected = match (self.has_moved, self.history.last()) {
             // A move is no correction.
             (true, Some(last)) => {

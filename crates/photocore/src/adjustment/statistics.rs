@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use super::loss::Loss;
 use super::problem::{AnyProblem, Evaluated, Problem};
 use super::terms::weighted_among;
 use crate::Threads;
@@ -66,6 +67,15 @@ impl<M: ?Sized> Problem<M> {
 }
 
 impl AnyProblem<'_> {
+    /// What is minimised, at values with the given residuals: the weighted sum of squares, those of groups and ties in the form of a loss.
+    pub fn objective(&self, values: &[f64], residuals: &[f64], loss: Option<Loss>) -> f64 {
+        let observed: f64 = match loss {
+            None => self.sum_of_squares(residuals),
+            Some(loss) => self.group_squares(residuals).map(|square| loss.value(square)).sum(),
+        };
+        observed + self.terms(values).sum_of_squares(0..values.len())
+    }
+
     /// Redundancy number of each unknown as an observation of itself, 1 - a Q a^T of its equation a; zero unless it is weighted. The cofactors of
     /// fixed and held unknowns, which stand in the normal equations with unit weight, are set to zero on the way; `values` are those at
     /// which these were formed.

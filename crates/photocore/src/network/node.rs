@@ -9,7 +9,7 @@ use super::solution::{observations, of_photo, sums_of_squares};
 use super::surroundings::{BlockOf, Surroundings};
 use super::{Dropped, Image, Network, NetworkError, Options, Point, Solution, SumsOfSquares};
 use crate::Threads;
-use crate::adjustment::{Adjustment, Counts, Linearized, Model, PartError, Watch};
+use crate::adjustment::{Adjustment, Counts, Linearized, Model, PartError, PartOptions, Watch};
 use crate::normals::{Contribution, Operations, packed};
 
 /// A node, its blocks ordered; it has no values.
@@ -83,7 +83,7 @@ impl Network {
     /// Takes the network as a node of a larger one.
     ///
     /// # Errors
-    /// A network that contradicts itself, blocks that are not there or have no unknowns, more memory than the options give; a loss.
+    /// A network that contradicts itself, blocks that are not there or have no unknowns, more memory than the options give.
     pub fn node(
         &self,
         options: &Options,
@@ -92,9 +92,6 @@ impl Network {
     ) -> Result<Node, NetworkError> {
         self.check()?;
         self.check_blocks(&surroundings)?;
-        if options.adjustment.loss.is_some() {
-            return Err(NetworkError::Node("a network in parts is adjusted without a loss"));
-        }
         let mut network = self.clone();
         network.release(&surroundings.outer);
         let in_photos = surroundings.held.clone();
@@ -236,19 +233,23 @@ impl Node {
         Ok(moved)
     }
 
-    /// Weighted sums of squares of what is at home here.
+    /// Weighted sums of squares of what is at home here, weights as a loss has changed them, and what is minimised: their sum, without one.
     ///
     /// # Errors
     /// A state of another length.
-    pub fn objective(&self, state: &[f64], threads: &Threads) -> Result<SumsOfSquares, NetworkError> {
+    pub fn objective(&self, state: &[f64], threads: &Threads) -> Result<(SumsOfSquares, f64), NetworkError> {
         self.check(&[state])?;
-        let problem = &self.assembled.problem;
-        let reached = Adjustment::between(problem, &self.held, state, state.to_vec(), threads);
+        let (problem, loss) = (&self.assembled.problem, self.options.adjustment.loss);
+        let reached = Adjustment::between(problem, loss, &self.held, state, state.to_vec(), threads);
         let observed = observations(&self.network, problem, &reached);
-        Ok(sums_of_squares(problem, &reached, state, &observed))
+        let sums = sums_of_squares(problem, &reached, state, &observed);
+        Ok((sums, problem.any().objective(state, &reached.residuals, loss)))
     }
 
     /// Forms the normal equations at a state, with what the nodes below leave, and eliminates what is at home here.
+    ///
+    /// * `damping`: a fraction of the diagonal that is added to it;
+    /// * `curved`: whether the second-order term of a loss is taken in.
     ///
     /// # Errors
     /// A state of another length, contributions over other unknowns, an interruption, no memory.
@@ -256,14 +257,15 @@ impl Node {
         &self,
         state: &[f64],
         contributions: &[Contribution<'_>],
-        damping: f64,
+        (damping, curved): (f64, bool),
         threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<FormedNode, NetworkError> {
         self.check(&[state])?;
         let problem = &self.assembled.problem;
-        let (state, held) = (state.to_vec(), self.held.clone());
-        let part = Linearized::of_part(problem, state, held, contributions, damping, threads, watch);
+        let loss = self.options.adjustment.loss;
+        let options = PartOptions { held: self.held.clone(), damping, loss, curved };
+        let part = Linearized::of_part(problem, state.to_vec(), contributions, options, threads, watch);
         Ok(FormedNode { part: part.map_err(|error| self.named(error))? })
     }
 
@@ -323,7 +325,8 @@ impl Node {
     ) -> Result<Solution, NetworkError> {
         self.check(&[state, before])?;
         let problem = &self.assembled.problem;
-        let adjustment = Adjustment::between(problem, &self.held, before, state.to_vec(), threads);
+        let loss = self.options.adjustment.loss;
+        let adjustment = Adjustment::between(problem, loss, &self.held, before, state.to_vec(), threads);
         Ok(self.solution_of(adjustment, threads))
     }
 

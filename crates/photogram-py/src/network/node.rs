@@ -1,6 +1,7 @@
 //! A node of the elimination tree of a block that is adjusted in parts; its documentation is in `_photocore.pyi`.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyReadonlyArrayDyn};
@@ -24,7 +25,13 @@ use crate::work::{Workers, watched};
 /// Adds the classes to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Node>()?;
-    module.add_class::<FormedNode>()
+    module.add_class::<FormedNode>()?;
+    module.add_function(wrap_pyfunction!(step_rules, module)?)
+}
+
+#[pyfunction]
+fn step_rules() -> BTreeMap<&'static str, f64> {
+    photocore::adjustment::step_rules().into()
 }
 
 type Numbers<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -163,20 +170,21 @@ impl Node {
         py: Python<'_>,
         state: Numbers<'_>,
         threads: usize,
-    ) -> PyResult<(f64, f64, f64, f64)> {
+    ) -> PyResult<(f64, f64, f64, f64, f64)> {
         let state = numbers("state", &state)?;
-        let sums = watched(py, self.workers(threads), None, |pool, _| self.node.objective(&state, pool))?;
-        let sums = sums.map_err(|error| failed(&error))?;
-        Ok((sums.camera, sums.ground, sums.plates, sums.observations))
+        let found = watched(py, self.workers(threads), None, |pool, _| self.node.objective(&state, pool))?;
+        let (sums, minimised) = found.map_err(|error| failed(&error))?;
+        Ok((sums.camera, sums.ground, sums.plates, sums.observations, minimised))
     }
 
-    #[pyo3(signature = (state, contributions, *, damping, threads, progress = None))]
+    #[pyo3(signature = (state, contributions, *, damping, curved, threads, progress = None))]
     fn form(
         &self,
         py: Python<'_>,
         state: Numbers<'_>,
         contributions: Vec<ContributionRow<'_>>,
         damping: f64,
+        curved: bool,
         threads: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<FormedNode> {
@@ -190,7 +198,7 @@ impl Node {
             });
         }
         let formed = watched(py, self.workers(threads), progress, |pool, watch| {
-            let mut formed = self.node.form(&state, &given, damping, pool, watch)?;
+            let mut formed = self.node.form(&state, &given, (damping, curved), pool, watch)?;
             let contribution = formed.take_contribution();
             Ok((formed, contribution))
         })?;

@@ -10,6 +10,7 @@ import numpy as np
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.agisoft import TITLE
 from photogram.formats.format import Wishes
 from photogram.formats.project import Frame, Project, Size, assembled
 from photogram.formats.rotations import Y_DOWN, checked_rotation
@@ -18,9 +19,8 @@ from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
 from photogram.network.observations import Control, Observation, Position
 
-__all__ = ["TITLE", "read"]
+__all__ = ["read"]
 
-TITLE = "Agisoft camera XML"
 LOCAL = "LOCAL_CS"
 GEOCENTRIC = 1e6
 """Metres from the origin beyond which a world is geocentric."""

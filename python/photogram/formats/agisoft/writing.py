@@ -10,6 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
+from photogram.formats.agisoft import FILE
 from photogram.formats.block_contents import correlated_control, lost_observations, posed
 from photogram.formats.images import to_corner
 from photogram.formats.lenses import lens_of
@@ -19,9 +20,8 @@ from photogram.formats.rotations import Y_DOWN
 from photogram.network.cameras import Camera
 from photogram.network.observations import Position
 
-__all__ = ["FILE", "cannot_hold", "write"]
+__all__ = ["cannot_hold", "write"]
 
-FILE = "cameras.xml"
 LOCAL = (
     'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],UNIT["metre",1,AUTHORITY["EPSG","9001"]]]'
 )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from photogram.formats.blocks_exchange.reading import TITLE, read
-from photogram.formats.blocks_exchange.writing import FILE, cannot_hold, write
-from photogram.formats.format import Format
+from photogram.formats.format import Format, later
 from photogram.formats.xml_stream import root_of
 
-__all__ = ["FORMAT"]
+__all__ = ["FILE", "FORMAT", "TITLE"]
+
+FILE = "block.xml"
+TITLE = "BlocksExchange"
 
 
 def _recognises(path: Path) -> bool:
@@ -20,9 +21,9 @@ FORMAT = Format(
     name="blocks_exchange",
     title=TITLE,
     recognises=_recognises,
-    read=read,
-    write=write,
+    read=later(f"{__name__}.reading", "read"),
+    write=later(f"{__name__}.writing", "write"),
     files=(FILE, "*.xml"),
-    cannot_hold=cannot_hold,
+    cannot_hold=later(f"{__name__}.writing", "cannot_hold"),
     pixels=True,
 )

@@ -11,6 +11,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.blocks_exchange import TITLE
 from photogram.formats.blocks_exchange.systems import PhotoRecord, PointRecord, Systems
 from photogram.formats.format import Wishes
 from photogram.formats.project import Project, Size, assembled
@@ -21,9 +22,8 @@ from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 
-__all__ = ["ORIENTATIONS", "TITLE", "read"]
+__all__ = ["ORIENTATIONS", "read"]
 
-TITLE = "BlocksExchange"
 ORIENTATIONS = {
     "XRightYDown": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
     "XRightYUp": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),

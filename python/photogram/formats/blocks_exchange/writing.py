@@ -10,6 +10,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control, lost_observations
+from photogram.formats.blocks_exchange import FILE
 from photogram.formats.blocks_exchange.reading import CENTER
 from photogram.formats.images import sizes_of, to_corner
 from photogram.formats.lenses import lens_of
@@ -19,9 +20,7 @@ from photogram.formats.rotations import Y_DOWN
 from photogram.network.cameras import Camera
 from photogram.network.observations import Position
 
-__all__ = ["FILE", "cannot_hold", "write"]
-
-FILE = "block.xml"
+__all__ = ["cannot_hold", "write"]
 
 
 def cannot_hold(project: Project) -> list[str]:

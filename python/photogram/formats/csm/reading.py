@@ -16,7 +16,7 @@ from photogram.formats.csm.optics import instrument, not_zero, read_detector, re
 from photogram.io.tree import Tree, read_json, unknown
 from photogram.network.trajectories import increasing, rotations
 
-__all__ = ["UNITS", "is_isd", "read_isd"]
+__all__ = ["UNITS", "read_isd"]
 
 _KINDS = {
     "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL": "line",
@@ -27,11 +27,6 @@ FRAMELETS = 100_000
 """At most in an image: each is a photo."""
 UNITS = {"m": 1.0, "km": 1000.0}
 """Metres; km where nothing is said."""
-
-
-def is_isd(tree: Tree) -> bool:
-    """Whether a document is one of support data."""
-    return isinstance(tree.value, dict) and "name_model" in tree and "instrument_position" in tree
 
 
 def read_isd(path: Path) -> Isd:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from photogram.formats.format import Format
-from photogram.formats.isis.assembling import TITLE, read
+from photogram.formats.format import Format, later
 from photogram.formats.isis.reading import is_network
-from photogram.formats.isis.rejection import rejecting
-from photogram.formats.isis.writing_results import results
 from photogram.io.files import reading
 
-__all__ = ["FORMAT"]
+__all__ = ["FORMAT", "TITLE"]
 
+TITLE = "control network (ISIS)"
 HEAD = 1 << 16
 """Bytes that tell a network."""
 
@@ -25,5 +23,10 @@ def _recognises(path: Path) -> bool:
 
 
 FORMAT = Format(
-    name="isis", title=TITLE, recognises=_recognises, read=read, results=results, adjusting=rejecting
+    name="isis",
+    title=TITLE,
+    recognises=_recognises,
+    read=later(f"{__name__}.assembling", "read"),
+    results=later(f"{__name__}.writing_results", "results"),
+    adjusting=later(f"{__name__}.rejection", "rejecting"),
 )

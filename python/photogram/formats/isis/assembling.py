@@ -13,6 +13,7 @@ from photogram.errors import InputError
 from photogram.formats.csm.lists import read_list, read_support
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.format import Wishes
+from photogram.formats.isis import TITLE
 from photogram.formats.isis.contents import DETAILS, PITCHES, Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.observations import observations_of, one_flight
@@ -28,9 +29,7 @@ from photogram.network.geometry import Spheroid
 from photogram.network.timed import Timed
 from photogram.network.whereabouts import about
 
-__all__ = ["TITLE", "read"]
-
-TITLE = "control network (ISIS)"
+__all__ = ["read"]
 
 
 def read(path: Path, wishes: Wishes) -> Project:

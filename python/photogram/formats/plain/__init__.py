@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from photogram.formats.format import Format
-from photogram.formats.plain.reading import SETTINGS, read
-from photogram.formats.plain.writing import cannot_hold, write
+from photogram.formats.format import Format, later
 
-__all__ = ["FORMAT"]
+__all__ = ["FORMAT", "SETTINGS"]
+
+SETTINGS = "project.toml"
 
 
 def _recognises(path: Path) -> bool:
@@ -19,9 +19,9 @@ FORMAT = Format(
     name="plain",
     title="plain project",
     recognises=_recognises,
-    read=read,
-    write=write,
-    cannot_hold=cannot_hold,
+    read=later(f"{__name__}.reading", "read"),
+    write=later(f"{__name__}.writing", "write"),
+    cannot_hold=later(f"{__name__}.writing", "cannot_hold"),
     files=(SETTINGS, "*.toml"),
     geographic=True,
 )

@@ -14,6 +14,7 @@ from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
+from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.boards import ASSUMED, read_bends, read_boards
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
@@ -42,9 +43,8 @@ from photogram.network.timed import Timed
 from photogram.network.unknowns import Unknown
 from photogram.results.features import named_points
 
-__all__ = ["SETTINGS", "read", "read_control", "read_tables"]
+__all__ = ["read", "read_control", "read_tables"]
 
-SETTINGS = "project.toml"
 LEVELS = "no standard deviation of an image of level 0: 1 px is assumed (--sd images=...)"
 """What is told of images whose table has levels alone."""
 DIFFER = 1e-6

@@ -24,10 +24,11 @@ from photogram.distributed.parts import AtHome, Names, Part, assembled_part
 from photogram.distributed.run import Manifest, divided, places_of
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
+from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.images import image_coordinates, read_images
 from photogram.formats.plain.photos import read_photos
-from photogram.formats.plain.reading import SETTINGS, read_tables
+from photogram.formats.plain.reading import read_tables
 from photogram.formats.plain.settings import Settings, read_settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.transform import Transform
@@ -105,10 +106,9 @@ class Streamed:
         self._settings, self._wishes = settings, wishes
         held = self._without_images()
         self.project: Project = read_tables(Tables(held, []), wishes)
-        asked = self.project.options
-        if asked.loss is not None or asked.datum in ("inner", "minimum"):
+        if self.project.options.datum in ("inner", "minimum"):
             raise InputError(
-                "in parts there is no loss and no datum to choose: take them out, or adjust in one process",
+                "in parts there is no datum to choose: take it out, or adjust in one process",
                 file=settings.path,
             )
         if self.project.block.timed:

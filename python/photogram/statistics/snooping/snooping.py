@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.choosing import Choice
 from photogram.statistics.snooping.consensus import begun
 from photogram.statistics.snooping.factors import scales
@@ -118,12 +117,3 @@ def _take_out(
     removed = work.apply(work.entries(choices, number), remarks, returning)
     note_return(work, returning, number)
     return removed
-
-
-def verdict_of(standing: Standing) -> str:
-    """Return what the global test says of a standing, in a few words."""
-    test = global_test(standing.weighted_sum_of_squares, standing.degrees_of_freedom)
-    if test is None:
-        return "no degrees of freedom"
-    said = "too high" if test.rejected_high else "too low" if test.rejected_low else "accepted"
-    return f"unit variance {test.variance:.4g}, expected {test.limits[0]:.3g} to {test.limits[1]:.3g}: {said}"

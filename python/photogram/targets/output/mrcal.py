@@ -12,8 +12,9 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.knots import KNOTTED
 from photogram.targets.calibrated import Calibrated
+from photogram.targets.corner_files import KEY
 from photogram.targets.mrcal_lenses import PREFIX
-from photogram.targets.mrcal_model import INDICES, KEY
+from photogram.targets.mrcal_model import INDICES
 from photogram.targets.output.rig import Rig
 from photogram.targets.output.terms import TERMS, terms_of
 
@@ -99,6 +100,7 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
         and calibration.shape in ("held", "bend")
         and board.pitch[0] == board.pitch[1]
         and len({name for name, _ in lenses}) == 1
+        and calibration.sync != "offset"
         and (count == 1 or all(rig.tied(row) for row in range(1, count)))
     )
     if not fits:

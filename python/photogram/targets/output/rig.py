@@ -66,7 +66,8 @@ class Rig:
         found = self.sizes[camera]
         if found is None:
             raise InputError(
-                f"the camera {self.names[camera]}: the size of its pictures is not known: --size WxH"
+                f"the camera {self.names[camera]}: the size of its pictures is not known: --size WxH beside"
+                " corners, width and height of cameras in a project"
             )
         return found
 

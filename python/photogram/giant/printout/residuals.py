@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from photogram.arguments.types import Floats
-from photogram.giant.listing.formats import fixed
-from photogram.giant.listing.pages import Page, headed, paginate
+from photogram.giant.printout.formats import fixed
+from photogram.giant.printout.pages import Page, headed, paginate
 from photogram.results.result import SumsOfSquares
 
 __all__ = ["PointResiduals", "residual_pages", "statistics"]

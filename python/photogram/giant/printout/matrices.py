@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from photogram.arguments.types import Floats
-from photogram.giant.listing.formats import exponential
+from photogram.giant.printout.formats import exponential
 
 __all__ = ["MATRIX", "matrix_rows"]
 

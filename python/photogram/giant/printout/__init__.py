@@ -1,5 +1,1 @@
 """The printout of GIANT (unit 6): a module for each kind of page, in the order of the guide's sample."""
-
-from photogram.giant.listing.listing import listing
-
-__all__ = ["listing"]

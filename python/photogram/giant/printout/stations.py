@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from photogram.arguments.types import Floats
-from photogram.giant.listing.formats import VALUE, Space, attitude, attitude_name
-from photogram.giant.listing.matrices import MATRIX, matrix_rows
-from photogram.giant.listing.pages import Page, headed, paginate
+from photogram.giant.printout.formats import VALUE, Space, attitude, attitude_name
+from photogram.giant.printout.matrices import MATRIX, matrix_rows
+from photogram.giant.printout.pages import Page, headed, paginate
 
 __all__ = ["station_pages"]
 

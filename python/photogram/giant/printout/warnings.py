@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from photogram.giant.diagnostics import ErrorWarning
-from photogram.giant.listing.pages import Page, paginate
+from photogram.giant.printout.pages import Page, paginate
 
 __all__ = ["warning_pages"]
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
-from photogram.giant.listing.formats import Space
-from photogram.giant.listing.pages import Page, headed, paginate
-from photogram.giant.listing.summaries import counts_and_rms
+from photogram.giant.printout.formats import Space
+from photogram.giant.printout.pages import Page, headed, paginate
+from photogram.giant.printout.summaries import counts_and_rms
 
 __all__ = ["correction_pages"]
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from photogram.giant.common import Common
-from photogram.giant.listing.formats import Space
-from photogram.giant.listing.pages import Page
+from photogram.giant.printout.formats import Space
+from photogram.giant.printout.pages import Page
 from photogram.network.refraction import Refraction
 
 __all__ = ["options_page"]

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from photogram.giant.images import IMAGE_SD, ImageFrame
-from photogram.giant.listing.formats import Space, Values, attitude, attitude_name, dms, fixed
-from photogram.giant.listing.pages import Page, headed, paginate
+from photogram.giant.printout.formats import Space, Values, attitude, attitude_name, dms, fixed
+from photogram.giant.printout.pages import Page, headed, paginate
 
 __all__ = ["Station", "frame_pages"]
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
-from photogram.giant.listing.formats import VALUE, Space
-from photogram.giant.listing.matrices import MATRIX, matrix_rows
-from photogram.giant.listing.pages import Page, headed, paginate
-from photogram.giant.listing.summaries import counts_and_rms
+from photogram.giant.printout.formats import VALUE, Space
+from photogram.giant.printout.matrices import MATRIX, matrix_rows
+from photogram.giant.printout.pages import Page, headed, paginate
+from photogram.giant.printout.summaries import counts_and_rms
 
 __all__ = ["point_pages", "propagated_point_pages"]
 

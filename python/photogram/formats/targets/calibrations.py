@@ -3,32 +3,53 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.format import Wishes
 from photogram.formats.plain.boards import ASSUMED
 from photogram.formats.project import Project
+from photogram.formats.targets import TITLE
 from photogram.messages import listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.passages import Figure
+from photogram.network.unknowns import Sensor
 from photogram.targets.board import Board
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.calibration import Calibration
 from photogram.targets.corners import Corners
+from photogram.targets.motion import motion_of
+from photogram.targets.reading import read
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
 
-__all__ = ["MIDDLE", "TITLE", "adjusted_project", "calibration_of", "project_of", "shifted"]
+__all__ = [
+    "MIDDLE",
+    "adjusted_project",
+    "calibration_of",
+    "project_of",
+    "read_project",
+    "shifted",
+    "tied_photos",
+]
 
-TITLE = "corners of a board"
 MIDDLE = 0.5
 """Of the first pixel, from the upper-left corner: projects count from there."""
 NEAR = 1e-6
 """Of the spacing: what control may be off the points of a board."""
+
+
+def read_project(path: Path, wishes: Wishes) -> Project:
+    """Read corners, with first values: what is adjusted is the block of their calibration."""
+    sd = wishes.sd.get("images")
+    origin = wishes.pixel_origin or "center"
+    found = read(path, sd0=None if sd is None else sd[0], pixel_origin=origin)
+    return project_of(found, path)
 
 
 def project_of(calibration: Start, path: Path | None = None) -> Project:
@@ -57,23 +78,27 @@ def calibration_of(project: Project) -> Calibration:
     ------
     InputError
         A project without a board, points that are not those of the board, cameras that are not in pixels,
-        photos on trajectories.
+        photos on other trajectories than those of views.
     """
     block = project.block
     if not project.boards:
         raise InputError("has no board: a table of boards says what its control is", file=project.path)
-    if block.image_unit != "px" or block.photo_cameras is None or block.timed:
-        raise InputError("a calibration has images in pixels, and no trajectories", file=project.path)
+    if block.image_unit != "px" or block.photo_cameras is None:
+        raise InputError("a calibration has images in pixels", file=project.path)
     if (block.image_sd[:, 0] != block.image_sd[:, 1]).any():
         raise InputError("corners of a calibration are as good in x as in y", file=project.path)
     (board,) = project.boards.values()
     number = _numbers_of(project, board)
     assumed = bool(project.details.get(ASSUMED))
     sd0 = 1.0 if assumed else float(block.image_sd.min())
-    references, sensors, stands = _tied(block)
+    references, sensors, sd_sensors, stands = _tied(block)
     corners, seen = _corners(project, number, stands, sd0)
     attitudes = Attitudes.of("omega_phi_kappa", block.photo_attitudes[seen])
+    bend, sd_bend = _bend(block)
     rig = len(np.unique(references)) < len(references)
+    clocks = _in_motion(project, seen) if block.timed else None
+    if clocks is not None:
+        corners = corners.replace(times=clocks.pop("times")[np.unique(block.image_photos)])
     return Calibration(
         board=_with_places(board, block, number),
         corners=corners,
@@ -82,16 +107,43 @@ def calibration_of(project: Project) -> Calibration:
         sensors=sensors,
         references=references,
         sd0=None if assumed else sd0,
-        sync="known" if rig or len(references) == 1 else "none",
-        bend=_bend(block),
+        sync="offset" if block.timed else "known" if rig or len(references) == 1 else "none",
+        bend=bend,
+        sd_sensors=sd_sensors,
+        sd_bend=sd_bend,
         messages=project.messages,
+        **(clocks or {}),
     )
 
 
-def _bend(block: Block) -> tuple[float, float]:
-    """Return the deflections that the board begins with."""
-    found = [each.bend.position for each in block.passages if isinstance(each, Figure)]
-    return (float(found[0][0]), float(found[0][1])) if found else (0.0, 0.0)
+def _in_motion(project: Project, seen: Indices) -> dict[str, Any]:
+    """Return what is told of clocks and of the board's motion: (P,) times, and fields of calibrations."""
+    block = project.block
+    assert block.photo_cameras is not None
+    places = {name: row for row, name in enumerate(block.photo_ids)}
+    times = np.full(len(places), np.nan)
+    offsets, sd = np.zeros(len(block.cameras)), np.full(len(block.cameras), np.inf)
+    motions: dict[int, Floats | None] = {}
+    for each in block.timed:
+        row = places[each.photo]
+        motions[row] = None if each.trajectory is None or each.readout else motion_of(each.trajectory)
+        times[row] = np.nan if each.time is None else each.time
+        if each.offset is not None:
+            camera = int(block.photo_cameras[row])
+            offsets[camera], sd[camera] = each.offset.value, each.offset.deviations[0]
+    motion = [motions.get(row) for row in seen.tolist()]
+    if np.isnan(times).any() or any(each is None for each in motion):
+        raise InputError("a calibration moves as its views tell, or not at all", file=project.path)
+    return {"times": times, "offsets": offsets, "sd_offsets": sd, "motion": np.array(motion)}
+
+
+def _bend(block: Block) -> tuple[tuple[float, float], Floats]:
+    """Return the deflections that the board begins with, and their standard deviations."""
+    found = [each.bend for each in block.passages if isinstance(each, Figure)]
+    if not found:
+        return (0.0, 0.0), np.full(2, np.inf)
+    along_x, along_y = found[0].position[:2].tolist()
+    return (along_x, along_y), found[0].deviations[:2]
 
 
 def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> tuple[Corners, Indices]:
@@ -128,19 +180,30 @@ def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> 
     return corners, seen
 
 
-def _tied(block: Block) -> tuple[Indices, Floats, Indices]:
-    """Return (K,) the references of cameras, (K, 4, 4) sensors, and (P,) the photo that stands for each."""
+def _tied(block: Block) -> tuple[Indices, Floats, Floats, Indices]:
+    """Return (K,) the references of cameras, (K, 4, 4) sensors, their sd, and (P,) the photo of each view."""
     assert block.photo_cameras is not None
     places = {name: row for row, name in enumerate(block.photo_ids)}
     count = len(block.cameras)
     references, sensors = np.arange(count), np.tile(np.eye(4), (count, 1, 1))
+    sd = np.full((count, 6), np.inf)
     views = np.arange(len(block.photo_ids))
-    for each in block.mounts:
-        photo, frame = places[each.photo], places[each.frame]
+    for name, stands, sensor in tied_photos(block):
+        photo, frame = places[name], places[stands]
         camera, reference = int(block.photo_cameras[photo]), int(block.photo_cameras[frame])
         views[photo], references[camera] = frame, reference
-        sensors[camera] = sensor_pose(each.sensor.position, each.sensor.attitude)
-    return references, sensors, views
+        sensors[camera], sd[camera] = sensor_pose(sensor.position, sensor.attitude), sensor.deviations
+    return references, sensors, sd, views
+
+
+def tied_photos(block: Block) -> list[tuple[str, str, Sensor]]:
+    """Return photos on sensors, with the photos that stand for their frames; itself where none does."""
+    flown = {id(each.trajectory): each.photo for each in block.timed if each.sensor is None}
+    return [(each.photo, each.frame, each.sensor) for each in block.mounts] + [
+        (each.photo, flown.get(id(each.trajectory), each.photo), each.sensor)
+        for each in block.timed
+        if each.sensor is not None
+    ]
 
 
 def _numbers_of(project: Project, board: Board) -> Indices:
@@ -175,15 +238,7 @@ def from_corner(block: Block) -> Block:
 
 def adjusted_project(calibrated: Calibrated) -> Project:
     """Return what was adjusted as a project: free values where the adjustment has ended."""
-    own, bend = calibrated.calibration, calibrated.bend
-    return project_of(
-        own.replace(
-            cameras=[each.restarted() for each in calibrated.cameras],
-            sensors=calibrated.sensors,
-            poses=calibrated.poses,
-            bend=own.bend if bend is None else (float(bend.position[0]), float(bend.position[1])),
-        )
-    )
+    return project_of(calibrated.restarted())
 
 
 def shifted(camera: Camera, by: float = MIDDLE) -> Camera:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from photogram.giant.ground import GroundPoint
-from photogram.giant.listing.formats import Space
-from photogram.giant.listing.pages import Page, headed, paginate
+from photogram.giant.printout.formats import Space
+from photogram.giant.printout.pages import Page, headed, paginate
 
 __all__ = ["control_pages"]
 

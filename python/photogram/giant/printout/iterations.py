@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from photogram.arguments.types import Floats
-from photogram.giant.listing.formats import Space, Values, fixed
-from photogram.giant.listing.pages import Page, headed, paginate
+from photogram.giant.printout.formats import Space, Values, fixed
+from photogram.giant.printout.pages import Page, headed, paginate
 from photogram.results.iteration import Iteration
 
 __all__ = ["iteration_pages"]

@@ -1,0 +1,197 @@
+"""A board that moves while cameras of a rig look whose clocks are apart: its motion about each view.
+
+About the time t0 of a view, that of its picture by the reference camera, photos of this camera move as
+
+    C(t) = C0 + sum c_k (t - t0)^k,        A(t) = A0 Exp(sum r_k (t - t0)^k),        k = 1 .. 4
+
+through the views before and after. A picture of another camera, dated t, shows the board at t + tau.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
+from photogram.network.timed import Timed
+from photogram.network.trajectories import Clock, Polynomial, Table, Trajectory
+from photogram.network.unknowns import Sensor
+from photogram.targets.corners import Corners
+from photogram.targets.vision import FLIP, composed, photo_poses
+
+__all__ = [
+    "NEAR",
+    "POWERS",
+    "dated",
+    "errors_of_speeds",
+    "motion_of",
+    "moved",
+    "moving",
+    "pictures_in_motion",
+]
+
+NEAR = 0.2
+"""Seconds: views that are farther from each other say nothing of how the board moves between them."""
+EACH_SIDE = 2
+POWERS = 2 * EACH_SIDE
+"""Of time, at the most: views on both sides, as many on one as on the other."""
+
+
+def dated(corners: Corners, tied: Bools) -> Floats:
+    """Return (V,) the times of views: of their pictures by cameras that are not tied; NaN without.
+
+    Raises
+    ------
+    InputError
+        Pictures without times.
+    """
+    if corners.times is None:
+        raise InputError("offsets between cameras need the times of their pictures: a column time")
+    found = np.full(corners.view_count, np.nan)
+    own = ~tied[corners.cameras]
+    found[corners.views[own]] = corners.times[own]
+    return found
+
+
+def moving(poses: Floats, times: Floats, references: Indices) -> Floats:
+    """Return (V, 4, 6) c_k and r_k of views: through as many neighbours on each side, two at the most.
+
+    Parameters
+    ----------
+    poses
+        (V, 4, 4) board -> reference.
+    times
+        (V,) of views.
+    references
+        (V,) the camera that each counts from.
+
+    Returns
+    -------
+    NaN of views without a neighbour within 0.2 s before and after, 0 for powers that these do not tell.
+
+    Raises
+    ------
+    InputError
+        Two views of one time.
+    """
+    found = np.full((len(poses), POWERS, 6), np.nan)
+    places, attitudes = photo_poses(poses)
+    turned = attitudes.matrices
+    for row, others in _neighbours(times, references):
+        shifts = places[others] - places[row]
+        turns = _photocore.rotation_vectors(turned[row].T @ turned[others])
+        own = _through(times[others] - times[row]) @ np.column_stack([shifts, turns])
+        found[row] = np.pad(own, ((0, POWERS - len(own)), (0, 0)))
+    return found
+
+
+def errors_of_speeds(times: Floats, references: Indices) -> Floats:
+    """Return (V,) the variance of c_1 and r_1 over that of the poses that they follow from; NaN without."""
+    found = np.full(len(times), np.nan)
+    for row, others in _neighbours(times, references):
+        weights = _through(times[others] - times[row])[0]
+        found[row] = weights @ weights + weights.sum() ** 2
+    return found
+
+
+def _neighbours(times: Floats, references: Indices) -> Iterator[tuple[int, Indices]]:
+    """Go through views with the views about each: as many before as after, each near the next."""
+    for reference in np.unique(references):
+        rows = np.flatnonzero((references == reference) & np.isfinite(times))
+        rows = rows[np.argsort(times[rows], kind="stable")]
+        gaps = np.diff(times[rows])
+        if (gaps <= 0).any():
+            raise InputError(f"two views are of one time: {times[rows[int(np.argmin(gaps))]]!r} s")
+        for k, row in enumerate(rows.tolist()):
+            # gaps[k] is that behind the k-th view.
+            sides = [
+                n
+                for n in range(1, min(EACH_SIDE, k, len(gaps) - k) + 1)
+                if (gaps[k - n : k + n] < NEAR).all()
+            ]
+            if sides:
+                yield row, rows[[*range(k - sides[-1], k), *range(k + 1, k + sides[-1] + 1)]]
+
+
+def _through(steps: Floats) -> Floats:
+    """Return (n, n) what makes the coefficients of (n,) powers of values at (n,) steps of time, 0 at 0."""
+    return np.asarray(np.linalg.inv(steps[:, np.newaxis] ** np.arange(1, len(steps) + 1)))
+
+
+def moved(poses: Floats, motion: Floats, steps: Floats) -> Floats:
+    """Return (n, 4, 4) poses, board -> reference, after (n,) steps of time with (n, 4, 6) motions."""
+    places, attitudes = photo_poses(poses)
+    own = np.einsum("nk,nkc->nc", steps[:, np.newaxis] ** np.arange(1, POWERS + 1), motion)
+    turned = attitudes.matrices @ _photocore.vector_rotations(own[:, 3:])
+    rotation = FLIP @ np.swapaxes(turned, 1, 2)
+    return composed(rotation, -np.einsum("nij,nj->ni", rotation, places + own[:, :3]))
+
+
+def pictures_in_motion(
+    corners: Corners,
+    poses: Floats,
+    motion: Floats,
+    times: Floats,
+    sensors: Sequence[Sensor],
+    clocks: Sequence[Clock | None],
+) -> list[Timed]:
+    """Return the pictures: each view is a trajectory whose pose is unknown, and whose motion is known.
+
+    Parameters
+    ----------
+    corners
+        Whose pictures they are.
+    poses, motion, times
+        (V, 4, 4), (V, 4, 6), (V,) of views.
+    sensors, clocks
+        Of each camera; no clock of one that is not tied.
+    """
+    assert corners.times is not None
+    places, attitudes = photo_poses(poses)
+    flights = []
+    for view, name in enumerate(corners.view_names()):
+        at, one = float(times[view]), slice(view, view + 1)
+        table = Table(times[one], places[one], times[one], attitudes.matrices[one])
+        position, rotation = (_known(at, motion[view, :, part]) for part in (slice(3), slice(3, 6)))
+        flights.append(Trajectory(name, table, position, rotation))
+    return [
+        Timed(
+            picture,
+            flights[view],
+            time,
+            sensor=None if clocks[camera] is None else sensors[camera],
+            offset=clocks[camera],
+        )
+        for picture, view, camera, time in zip(
+            corners.pictures,
+            corners.views.tolist(),
+            corners.cameras.tolist(),
+            corners.times.tolist(),
+            strict=True,
+        )
+    ]
+
+
+def _known(time: float, motion: Floats) -> Polynomial:
+    """Return a polynomial about a time whose constant is free, and everything else known."""
+    told = np.nan_to_num(motion)
+    told = told[: int(np.flatnonzero(told.any(axis=1)).max(initial=-1)) + 1]
+    value = np.vstack([np.zeros(3), told])
+    sd = np.zeros_like(value)
+    sd[0] = np.inf
+    return Polynomial(len(told), time, 1.0, value, sd)
+
+
+def motion_of(flight: Trajectory) -> Floats | None:
+    """Return (4, 6) the motion of a view that is such a trajectory; None of another."""
+    found = np.zeros((POWERS, 6))
+    for part, basis in ((slice(3), flight.position), (slice(3, 6), flight.rotation)):
+        if not isinstance(basis, Polynomial) or basis.degree > POWERS or basis.scale != 1.0:
+            return None
+        value = np.broadcast_to(basis.value, (basis.count, 3))
+        found[: basis.degree, part] = value[1:]
+    alone = len(flight.table.times) == 1 and flight.body is None
+    return found if alone and flight.angles == "vector" else None
